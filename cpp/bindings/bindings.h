@@ -1,0 +1,21 @@
+// What the binding files share: one register function a family, and C-order float64 arrays checked in one place.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+namespace magshell::bindings {
+
+namespace py = pybind11;
+
+// C order and float64 (int32 for indices); anything else is converted by numpy on the way in.
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using IndexArray = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
+
+void register_errors(py::module_& module);
+void register_mesh(py::module_& module);
+void register_field(py::module_& module);
+void register_linalg(py::module_& module);
+
+}  // namespace magshell::bindings

@@ -1,0 +1,9 @@
+// The extension module: errors first, then one register function a family.
+#include "bindings/bindings.h"
+
+PYBIND11_MODULE(_core, module) {
+    namespace b = magshell::bindings;
+    module.doc() = "The C++ core of magshell; use the functions of the package, not this module.";
+    module.attr("__version__") = MAGSHELL_VERSION;
+    b::register_errors(module);
+}
