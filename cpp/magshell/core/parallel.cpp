@@ -7,7 +7,6 @@
 #include <condition_variable>
 #include <cstdlib>
 #include <exception>
-#include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -32,7 +31,7 @@ class Pool {
         for (int i = 0; i < workers; ++i) threads_.emplace_back([this] { work(); });
     }
 
-    ~Pool() {
+    void stop() {
         {
             const std::lock_guard lock(mutex_);
             stop_ = true;
@@ -41,8 +40,8 @@ class Pool {
         for (std::thread& thread : threads_) thread.join();
     }
 
-    bool serves(int workers) const { return owner_ == getpid() && static_cast<int>(threads_.size()) == workers; }
     bool forked() const { return owner_ != getpid(); }
+    int workers() const { return static_cast<int>(threads_.size()); }
 
     void run(int count, const std::function<void(int)>& body) {
         {
@@ -108,7 +107,7 @@ class Pool {
 };
 
 std::mutex pool_in_use;
-std::unique_ptr<Pool> pool;
+Pool* pool = nullptr;  // never destroyed at exit: after a fork, or while Python ends, its threads cannot be joined
 
 void run_serially(int count, const std::function<void(int)>& body) {
     for (int i = 0; i < count; ++i) body(i);
@@ -126,8 +125,13 @@ void parallel_for(int count, const std::function<void(int)>& body) {
     if (workers < 1 || !lock.owns_lock()) return run_serially(count, body);
 
     const int wanted = num_threads() - 1;
-    if (pool && pool->forked()) pool.release();  // its threads stayed in the parent; joining them would wait for ever
-    if (!pool || !pool->serves(wanted)) pool = std::make_unique<Pool>(wanted);
+    if (pool && pool->forked()) pool = nullptr;  // its threads stayed in the parent
+    if (pool && pool->workers() != wanted) {
+        pool->stop();
+        delete pool;
+        pool = nullptr;
+    }
+    if (!pool) pool = new Pool(wanted);
     pool->run(count, body);
 }
 
