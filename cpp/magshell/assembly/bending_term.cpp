@@ -1,0 +1,284 @@
+#include "magshell/assembly/bending_term.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "magshell/strain/fold_angle.h"
+
+namespace magshell {
+
+BendingTerm::BendingTerm(const Sheet& sheet, const SystemMatrix& matrix)
+    : sheet_(sheet),
+      face_schedule_(sheet.n_faces(), sheet.n_nodes(),
+                     [&](Index f) {
+                         const Stencil& s = sheet.stencils[f];
+                         return std::vector<Index>(s.nodes.begin(), s.nodes.end());
+                     }),
+      fold_schedule_(static_cast<Index>(sheet.folds.size()), sheet.n_nodes(),
+                     [&](Index h) {
+                         const FoldStencil& fold = sheet.folds[h];
+                         return std::vector<Index>(fold.nodes.begin(), fold.nodes.end());
+                     }),
+      stiffness_(face_packs()),
+      stress_(face_packs()),
+      extrapolated_(face_packs()),
+      folds_(sheet.folds.size()) {
+    for (const Stencil& s : sheet.stencils) {
+        FaceSlots& slots = face_slots_.emplace_back();
+        slots.nodes = pair_slots<6>(matrix, s.nodes);
+        for (int i = 0; i < 3; ++i) {
+            const Index r = s.rotations[i];
+            for (int k = 0; k < 6; ++k)
+                slots.rotation_nodes[6 * i + k] = r < 0 || s.nodes[k] < 0 ? -1 : matrix.rotation_slot(r, s.nodes[k]);
+            for (int j = 0; j <= i; ++j)
+                slots.rotations[lower_index(i, j)] =
+                    r < 0 || s.rotations[j] < 0 ? -1 : matrix.rotations_slot(r, s.rotations[j]);
+        }
+    }
+    for (const FoldStencil& fold : sheet.folds) {
+        fold_slots_.push_back(pair_slots<4>(matrix, fold.nodes));
+        fold_slots_.back()[lower_index(2, 2)] = -1;  // (3, 2): the two wings do not meet in d2theta
+    }
+}
+
+void BendingTerm::set_material(const std::vector<SheetMaterial>& materials, const VectorXd& curvature_scale) {
+    for (Index pack = 0; pack < face_packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = element_of(pack, lane, sheet_.n_faces());
+            const std::array<Index, 3>& c = sheet_.corners[f];
+            const Vec3 x[3] = {sheet_.rest[c[0]], sheet_.rest[c[1]], sheet_.rest[c[2]]};
+            const std::array<Index, 3>& e = sheet_.edges[f];
+            const Vec3 scale(curvature_scale[e[0]], curvature_scale[e[1]], curvature_scale[e[2]]);
+            const Mat3 scaled =
+                scale.asDiagonal() * RestFace(x).bending_stiffness(materials[f]) * scale.asDiagonal();
+            set_lane(stiffness_[pack], lane, scaled);
+        }
+}
+
+Fold BendingTerm::fold_at(Index pack, const double* q) const {
+    Pack3 x[4];
+    Pack right_is_point;
+    for (int lane = 0; lane < Pack::width; ++lane) {
+        const FoldStencil& fold = sheet_.folds[element_of(pack, lane, n_folds())];
+        for (int k = 0; k < 4; ++k) set_lane(x[k], lane, q + 3 * fold.nodes[k]);
+        right_is_point.set(lane, fold.right_is_point ? 1.0 : 0.0);
+    }
+    return Fold(x[0], x[1], x[2], x[3], right_is_point);
+}
+
+// theta - theta~ in (-pi, pi]: a sheet rolled into a closed surface may have its rest angle on the other side of pi.
+double BendingTerm::turn_from(double angle, Index fold) const {
+    return std::remainder(angle - sheet_.folds[fold].rest_angle, 2.0 * std::numbers::pi);
+}
+
+void BendingTerm::store_folds(const double* q) {
+    fold_schedule_.each([&](Index first, Index last) {
+        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) {
+            const Fold fold = fold_at(pack, q);
+            const Pack angle = fold.angle();
+            Pack3 g[4];
+            fold.gradient(g);
+            for (int lane = 0; lane < Pack::width && pack * Pack::width + lane < last; ++lane) {
+                FoldState& state = folds_[pack * Pack::width + lane];
+                state.turn = turn_from(angle[lane], pack * Pack::width + lane);
+                for (int k = 0; k < 4; ++k) {
+                    state.gradient[3 * k] = g[k].x[lane];
+                    state.gradient[3 * k + 1] = g[k].y[lane];
+                    state.gradient[3 * k + 2] = g[k].z[lane];
+                }
+            }
+        }
+    });
+}
+
+/// delta of a pack of faces from a number a fold and the rotations in q; linear, so it serves rates as well.
+void BendingTerm::strain(Index pack, const double* q, const double FoldState::*turn, Pack delta[3]) const {
+    const double* rotation = q + 3 * sheet_.n_nodes();
+    for (int lane = 0; lane < Pack::width; ++lane) {
+        const std::array<FaceSide, 3>& sides = sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
+        for (int i = 0; i < 3; ++i) {
+            const FaceSide& side = sides[i];
+            double value = side.fold < 0 ? 0.0 : side.weight * (folds_[side.fold].*turn);
+            if (side.rotation >= 0) value += side.sign * rotation[side.rotation];
+            delta[i].set(lane, value);
+        }
+    }
+}
+
+double BendingTerm::energy(const double* q, const Controls&) const {
+    std::vector<double> turns(folds_.size());
+    fold_schedule_.each([&](Index first, Index last) {
+        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) {
+            const Pack angle = fold_at(pack, q).angle();
+            for (int lane = 0; lane < Pack::width && pack * Pack::width + lane < last; ++lane)
+                turns[pack * Pack::width + lane] = turn_from(angle[lane], pack * Pack::width + lane);
+        }
+    });
+    const double* rotation = q + 3 * sheet_.n_nodes();
+    return face_schedule_.sum([&](Index first, Index last) {
+        double total = 0.0;
+        for (Index f = first; f < last; ++f) {
+            double delta[3];
+            for (int i = 0; i < 3; ++i) {
+                const FaceSide& side = sheet_.sides[f][i];
+                delta[i] = side.fold < 0 ? 0.0 : side.weight * turns[side.fold];
+                if (side.rotation >= 0) delta[i] += side.sign * rotation[side.rotation];
+            }
+            const Symmetric3& stiffness = stiffness_[f / Pack::width];
+            const int lane = f % Pack::width;
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) total += 0.5 * delta[i] * stiffness(i, j)[lane] * delta[j];
+        }
+        return total;
+    });
+}
+
+void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
+    store_folds(q);
+    face_schedule_.each([&](Index first, Index last) {
+        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) {
+            Pack delta[3];
+            strain(pack, q, &FoldState::turn, delta);
+            stiffness_[pack].times(delta, stress_[pack].at);
+        }
+    });
+    add_forces(out);
+}
+
+/// dE/dtheta of a fold: what the strains that it enters are worth.
+double BendingTerm::moment(const FoldStencil& fold, const std::vector<Stress>& stress) const {
+    double sum = 0.0;
+    for (const FoldStencil::Side& side : {fold.left, fold.right})
+        if (side.face >= 0)
+            sum += sheet_.sides[side.face][side.corner].weight *
+                   stress[side.face / Pack::width].at[side.corner][side.face % Pack::width];
+    return sum;
+}
+
+void BendingTerm::add_forces(Residual& out) const {
+    fold_schedule_.scatter([&](Index first, Index last) {
+        for (Index h = first; h < last; ++h) {
+            const double m = moment(sheet_.folds[h], stress_);
+            for (int k = 0; k < 4; ++k)
+                for (int c = 0; c < 3; ++c)
+                    out.add(3 * sheet_.folds[h].nodes[k] + c, m * folds_[h].gradient[3 * k + c]);
+        }
+    });
+    // Two faces that share a rotation share an edge and so a node: the faces' colours hold for rotations too.
+    face_schedule_.scatter([&](Index first, Index last) {
+        for (Index f = first; f < last; ++f)
+            for (int i = 0; i < 3; ++i) {
+                const FaceSide& side = sheet_.sides[f][i];
+                if (side.rotation >= 0)
+                    out.add(3 * sheet_.n_nodes() + side.rotation,
+                            side.sign * stress_[f / Pack::width].at[i][f % Pack::width]);
+            }
+    });
+}
+
+void BendingTerm::assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) {
+    face_schedule_.scatter([&](Index first, Index last) {
+        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) assemble_faces(pack, out);
+    });
+    const std::vector<Stress>& stress = extrapolated_stress ? extrapolated_ : stress_;
+    fold_schedule_.scatter([&](Index first, Index last) {
+        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) assemble_folds(pack, q, stress, out);
+    });
+}
+
+void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
+    BendingFace face;
+    for (int lane = 0; lane < Pack::width; ++lane) {
+        const std::array<FaceSide, 3>& sides = sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
+        for (int i = 0; i < 3; ++i) {
+            const FaceSide& side = sides[i];
+            face.sign[i].set(lane, side.sign);
+            static constexpr double nothing[12] = {};
+            const double* g = side.fold < 0 ? nothing : folds_[side.fold].gradient;
+            // On its right face, a fold's first two nodes are swapped and so are its last two.
+            const int swap = side.on_left ? 0 : 3;
+            const Vec3 from[4] = {side.weight * Vec3(g + swap), side.weight * Vec3(g + 3 - swap),
+                                  side.weight * Vec3(g + 6 + swap), side.weight * Vec3(g + 9 - swap)};
+            set_lane(face.corner[i][(i + 1) % 3], lane, from[0]);
+            set_lane(face.corner[i][(i + 2) % 3], lane, from[1]);
+            set_lane(face.corner[i][i], lane, from[2]);
+            set_lane(face.beyond[i], lane, from[3]);
+        }
+    }
+    Pack33 blocks[21];
+    Pack3 stiff_corner[3][3], rows[3][6];
+    face.node_blocks(stiffness_[pack], blocks, stiff_corner);
+    const bool directors = sheet_.n_rotations() > 0;
+    if (directors) face.rotation_rows(stiffness_[pack], stiff_corner, rows);
+
+    const int lanes = std::min(Pack::width, sheet_.n_faces() - pack * Pack::width);
+    for (int lane = 0; lane < lanes; ++lane) {
+        const Index f = pack * Pack::width + lane;
+        const Stencil& stencil = sheet_.stencils[f];
+        const FaceSlots& slots = face_slots_[f];
+        scatter_blocks<6>(out, stencil.nodes, slots.nodes, blocks, lane);
+        if (!directors) continue;
+        for (int i = 0; i < 3; ++i) {
+            if (stencil.rotations[i] < 0) continue;
+            for (int k = 0; k < 6; ++k)
+                if (stencil.nodes[k] >= 0)
+                    out.add_rotation_row(slots.rotation_nodes[6 * i + k], out.column_length(stencil.nodes[k]),
+                                         rows[i][k], lane);
+            for (int j = 0; j <= i; ++j)
+                if (stencil.rotations[j] >= 0)
+                    out.add(slots.rotations[lower_index(i, j)], face.sign[i][lane] * face.sign[j][lane] *
+                                                                    stiffness_[pack](i, j)[lane]);
+        }
+    }
+}
+
+void BendingTerm::assemble_folds(Index pack, const double* q, const std::vector<Stress>& stress,
+                                 SystemMatrix& out) const {
+    FoldCurvature curvature(fold_at(pack, q));
+    Pack moments(0.0);
+    const int lanes = std::min(Pack::width, n_folds() - pack * Pack::width);
+    for (int lane = 0; lane < lanes; ++lane)
+        moments.set(lane, moment(sheet_.folds[pack * Pack::width + lane], stress));
+    for (Pack33& block : curvature.block) block = moments * block;
+    for (int lane = 0; lane < lanes; ++lane) {
+        const Index h = pack * Pack::width + lane;
+        scatter_blocks<4>(out, sheet_.folds[h].nodes, fold_slots_[h], curvature.block, lane);
+    }
+}
+
+void BendingTerm::extrapolate(const double* p) {
+    fold_schedule_.each([&](Index first, Index last) {
+        for (Index h = first; h < last; ++h) {
+            folds_[h].rate = 0.0;
+            for (int k = 0; k < 4; ++k)
+                for (int c = 0; c < 3; ++c)
+                    folds_[h].rate += folds_[h].gradient[3 * k + c] * p[3 * sheet_.folds[h].nodes[k] + c];
+        }
+    });
+    face_schedule_.each([&](Index first, Index last) {
+        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) {
+            Pack rate[3], change[3];
+            strain(pack, p, &FoldState::rate, rate);
+            stiffness_[pack].times(rate, change);
+            for (int i = 0; i < 3; ++i) extrapolated_[pack].at[i] = stress_[pack].at[i] + change[i];
+        }
+    });
+}
+
+/// A fold angle is exact to about one unit of round-off of a radian.
+void BendingTerm::add_cancelling_forces(VectorXd& out) const {
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        for (int i = 0; i < 3; ++i) {
+            const FaceSide& side = sheet_.sides[f][i];
+            double moment = 0.0;
+            for (int j = 0; j < 3; ++j) moment += std::abs(stiffness_[f / Pack::width](i, j)[f % Pack::width]);
+            if (side.rotation >= 0) out[3 * sheet_.n_nodes() + side.rotation] += moment;
+        }
+}
+
+std::size_t BendingTerm::bytes() const {
+    return bytes_of(face_slots_) + bytes_of(fold_slots_) + bytes_of(stiffness_) + bytes_of(stress_) +
+           bytes_of(extrapolated_) + bytes_of(folds_) + face_schedule_.bytes() + fold_schedule_.bytes();
+}
+
+}  // namespace magshell

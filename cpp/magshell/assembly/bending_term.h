@@ -1,0 +1,68 @@
+// The bending energy of a whole sheet, `hinge` and `midedge` alike: energy/bending.h over strain/fold_angle.h.
+//
+// Fold angles and their gradients are found once an edge; faces combine three of them. The Hessian is the faces'
+// J^T C J, plus each fold's curvature times the moment of the faces beside it.
+#pragma once
+
+#include "magshell/assembly/lanes.h"
+#include "magshell/assembly/schedule.h"
+#include "magshell/assembly/sheet.h"
+#include "magshell/energy/bending.h"
+#include "magshell/energy/material.h"
+
+namespace magshell {
+
+class BendingTerm final : public Term {
+  public:
+    BendingTerm(const Sheet& sheet, const SystemMatrix& matrix);
+
+    /// One material a face in our numbering; one curvature scale an edge in the caller's, [Chen22] k_cur.
+    void set_material(const std::vector<SheetMaterial>& materials, const VectorXd& curvature_scale);
+
+    std::string_view name() const override { return "bending"; }
+    double energy(const double* q, const Controls&) const override;
+    void evaluate(const double* q, const Controls&, Residual& out) override;
+    void assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) override;
+    void extrapolate(const double* p) override;
+    void add_cancelling_forces(VectorXd& out) const override;
+    std::size_t bytes() const override;
+
+  private:
+    // A fold at the last evaluated state.
+    struct FoldState {
+        double turn;          // theta - theta~
+        double gradient[12];  // by its four nodes
+        double rate;          // of theta, along the last extrapolated step
+        double unused[2];     // two cache lines in all
+    };
+    struct Stress {
+        Pack at[3];
+    };
+    struct FaceSlots {
+        PairSlots<6> nodes;
+        std::array<Index, 18> rotation_nodes;  // rotation i against node k, at 6 i + k
+        std::array<Index, 6> rotations;        // rotations (i, j) at lower_index(i, j)
+    };
+
+    Index face_packs() const { return packs_for(sheet_.n_faces()); }
+    Index fold_packs() const { return packs_for(n_folds()); }
+    Index n_folds() const { return static_cast<Index>(sheet_.folds.size()); }
+    Fold fold_at(Index pack, const double* q) const;
+    double turn_from(double angle, Index fold) const;
+    void strain(Index pack, const double* q, const double FoldState::*turn, Pack delta[3]) const;
+    double moment(const FoldStencil& fold, const std::vector<Stress>& stress) const;
+    void store_folds(const double* q);
+    void add_forces(Residual& out) const;
+    void assemble_faces(Index pack, SystemMatrix& out) const;
+    void assemble_folds(Index pack, const double* q, const std::vector<Stress>& stress, SystemMatrix& out) const;
+
+    const Sheet& sheet_;
+    Schedule face_schedule_, fold_schedule_;
+    std::vector<FaceSlots> face_slots_;
+    std::vector<PairSlots<4>> fold_slots_;
+    std::vector<Symmetric3> stiffness_;
+    std::vector<Stress> stress_, extrapolated_;
+    std::vector<FoldState> folds_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,65 @@
+#include "magshell/assembly/couple_term.h"
+
+#include <numbers>
+
+#include "magshell/strain/fold_angle.h"
+
+namespace magshell {
+namespace {
+
+// One couple a pack: they sit on boundaries and are few.
+Fold fold_at(const CoupleTerm::Couple& couple, const double* q) {
+    Pack3 x[4];
+    for (int k = 0; k < 4; ++k)
+        for (int lane = 0; lane < Pack::width; ++lane) set_lane(x[k], lane, q + 3 * couple.nodes[k]);
+    return Fold(x[0], x[1], x[2], x[3], Pack(0.0));
+}
+
+}  // namespace
+
+CoupleTerm::CoupleTerm(const Sheet& sheet, const SystemMatrix& matrix, std::vector<Couple> couples)
+    : sheet_(sheet), couples_(std::move(couples)), last_turn_(couples_.size(), 0.0) {
+    for (const Couple& couple : couples_) {
+        slots_.push_back(pair_slots<4>(matrix, couple.nodes));
+        slots_.back()[lower_index(2, 2)] = -1;
+    }
+}
+
+double CoupleTerm::turn(const double* q, std::size_t k) const {
+    const Couple& couple = couples_[k];
+    const double angle = fold_at(couple, q).angle()[0] - couple.rest_angle;
+    return last_turn_[k] + std::remainder(angle - last_turn_[k], 2.0 * std::numbers::pi);
+}
+
+double CoupleTerm::energy(const double* q, const Controls& controls) const {
+    double work = 0.0;
+    for (std::size_t k = 0; k < couples_.size(); ++k) {
+        double psi = turn(q, k);
+        if (couples_[k].rotation >= 0)
+            psi -= couples_[k].rotation_sign * q[3 * sheet_.n_nodes() + couples_[k].rotation];
+        work += couples_[k].couple * psi;
+    }
+    return -controls.load * work;
+}
+
+void CoupleTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
+    for (std::size_t k = 0; k < couples_.size(); ++k) {
+        const Couple& couple = couples_[k];
+        last_turn_[k] = turn(q, k);
+        const double pull = -controls.load * couple.couple;
+        Pack3 g[4];
+        fold_at(couple, q).gradient(g);
+        for (int node = 0; node < 4; ++node) scatter_node(out, couple.nodes[node], Pack(pull) * g[node], 0);
+        if (couple.rotation >= 0) out.add(3 * sheet_.n_nodes() + couple.rotation, -pull * couple.rotation_sign);
+    }
+}
+
+void CoupleTerm::assemble(const double* q, const Controls& controls, bool, SystemMatrix& out) {
+    for (std::size_t k = 0; k < couples_.size(); ++k) {
+        FoldCurvature curvature(fold_at(couples_[k], q));
+        for (Pack33& block : curvature.block) block = Pack(-controls.load * couples_[k].couple) * block;
+        scatter_blocks<4>(out, couples_[k].nodes, slots_[k], curvature.block, 0);
+    }
+}
+
+}  // namespace magshell

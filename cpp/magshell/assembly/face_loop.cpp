@@ -1,0 +1,15 @@
+#include "magshell/assembly/face_loop.h"
+
+namespace magshell {
+
+FaceLoop::FaceLoop(const Sheet& sheet, const SystemMatrix& matrix)
+    : faces_(sheet.n_faces()),
+      corners_(&sheet.corners),
+      schedule_(sheet.n_faces(), sheet.n_nodes(), [&](Index f) {
+          return std::vector<Index>(sheet.corners[f].begin(), sheet.corners[f].end());
+      }) {
+    slots_.reserve(faces_);
+    for (const std::array<Index, 3>& nodes : sheet.corners) slots_.push_back(pair_slots<3>(matrix, nodes));
+}
+
+}  // namespace magshell

@@ -1,0 +1,77 @@
+// What every term on faces shares: fetching the corners of a pack of faces, and adding forces and blocks to them.
+#pragma once
+
+#include "magshell/assembly/lanes.h"
+#include "magshell/assembly/schedule.h"
+#include "magshell/assembly/sheet.h"
+
+namespace magshell {
+
+class FaceLoop {
+  public:
+    FaceLoop(const Sheet& sheet, const SystemMatrix& matrix);
+
+    Index packs() const { return packs_for(faces_); }
+    int lanes_in(Index pack) const { return std::min(Pack::width, faces_ - pack * Pack::width); }
+    Index face(Index pack, int lane) const { return element_of(pack, lane, faces_); }
+    const Schedule& schedule() const { return schedule_; }
+
+    void gather(Index pack, const double* q, Pack3 x[3]) const {
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const std::array<Index, 3>& nodes = (*corners_)[face(pack, lane)];
+            for (int k = 0; k < 3; ++k) set_lane(x[k], lane, q + 3 * nodes[k]);
+        }
+    }
+
+    void scatter(Index pack, const Pack3 g[3], Residual& out) const {
+        for (int lane = 0; lane < lanes_in(pack); ++lane)
+            for (int k = 0; k < 3; ++k) scatter_node(out, (*corners_)[face(pack, lane)][k], g[k], lane);
+    }
+
+    void scatter(Index pack, const Pack33 h[6], SystemMatrix& out) const {
+        for (int lane = 0; lane < lanes_in(pack); ++lane) {
+            const Index f = face(pack, lane);
+            scatter_blocks<3>(out, (*corners_)[f], slots_[f], h, lane);
+        }
+    }
+
+    /// body(pack) for all packs, in the schedule's order, where body scatters.
+    template <class Body>
+    void scatter_packs(const Body& body) const {
+        schedule_.scatter([&](Index first, Index last) { over_packs(first, last, body); });
+    }
+
+    /// body(pack) for all packs, where body writes only what belongs to them.
+    template <class Body>
+    void each_pack(const Body& body) const {
+        schedule_.each([&](Index first, Index last) { over_packs(first, last, body); });
+    }
+
+    /// The sum of energy(pack) over the faces.
+    template <class Energy>
+    double sum(const Energy& energy) const {
+        return schedule_.sum([&](Index first, Index last) {
+            double total = 0.0;
+            over_packs(first, last, [&](Index pack) {
+                const Pack parts = energy(pack);
+                for (int lane = 0; lane < lanes_in(pack); ++lane) total += parts[lane];
+            });
+            return total;
+        });
+    }
+
+    std::size_t bytes() const { return bytes_of(slots_) + schedule_.bytes(); }
+
+  private:
+    template <class Body>
+    static void over_packs(Index first, Index last, const Body& body) {
+        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) body(pack);
+    }
+
+    Index faces_;
+    const std::vector<std::array<Index, 3>>* corners_;
+    Schedule schedule_;
+    std::vector<PairSlots<3>> slots_;
+};
+
+}  // namespace magshell

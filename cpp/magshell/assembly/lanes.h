@@ -1,0 +1,82 @@
+// Filling packs from per-element data and emptying them again: lane l of pack k is element k * width + l.
+#pragma once
+
+#include <vector>
+
+#include "magshell/assembly/system_matrix.h"
+#include "magshell/assembly/term.h"
+#include "magshell/core/vector3.h"
+#include "magshell/energy/symmetric3.h"
+
+namespace magshell {
+
+constexpr Index packs_for(Index elements) { return (elements + Pack::width - 1) / Pack::width; }
+
+/// The element of a lane; lanes past the end repeat the last element and are never scattered.
+inline Index element_of(Index pack, int lane, Index elements) {
+    const Index element = pack * Pack::width + lane;
+    return element < elements ? element : elements - 1;
+}
+
+inline void set_lane(Pack3& pack, int lane, const double* from) {
+    pack.x.set(lane, from[0]);
+    pack.y.set(lane, from[1]);
+    pack.z.set(lane, from[2]);
+}
+
+inline void set_lane(Pack3& pack, int lane, const Vec3& from) { set_lane(pack, lane, from.data()); }
+
+inline void set_lane(Symmetric3& pack, int lane, const Mat3& from) {
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j <= i; ++j) pack.at[lower_index(i, j)].set(lane, from(i, j));
+}
+
+/// The nodes of an element, as three-vectors of packs.
+template <int N>
+inline void gather_nodes(const double* q, const std::array<Index, N> (&nodes)[Pack::width], Pack3 x[N]) {
+    for (int k = 0; k < N; ++k)
+        for (int lane = 0; lane < Pack::width; ++lane) set_lane(x[k], lane, q + 3 * nodes[lane][k]);
+}
+
+inline void scatter_node(Residual& out, Index node, const Pack3& force, int lane) {
+    out.add(3 * node, force.x[lane]);
+    out.add(3 * node + 1, force.y[lane]);
+    out.add(3 * node + 2, force.z[lane]);
+}
+
+/// Where the blocks of N nodes go: one slot a pair, at lower_index(row - 1, column).
+template <int N>
+using PairSlots = std::array<SystemMatrix::Slot, N * (N - 1) / 2>;
+
+template <int N, class Nodes>
+PairSlots<N> pair_slots(const SystemMatrix& matrix, const Nodes& nodes) {
+    PairSlots<N> slots;
+    for (int i = 1; i < N; ++i)
+        for (int j = 0; j < i; ++j)
+            slots[lower_index(i - 1, j)] =
+                nodes[i] < 0 || nodes[j] < 0 ? -1 : matrix.node_slot(nodes[i], nodes[j]);
+    return slots;
+}
+
+/// Adds the lower blocks (row, column) at lower_index(row, column) of one lane; absent nodes are passed over.
+template <int N, class Nodes>
+inline void scatter_blocks(SystemMatrix& matrix, const Nodes& nodes, const PairSlots<N>& slots, const Pack33* blocks,
+                           int lane) {
+    Index length[N];
+    for (int i = 0; i < N; ++i) length[i] = nodes[i] < 0 ? 0 : matrix.column_length(nodes[i]);
+    for (int i = 0; i < N; ++i) {
+        if (nodes[i] < 0) continue;
+        matrix.add_diagonal_block(nodes[i], blocks[lower_index(i, i)], lane);
+        for (int j = 0; j < i; ++j) {
+            const SystemMatrix::Slot slot = slots[lower_index(i - 1, j)];
+            if (slot >= 0) matrix.add_block(slot, length[slot & 1 ? i : j], blocks[lower_index(i, j)], lane);
+        }
+    }
+}
+
+template <class T>
+std::size_t bytes_of(const std::vector<T>& values) {
+    return values.capacity() * sizeof(T);
+}
+
+}  // namespace magshell

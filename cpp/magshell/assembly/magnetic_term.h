@@ -1,0 +1,40 @@
+// The magnetic energy of a whole sheet, in a uniform applied flux density and any number of field sources.
+//
+// Where the field is uniform nothing is sampled; where no face is magnetized along its normal as well, the force does
+// not depend on the deformation and there is no Hessian to add.
+#pragma once
+
+#include <memory>
+
+#include "magshell/assembly/face_loop.h"
+#include "magshell/energy/magnetic.h"
+#include "magshell/field/applied_field.h"
+
+namespace magshell {
+
+class MagneticTerm final : public Term {
+  public:
+    MagneticTerm(const Sheet& sheet, const FaceLoop& loop, std::vector<std::shared_ptr<const AppliedField>> sources);
+
+    /// Remanent magnetization [A/m] in world axes at rest and thickness [m], one a face, in our numbering.
+    void set_magnetization(const std::vector<Vec3>& remanent_magnetization, const std::vector<double>& thickness);
+
+    std::string_view name() const override { return Magnetic::name; }
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void assemble(const double* q, const Controls& controls, bool, SystemMatrix& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    bool sampled(const Controls& controls) const { return !sources_.empty() && controls.field != 0.0; }
+    /// The applied field at every barycentre, in packs. Order as in AppliedField::add_samples.
+    std::vector<Magnetic::Field> sample(const double* q, const Controls& controls, int order) const;
+
+    const Sheet& sheet_;
+    const FaceLoop& loop_;
+    std::vector<std::shared_ptr<const AppliedField>> sources_;
+    std::vector<Magnetic::Element> elements_;
+    bool normal_magnetization_ = false;
+};
+
+}  // namespace magshell

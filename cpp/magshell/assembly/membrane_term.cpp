@@ -1,0 +1,93 @@
+#include "magshell/assembly/membrane_term.h"
+
+namespace magshell {
+
+MembraneTerm::MembraneTerm(const Sheet& sheet, const FaceLoop& loop)
+    : sheet_(sheet), loop_(loop), elements_(loop.packs()), stress_(loop.packs()), extrapolated_(loop.packs()) {
+    for (Index pack = 0; pack < loop.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const std::array<Index, 3>& c = sheet.corners[loop.face(pack, lane)];
+            for (int i = 0; i < 3; ++i)
+                elements_[pack].rest_squared_length[i].set(
+                    lane, (sheet.rest[c[(i + 2) % 3]] - sheet.rest[c[(i + 1) % 3]]).squaredNorm());
+        }
+}
+
+void MembraneTerm::set_material(const std::vector<SheetMaterial>& materials) {
+    for (Index pack = 0; pack < loop_.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = loop_.face(pack, lane);
+            const std::array<Index, 3>& c = sheet_.corners[f];
+            const Vec3 x[3] = {sheet_.rest[c[0]], sheet_.rest[c[1]], sheet_.rest[c[2]]};
+            set_lane(elements_[pack].stiffness, lane, RestFace(x).membrane_stiffness(materials[f]));
+        }
+}
+
+double MembraneTerm::energy(const double* q, const Controls&) const {
+    return loop_.sum([&](Index pack) {
+        Pack3 x[3];
+        loop_.gather(pack, q, x);
+        Pack strain[3], stress[3];
+        Membrane(x).strain(elements_[pack], strain);
+        elements_[pack].stiffness.times(strain, stress);
+        return Pack(0.5) * (strain[0] * stress[0] + strain[1] * stress[1] + strain[2] * stress[2]);
+    });
+}
+
+void MembraneTerm::evaluate(const double* q, const Controls&, Residual& out) {
+    state_.assign(q, q + 3 * sheet_.n_nodes());
+    loop_.scatter_packs([&](Index pack) {
+        Pack3 x[3], g[3];
+        loop_.gather(pack, q, x);
+        const Membrane membrane(x);
+        Pack strain[3];
+        membrane.strain(elements_[pack], strain);
+        elements_[pack].stiffness.times(strain, stress_[pack].at);
+        membrane.gradient(stress_[pack].at, g);
+        loop_.scatter(pack, g, out);
+    });
+}
+
+void MembraneTerm::assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) {
+    const std::vector<Stress>& stress = extrapolated_stress ? extrapolated_ : stress_;
+    loop_.scatter_packs([&](Index pack) {
+        Pack3 x[3];
+        Pack33 h[6];
+        loop_.gather(pack, q, x);
+        Membrane(x).hessian(elements_[pack], stress[pack].at, h);
+        loop_.scatter(pack, h, out);
+    });
+}
+
+void MembraneTerm::extrapolate(const double* p) {
+    loop_.each_pack([&](Index pack) {
+        Pack3 x[3], step[3];
+        loop_.gather(pack, state_.data(), x);
+        loop_.gather(pack, p, step);
+        Pack rate[3], change[3];
+        Membrane(x).strain_rate(step, rate);
+        elements_[pack].stiffness.times(rate, change);
+        for (int i = 0; i < 3; ++i) extrapolated_[pack].at[i] = stress_[pack].at[i] + change[i];
+    });
+}
+
+void MembraneTerm::add_cancelling_forces(VectorXd& out) const {
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const Membrane::Element& element = elements_[f / Pack::width];
+        const int lane = f % Pack::width;
+        for (int i = 0; i < 3; ++i) {
+            double stress = 0.0;
+            for (int j = 0; j < 3; ++j)
+                stress += std::abs(element.stiffness(i, j)[lane]) * element.rest_squared_length[j][lane];
+            const double force = 2.0 * stress * std::sqrt(element.rest_squared_length[i][lane]);
+            for (const int k : {(i + 1) % 3, (i + 2) % 3})
+                out.segment<3>(3 * sheet_.corners[f][k]).array() += force;
+        }
+    }
+}
+
+std::size_t MembraneTerm::bytes() const {
+    return bytes_of(elements_) + bytes_of(stress_) + bytes_of(extrapolated_) + bytes_of(state_);
+}
+
+}  // namespace magshell

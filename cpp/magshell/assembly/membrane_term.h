@@ -1,0 +1,37 @@
+// The membrane energy of a whole sheet: energy/membrane.h on every face, and the stresses of the mixed Newton.
+#pragma once
+
+#include "magshell/assembly/face_loop.h"
+#include "magshell/energy/material.h"
+#include "magshell/energy/membrane.h"
+
+namespace magshell {
+
+class MembraneTerm final : public Term {
+  public:
+    MembraneTerm(const Sheet& sheet, const FaceLoop& loop);
+
+    /// One material a face, in our numbering.
+    void set_material(const std::vector<SheetMaterial>& materials);
+
+    std::string_view name() const override { return Membrane::name; }
+    double energy(const double* q, const Controls&) const override;
+    void evaluate(const double* q, const Controls&, Residual& out) override;
+    void assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) override;
+    void extrapolate(const double* p) override;
+    void add_cancelling_forces(VectorXd& out) const override;
+    std::size_t bytes() const override;
+
+  private:
+    struct Stress {
+        Pack at[3];
+    };
+
+    const Sheet& sheet_;
+    const FaceLoop& loop_;
+    std::vector<Membrane::Element> elements_;
+    std::vector<Stress> stress_, extrapolated_;
+    std::vector<double> state_;  // the nodes at which stress_ holds
+};
+
+}  // namespace magshell

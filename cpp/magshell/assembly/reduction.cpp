@@ -1,0 +1,160 @@
+#include "magshell/assembly/reduction.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace magshell {
+namespace {
+
+Mat3 rotation(const Vec3& vector) {
+    const double angle = vector.norm();
+    if (angle == 0.0) return Mat3::Identity();
+    return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
+}
+
+}  // namespace
+
+Vec3 Motion::point(const Vec3& rest, double progress) const {
+    return centre + rotation(progress * rotation_vector) * (rest - centre) + progress * translation;
+}
+
+Vec3 Motion::direction(const Vec3& rest, double progress) const { return rotation(progress * rotation_vector) * rest; }
+
+Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, std::vector<Motion> motions,
+                     const std::vector<Vec3>& rest, Index n_vertices)
+    : held_(std::move(held)), motions_(std::move(motions)), rest_(rest), n_vertices_(n_vertices), full_size_(matrix.size()) {
+    std::vector<char> is_held(matrix.size(), 0);
+    for (Index k = 0; k < static_cast<Index>(held_.size()); ++k) {
+        const HeldNode& h = held_[k];
+        if (h.held == 3 || axis_aligned(h)) {
+            for (int axis = 0; axis < h.held; ++axis) {
+                Index component;
+                h.frame.col(axis).cwiseAbs().maxCoeff(&component);
+                is_held[3 * h.node + (h.held == 3 ? axis : component)] = 1;
+            }
+            continue;
+        }
+        if (frame_of_.empty()) frame_of_.assign(matrix.nodes(), -1);
+        frame_of_[h.node] = k;
+        for (int axis = 0; axis < h.held; ++axis) is_held[3 * h.node + axis] = 1;
+    }
+
+    std::vector<Index> reduced(matrix.size(), -1);
+    for (Index u = 0; u < matrix.size(); ++u)
+        if (!is_held[u]) {
+            reduced[u] = static_cast<Index>(free_unknowns_.size());
+            free_unknowns_.push_back(u);
+        }
+    pattern_.size = static_cast<Index>(free_unknowns_.size());
+    pattern_.column_starts.push_back(0);
+    for (const Index u : free_unknowns_) {
+        for (Index k = matrix.column_starts()[u]; k < matrix.column_starts()[u + 1]; ++k) {
+            const Index row = reduced[matrix.rows()[k]];
+            if (row < 0) continue;
+            pattern_.rows.push_back(row);
+            source_.push_back(k);
+        }
+        pattern_.column_starts.push_back(static_cast<Index>(pattern_.rows.size()));
+    }
+}
+
+bool Reduction::axis_aligned(const HeldNode& h) const {
+    for (int axis = 0; axis < h.held; ++axis)
+        if (h.frame.col(axis).cwiseAbs().maxCoeff() != 1.0) return false;
+    return true;
+}
+
+VectorXd Reduction::prescribed_increment(const VectorXd& q, double progress) const {
+    VectorXd increment = VectorXd::Zero(q.size());
+    for (const HeldNode& h : held_) {
+        Vec3 wanted = rest_[h.node];
+        if (h.motion >= 0)
+            wanted = h.node < n_vertices_ ? motions_[h.motion].point(wanted, progress)
+                                          : motions_[h.motion].direction(wanted, progress);
+        const Vec3 gap = wanted - q.segment<3>(3 * h.node);
+        for (int axis = 0; axis < h.held; ++axis)
+            increment.segment<3>(3 * h.node) += h.frame.col(axis) * h.frame.col(axis).dot(gap);
+    }
+    return increment;
+}
+
+// B_ij -> Q_i^T B_ij Q_j wherever a framed node is i or j. Row triples of a node's three columns stand as
+// system_matrix.h says.
+void Reduction::turn_blocks(SystemMatrix& full) const {
+    const Index rotations_from = 3 * full.nodes();
+    const auto frame = [&](Index node) -> const Mat3& { return held_[frame_of_[node]].frame; };
+    for (Index j = 0; j < full.nodes(); ++j) {
+        const Index length = full.column_length(j);
+        const Index start = full.column_starts()[3 * j];
+        const Index starts[3] = {start, start + length - 1, start + 2 * length - 3};  // of the row where column 0 begins
+        double* values = full.values().data();
+        if (frame_of_[j] >= 0) {
+            double &a = values[starts[0]], &b = values[starts[0] + 1], &c = values[starts[0] + 2];
+            double &d = values[starts[1] + 1], &e = values[starts[1] + 2], &f = values[starts[2] + 2];
+            Mat3 block;
+            block << a, b, c, b, d, e, c, e, f;
+            const Mat3 turned = frame(j).transpose() * block * frame(j);
+            a = turned(0, 0), b = turned(1, 0), c = turned(2, 0), d = turned(1, 1), e = turned(2, 1), f = turned(2, 2);
+        }
+        for (Index k = 3; k < length; ++k) {
+            const Index row = full.rows()[start + k];
+            if (row >= rotations_from) {
+                if (frame_of_[j] < 0) continue;
+                Vec3 entry(values[starts[0] + k], values[starts[1] + k], values[starts[2] + k]);
+                entry = frame(j).transpose() * entry;
+                for (int c = 0; c < 3; ++c) values[starts[c] + k] = entry[c];
+                continue;
+            }
+            const Index i = row / 3;
+            if (frame_of_[i] >= 0 || frame_of_[j] >= 0) {
+                Mat3 block;
+                for (int c = 0; c < 3; ++c)
+                    for (int r = 0; r < 3; ++r) block(r, c) = values[starts[c] + k + r];
+                if (frame_of_[i] >= 0) block = (frame(i).transpose() * block).eval();
+                if (frame_of_[j] >= 0) block = (block * frame(j)).eval();
+                for (int c = 0; c < 3; ++c)
+                    for (int r = 0; r < 3; ++r) values[starts[c] + k + r] = block(r, c);
+            }
+            k += 2;
+        }
+    }
+}
+
+void Reduction::matrix(SystemMatrix& full, std::vector<double>& values) const {
+    if (!frame_of_.empty()) turn_blocks(full);
+    values.resize(source_.size());
+    const double* from = full.values().data();
+    for (std::size_t k = 0; k < source_.size(); ++k) values[k] = from[source_[k]];
+}
+
+VectorXd Reduction::vector(const VectorXd& full) const {
+    VectorXd reduced(size());
+    if (frame_of_.empty()) {
+        for (Index k = 0; k < size(); ++k) reduced[k] = full[free_unknowns_[k]];
+        return reduced;
+    }
+    VectorXd turned = full;
+    for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
+        if (frame_of_[node] >= 0)
+            turned.segment<3>(3 * node) = held_[frame_of_[node]].frame.transpose() * full.segment<3>(3 * node);
+    for (Index k = 0; k < size(); ++k) reduced[k] = turned[free_unknowns_[k]];
+    return reduced;
+}
+
+VectorXd Reduction::expand(const VectorXd& reduced) const {
+    VectorXd full = VectorXd::Zero(full_size_);
+    for (Index k = 0; k < size(); ++k) full[free_unknowns_[k]] = reduced[k];
+    for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
+        if (frame_of_[node] >= 0) {
+            const Vec3 local = full.segment<3>(3 * node);
+            full.segment<3>(3 * node) = held_[frame_of_[node]].frame * local;
+        }
+    return full;
+}
+
+std::size_t Reduction::bytes() const {
+    return (frame_of_.capacity() + free_unknowns_.capacity() + source_.capacity() + pattern_.rows.capacity() +
+            pattern_.column_starts.capacity()) * sizeof(Index);
+}
+
+}  // namespace magshell

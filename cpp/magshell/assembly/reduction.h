@@ -1,0 +1,64 @@
+// From all unknowns to the free ones: supports hold nodes along some directions and may move them as rigid bodies.
+//
+// A node held along directions that are not the world's axes is turned into a frame of its own, in which it is held
+// along the first one or two axes. Nodes without supports cost nothing here.
+#pragma once
+
+#include <vector>
+
+#include "magshell/assembly/system_matrix.h"
+#include "magshell/linalg/factor.h"
+
+namespace magshell {
+
+/// A rigid motion of what a support holds: x -> centre + R(t w)(x - centre) + t u at t = controls.motion.
+struct Motion {
+    Vec3 centre = Vec3::Zero(), rotation_vector = Vec3::Zero(), translation = Vec3::Zero();
+
+    Vec3 point(const Vec3& rest, double progress) const;
+    Vec3 direction(const Vec3& rest, double progress) const;
+};
+
+/// A node and the orthonormal directions along which it is held (the first `held` columns of `frame`).
+struct HeldNode {
+    Index node;
+    int held;
+    Mat3 frame;
+    Index motion = -1;
+};
+
+class Reduction {
+  public:
+    /// `rest` per node; nodes from `n_vertices` on are directions and turn only.
+    Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, std::vector<Motion> motions,
+              const std::vector<Vec3>& rest, Index n_vertices);
+
+    Index size() const { return pattern_.size; }
+    const SparsePattern& pattern() const { return pattern_; }
+
+    /// Where the supports want their nodes at this progress of their motion, less where they are: zero elsewhere.
+    VectorXd prescribed_increment(const VectorXd& q, double progress) const;
+
+    /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first.
+    void matrix(SystemMatrix& full, std::vector<double>& values) const;
+    VectorXd vector(const VectorXd& full) const;
+    /// A free vector back among all unknowns, zero where they are held.
+    VectorXd expand(const VectorXd& reduced) const;
+
+    std::size_t bytes() const;
+
+  private:
+    bool axis_aligned(const HeldNode& h) const;
+    void turn_blocks(SystemMatrix& full) const;
+
+    std::vector<HeldNode> held_;
+    std::vector<Motion> motions_;
+    std::vector<Vec3> rest_;
+    Index n_vertices_, full_size_;
+    std::vector<Index> frame_of_;       // per node: index into held_ where turned, else -1; empty if none is
+    std::vector<Index> free_unknowns_;  // reduced -> full, ascending
+    SparsePattern pattern_;
+    std::vector<Index> source_;         // reduced entry -> position in the full matrix
+};
+
+}  // namespace magshell

@@ -1,0 +1,101 @@
+// The Hessian of a scene: lower triangle, compressed columns, in all unknowns before supports take any away.
+//
+// Unknowns are numbered node by node (three each), then the edge rotations (one each). Where things go is worked out
+// once; evaluations add values in place. A place for a 3x3 block of nodes (i, j) is one number, because the three
+// columns of a node have the same rows and shrink by one from column to column: it stands at p, p + L - 1 and
+// p + 2 L - 3 in them, with L the length of the first.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "magshell/core/types.h"
+#include "magshell/core/vector3.h"
+
+namespace magshell {
+
+/// The unknowns that one element couples. Negative: absent.
+struct Stencil {
+    std::array<Index, 6> nodes{-1, -1, -1, -1, -1, -1};
+    std::array<Index, 3> rotations{-1, -1, -1};
+};
+
+class SystemMatrix {
+  public:
+    /// Where a block of two nodes goes: twice its position, plus one where it is to be transposed. Negative: nowhere.
+    using Slot = Index;
+
+    SystemMatrix() = default;
+    SystemMatrix(Index nodes, Index rotations, const std::vector<Stencil>& stencils);
+
+    Index nodes() const { return nodes_; }
+    Index rotations() const { return rotations_; }
+    Index size() const { return 3 * nodes_ + rotations_; }
+    const std::vector<Index>& column_starts() const { return column_starts_; }
+    const std::vector<Index>& rows() const { return rows_; }
+    const std::vector<double>& values() const { return values_; }
+    std::vector<double>& values() { return values_; }
+    void set_zero() { std::fill(values_.begin(), values_.end(), 0.0); }
+    std::size_t bytes() const;
+
+    /// The slot of the block with rows at node i and columns at node j.
+    Slot node_slot(Index i, Index j) const;
+    /// The position of (rotation, first component of node).
+    Index rotation_slot(Index rotation, Index node) const;
+    /// The position of (a, b), two rotations.
+    Index rotations_slot(Index a, Index b) const;
+    /// The length of the first of a node's three columns.
+    Index column_length(Index node) const { return column_starts_[3 * node + 1] - column_starts_[3 * node]; }
+
+    /// y = A x with the symmetric matrix.
+    void multiply(const double* x, double* y) const;
+
+    /// Adds lane `lane` of block (i, j), i != j; `length` is the column length of the node whose columns the slot is in.
+    void add_block(Slot slot, Index length, const Pack33& block, int lane) {
+        const double* from = reinterpret_cast<const double*>(&block) + lane;
+        const bool transposed = slot & 1;
+        const Index row_stride = (transposed ? 1 : 3) * Pack::width, column_stride = (transposed ? 3 : 1) * Pack::width;
+        double* to = values_.data() + (slot >> 1);
+        for (int column = 0; column < 3; ++column) {
+            const double* entry = from + column * column_stride;
+            to[0] += entry[0];
+            to[1] += entry[row_stride];
+            to[2] += entry[2 * row_stride];
+            to += length - 1 - column;
+        }
+    }
+
+    /// Adds lane `lane` of a symmetric block on the diagonal of a node.
+    void add_diagonal_block(Index node, const Pack33& block, int lane) {
+        const double* from = reinterpret_cast<const double*>(&block) + lane;
+        constexpr int w = Pack::width;
+        double* to = values_.data() + column_starts_[3 * node];
+        const Index length = column_length(node);
+        to[0] += from[0];
+        to[1] += from[3 * w];
+        to[2] += from[6 * w];
+        to += length;
+        to[0] += from[4 * w];
+        to[1] += from[7 * w];
+        to[length - 1] += from[8 * w];
+    }
+
+    /// Adds a row of three at a rotation_slot.
+    void add_rotation_row(Index slot, Index length, const Pack3& row, int lane) {
+        double* to = values_.data() + slot;
+        to[0] += row.x[lane];
+        to[length - 1] += row.y[lane];
+        to[2 * length - 3] += row.z[lane];
+    }
+
+    void add(Index position, double value) { values_[position] += value; }
+
+  private:
+    Index find(Index column, Index row) const;
+
+    Index nodes_ = 0, rotations_ = 0;
+    std::vector<Index> column_starts_, rows_;
+    std::vector<double> values_;
+};
+
+}  // namespace magshell

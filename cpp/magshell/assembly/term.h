@@ -1,0 +1,52 @@
+// A term of the energy: all elements of one kind. One virtual call a term, none an element.
+#pragma once
+
+#include <string_view>
+
+#include "magshell/assembly/system_matrix.h"
+#include "magshell/energy/controls.h"
+
+namespace magshell {
+
+/// The gradient of the energy, and the sum of the magnitudes of what was added up to it: its round-off is a fraction
+/// of that, not of the little that is left.
+struct Residual {
+    VectorXd gradient, magnitude;
+
+    void reset(Index size) {
+        gradient.setZero(size);
+        magnitude.setZero(size);
+    }
+    void add(Index unknown, double value) {
+        gradient[unknown] += value;
+        magnitude[unknown] += std::abs(value);
+    }
+};
+
+/// The order of calls in a Newton step: evaluate at a state; assemble there, with its own stresses (plain Newton) or
+/// with the extrapolated ones (mixed); once the increment is known, extrapolate.
+class Term {
+  public:
+    virtual ~Term() = default;
+
+    virtual std::string_view name() const = 0;
+
+    /// The energy [J] at q; changes nothing.
+    virtual double energy(const double* q, const Controls& controls) const = 0;
+
+    /// Adds the gradient at q and keeps what assemble and extrapolate need of this state.
+    virtual void evaluate(const double* q, const Controls& controls, Residual& out) = 0;
+
+    /// Adds the Hessian at the state of the last evaluate.
+    virtual void assemble(const double* q, const Controls& controls, bool extrapolated_stress, SystemMatrix& out) = 0;
+
+    /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J p).
+    virtual void extrapolate(const double* /*p*/) {}
+
+    /// Adds the magnitude of forces that cancel inside the strains themselves, as for |a|^2 - |a~|^2 at rest.
+    virtual void add_cancelling_forces(VectorXd& /*out*/) const {}
+
+    virtual std::size_t bytes() const = 0;
+};
+
+}  // namespace magshell

@@ -1,0 +1,122 @@
+// Zeeman energy of a uniformly magnetized face in an applied field.
+//
+//   E_f = - A~ h (F_0 M~_r) . B(x_b)                                                [J]   [Chen22] (20), (24)
+//
+// F_0 carries the rest tangents to the current ones and the rest normal to the current unit normal, so with the
+// rest coordinates (alpha, beta, gamma) of M~_r [A/m] in (a~_1, a~_2, n~)
+//
+//   F_0 M~_r = alpha a_1 + beta a_2 + gamma n,     a_1 = x_1 - x_0,  a_2 = x_2 - x_0.
+//
+// Derivatives as in [Chen22] (62), (63) without their misprints: the factor is (n~ . M~_r), and the signs are those
+// below (checked against automatic differentiation). One face a lane.
+#pragma once
+
+#include <string_view>
+
+#include "magshell/core/vector3.h"
+#include "magshell/energy/symmetric3.h"
+
+namespace magshell {
+
+struct Magnetic {
+    static constexpr std::string_view name = "magnetic";
+
+    struct Element {
+        Pack volume;              // A~ h [m3]
+        Pack alpha, beta, gamma;  // M~_r [A/m] in (a~_1, a~_2, n~)
+    };
+
+    /// The applied field at the barycentre. Gradient and curvature only where it varies in space.
+    struct Field {
+        Pack3 flux;             // B                      [T]
+        Pack33 gradient;        // dB_i/dx_j              [T/m]
+        Pack33 curvature;       // d2(M . B)/dx_j dx_k    [A/m T/m2]
+    };
+
+    Pack3 a1, a2, normal;
+    Pack inverse_area2;  // 1 / |a_1 x a_2|
+
+    explicit Magnetic(const Pack3 x[3]) : a1(x[1] - x[0]), a2(x[2] - x[0]) {
+        const Pack3 across = cross(a1, a2);
+        inverse_area2 = Pack(1.0) / sqrt(squared_norm(across));
+        normal = inverse_area2 * across;
+    }
+
+    Pack3 magnetization(const Element& e) const { return e.alpha * a1 + e.beta * a2 + e.gamma * normal; }
+
+    Pack energy(const Element& e, const Pack3& flux) const {
+        return -e.volume * dot(magnetization(e), flux);
+    }
+
+    /// d(M . b)/da_1 and d(M . b)/da_2 for a fixed vector b.
+    void by_edges(const Element& e, const Pack3& b, Pack3& d1, Pack3& d2) const {
+        const Pack3 p = tangential(b);
+        d1 = e.alpha * b + e.gamma * cross(a2, p);
+        d2 = e.beta * b - e.gamma * cross(a1, p);
+    }
+
+    void gradient(const Element& e, const Pack3& flux, Pack3 g[3]) const {
+        Pack3 d1, d2;
+        by_edges(e, flux, d1, d2);
+        g[1] = -(e.volume * d1);
+        g[2] = -(e.volume * d2);
+        g[0] = -(g[1] + g[2]);
+    }
+
+    /// What a field that varies adds to the gradient of each node: - A~ h (dB/dx)^T M / 3.
+    Pack3 gradient_by_place(const Element& e, const Field& field) const {
+        const Pack3 m = magnetization(e);
+        const Pack* g = field.gradient.at;
+        const Pack3 pull = {g[0] * m.x + g[3] * m.y + g[6] * m.z, g[1] * m.x + g[4] * m.y + g[7] * m.z,
+                            g[2] * m.x + g[5] * m.y + g[8] * m.z};
+        return (e.volume * Pack(-1.0 / 3.0)) * pull;
+    }
+
+    /// Lower blocks at lower_index(k, l), in a field taken as uniform.
+    void hessian(const Element& e, const Pack3& flux, Pack33 h[6]) const {
+        const Pack along = dot(normal, flux);
+        // K = (3 (n.B) n n^T - n B^T - B n^T - (n.B) I) / |N|^2
+        Pack33 k = outer((Pack(3.0) * along) * normal, normal) - symmetric_outer(normal, flux);
+        add_to_diagonal(k, -along);
+        const Pack scale = -e.volume * e.gamma;
+        k = (scale * inverse_area2 * inverse_area2) * k;
+        const Pack33 c1 = cross_matrix(a1), c2 = cross_matrix(a2);
+        const Pack33 kc1 = multiply(k, c1);
+        const Pack33 h11 = -multiply(c2, multiply(k, c2)), h22 = -multiply(c1, kc1);
+        const Pack33 h12 = multiply(c2, kc1) - scale * cross_matrix(tangential(flux));
+        const Pack33 h21 = transpose(h12);
+        h[lower_index(1, 1)] = h11;
+        h[lower_index(2, 1)] = h21;
+        h[lower_index(2, 2)] = h22;
+        h[lower_index(1, 0)] = -(h11 + h12);
+        h[lower_index(2, 0)] = -(h21 + h22);
+        h[lower_index(0, 0)] = h11 + h12 + h21 + h22;
+    }
+
+    /// Adds what a field that varies in space brings: d2(M . B(x_b)) with one or two derivatives on x_b.
+    void add_hessian_by_place(const Element& e, const Field& field, Pack33 h[6]) const {
+        Pack33 by_node[3];  // d(M . dB/dx_j)/dx_node, row = component of the node, column = j
+        for (int j = 0; j < 3; ++j) {
+            Pack3 d1, d2;
+            by_edges(e, {field.gradient.at[j], field.gradient.at[3 + j], field.gradient.at[6 + j]}, d1, d2);
+            const Pack3 d0 = -(d1 + d2);
+            const Pack3* of_node[3] = {&d0, &d1, &d2};
+            for (int k = 0; k < 3; ++k) {
+                by_node[k].at[j] = of_node[k]->x;
+                by_node[k].at[3 + j] = of_node[k]->y;
+                by_node[k].at[6 + j] = of_node[k]->z;
+            }
+        }
+        const Pack33 both = (e.volume * Pack(-1.0 / 9.0)) * field.curvature;
+        const Pack third = e.volume * Pack(-1.0 / 3.0);
+        for (int k = 0; k < 3; ++k)
+            for (int l = 0; l <= k; ++l)
+                h[lower_index(k, l)] += both + third * (by_node[k] + transpose(by_node[l]));
+    }
+
+  private:
+    /// P = (b - n (n . b)) / |N|
+    Pack3 tangential(const Pack3& b) const { return inverse_area2 * (b - dot(normal, b) * normal); }
+};
+
+}  // namespace magshell

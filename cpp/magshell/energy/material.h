@@ -1,0 +1,65 @@
+// The constant stiffness C of a face's strain measures, from its rest shape and material.
+//
+// St. Venant-Kirchhoff in plane stress; t~_i is the rest edge i turned by 90 degrees in the face's plane.
+//   membrane  S_i = (t~_j (x) t~_k + t~_k (x) t~_j) / (16 A~^2)      [Chen22] (18), (22)
+//             C_ij = Y A~ h / (1 - nu^2) ((1 - nu) tr(S_i S_j) + nu tr S_i tr S_j)
+//   bending   R_i = t~_i (x) t~_i / (A~ l~_i)                        [Chen22] (19), (23)
+//             C_ij = Y A~ h^3 / (12 (1 - nu^2)) ((1 - nu) tr(R_i R_j) + nu tr R_i tr R_j)
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "magshell/core/types.h"
+
+namespace magshell {
+
+struct SheetMaterial {
+    double thickness, young_modulus, poisson_ratio;
+};
+
+/// A face at rest, laid flat: its turned edges, their lengths and its area.
+struct RestFace {
+    Eigen::Vector2d turned_edge[3];
+    double edge_length[3];
+    double area;
+
+    explicit RestFace(const Vec3 x[3]) {
+        const Vec3 edge[3] = {x[2] - x[1], x[0] - x[2], x[1] - x[0]};
+        const Vec3 across = edge[0].cross(edge[1]);
+        area = 0.5 * across.norm();
+        const Vec3 e1 = edge[0].normalized(), e2 = across.normalized().cross(e1);
+        for (int i = 0; i < 3; ++i) {
+            turned_edge[i] = {edge[i].dot(e2), -edge[i].dot(e1)};
+            edge_length[i] = edge[i].norm();
+        }
+    }
+
+    Mat3 membrane_stiffness(const SheetMaterial& m) const {
+        Eigen::Matrix2d measure[3];
+        for (int i = 0; i < 3; ++i) {
+            const Eigen::Vector2d &tj = turned_edge[(i + 1) % 3], &tk = turned_edge[(i + 2) % 3];
+            measure[i] = (tj * tk.transpose() + tk * tj.transpose()) / (16.0 * area * area);
+        }
+        return plane_stress(measure, m.poisson_ratio, m.young_modulus * area * m.thickness);
+    }
+
+    Mat3 bending_stiffness(const SheetMaterial& m) const {
+        Eigen::Matrix2d measure[3];
+        for (int i = 0; i < 3; ++i)
+            measure[i] = turned_edge[i] * turned_edge[i].transpose() / (area * edge_length[i]);
+        const double cubed = m.thickness * m.thickness * m.thickness;
+        return plane_stress(measure, m.poisson_ratio, m.young_modulus * area * cubed / 12.0);
+    }
+
+  private:
+    static Mat3 plane_stress(const Eigen::Matrix2d measure[3], double poisson_ratio, double modulus) {
+        Mat3 stiffness;
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j)
+                stiffness(i, j) = (1.0 - poisson_ratio) * (measure[i] * measure[j]).trace() +
+                                  poisson_ratio * measure[i].trace() * measure[j].trace();
+        return modulus / (1.0 - poisson_ratio * poisson_ratio) * stiffness;
+    }
+};
+
+}  // namespace magshell

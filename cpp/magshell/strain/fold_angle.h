@@ -1,0 +1,117 @@
+// The angle by which a sheet is folded about an edge, its gradient and its second derivative.
+//
+// An edge e = x1 - x0 and a point r = x2 - x0 beside it span a half-plane, a "wing". With
+//
+//   e^ = e/|e|,  n = e x r / |e x r|,  t = n x e^  (in the wing, away from the edge),  r = s e + h t,
+//
+// turning the wing about the edge by dα moves r by h dα along n, so the angle α of a wing has
+//
+//   dα/dr = n/h,      dα/de = - s n/h
+//   d2α/dr2  = - (n t^T + t n^T) / h^2
+//   d2α/drde = (s/h^2) (n t^T + t n^T) - e^ n^T / (|e| h)
+//   d2α/de2  = - (s^2/h^2 + 1/(2|e|^2)) (n t^T + t n^T) + (s / (|e| h)) (e^ n^T + n e^^T)
+//
+// up to a rotation about e^ that two wings of one edge share and that cancels in the fold, the difference of the two:
+//
+//   theta = α_left - α_right + π,   0 where the sheet is flat, positive where the two normals lean together.
+//
+// The right wing is either a second face (r = x3 - x0) or a fixed direction (r = x3), which makes a clamped
+// edge, an edge on a symmetry plane and an edge that a couple turns.
+#pragma once
+
+#include "magshell/core/vector3.h"
+
+namespace magshell {
+
+struct Wing {
+    Pack3 edge_direction;  // e^
+    Pack3 normal;          // n
+    Pack3 away;            // t
+    Pack edge_length;      // |e|
+    Pack height;           // h
+    Pack foot;             // s, where the point stands along the edge: 0 at x0, 1 at x1
+
+    Wing(const Pack3& e, const Pack3& r) {
+        const Pack e2 = squared_norm(e);
+        edge_length = sqrt(e2);
+        const Pack3 across = cross(e, r);
+        const Pack across_length = sqrt(squared_norm(across));
+        edge_direction = (Pack(1.0) / edge_length) * e;
+        normal = (Pack(1.0) / across_length) * across;
+        away = cross(normal, edge_direction);
+        height = across_length / edge_length;
+        foot = dot(r, e) / e2;
+    }
+
+    Pack3 by_point() const { return (Pack(1.0) / height) * normal; }
+};
+
+/// d2α of one wing in its own variables (r, e); the (e, r) block is the transpose of `point_edge`.
+struct WingCurvature {
+    Pack33 point_point, point_edge, edge_edge;
+
+    explicit WingCurvature(const Wing& w) {
+        const Pack inverse_h = Pack(1.0) / w.height;
+        const Pack inverse_e = Pack(1.0) / w.edge_length;
+        const Pack33 turn = symmetric_outer(w.normal, w.away);
+        const Pack33 slide = outer(w.edge_direction, w.normal);
+        const Pack a = inverse_h * inverse_h, b = w.foot * a, c = inverse_e * inverse_h;
+        const Pack d = w.foot * b + Pack(0.5) * inverse_e * inverse_e, f = w.foot * c;
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 3; ++column) {
+                const int k = 3 * row + column, transposed = 3 * column + row;
+                point_point.at[k] = -a * turn.at[k];
+                point_edge.at[k] = b * turn.at[k] - c * slide.at[k];
+                edge_edge.at[k] = f * (slide.at[k] + slide.at[transposed]) - d * turn.at[k];
+            }
+    }
+};
+
+/// A fold about the edge x0-x1 between the wings of x2 (left) and x3 (right).
+struct Fold {
+    Wing left, right;
+    Pack right_is_point;  // 1: x3 is a point, r = x3 - x0;  0: x3 is a direction, r = x3
+
+    Fold(const Pack3& x0, const Pack3& x1, const Pack3& x2, const Pack3& x3, const Pack& right_is_point_)
+        : left(x1 - x0, x2 - x0), right(x1 - x0, x3 - right_is_point_ * x0), right_is_point(right_is_point_) {}
+
+    /// theta in (-π, π]; the right wing's normal is that of a face turned round, hence the minus sign
+    Pack angle() const {
+        const Pack cosine = -dot(left.normal, right.normal);
+        const Pack sine = dot(left.normal, right.away);
+        return atan2(sine, cosine);
+    }
+
+    void gradient(Pack3 g[4]) const {
+        const Pack3 l = left.by_point(), r = -right.by_point();
+        const Pack3 e = -(left.foot * l) - right.foot * r;
+        g[0] = -(e + l + right_is_point * r);
+        g[1] = e;
+        g[2] = l;
+        g[3] = r;
+    }
+};
+
+/// d2theta as 3x3 blocks of the nodes 0..3, the lower triangle at row (row + 1) / 2 + column. The last but one,
+/// (3, 2), is zero and left unset.
+struct FoldCurvature {
+    enum Block { B00, B10, B11, B20, B21, B22, B30, B31, B32, B33, count };
+    Pack33 block[count];
+
+    explicit FoldCurvature(const Fold& fold) {
+        const WingCurvature l(fold.left), r(fold.right);
+        const Pack p = fold.right_is_point;
+        // x1 enters by e, x2 by r_left, x3 by r_right, and x0 by minus their sum (r_right only where x3 is a point).
+        block[B11] = l.edge_edge - r.edge_edge;
+        block[B21] = l.point_edge;
+        block[B31] = -r.point_edge;
+        block[B22] = l.point_point;
+        block[B33] = -r.point_point;
+        block[B20] = -(block[B21] + block[B22]);
+        block[B30] = -(block[B31] + p * block[B33]);
+        block[B10] = -transpose(block[B11] + block[B21] + p * block[B31]);
+        block[B00] = -(block[B10] + block[B20] + p * block[B30]);
+    }
+};
+
+}  // namespace magshell
