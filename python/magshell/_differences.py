@@ -22,7 +22,7 @@ AXES = np.eye(3)
 PAIRS = [(0, 1), (1, 2), (2, 0)]
 DIAGONALS = np.array([AXES[j] + AXES[k] for j, k in PAIRS])
 
-# The step in units of the length scale. For a dipole at that distance, both the truncation and the rounding error are
+# The step in units of the length scale. For a dipole at that distance, truncation and rounding together are
 # then below 1e-10 of the largest entry, for the first and for the second derivatives.
 STEP = 4e-3
 
@@ -53,7 +53,7 @@ def second_derivatives(
 
 
 class FluxSampler:
-    """Samples a field of which only B is known: 19 evaluations a point for the gradient, 37 with the curvature."""
+    """Samples a field of which only B is known: 19 evaluations a point up to the gradient, 37 in all."""
 
     def __init__(self, flux_density: Function, step: float) -> None:
         self._flux_density = flux_density
@@ -77,7 +77,7 @@ class FluxSampler:
 
 
 class GradientSampler:
-    """Samples a field of which B and its gradient are known: 19 evaluations a point of the gradient for the curvature."""
+    """Samples a field of which B and its gradient are known: the curvature takes 19 gradients a point."""
 
     def __init__(self, flux_density: Function, gradient: Function, step: float) -> None:
         self._flux_density = flux_density

@@ -1,4 +1,4 @@
-"""Physical quantities that a caller hands in: checked once, with the name, the unit and the offending entry."""
+"""Physical quantities that a caller hands in: checked once, naming the unit and the offending entry."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import numpy as np
 
 
 def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.ndarray:
-    """A read-only float64 copy of finite numbers. Letters in the shape stand for any size, "..." for any leading axes.
+    """A read-only float64 copy of finite numbers.
+
+    Letters in the shape stand for any size, "..." in front for any leading axes.
 
     >>> quantity("positions", "m", [[0, 0, 1]], ("n", 3)).shape
     (1, 3)
@@ -26,9 +28,8 @@ def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.n
         raise ValueError(f"{label} must have shape ({wanted}), got {array.shape}")
     if not np.isfinite(array).all():
         index = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
-        raise ValueError(
-            f"{label} must be finite, but {name}[{', '.join(map(str, index))}] is {array[index]}"
-        )
+        entry = f"{name}[{', '.join(map(str, index))}]" if index else name
+        raise ValueError(f"{label} must be finite, but {entry} is {array[index]}")
     array.flags.writeable = False
     return array
 

@@ -1,4 +1,4 @@
-"""Applied magnetic fields: uniform, of dipoles, sampled on a grid. Fields given as functions: `field_adapters`."""
+"""Applied magnetic fields: uniform, of dipoles, sampled on a grid. As functions: `field_adapters`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ._quantity import quantity
 
 
 def residual_to_remanent(residual_flux_density):
-    """The remanent magnetization M_r = B_r / mu_0 [A/m] of a residual flux density B_r [T], as data sheets state it.
+    """The remanent magnetization M_r = B_r / mu_0 [A/m] of the residual flux density B_r [T] of a data sheet.
 
     Numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph.
 
@@ -24,7 +24,7 @@ def residual_to_remanent(residual_flux_density):
 
 
 class AppliedField:
-    """A flux density B(x) [T] that is the same whatever the sheet does: it neither moves nor is magnetised by the sheet.
+    """A flux density B(x) [T] that does not depend on the sheet.
 
     `_core` is the field of the C++ core, or None where a solve supplies the value.
     """
@@ -36,7 +36,7 @@ class AppliedField:
         return self._samples(points, order=0)[0]
 
     def gradient(self, points) -> np.ndarray:
-        """dB_i/dx_j [T/m], (..., 3, 3) as [..., i, j], at points [m], (..., 3); NaN where the field has no value."""
+        """dB_i/dx_j [T/m], (..., 3, 3) as [..., i, j], at points [m], (..., 3); NaN as above."""
         return self._samples(points, order=1)[1]
 
     def _samples(self, points, order: int) -> tuple[np.ndarray, ...]:
@@ -51,7 +51,7 @@ class AppliedField:
 
 
 class UniformField(AppliedField):
-    """A field that is the same everywhere. Its value comes with each solve, as `applied_flux_density` [T], (3,).
+    """A field that is the same everywhere; each solve gives its value, `applied_flux_density` [T], (3,).
 
     >>> UniformField()
     UniformField()
@@ -64,8 +64,8 @@ class UniformField(AppliedField):
 class Dipoles(AppliedField):
     """Point dipoles in vacuum, B = mu_0/(4 pi) sum (3 (m . r) r / |r|^5 - m / |r|^3).
 
-    A sphere magnetised uniformly is exactly one of them, seen from outside; other magnets are, from afar. The field is
-    NaN on a dipole itself.
+    A sphere magnetised uniformly is exactly one of them, seen from outside; other magnets are, from afar. The
+    field is NaN on a dipole itself.
 
     Args:
         positions: (n, 3) [m]
@@ -86,13 +86,15 @@ class Dipoles(AppliedField):
 
 
 class SampledField(AppliedField):
-    """A field given by samples on a regular grid, interpolated by cubic splines that reproduce cubics up to the border.
+    """A field given by samples on a regular grid, interpolated by cubic splines.
 
-    The interpolant is twice continuously differentiable. Its error falls with the fourth power of the spacing, that of
-    its gradient with the third. Outside the grid the field is NaN, and a solve that gets there fails.
+    The interpolant is twice continuously differentiable and reproduces cubics up to the border. Its error
+    falls with the fourth power of the spacing, that of its gradient with the third. Outside the grid the
+    field is NaN, and a solve that gets there fails.
 
-    An axis with one sample is one along which the field does not change: (nx, 1, nz, 3) is a field in a plane, and its
-    entries in origin and spacing do not matter. An axis with two samples is interpolated linearly, with three by a parabola.
+    Along an axis with one sample the field does not change: (nx, 1, nz, 3) is a field in a plane, and that
+    axis' entries in origin and spacing do not matter. Two samples are joined by a straight line, three by a
+    parabola.
 
     Args:
         origin: (3,) [m], the position of flux_density[0, 0, 0]
@@ -113,7 +115,8 @@ class SampledField(AppliedField):
         for axis, (count, step) in enumerate(zip(self.counts, self.spacing.tolist(), strict=True)):
             if count > 1 and step <= 0:
                 raise ValueError(
-                    f"spacing [m] must be positive along an axis with several samples, but spacing[{axis}] is {step}"
+                    "spacing [m] must be positive along an axis with several samples,"
+                    f" but spacing[{axis}] is {step}"
                 )
         self._core = _core.SampledField(self.origin, self.spacing, flux_density)
 
@@ -123,8 +126,8 @@ class SampledField(AppliedField):
     ) -> SampledField:
         """Samples a function of points (n, 3) [m] that returns B (n, 3) [T]: a slow field is worth it.
 
-        `counts` samples lie on each axis between the corners lower and upper (3,) [m], both included; a single one
-        lies in the middle.
+        `counts` (3,) samples lie along the axes between the corners lower and upper (3,) [m], both
+        included; a single one lies in the middle.
         """
         lower = quantity("lower", "m", lower, (3,))
         upper = quantity("upper", "m", upper, (3,))

@@ -1,4 +1,4 @@
-"""Applied fields that come as Python functions or from magpylib; what they lack of derivatives is differenced."""
+"""Applied fields that come as Python functions or from magpylib, with differences for missing derivatives."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from .field import AppliedField
 class CustomField(AppliedField):
     """A field given by a Python function, and its gradient by another one or by differences.
 
-    Derivatives that are not given are central differences of sixth order, with steps of 0.004 length scales, up to three
-    of them away from the point along the axes and their diagonals. Both derivatives are right to about 1e-10 where the
-    field is as smooth as that of a dipole one length scale away, and to 1e-7 at a quarter of that distance.
+    Derivatives that are not given are central differences of sixth order, with steps of 0.004 length
+    scales, up to three of them away from the point along the axes and their diagonals. They are right to
+    1e-10 where the field is as smooth as that of a dipole one length scale away, and to 1e-7 at a quarter
+    of that distance.
 
     Args:
         function: points (n, 3) [m] -> B (n, 3) [T]. It is called with many points at once.
-        length_scale: [m], over which the field changes by its own size, such as the distance to the nearest source
+        length_scale: [m], over which the field changes by its own size: the distance to the nearest source
         gradient: points (n, 3) [m] -> dB_i/dx_j (n, 3, 3) [T/m], as [:, i, j]
 
     >>> CustomField(lambda x: 0.1 * x, length_scale=0.01).gradient([0, 0, 0]).round(6)[0]
@@ -46,8 +47,9 @@ class CustomField(AppliedField):
 class MagpylibField(AppliedField):
     """The field of magpylib's sources (version 5 or later, which works in SI), as they stand now.
 
-    The sources are copied, so that moving them later leaves this field alone. Their gradient is differenced as in
-    `CustomField`; B jumps at the surface of a magnet, so that points must keep further from it than 0.02 length scales.
+    The sources are copied, so that moving them later leaves this field alone. Derivatives are differences,
+    as in `CustomField`. B jumps at the surface of a magnet: points must keep 0.02 length scales away from
+    it.
 
     Args:
         sources: a source, a collection, or a list of them
