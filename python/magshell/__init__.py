@@ -3,5 +3,6 @@
 from . import meshes
 from ._core import __version__
 from .mesh import TriangleMesh
+from .weld import Weld, weld
 
-__all__ = ["TriangleMesh", "__version__", "meshes"]
+__all__ = ["TriangleMesh", "Weld", "__version__", "meshes", "weld"]
