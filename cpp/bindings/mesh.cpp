@@ -1,0 +1,53 @@
+// TriangleMesh to Python: arrays in, read-only views out.
+#include "magshell/mesh/triangle_mesh.h"
+
+#include <memory>
+#include <string>
+
+#include "bindings/bindings.h"
+#include "magshell/core/errors.h"
+
+namespace magshell::bindings {
+
+namespace {
+
+using LongIndexArray = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+
+void check_rows3(const py::array& array, const char* name, const char* rows) {
+    if (array.ndim() == 2 && array.shape(1) == 3) return;
+    const std::string shape = py::str(py::tuple(array.attr("shape")));
+    throw InvalidInput(std::string(name) + " must have shape (" + rows + ", 3), got " + shape);
+}
+
+std::shared_ptr<TriangleMesh> make_mesh(const Array& rest_positions, const LongIndexArray& faces) {
+    check_rows3(rest_positions, "rest_positions [m]", "n_v");
+    check_rows3(faces, "faces", "n_f");
+    Rows3 positions = Eigen::Map<const Rows3>(rest_positions.data(), rest_positions.shape(0), 3);
+    const Rows3l face_rows = Eigen::Map<const Rows3l>(faces.data(), faces.shape(0), 3);
+    const py::gil_scoped_release unlocked;
+    return std::make_shared<TriangleMesh>(std::move(positions), face_rows);
+}
+
+// A view into the mesh that keeps it alive and cannot be written to.
+template <auto member>
+py::array view(const py::object& self) {
+    const auto& rows = (self.cast<const TriangleMesh&>().*member)();
+    using Scalar = typename std::decay_t<decltype(rows)>::Scalar;
+    py::array_t<Scalar> array({rows.rows(), rows.cols()}, rows.data(), self);
+    array.attr("setflags")(py::arg("write") = false);
+    return array;
+}
+
+}  // namespace
+
+void register_mesh(py::module_& module) {
+    py::class_<TriangleMesh, std::shared_ptr<TriangleMesh>>(module, "TriangleMesh")
+        .def(py::init(&make_mesh), py::arg("rest_positions"), py::arg("faces"))
+        .def_property_readonly("rest_positions", &view<&TriangleMesh::rest_positions>)
+        .def_property_readonly("faces", &view<&TriangleMesh::faces>)
+        .def_property_readonly("edges", &view<&TriangleMesh::edges>)
+        .def_property_readonly("edge_faces", &view<&TriangleMesh::edge_faces>)
+        .def_property_readonly("face_edges", &view<&TriangleMesh::face_edges>);
+}
+
+}  // namespace magshell::bindings

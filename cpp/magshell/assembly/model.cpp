@@ -1,0 +1,180 @@
+#include "magshell/assembly/model.h"
+
+#include "magshell/strain/fold_angle.h"
+
+namespace magshell {
+namespace {
+
+std::vector<Stencil> all_stencils(const Sheet& sheet, const SceneInput& input) {
+    std::vector<Stencil> stencils = sheet.stencils;
+    for (const EdgeCoupleInput& couple : input.couples) {
+        const Index user_face = input.mesh.edge_faces().row(couple.edge).maxCoeff();
+        const Index f = sheet.faces.core[user_face];
+        Stencil s;
+        for (int k = 0; k < 3; ++k) s.nodes[k] = sheet.corners[f][k];
+        s.nodes[3] = sheet.direction_node(couple.direction);
+        stencils.push_back(s);
+    }
+    return stencils;
+}
+
+std::vector<HeldNode> renumbered(std::vector<HeldNode> held, const Sheet& sheet) {
+    for (HeldNode& h : held)
+        if (h.node < sheet.n_vertices()) h.node = sheet.vertices.core[h.node];
+    return held;
+}
+
+std::vector<SheetMaterial> renumbered(const std::vector<SheetMaterial>& materials, const Sheet& sheet) {
+    std::vector<SheetMaterial> ours;
+    ours.reserve(materials.size());
+    for (const Index user : sheet.faces.user) ours.push_back(materials[user]);
+    return ours;
+}
+
+VectorXd node_forces(const Rows3& vertex_loads, const Sheet& sheet) {
+    VectorXd forces = VectorXd::Zero(3 * sheet.n_nodes());
+    for (Index v = 0; v < sheet.n_vertices(); ++v)
+        forces.segment<3>(3 * v) = vertex_loads.row(sheet.vertices.user[v]).transpose();
+    return forces;
+}
+
+VectorXd area_metric(const Sheet& sheet) {
+    VectorXd metric = VectorXd::Zero(sheet.n_unknowns());
+    for (const std::array<Index, 3>& c : sheet.corners) {
+        const Vec3 a = sheet.rest[c[1]] - sheet.rest[c[0]], b = sheet.rest[c[2]] - sheet.rest[c[0]];
+        for (const Index node : c) metric.segment<3>(3 * node).array() += a.cross(b).norm() / 6.0;
+    }
+    return metric;
+}
+
+double extent_of(const TriangleMesh& mesh) {
+    return (mesh.rest_positions().colwise().maxCoeff() - mesh.rest_positions().colwise().minCoeff()).norm();
+}
+
+}  // namespace
+
+Model::Model(SceneInput input)
+    : sheet_(input.mesh, input.directed_edges, input.directions, input.directors),
+      matrix_(sheet_.n_nodes(), sheet_.n_rotations(), all_stencils(sheet_, input)),
+      reduction_(matrix_, renumbered(input.held, sheet_), input.motions, sheet_.rest, sheet_.n_vertices()),
+      faces_(sheet_, matrix_),
+      metric_(area_metric(sheet_)),
+      extent_(extent_of(input.mesh)) {
+    const std::vector<SheetMaterial> materials = renumbered(input.materials, sheet_);
+    for (const SheetMaterial& m : materials) thickness_.push_back(m.thickness);
+
+    auto membrane = std::make_unique<MembraneTerm>(sheet_, faces_);
+    membrane->set_material(materials);
+    terms_.push_back(std::move(membrane));
+    auto bending = std::make_unique<BendingTerm>(sheet_, matrix_);
+    bending->set_material(materials, input.curvature_scale);
+    terms_.push_back(std::move(bending));
+    if (input.magnetic) {
+        auto magnetic = std::make_unique<MagneticTerm>(sheet_, faces_, input.field_sources);
+        magnetic_ = magnetic.get();
+        magnetic_->set_magnetization(std::vector<Vec3>(sheet_.n_faces(), Vec3::Zero()), thickness_);
+        terms_.push_back(std::move(magnetic));
+    }
+    if (!input.gravity.isZero(0.0)) {
+        const Rows3 weight = input.vertex_mass * input.gravity.transpose();
+        terms_.push_back(
+            std::make_unique<LoadTerm>("gravity", node_forces(weight, sheet_), &Controls::gravity));
+    }
+    if (input.vertex_loads.rows() > 0)
+        terms_.push_back(
+            std::make_unique<LoadTerm>("loads", node_forces(input.vertex_loads, sheet_), &Controls::load));
+    if (!input.couples.empty()) add_couples(input);
+
+    cancelling_forces_ = VectorXd::Zero(size());
+    for (const std::unique_ptr<Term>& term : terms_) term->add_cancelling_forces(cancelling_forces_);
+}
+
+void Model::add_couples(const SceneInput& input) {
+    std::vector<CoupleTerm::Couple> couples;
+    for (const EdgeCoupleInput& given : input.couples) {
+        const bool forward = input.mesh.edge_faces()(given.edge, 0) != TriangleMesh::none;
+        const Index f = sheet_.faces.core[input.mesh.edge_faces()(given.edge, forward ? 0 : 1)];
+        int i = 0;
+        while (sheet_.edges[f][i] != given.edge) ++i;
+        const std::array<Index, 3>& c = sheet_.corners[f];
+        const std::array<Index, 4> nodes = {c[(i + 1) % 3], c[(i + 2) % 3], c[i],
+                                            sheet_.direction_node(given.direction)};
+        Pack3 x[4];
+        for (int k = 0; k < 4; ++k)
+            for (int lane = 0; lane < Pack::width; ++lane) set_lane(x[k], lane, sheet_.rest[nodes[k]]);
+        const double rest_angle = Fold(x[0], x[1], x[2], x[3], Pack(0.0)).angle()[0];
+        couples.push_back({nodes, rest_angle, sheet_.rotation_of_edge[given.edge], forward ? 1.0 : -1.0, given.couple});
+    }
+    terms_.push_back(std::make_unique<CoupleTerm>(sheet_, matrix_, std::move(couples)));
+}
+
+void Model::set_magnetization(const Rows3& remanent_magnetization) {
+    std::vector<Vec3> ours;
+    ours.reserve(sheet_.n_faces());
+    for (const Index user : sheet_.faces.user) ours.push_back(remanent_magnetization.row(user).transpose());
+    magnetic_->set_magnetization(ours, thickness_);
+}
+
+VectorXd Model::rest_state() const {
+    VectorXd q = VectorXd::Zero(size());
+    for (Index node = 0; node < sheet_.n_nodes(); ++node) q.segment<3>(3 * node) = sheet_.rest[node];
+    return q;
+}
+
+VectorXd Model::state(const Rows3& positions, const VectorXd& edge_rotations) const {
+    VectorXd q = rest_state();
+    for (Index v = 0; v < sheet_.n_vertices(); ++v)
+        q.segment<3>(3 * v) = positions.row(sheet_.vertices.user[v]).transpose();
+    for (Index r = 0; r < sheet_.n_rotations(); ++r)
+        q[3 * sheet_.n_nodes() + r] = edge_rotations[sheet_.edge_of_rotation[r]];
+    return q;
+}
+
+Rows3 Model::positions(const VectorXd& q) const {
+    Rows3 x(sheet_.n_vertices(), 3);
+    for (Index v = 0; v < sheet_.n_vertices(); ++v)
+        x.row(sheet_.vertices.user[v]) = q.segment<3>(3 * v).transpose();
+    return x;
+}
+
+VectorXd Model::edge_rotations(const VectorXd& q) const {
+    VectorXd rotations = VectorXd::Zero(sheet_.n_edges());
+    for (Index r = 0; r < sheet_.n_rotations(); ++r)
+        rotations[sheet_.edge_of_rotation[r]] = q[3 * sheet_.n_nodes() + r];
+    return rotations;
+}
+
+double Model::energy(const VectorXd& q, const Controls& controls) const {
+    double total = 0.0;
+    for (const std::unique_ptr<Term>& term : terms_) total += term->energy(q.data(), controls);
+    return total;
+}
+
+std::vector<std::pair<std::string_view, double>> Model::energies(const VectorXd& q, const Controls& controls) const {
+    std::vector<std::pair<std::string_view, double>> of_terms;
+    for (const std::unique_ptr<Term>& term : terms_)
+        of_terms.emplace_back(term->name(), term->energy(q.data(), controls));
+    return of_terms;
+}
+
+void Model::evaluate(const VectorXd& q, const Controls& controls) {
+    residual_.reset(size());
+    for (const std::unique_ptr<Term>& term : terms_) term->evaluate(q.data(), controls, residual_);
+}
+
+void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress) {
+    matrix_.set_zero();
+    for (const std::unique_ptr<Term>& term : terms_) term->assemble(q.data(), controls, extrapolated_stress, matrix_);
+}
+
+void Model::extrapolate(const VectorXd& p) {
+    for (const std::unique_ptr<Term>& term : terms_) term->extrapolate(p.data());
+}
+
+std::size_t Model::bytes() const {
+    std::size_t total = matrix_.bytes() + reduction_.bytes() + faces_.bytes();
+    for (const std::unique_ptr<Term>& term : terms_) total += term->bytes();
+    return total;
+}
+
+}  // namespace magshell

@@ -1,0 +1,97 @@
+// A scene in the core: a sheet, its terms, its supports. Everything is evaluated here; solvers only call.
+//
+// Not for two threads at once: evaluations keep what the assembly after them needs.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "magshell/assembly/bending_term.h"
+#include "magshell/assembly/couple_term.h"
+#include "magshell/assembly/load_term.h"
+#include "magshell/assembly/magnetic_term.h"
+#include "magshell/assembly/membrane_term.h"
+#include "magshell/assembly/reduction.h"
+
+namespace magshell {
+
+/// A couple on a free edge, in the caller's numbering; `direction` is a row of SceneInput::directions.
+struct EdgeCoupleInput {
+    Index edge, direction;
+    double couple;  // [N m], about the edge with the sheet to its left
+};
+
+/// A scene as the caller describes it, in the caller's numbering. Held nodes count vertices first, then directions.
+struct SceneInput {
+    TriangleMesh mesh;
+    bool directors = true;  // midedge; false: hinge
+    std::vector<DirectedEdge> directed_edges;
+    Rows3 directions;  // (n_d, 3), of directed edges and of couples
+    std::vector<HeldNode> held;
+    std::vector<Motion> motions;
+    std::vector<SheetMaterial> materials;  // one a face
+    VectorXd curvature_scale;              // one an edge
+    VectorXd vertex_mass;                  // [kg], for gravity
+    Vec3 gravity = Vec3::Zero();           // [m/s2]
+    Rows3 vertex_loads;                    // (n_v, 3) [N], or empty
+    std::vector<EdgeCoupleInput> couples;
+    bool magnetic = false;
+    std::vector<std::shared_ptr<const AppliedField>> field_sources;
+};
+
+class Model {
+  public:
+    explicit Model(SceneInput input);
+
+    /// (n_f, 3) [A/m], rest frame, world axes. Only of a scene that was said to be magnetic.
+    void set_magnetization(const Rows3& remanent_magnetization);
+
+    const Sheet& sheet() const { return sheet_; }
+    const Reduction& reduction() const { return reduction_; }
+    SystemMatrix& matrix() { return matrix_; }
+    const Residual& residual() const { return residual_; }
+    Index size() const { return sheet_.n_unknowns(); }
+    double extent() const { return extent_; }
+    const VectorXd& metric() const { return metric_; }
+    const VectorXd& cancelling_forces() const { return cancelling_forces_; }
+
+    VectorXd rest_state() const;
+    /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,), and back.
+    VectorXd state(const Rows3& positions, const VectorXd& edge_rotations) const;
+    Rows3 positions(const VectorXd& q) const;
+    VectorXd edge_rotations(const VectorXd& q) const;
+    /// A vector of all unknowns (a gradient, a mode) as rows of the caller's vertices.
+    Rows3 vertex_rows(const VectorXd& full) const { return positions(full); }
+
+    double energy(const VectorXd& q, const Controls& controls) const;
+    std::vector<std::pair<std::string_view, double>> energies(const VectorXd& q, const Controls& controls) const;
+
+    /// The residual at q; keeps what assemble and extrapolate need.
+    void evaluate(const VectorXd& q, const Controls& controls);
+    /// The Hessian at the last evaluated state, in matrix().
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
+    void extrapolate(const VectorXd& p);
+
+    std::size_t bytes() const;
+    std::mutex& in_use() { return in_use_; }
+
+  private:
+    void add_couples(const SceneInput& input);
+
+    Sheet sheet_;
+    SystemMatrix matrix_;
+    Reduction reduction_;
+    FaceLoop faces_;
+    std::vector<std::unique_ptr<Term>> terms_;
+    MagneticTerm* magnetic_ = nullptr;
+    std::vector<double> thickness_;  // in our numbering
+    Residual residual_;
+    VectorXd metric_;             // area at each unknown of a vertex, zero for directions and rotations
+    VectorXd cancelling_forces_;  // the floor under every residual, to be multiplied by the unit of round-off
+    double extent_;
+    std::mutex in_use_;
+};
+
+}  // namespace magshell

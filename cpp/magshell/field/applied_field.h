@@ -1,0 +1,43 @@
+// The face of every applied magnetic field: values and derivatives of the flux density at a batch of points.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "magshell/core/types.h"
+
+namespace magshell {
+
+/// What an energy m . B(x) and its derivatives need at n points. Fields add into it, so that several
+/// superpose.
+struct FieldSamples {
+    std::vector<Vec3> flux;  // B                                     [T]
+    std::vector<Mat3>
+        gradient;  // G_ij = dB_i/dx_j                      [T/m]                  from order 1 on
+    std::vector<Mat3> curvature;  // d2(m . B)/(dx_j dx_k), symmetric      [T/m2, times m's unit] order 2
+
+    /// Zeros for this many points; what the order does not ask for is left empty.
+    void reset(std::size_t points, int order);
+};
+
+/// An applied flux density B(x).
+class AppliedField {
+  public:
+    virtual ~AppliedField() = default;
+
+    virtual std::string_view name() const = 0;
+
+    /// Adds scale * B at the points [m] (order 0), its gradient (order 1), and its second derivative
+    /// contracted with the moment of each point (order 2; no other order reads the moments). Where the field
+    /// has no value, on a dipole or outside a grid, it adds NaN to everything. To be called from one thread
+    /// at a time.
+    virtual void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order,
+                             double scale, FieldSamples& out) const = 0;
+
+    /// Whether add_samples runs Python code. It then takes the GIL by itself.
+    virtual bool needs_gil() const { return false; }
+};
+
+}  // namespace magshell

@@ -1,0 +1,71 @@
+#include "magshell/field/dipoles.h"
+
+#include <numbers>
+
+#include "magshell/core/errors.h"
+#include "magshell/field/point_loop.h"
+
+namespace magshell {
+namespace {
+
+// With p the moment of the dipole, r the vector from it to the point, e = r/|r|, and m the moment of the
+// point:
+//
+//   B       = k/|r|^3 (3 (p.e) e - p)                                                          k = mu_0/(4
+//   pi) dB/dx   = 3k/|r|^4 (p e^T + e p^T + (p.e) (I - 5 e e^T)) d2(m.B) = 3k/|r|^5 (p m^T + m p^T - 5 (v e^T
+//   + e v^T) + (35 ab - 5 c) e e^T + (c - 5 ab) I)
+//
+// where a = p.e, b = m.e, c = p.m, v = b p + a m. All three are harmonic in r: both matrices are free of
+// trace.
+
+Vec3 flux(const Vec3& p, const Vec3& e) {
+    return 3.0 * p.dot(e) * e - p;
+}
+
+Mat3 gradient(const Vec3& p, const Vec3& e) {
+    const Mat3 pe = p * e.transpose();
+    const double a = p.dot(e);
+    Mat3 result = pe + pe.transpose() - 5.0 * a * e * e.transpose();
+    result.diagonal().array() += a;
+    return result;
+}
+
+Mat3 curvature(const Vec3& p, const Vec3& m, const Vec3& e) {
+    const double a = p.dot(e), b = m.dot(e), c = p.dot(m);
+    const Vec3 v = b * p + a * m;
+    const Mat3 half = p * m.transpose() - 5.0 * v * e.transpose();
+    Mat3 result = half + half.transpose() + (35.0 * a * b - 5.0 * c) * e * e.transpose();
+    result.diagonal().array() += c - 5.0 * a * b;
+    return result;
+}
+
+}  // namespace
+
+Dipoles::Dipoles(std::vector<Vec3> positions, std::vector<Vec3> moments)
+    : positions_(std::move(positions)), moments_(std::move(moments)) {
+    if (positions_.size() != moments_.size()) {
+        throw InvalidInput("dipoles need one moment a position, got " + std::to_string(positions_.size()) +
+                           " positions and " + std::to_string(moments_.size()) + " moments");
+    }
+}
+
+void Dipoles::add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order,
+                          double scale, FieldSamples& out) const {
+    const double k = scale * vacuum_permeability / (4.0 * std::numbers::pi);
+    for_each_point(points.size(), [&](std::size_t point) {
+        for (std::size_t d = 0; d < positions_.size(); ++d) {
+            const Vec3 r = points[point] - positions_[d];
+            const double distance = r.norm();
+            const Vec3 e = r / distance;  // NaN on the dipole itself, and so is all that follows
+            const double k3 = k / (distance * distance * distance);
+            out.flux[point] += k3 * flux(moments_[d], e);
+            if (order >= 1) out.gradient[point] += 3.0 * k3 / distance * gradient(moments_[d], e);
+            if (order >= 2) {
+                out.curvature[point] +=
+                    3.0 * k3 / (distance * distance) * curvature(moments_[d], moments[point], e);
+            }
+        }
+    });
+}
+
+}  // namespace magshell

@@ -1,0 +1,150 @@
+#include "magshell/field/sampled_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "magshell/core/errors.h"
+#include "magshell/field/point_loop.h"
+
+namespace magshell {
+namespace {
+
+// A dense array of three axes in C order.
+struct Grid {
+    std::array<Index, 3> size;
+    std::vector<Vec4> values;
+
+    std::ptrdiff_t stride(int axis) const {
+        std::ptrdiff_t result = 1;
+        for (int a = axis + 1; a < 3; ++a) result *= size[a];
+        return result;
+    }
+};
+
+// Replaces the samples along one axis by their spline coefficients, two more of them.
+Grid interpolate_along(int axis, const Grid& samples) {
+    const Index n = samples.size[axis];
+    if (n == 1) return samples;
+
+    Grid result{samples.size, {}};
+    result.size[axis] = n + 2;
+    const std::ptrdiff_t stride = samples.stride(axis);  // the same in both grids
+    const std::ptrdiff_t lines = static_cast<std::ptrdiff_t>(samples.values.size()) / n;
+    result.values.resize(lines * (n + 2));
+
+    std::vector<Vec4> line(n);
+    for (std::ptrdiff_t l = 0; l < lines; ++l) {
+        const std::ptrdiff_t slab = l / stride, offset = l % stride;
+        for (Index i = 0; i < n; ++i) line[i] = samples.values[(slab * n + i) * stride + offset];
+        const std::vector<Vec4> c = spline_coefficients(line);
+        for (Index i = 0; i < n + 2; ++i) result.values[(slab * (n + 2) + i) * stride + offset] = c[i];
+    }
+    return result;
+}
+
+}  // namespace
+
+SampledField::SampledField(const Vec3& origin, const Vec3& spacing, const std::array<Index, 3>& samples,
+                           std::span<const Vec3> flux_density) {
+    std::size_t expected = 1;
+    for (const Index n : samples) expected *= static_cast<std::size_t>(std::max<Index>(n, 0));
+    if (expected == 0 || expected != flux_density.size()) {
+        throw InvalidInput("a grid of " + std::to_string(samples[0]) + " x " + std::to_string(samples[1]) +
+                           " x " + std::to_string(samples[2]) + " samples does not fit " +
+                           std::to_string(flux_density.size()) + " values");
+    }
+
+    Grid grid{samples, {}};
+    grid.values.reserve(expected);
+    for (const Vec3& b : flux_density) grid.values.emplace_back(b.x(), b.y(), b.z(), 0.0);
+    for (int a = 0; a < 3; ++a) grid = interpolate_along(a, grid);
+    for (int a = 0; a < 3; ++a) {
+        const bool constant = samples[a] == 1;
+        axes_[a] = {origin[a], constant ? 0.0 : 1.0 / spacing[a], samples[a], constant ? 0 : grid.stride(a)};
+    }
+    coefficients_ = std::move(grid.values);
+}
+
+bool SampledField::Axis::contains(double x) const {
+    constexpr double slack = 1e-9;
+    const double u = knots_from_origin(x);
+    return u >= -slack && u <= samples - 1 + slack;  // false for NaN
+}
+
+bool SampledField::contains(const Vec3& point) const {
+    return axes_[0].contains(point[0]) && axes_[1].contains(point[1]) && axes_[2].contains(point[2]);
+}
+
+template <int Order>
+void SampledField::add_sample(std::size_t k, const Vec3& point, const Vec3& moment, double scale,
+                              FieldSamples& out) const {
+    std::array<SplineWeights, 3> w;
+    const Vec4* cell = coefficients_.data();
+    for (int a = 0; a < 3; ++a) {
+        const Axis& axis = axes_[a];
+        const double u = axis.knots_from_origin(point[a]);
+        const double i = std::clamp(std::floor(u), 0.0, std::max(axis.samples - 2.0, 0.0));
+        w[a] = spline_weights(u - i);
+        cell += static_cast<std::ptrdiff_t>(i) * axis.stride;
+    }
+
+    // Partial derivatives by sum factorisation: d[a][b][c] differentiates a, b and c times along x, y and z.
+    constexpr int n = Order + 1;
+    const Vec4 zero = Vec4::Zero();
+    Vec4 d[n][n][n];
+    std::fill_n(&d[0][0][0], n * n * n, zero);
+    for (int i = 0; i < 4; ++i) {
+        Vec4 dyz[n][n];
+        std::fill_n(&dyz[0][0], n * n, zero);
+        for (int j = 0; j < 4; ++j) {
+            const Vec4* row = cell + i * axes_[0].stride + j * axes_[1].stride;
+            for (int c = 0; c <= Order; ++c) {
+                Vec4 dz = w[2][c][0] * row[0];
+                for (int l = 1; l < 4; ++l) dz += w[2][c][l] * row[l * axes_[2].stride];
+                for (int b = 0; b + c <= Order; ++b) dyz[b][c] += w[1][b][j] * dz;
+            }
+        }
+        for (int a = 0; a <= Order; ++a)
+            for (int b = 0; a + b <= Order; ++b)
+                for (int c = 0; a + b + c <= Order; ++c) d[a][b][c] += w[0][a][i] * dyz[b][c];
+    }
+
+    const Vec3 knots_per_metre(axes_[0].knots_per_metre, axes_[1].knots_per_metre, axes_[2].knots_per_metre);
+    out.flux[k] += scale * d[0][0][0].template head<3>();
+    if constexpr (Order >= 1) {
+        Mat3 gradient;
+        gradient << d[1][0][0].template head<3>(), d[0][1][0].template head<3>(),
+            d[0][0][1].template head<3>();
+        out.gradient[k] += scale * gradient * knots_per_metre.asDiagonal();
+    }
+    if constexpr (Order >= 2) {
+        const auto contracted = [&](const Vec4& derivative) { return moment.dot(derivative.head<3>()); };
+        const double xx = contracted(d[2][0][0]), yy = contracted(d[0][2][0]), zz = contracted(d[0][0][2]);
+        const double xy = contracted(d[1][1][0]), xz = contracted(d[1][0][1]), yz = contracted(d[0][1][1]);
+        Mat3 curvature;
+        curvature << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+        out.curvature[k] += scale * (knots_per_metre * knots_per_metre.transpose()).cwiseProduct(curvature);
+    }
+}
+
+void SampledField::add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order,
+                               double scale, FieldSamples& out) const {
+    for_each_point(points.size(), [&](std::size_t k) {
+        if (!contains(points[k])) {
+            constexpr double none = std::numeric_limits<double>::quiet_NaN();
+            out.flux[k].setConstant(none);
+            if (order >= 1) out.gradient[k].setConstant(none);
+            if (order >= 2) out.curvature[k].setConstant(none);
+        } else if (order == 0) {
+            add_sample<0>(k, points[k], Vec3::Zero(), scale, out);
+        } else if (order == 1) {
+            add_sample<1>(k, points[k], Vec3::Zero(), scale, out);
+        } else {
+            add_sample<2>(k, points[k], moments[k], scale, out);
+        }
+    });
+}
+
+}  // namespace magshell

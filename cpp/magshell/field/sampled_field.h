@@ -1,0 +1,49 @@
+// A flux density given by samples on a regular grid, interpolated by tensor-product cubic B-splines.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "magshell/field/applied_field.h"
+#include "magshell/field/cubic_spline.h"
+
+namespace magshell {
+
+/// Twice continuously differentiable inside the grid, NaN outside. The error falls with the fourth power of
+/// the spacing, that of the gradient with the third, that of the second derivative with the second.
+class SampledField final : public AppliedField {
+  public:
+    /// Samples B [T] in C order: the last axis runs fastest. An axis with one sample is one along which the
+    /// field does not change; its origin and spacing are not used.
+    SampledField(const Vec3& origin, const Vec3& spacing, const std::array<Index, 3>& samples,
+                 std::span<const Vec3> flux_density);
+
+    std::string_view name() const override { return "sampled field"; }
+    void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
+                     FieldSamples& out) const override;
+
+    /// Whether the point lies in the grid; rounding may carry it out by a billionth of a cell.
+    bool contains(const Vec3& point) const;
+
+  private:
+    // One axis of the grid. A constant one has stride 0 and knots_per_metre 0, so that all four weights,
+    // which add up to one, meet the same coefficient.
+    struct Axis {
+        double origin;
+        double knots_per_metre;
+        Index samples;
+        std::ptrdiff_t stride;  // between neighbouring coefficients
+
+        double knots_from_origin(double x) const { return (x - origin) * knots_per_metre; }
+        bool contains(double x) const;
+    };
+
+    template <int Order>
+    void add_sample(std::size_t k, const Vec3& point, const Vec3& moment, double scale,
+                    FieldSamples& out) const;
+
+    std::array<Axis, 3> axes_;
+    std::vector<Vec4> coefficients_;
+};
+
+}  // namespace magshell

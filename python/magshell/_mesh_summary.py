@@ -1,0 +1,69 @@
+"""What a person asks about a mesh, in four lines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def summary(mesh) -> str:
+    extent = np.ptp(mesh.rest_positions, axis=0)
+    parts = "1 part" if mesh.n_components == 1 else f"{mesh.n_components} parts"
+    loops = [len(loop) for loop in mesh.boundary_loops]
+    if not loops:
+        boundary = "closed"
+    elif len(loops) == 1:
+        boundary = f"1 boundary loop of {loops[0]} edges"
+    else:
+        boundary = f"{len(loops)} boundary loops of {min(loops)} to {max(loops)} edges"
+    return (
+        f"TriangleMesh: {mesh.n_vertices} vertices, {mesh.n_faces} faces, {mesh.n_edges} edges\n"
+        f"  size: {' x '.join(f'{length:.4g}' for length in extent)} m, area {mesh.face_areas.sum():.4g} m2\n"
+        f"  shape: {parts}, {boundary}\n"
+        f"  faces: edges {mesh.edge_lengths.min():.3g} to {mesh.edge_lengths.max():.3g} m, "
+        f"smallest angle {np.degrees(smallest_angle(mesh)):.1f} deg, "
+        f"aspect at most {aspect_ratios(mesh).max():.3g}"
+    )
+
+
+def smallest_angle(mesh) -> float:
+    """The smallest angle of any face, rad. It lies opposite the shortest edge."""
+    a, b, c = np.sort(mesh.edge_lengths[mesh.face_edges], axis=1).T
+    # b c sin = 2 A,   b c cos = (b^2 + c^2 - a^2) / 2
+    return float(np.arctan2(2 * mesh.face_areas, 0.5 * (b**2 + c**2 - a**2)).min())
+
+
+def aspect_ratios(mesh) -> np.ndarray:
+    """(n_f,): longest edge over inscribed radius, relative to the 2 sqrt(3) of an equilateral triangle."""
+    lengths = mesh.edge_lengths[mesh.face_edges]
+    inscribed_radius = 2 * mesh.face_areas / lengths.sum(axis=1)
+    return lengths.max(axis=1) / (2 * np.sqrt(3) * inscribed_radius)
+
+
+def boundary_loops(mesh) -> list[np.ndarray]:
+    """Vertices of each boundary curve in the order its faces run them, from the lowest boundary edge on."""
+    starts = {}  # boundary edge -> the vertex its face leaves
+    for edge in mesh.boundary_edges:
+        forward = mesh.edge_faces[edge, 0] >= 0
+        starts[int(edge)] = int(mesh.edges[edge, 0 if forward else 1])
+    loops, seen = [], set()
+    for first in starts:
+        loop, edge = [], first
+        while edge not in seen:
+            seen.add(edge)
+            loop.append(starts[edge])
+            edge = _next_boundary_edge(mesh, edge)
+        if loop:
+            loops.append(np.array(loop))
+    return loops
+
+
+def _next_boundary_edge(mesh, edge: int) -> int:
+    """Turns around the far vertex through its faces, so that fans of faces meeting at a vertex stay apart."""
+    face = int(mesh.edge_faces[edge].max())
+    while True:
+        corner = int(np.flatnonzero(mesh.face_edges[face] == edge)[0])
+        edge = int(mesh.face_edges[face, (corner + 1) % 3])
+        here, there = mesh.edge_faces[edge]
+        if here < 0 or there < 0:
+            return edge
+        face = int(there if here == face else here)

@@ -1,0 +1,56 @@
+"""A gmsh session that leaves no trace: none in a session that the user has open, none after its end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+# Everything that decides what the mesh looks like: the user's own settings must not reach in.
+_OPTIONS = {
+    "General.Terminal": 0,
+    "General.NumThreads": 1,
+    "Geometry.Tolerance": 1e-8,
+    "Mesh.Algorithm": 6,  # Frontal-Delaunay
+    "Mesh.ElementOrder": 1,
+    "Mesh.MeshSizeExtendFromBoundary": 1,
+    "Mesh.MeshSizeFactor": 1,
+    "Mesh.MeshSizeFromCurvature": 0,
+    "Mesh.MeshSizeFromPoints": 1,
+    "Mesh.MeshSizeMax": 1e22,
+    "Mesh.MeshSizeMin": 0,
+    "Mesh.Optimize": 1,
+    "Mesh.RandomFactor": 1e-9,
+    "Mesh.RandomSeed": 1,
+    "Mesh.RecombineAll": 0,
+    "Mesh.Smoothing": 1,
+    "Mesh.SubdivisionAlgorithm": 0,
+}
+
+
+@contextmanager
+def gmsh_session(mesh_size: float) -> Iterator:
+    """Yields the gmsh module with an empty model of its own, quiet, on one thread."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # OSError: gmsh is there, a system library that it needs is not
+        raise ImportError(f'outlines are meshed by gmsh: pip install "magshell[gmsh]" ({error})') from error
+
+    started_here = not gmsh.isInitialized()
+    if started_here:
+        # not interruptible: gmsh would take over Ctrl-C, and can only do so in the main thread
+        gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
+    users_model = gmsh.model.getCurrent()
+    users_options = {name: gmsh.option.getNumber(name) for name in _OPTIONS}
+    for name, value in {**_OPTIONS, "Mesh.MeshSizeMax": mesh_size}.items():
+        gmsh.option.setNumber(name, value)
+    gmsh.model.add("magshell outline")
+    try:
+        yield gmsh
+    finally:
+        gmsh.model.remove()
+        if started_here:
+            gmsh.finalize()
+        else:
+            gmsh.model.setCurrent(users_model)
+            for name, value in users_options.items():
+                gmsh.option.setNumber(name, value)
