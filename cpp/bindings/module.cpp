@@ -6,9 +6,6 @@ PYBIND11_MODULE(_core, module) {
     module.doc() = "The C++ core of magshell; use the functions of the package, not this module.";
     module.attr("__version__") = MAGSHELL_VERSION;
     b::register_errors(module);
-<<<<<<< .merge_file_WaUHk2
     b::register_field(module);
-=======
     b::register_mesh(module);
->>>>>>> .merge_file_tYRd7g
 }
