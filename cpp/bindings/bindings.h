@@ -17,5 +17,7 @@ void register_errors(py::module_& module);
 void register_mesh(py::module_& module);
 void register_field(py::module_& module);
 void register_linalg(py::module_& module);
+void register_model(py::module_& module);
+void register_statics(py::module_& module);
 
 }  // namespace magshell::bindings

@@ -8,4 +8,6 @@ PYBIND11_MODULE(_core, module) {
     b::register_errors(module);
     b::register_field(module);
     b::register_mesh(module);
+    b::register_model(module);
+    b::register_statics(module);
 }

@@ -3,8 +3,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "magshell/strain/fold_angle.h"
-
 namespace magshell {
 
 BendingTerm::BendingTerm(const Sheet& sheet, const SystemMatrix& matrix)

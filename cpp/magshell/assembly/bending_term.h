@@ -9,6 +9,7 @@
 #include "magshell/assembly/sheet.h"
 #include "magshell/energy/bending.h"
 #include "magshell/energy/material.h"
+#include "magshell/strain/fold_angle.h"
 
 namespace magshell {
 

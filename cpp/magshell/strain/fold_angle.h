@@ -93,7 +93,7 @@ struct Fold {
 };
 
 /// d2theta as 3x3 blocks of the nodes 0..3, the lower triangle at row (row + 1) / 2 + column. The last but one,
-/// (3, 2), is zero and left unset.
+/// (3, 2), is zero.
 struct FoldCurvature {
     enum Block { B00, B10, B11, B20, B21, B22, B30, B31, B32, B33, count };
     Pack33 block[count];
@@ -107,6 +107,7 @@ struct FoldCurvature {
         block[B31] = -r.point_edge;
         block[B22] = l.point_point;
         block[B33] = -r.point_point;
+        block[B32] = {};
         block[B20] = -(block[B21] + block[B22]);
         block[B30] = -(block[B31] + p * block[B33]);
         block[B10] = -transpose(block[B11] + block[B21] + p * block[B31]);

@@ -1,0 +1,136 @@
+// The model of a scene to Python: checked arrays in, numbers out. Scene in the package builds it.
+#include "magshell/assembly/model.h"
+
+#include "bindings/bindings.h"
+#include "bindings/arrays.h"
+#include "magshell/core/errors.h"
+
+namespace magshell::bindings {
+namespace {
+
+std::vector<DirectedEdge> directed_edges(const IndexArray& pairs) {
+    std::vector<DirectedEdge> edges;
+    for (py::ssize_t k = 0; k < pairs.shape(0); ++k) edges.push_back({pairs.at(k, 0), pairs.at(k, 1)});
+    return edges;
+}
+
+std::vector<HeldNode> held_nodes(const IndexArray& nodes, const Array& frames) {
+    std::vector<HeldNode> held;
+    for (py::ssize_t k = 0; k < nodes.shape(0); ++k) {
+        Mat3 frame;
+        for (int r = 0; r < 3; ++r)
+            for (int c = 0; c < 3; ++c) frame(r, c) = frames.at(k, r, c);
+        held.push_back({nodes.at(k, 0), nodes.at(k, 1), frame, nodes.at(k, 2)});
+    }
+    return held;
+}
+
+std::vector<Motion> motions_of(const Array& rows) {
+    std::vector<Motion> motions;
+    for (py::ssize_t k = 0; k < rows.shape(0); ++k)
+        motions.push_back({Vec3(rows.data(k, 0)), Vec3(rows.data(k, 1)), Vec3(rows.data(k, 2))});
+    return motions;
+}
+
+std::unique_ptr<Model> make_model(const std::shared_ptr<TriangleMesh>& mesh, const py::kwargs& given) {
+    const auto array = [&](const char* name) { return given[name].cast<Array>(); };
+    const auto indices = [&](const char* name) { return given[name].cast<IndexArray>(); };
+    SceneInput input{.mesh = *mesh};
+    input.directors = given["directors"].cast<bool>();
+    input.directed_edges = directed_edges(indices("directed_edges"));
+    input.directions = to_rows3(array("directions"));
+    input.held = held_nodes(indices("held_nodes"), array("held_frames"));
+    input.motions = motions_of(array("motions"));
+    const Array thickness = array("thickness"), young = array("young_modulus"), poisson = array("poisson_ratio");
+    for (Index f = 0; f < mesh->n_faces(); ++f)
+        input.materials.push_back({thickness.at(f), young.at(f), poisson.at(f)});
+    input.curvature_scale = to_vector(array("curvature_scale"));
+    input.vertex_mass = to_vector(array("vertex_mass"));
+    input.gravity = to_vector(array("gravity"));
+    input.vertex_loads = to_rows3(array("vertex_loads"));
+    const IndexArray couple_edges = indices("couple_edges");
+    const Array couples = array("couples");
+    for (py::ssize_t k = 0; k < couples.size(); ++k)
+        input.couples.push_back({couple_edges.at(k, 0), couple_edges.at(k, 1), couples.at(k)});
+    input.magnetic = given["magnetic"].cast<bool>();
+    for (const py::handle source : given["field_sources"])
+        input.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
+    const py::gil_scoped_release unlocked;
+    return std::make_unique<Model>(std::move(input));
+}
+
+py::dict energies(const Model& model, const VectorXd& q, const Controls& controls) {
+    std::vector<std::pair<std::string_view, double>> of_terms;
+    {
+        const py::gil_scoped_release unlocked;
+        of_terms = model.energies(q, controls);
+    }
+    py::dict energies;
+    for (const auto& [name, value] : of_terms) energies[py::str(name.data(), name.size())] = value;
+    return energies;
+}
+
+// The lower triangle as (size, column starts, rows, values): of all unknowns, or of the free ones.
+py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, bool reduced) {
+    std::vector<double> values;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        model.evaluate(q, controls);
+        model.assemble(q, controls, false);
+        if (reduced) model.reduction().matrix(model.matrix(), values);
+        else values = model.matrix().values();
+    }
+    const SparsePattern& pattern = model.reduction().pattern();
+    const auto& starts = reduced ? pattern.column_starts : model.matrix().column_starts();
+    const auto& rows = reduced ? pattern.rows : model.matrix().rows();
+    return py::make_tuple(starts.size() - 1, py::array_t<Index>(starts.size(), starts.data()),
+                          py::array_t<Index>(rows.size(), rows.data()),
+                          py::array_t<double>(values.size(), values.data()));
+}
+
+}  // namespace
+
+void register_model(py::module_& module) {
+    py::class_<Controls>(module, "Controls")
+        .def(py::init([](const Vec3& flux_density, double field, double load, double gravity, double motion) {
+                 return Controls{flux_density, field, load, gravity, motion};
+             }),
+             py::kw_only(), py::arg("flux_density") = Vec3::Zero().eval(), py::arg("field") = 0.0,
+             py::arg("load") = 0.0, py::arg("gravity") = 0.0, py::arg("motion") = 0.0)
+        .def_readonly("flux_density", &Controls::flux_density)
+        .def_readonly("field", &Controls::field)
+        .def_readonly("load", &Controls::load)
+        .def_readonly("gravity", &Controls::gravity)
+        .def_readonly("motion", &Controls::motion)
+        .def("towards", &interpolate, py::arg("to"), py::arg("parameter"));
+
+    py::class_<Model>(module, "Model")
+        .def(py::init(&make_model), py::arg("mesh"))
+        .def("set_magnetization",
+             [](Model& model, const Array& magnetization) {
+                 const std::lock_guard lock(model.in_use());
+                 model.set_magnetization(to_rows3(magnetization));
+             })
+        .def_property_readonly("size", &Model::size)
+        .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
+        .def_property_readonly("bytes", &Model::bytes)
+        .def("rest_state", &Model::rest_state)
+        .def("state", [](const Model& m, const Array& x, const Array& r) { return m.state(to_rows3(x), to_vector(r)); })
+        .def("positions", &Model::positions)
+        .def("edge_rotations", &Model::edge_rotations)
+        .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })
+        .def("reduce", [](const Model& m, const VectorXd& full) { return m.reduction().vector(full); })
+        .def("energy", &Model::energy, py::call_guard<py::gil_scoped_release>())
+        .def("energies", &energies)
+        .def("gradient",
+             [](Model& model, const VectorXd& q, const Controls& controls) {
+                 const std::lock_guard lock(model.in_use());
+                 model.evaluate(q, controls);
+                 return model.residual().gradient;
+             },
+             py::call_guard<py::gil_scoped_release>())
+        .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true);
+}
+
+}  // namespace magshell::bindings

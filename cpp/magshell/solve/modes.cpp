@@ -1,0 +1,69 @@
+#include "magshell/solve/modes.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace magshell {
+namespace {
+
+using Eigen::MatrixXd;
+
+// A start that no symmetry of the sheet is likely to be orthogonal to, the same on every run.
+MatrixXd generic_start(Index rows, int columns) {
+    MatrixXd start(rows, columns);
+    std::uint64_t state = 88172645463325252ull;
+    for (int c = 0; c < columns; ++c)
+        for (Index r = 0; r < rows; ++r) {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            start(r, c) = static_cast<double>(state >> 11) / 9007199254740992.0 - 0.5;
+        }
+    return start;
+}
+
+}  // namespace
+
+std::vector<Mode> modes_near_zero(Newton& newton, int count) {
+    const Model& model = newton.model();
+    const VectorXd metric = model.reduction().vector(model.metric());
+    const Index massive = (metric.array() > 0.0).count();
+    const int columns = static_cast<int>(std::min<Index>(count + 3, massive));
+
+    // With X = K^-1 M Y: X^T K X = X^T M Y, so K itself is not needed.
+    MatrixXd y = generic_start(model.reduction().size(), columns);
+    VectorXd eigenvalues = VectorXd::Zero(columns);
+    for (int round = 0; round < 40; ++round) {
+        const MatrixXd my = metric.asDiagonal() * y;
+        MatrixXd x = my;
+        newton.factor().solve(x);
+        const MatrixXd k = x.transpose() * my, m = x.transpose() * metric.asDiagonal() * x;
+        const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> ritz(0.5 * (k + k.transpose()),
+                                                                      0.5 * (m + m.transpose()));
+        const VectorXd before = eigenvalues;
+        eigenvalues = ritz.eigenvalues();
+        y = x * ritz.eigenvectors();
+        const double scale = eigenvalues.cwiseAbs().minCoeff();
+        Index nearest, nearest_before;
+        eigenvalues.cwiseAbs().minCoeff(&nearest);
+        before.cwiseAbs().minCoeff(&nearest_before);
+        if (round > 2 && std::abs(eigenvalues[nearest] - before[nearest_before]) <= 1e-7 * scale) break;
+    }
+    std::vector<int> order(columns);
+    for (int c = 0; c < columns; ++c) order[c] = c;
+    std::sort(order.begin(), order.end(),
+              [&](int a, int b) { return std::abs(eigenvalues[a]) < std::abs(eigenvalues[b]); });
+    order.resize(std::min(count, columns));
+    std::sort(order.begin(), order.end());  // Ritz values ascend
+    std::vector<Mode> modes;
+    for (const int c : order) {
+        VectorXd shape = model.reduction().expand(y.col(c));
+        Index largest;
+        shape.head(3 * model.sheet().n_vertices()).cwiseAbs().maxCoeff(&largest);
+        modes.push_back({eigenvalues[c], shape / shape[largest]});
+    }
+    return modes;
+}
+
+}  // namespace magshell

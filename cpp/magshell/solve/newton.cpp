@@ -1,0 +1,120 @@
+#include "magshell/solve/newton.h"
+
+#include <cmath>
+#include <limits>
+
+namespace magshell {
+namespace {
+
+constexpr double round_off = std::numeric_limits<double>::epsilon();
+
+// |part| / (|magnitude| + floor / tolerance): below the tolerance when the residual is small beside the forces that
+// cancel in it, or within the round-off of the forces that cancel inside the strains.
+double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd& cancelling, double tolerance) {
+    if (part.size() == 0) return 0.0;
+    const double scale = magnitude.norm() + 4.0 * round_off / tolerance * cancelling.norm();
+    return scale > 0.0 ? part.norm() / scale : part.norm() > 0.0 ? 1.0 : 0.0;
+}
+
+}  // namespace
+
+Newton::Newton(Model& model, const NewtonOptions& options, Watch watch)
+    : model_(model),
+      options_(options),
+      watch_(std::move(watch)),
+      factor_(analyze(model.reduction().pattern())),
+      reduced_metric_(model.reduction().vector(model.metric())) {}
+
+// Frames leave the metric alone: it is the same along the three axes of a node.
+VectorXd Newton::gradient(const VectorXd& q, const Anchor& anchor) const {
+    VectorXd g = model_.residual().gradient;
+    if (anchor.state) g += anchor.weight * model_.metric().cwiseProduct(q - *anchor.state);
+    return g;
+}
+
+double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const {
+    const Reduction& reduction = model_.reduction();
+    // Held components have no residual of their own; those of framed nodes are told apart in their frames.
+    const VectorXd free = reduction.expand(reduction.vector(gradient(q, anchor)));
+    const Index nodes = 3 * model_.sheet().n_nodes(), rotations = model_.sheet().n_rotations();
+    const VectorXd &magnitude = model_.residual().magnitude, &cancelling = model_.cancelling_forces();
+    return std::max(relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
+                    relative(free.tail(rotations), magnitude.tail(rotations), cancelling.tail(rotations),
+                             options_.tolerance));
+}
+
+FactorReport Newton::factorize(const Anchor& anchor) {
+    model_.reduction().matrix(model_.matrix(), values_);
+    if (anchor.state) {
+        const SparsePattern& pattern = model_.reduction().pattern();
+        for (Index k = 0; k < pattern.size; ++k)
+            values_[pattern.column_starts[k]] += anchor.weight * reduced_metric_[k];
+    }
+    ++factorizations_;
+    const FactorReport report = factor_->factorize(values_.data());
+    if (!report.succeeded) ++failed_factorizations_;
+    return report;
+}
+
+FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls) {
+    model_.evaluate(q, controls);
+    model_.assemble(q, controls, false);
+    return factorize({});
+}
+
+VectorXd Newton::solve_with_factor(const VectorXd& rhs) const {
+    VectorXd reduced = model_.reduction().vector(rhs);
+    factor_->solve(reduced);
+    return model_.reduction().expand(reduced);
+}
+
+NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    return solve(q, controls, anchor, options_.max_iterations);
+}
+
+NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations) {
+    NewtonReport report;
+    VectorXd move = model_.reduction().prescribed_increment(q, controls.motion);
+    bool moving = move.lpNorm<Eigen::Infinity>() > 0.0, extrapolated = false;
+    double last_step = 0.0;
+    model_.evaluate(q, controls);
+    for (;; ++report.iterations, ++iterations_) {
+        report.residual = relative_residual(q, anchor);
+        if (watch_) watch_(report.residual);
+        if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent()) {
+            report.reason = "the iteration diverged";
+            return report;
+        }
+        if (!moving && report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent()) {
+            report.converged = true;
+            return report;
+        }
+        if (report.iterations == max_iterations) {
+            report.reason = "no convergence in " + std::to_string(max_iterations) + " iterations";
+            return report;
+        }
+        model_.assemble(q, controls, options_.mixed && extrapolated);
+        VectorXd force = -gradient(q, anchor);
+        if (moving) {
+            VectorXd pull(q.size());
+            model_.matrix().multiply(move.data(), pull.data());
+            force -= pull;
+        }
+        const FactorReport factor = factorize(anchor);
+        report.negative_pivots = factor.negative_pivots;
+        if (!factor.succeeded) {
+            report.reason = factor.reason;
+            return report;
+        }
+        VectorXd step = solve_with_factor(force);
+        if (moving) step += move;
+        moving = false;
+        if (options_.mixed) model_.extrapolate(step);
+        extrapolated = true;
+        last_step = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
+        q += step;
+        model_.evaluate(q, controls);
+    }
+}
+
+}  // namespace magshell

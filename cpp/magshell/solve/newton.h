@@ -1,0 +1,86 @@
+// Newton's method at fixed controls, on the stationarity of the energy.
+//
+// Mixed (mixed integration points, Magisano, Leonetti, Garcea 2017): the element stresses are unknowns of their own,
+// condensed element by element. Only the geometric stiffness sees them,
+//
+//   K = J^T C J + sum sigma_i d2d_i,   K p = - (J^T C d - f),   q += p,   sigma = C (d(q_old) + J p)
+//
+// and where plain Newton takes sigma = C d(q), a stress that the strains of a trial step have spoiled, the linearized
+// one keeps a thin shell's bending alive. Same matrix, same solution, many fewer iterations.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "magshell/assembly/model.h"
+#include "magshell/linalg/factor.h"
+
+namespace magshell {
+
+struct NewtonOptions {
+    bool mixed = true;
+    double tolerance = 1e-10;   // of the residual, relative to the forces that cancel in it
+    int max_iterations = 20;
+};
+
+/// What happened in one solve at fixed controls.
+struct NewtonReport {
+    bool converged = false;
+    int iterations = 0;
+    double residual = 0.0;
+    Index negative_pivots = 0;  // of the last matrix factorized
+    std::string reason;         // why not converged
+};
+
+/// A quadratic pull towards an anchor, weight/2 |x - anchor|^2 in the model's metric: one implicit Euler step of a
+/// gradient flow whose time step is 1/weight.
+struct Anchor {
+    double weight = 0.0;
+    const VectorXd* state = nullptr;
+};
+
+/// A model with its factorization, counting what it costs. Everything that solves goes through here.
+class Newton {
+  public:
+    /// Called once an iteration; throws to stop.
+    using Watch = std::function<void(double residual)>;
+
+    Newton(Model& model, const NewtonOptions& options, Watch watch = {});
+
+    /// From q to a stationary point at the controls, or to where it failed. Held nodes are moved to where the
+    /// controls want them, in the first iteration and with its linearization.
+    NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
+
+    /// As solve(), with another limit on iterations.
+    NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
+
+    /// Evaluates, assembles with the state's own stresses and factorizes.
+    FactorReport factorize_at(const VectorXd& q, const Controls& controls);
+    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held.
+    VectorXd solve_with_factor(const VectorXd& rhs) const;
+
+    /// The residual at the last evaluated state, relative to the forces that cancel in it and to their round-off.
+    double relative_residual(const VectorXd& q, const Anchor& anchor) const;
+
+    Model& model() { return model_; }
+    const Factor& factor() const { return *factor_; }
+    const NewtonOptions& options() const { return options_; }
+    int factorizations() const { return factorizations_; }
+    int failed_factorizations() const { return failed_factorizations_; }
+    int iterations() const { return iterations_; }
+
+  private:
+    FactorReport factorize(const Anchor& anchor);
+    VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
+
+    Model& model_;
+    NewtonOptions options_;
+    Watch watch_;
+    std::unique_ptr<Factor> factor_;
+    VectorXd reduced_metric_;
+    std::vector<double> values_;
+    int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
+};
+
+}  // namespace magshell

@@ -1,0 +1,155 @@
+#include "magshell/solve/statics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "magshell/core/errors.h"
+#include "magshell/solve/modes.h"
+#include "magshell/solve/relaxation.h"
+
+namespace magshell {
+namespace {
+
+constexpr int quick_iterations = 8;  // a load step that converged in so many is followed by one twice as long
+
+class Statics {
+  public:
+    Statics(Newton& newton, const Controls& from, const Controls& to, const StaticsOptions& options,
+            StaticsResult& result)
+        : newton_(newton), from_(from), to_(to), options_(options), result_(result) {}
+
+    bool run() {
+        if (!load()) return false;
+        if (!result_.stable && options_.require_stable && !leave_saddles()) return false;
+        return true;
+    }
+
+  private:
+    bool load() {
+        double step = options_.first_step;
+        while (result_.progress < 1.0) {
+            const double target = std::min(1.0, result_.progress + step);
+            const Controls controls = interpolate(from_, to_, target);
+            VectorXd trial = result_.state;
+            const NewtonReport report = newton_.solve(trial, controls);
+            if (report.converged) {
+                accept(trial, controls, target, report.residual);
+                if (report.iterations <= quick_iterations) step *= 2.0;
+                continue;
+            }
+            result_.reason = report.reason;
+            step = 0.5 * (target - result_.progress);
+            if (step < options_.smallest_step || !options_.start_at_rest) return relax_to_end();
+        }
+        return check_stability();
+    }
+
+    void accept(const VectorXd& state, const Controls& controls, double progress, double residual) {
+        result_.state = state;
+        result_.controls = controls;
+        result_.progress = progress;
+        result_.residual = residual;
+        ++result_.load_steps;
+    }
+
+    // The factorization at the solution itself, with its own stresses, decides.
+    bool check_stability() {
+        const FactorReport factor = newton_.factorize_at(result_.state, to_);
+        result_.unstable_directions = factor.negative_pivots;
+        result_.stable = factor.succeeded && factor.negative_pivots == 0 && factor.perturbed_pivots == 0;
+        if (!factor.succeeded) result_.reason = factor.reason;
+        return factor.succeeded;
+    }
+
+    bool descend(VectorXd trial, double rate) {
+        const RelaxationReport report = relax(newton_, trial, to_, rate, options_.max_relaxation_steps);
+        result_.relaxation_steps += report.steps;
+        if (!report.converged) {
+            result_.reason = report.reason;
+            return false;
+        }
+        accept(trial, to_, 1.0, report.residual);
+        return check_stability();
+    }
+
+    bool relax_to_end() {
+        VectorXd trial = result_.state;
+        trial += newton_.model().reduction().prescribed_increment(trial, to_.motion);
+        const FactorReport factor = newton_.factorize_at(trial, to_);
+        if (!factor.succeeded) {
+            result_.reason = factor.reason;
+            return false;
+        }
+        const std::vector<Mode> modes = modes_near_zero(newton_, static_cast<int>(factor.negative_pivots) + 2);
+        return descend(trial, 4.0 * largest(modes));
+    }
+
+    static double largest(const std::vector<Mode>& modes) {
+        double value = 0.0;
+        for (const Mode& mode : modes) value = std::max(value, std::abs(mode.eigenvalue));
+        return value;
+    }
+
+    // Off the saddle along its most unstable direction, as far as the energy falls, and down from there.
+    bool leave_saddles() {
+        constexpr int attempts = 5;
+        Model& model = newton_.model();
+        for (int k = 0; k < attempts && !result_.stable; ++k) {
+            const int count = static_cast<int>(std::min<Index>(result_.unstable_directions, 8)) + 1;
+            const std::vector<Mode> modes = modes_near_zero(newton_, count);
+            const auto lowest = std::min_element(modes.begin(), modes.end(), [](const Mode& a, const Mode& b) {
+                return a.eigenvalue < b.eigenvalue;
+            });
+            if (lowest->eigenvalue >= 0.0) {
+                result_.reason = "the equilibrium is neutral: the Hessian is singular there";
+                return false;
+            }
+            const double level = model.energy(result_.state, to_);
+            double amplitude = 1e-4 * model.extent(), best = level;
+            VectorXd start = result_.state + amplitude * lowest->shape;
+            for (double a = amplitude; a < 0.5 * model.extent(); a *= 2.0) {
+                const VectorXd trial = result_.state + a * lowest->shape;
+                const double energy = model.energy(trial, to_);
+                if (!(energy < best)) break;
+                best = energy;
+                start = trial;
+            }
+            ++result_.saddles_left;
+            if (!descend(start, 2.0 * std::abs(lowest->eigenvalue))) return false;
+        }
+        if (!result_.stable) result_.reason = "every equilibrium found was a saddle";
+        return result_.stable;
+    }
+
+    Newton& newton_;
+    const Controls from_, to_;
+    const StaticsOptions& options_;
+    StaticsResult& result_;
+};
+
+}  // namespace
+
+StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Controls& from, const Controls& to,
+                               const StaticsOptions& options, const StaticsWatch& watch) {
+    StaticsResult result;
+    result.state = start;
+    result.controls = from;
+    Newton newton(model, options.newton, [&](double residual) {
+        if (watch) watch(result.progress, residual);
+    });
+    try {
+        Statics statics(newton, from, to, options, result);
+        result.outcome = statics.run() ? Outcome::converged : Outcome::failed;
+    } catch (const Interrupted&) {
+        result.outcome = Outcome::interrupted;
+        result.reason = "interrupted";
+    }
+    result.iterations = newton.iterations();
+    result.factorizations = newton.factorizations();
+    result.failed_factorizations = newton.failed_factorizations();
+    result.bytes = model.bytes() + newton.factor().bytes();
+    result.factorization = newton.factor().name();
+    return result;
+}
+
+}  // namespace magshell

@@ -1,0 +1,41 @@
+// A stable equilibrium: mixed Newton in adaptive load steps, saddles left, relaxation where it does not converge.
+#pragma once
+
+#include "magshell/solve/newton.h"
+
+namespace magshell {
+
+struct StaticsOptions {
+    NewtonOptions newton;
+    double first_step = 1.0;       // of the way from the old controls to the new
+    double smallest_step = 1.0 / 64.0;
+    bool require_stable = true;    // false: hand back what Newton found, a saddle too
+    bool start_at_rest = true;     // the start is an equilibrium at the old controls: worth halving load steps
+    int max_relaxation_steps = 200;
+};
+
+enum class Outcome { converged, failed, interrupted };
+
+struct StaticsResult {
+    Outcome outcome = Outcome::failed;
+    VectorXd state;            // the equilibrium, or the last good state
+    Controls controls;         // at which `state` holds
+    double progress = 0.0;     // how far the controls got, 0 to 1
+    std::string reason;
+    int iterations = 0, factorizations = 0, failed_factorizations = 0, load_steps = 0, relaxation_steps = 0;
+    int saddles_left = 0;
+    double residual = 0.0;
+    bool stable = false;
+    Index unstable_directions = 0;
+    std::size_t bytes = 0;     // of the model and the factorization
+    std::string factorization; // which
+};
+
+/// Called now and then with the progress of the controls and the residual; throws Interrupted to stop.
+using StaticsWatch = std::function<void(double progress, double residual)>;
+
+/// From an equilibrium `start` at `from` to one at `to`.
+StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Controls& from, const Controls& to,
+                               const StaticsOptions& options, const StaticsWatch& watch = {});
+
+}  // namespace magshell
