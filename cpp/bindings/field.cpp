@@ -1,6 +1,10 @@
 // Applied magnetic fields, and the one that calls back into Python.
 #include <algorithm>
 #include <array>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "bindings/bindings.h"
 #include "magshell/core/errors.h"
@@ -37,13 +41,12 @@ Array from_matrices(std::span<const Mat3> matrices) {
     return result;
 }
 
-/// A field whose samples come from a Python callable,
-/// sampler(points (n, 3), moments (n, 3), order) -> (flux (n, 3), gradient (n, 3, 3), curvature (n, 3,
-/// 3))[:order + 1].
+/// A field whose samples come from a Python callable: sampler(points (n, 3), moments (n, 3), order) returns a
+/// tuple of the first order + 1 of flux (n, 3), gradient (n, 3, 3) and contracted curvature (n, 3, 3).
 class PythonField final : public AppliedField {
   public:
     explicit PythonField(py::function sampler) : sampler_(std::move(sampler)) {}
-    ~PythonField() override {
+    ~PythonField() override {  // the last owner may be C++ code that has released the GIL
         const py::gil_scoped_acquire gil;
         sampler_ = py::function();
     }
@@ -53,6 +56,7 @@ class PythonField final : public AppliedField {
 
     void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
                      FieldSamples& out) const override {
+        if (points.empty()) return;
         const py::gil_scoped_acquire gil;
         const py::tuple samples = sampler_(from_vectors(points), from_vectors(moments), order);
         if (samples.size() != static_cast<std::size_t>(order) + 1) {

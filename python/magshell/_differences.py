@@ -67,8 +67,10 @@ class FluxSampler:
         gradient = first_derivatives(forward[:3], backward[:3], self._step)
         if order == 1:
             return flux, gradient
-        energies = [np.einsum("...ni,ni->...n", values, moments) for values in (flux, forward, backward)]
-        second = second_derivatives(*energies, self._step)
+        centre, ahead, behind = (
+            np.einsum("...i,...i", values, moments) for values in (flux, forward, backward)
+        )
+        second = second_derivatives(centre, ahead, behind, self._step)
         curvature = second[:, :3, None] * np.eye(3)
         for along_diagonal, (j, k) in zip(second[:, 3:].T, PAIRS, strict=True):
             mixed = (along_diagonal - second[:, j] - second[:, k]) / 2

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from . import _core
+from . import _core as core
 from ._quantity import quantity
 
 
@@ -20,7 +20,7 @@ def residual_to_remanent(residual_flux_density):
     """
     if isinstance(residual_flux_density, list | tuple):
         residual_flux_density = np.asarray(residual_flux_density, dtype=np.float64)
-    return residual_flux_density / _core.vacuum_permeability
+    return residual_flux_density / core.vacuum_permeability
 
 
 class AppliedField:
@@ -29,7 +29,7 @@ class AppliedField:
     `_core` is the field of the C++ core, or None where a solve supplies the value.
     """
 
-    _core: _core.AppliedField | None = None
+    _core: core.AppliedField | None = None
 
     def flux_density(self, points) -> np.ndarray:
         """B [T], (..., 3), at points [m], (..., 3); NaN where the field has no value."""
@@ -46,7 +46,7 @@ class AppliedField:
             )
         points = quantity("points", "m", points, ("...", 3))
         rows = points.reshape(-1, 3)
-        samples = _core.sample_fields([self._core], [1.0], rows, np.zeros_like(rows), order)
+        samples = core.sample_fields([self._core], [1.0], rows, np.zeros_like(rows), order)
         return tuple(values.reshape(*points.shape[:-1], *values.shape[1:]) for values in samples[: order + 1])
 
 
@@ -78,7 +78,7 @@ class Dipoles(AppliedField):
     def __init__(self, positions, moments) -> None:
         self.positions = quantity("positions", "m", positions, ("n", 3))
         self.moments = quantity("moments", "A m^2", moments, (len(self.positions), 3))
-        self._core = _core.Dipoles(self.positions, self.moments)
+        self._core = core.Dipoles(self.positions, self.moments)
 
     def __repr__(self) -> str:
         count = len(self.positions)
@@ -105,6 +105,8 @@ class SampledField(AppliedField):
     SampledField(4 x 4 x 4 samples, from (0, 0, 0) to (1, 1, 1) m)
     """
 
+    _core: core.SampledField
+
     def __init__(self, origin, spacing, flux_density) -> None:
         self.origin = quantity("origin", "m", origin, (3,))
         self.spacing = quantity("spacing", "m", spacing, (3,))
@@ -118,7 +120,7 @@ class SampledField(AppliedField):
                     "spacing [m] must be positive along an axis with several samples,"
                     f" but spacing[{axis}] is {step}"
                 )
-        self._core = _core.SampledField(self.origin, self.spacing, flux_density)
+        self._core = core.SampledField(self.origin, self.spacing, flux_density)
 
     @classmethod
     def from_function(
@@ -154,7 +156,7 @@ class SampledField(AppliedField):
     def contains(self, points) -> np.ndarray:
         """Whether points [m], (..., 3), lie in the grid: bool, (...)."""
         points = quantity("points", "m", points, ("...", 3))
-        return np.array(self._core.contains(points), dtype=bool).reshape(points.shape[:-1])
+        return np.asarray(self._core.contains(points), dtype=np.bool_).reshape(points.shape[:-1])
 
     def __repr__(self) -> str:
         def corner(x: np.ndarray) -> str:

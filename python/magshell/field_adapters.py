@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from . import _core
+from . import _core as core
 from ._differences import STEP, FluxSampler, Function, GradientSampler
 from ._quantity import quantity
 from .field import AppliedField
@@ -35,10 +35,10 @@ class CustomField(AppliedField):
         step = STEP * self.length_scale
         flux_density = _checked_function("function", "T", function, (3,))
         if gradient is None:
-            self._core = _core.PythonField(FluxSampler(flux_density, step))
+            self._core = core.PythonField(FluxSampler(flux_density, step))
         else:
             given = _checked_function("gradient", "T/m", gradient, (3, 3))
-            self._core = _core.PythonField(GradientSampler(flux_density, given, step))
+            self._core = core.PythonField(GradientSampler(flux_density, given, step))
 
     def __repr__(self) -> str:
         return f"CustomField({self.name}, length_scale={self.length_scale:g} m)"
@@ -67,7 +67,8 @@ class MagpylibField(AppliedField):
         listed = list(sources) if isinstance(sources, list | tuple) else [sources]
         try:
             copies = [source.copy() for source in listed]
-            paths = magpylib.getB(copies, np.zeros(3), sumup=True, squeeze=False).shape[1]
+            with np.errstate(all="ignore"):  # a source may lie at the point asked for
+                paths = magpylib.getB(copies, np.zeros(3), sumup=True, squeeze=False).shape[1]
         except (AttributeError, ValueError) as error:
             raise ValueError(f"sources must be magpylib sources or collections of them: {error}") from error
         if paths != 1:
@@ -80,7 +81,7 @@ class MagpylibField(AppliedField):
             return magpylib.getB(copies, points, sumup=True, squeeze=False).reshape(-1, 3)
 
         self.names = [type(source).__name__ for source in listed]
-        self._core = _core.PythonField(FluxSampler(flux_density, STEP * self.length_scale))
+        self._core = core.PythonField(FluxSampler(flux_density, STEP * self.length_scale))
 
     def __repr__(self) -> str:
         return f"MagpylibField({', '.join(self.names)}, length_scale={self.length_scale:g} m)"

@@ -13,10 +13,9 @@ namespace magshell {
 /// What an energy m . B(x) and its derivatives need at n points. Fields add into it, so that several
 /// superpose.
 struct FieldSamples {
-    std::vector<Vec3> flux;  // B                                     [T]
-    std::vector<Mat3>
-        gradient;  // G_ij = dB_i/dx_j                      [T/m]                  from order 1 on
-    std::vector<Mat3> curvature;  // d2(m . B)/(dx_j dx_k), symmetric      [T/m2, times m's unit] order 2
+    std::vector<Vec3> flux;       // B                                      [T]
+    std::vector<Mat3> gradient;   // G_ij = dB_i/dx_j                       [T/m]             from order 1 on
+    std::vector<Mat3> curvature;  // d2(m . B)/(dx_j dx_k), symmetric       [T/m2 unit of m]  order 2
 
     /// Zeros for this many points; what the order does not ask for is left empty.
     void reset(std::size_t points, int order);

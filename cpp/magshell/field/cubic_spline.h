@@ -1,5 +1,4 @@
-// Cubic B-splines on equally spaced knots: the coefficients that interpolate samples, and the weights that
-// evaluate.
+// Cubic B-splines on equally spaced knots: coefficients that interpolate samples, weights that evaluate.
 //
 //   f(origin + (i + t) spacing) = sum_{k=0..3} w_k(t) c_{i-1+k},       0 <= t <= 1
 //

@@ -1,6 +1,8 @@
 #include "magshell/field/dipoles.h"
 
 #include <numbers>
+#include <string>
+#include <utility>
 
 #include "magshell/core/errors.h"
 #include "magshell/field/point_loop.h"
@@ -8,15 +10,14 @@
 namespace magshell {
 namespace {
 
-// With p the moment of the dipole, r the vector from it to the point, e = r/|r|, and m the moment of the
-// point:
+// p is the moment of the dipole, r the vector from it to the point, e = r/|r|, and m the moment of the point.
 //
-//   B       = k/|r|^3 (3 (p.e) e - p)                                                          k = mu_0/(4
-//   pi) dB/dx   = 3k/|r|^4 (p e^T + e p^T + (p.e) (I - 5 e e^T)) d2(m.B) = 3k/|r|^5 (p m^T + m p^T - 5 (v e^T
-//   + e v^T) + (35 ab - 5 c) e e^T + (c - 5 ab) I)
+//   B           = k/|r|^3  (3 (p.e) e - p)                                            k = mu_0/(4 pi)
+//   dB/dx       = 3k/|r|^4 (p e^T + e p^T + (p.e) (I - 5 e e^T))
+//   d2(m.B)/dx2 = 3k/|r|^5 (p m^T + m p^T - 5 (v e^T + e v^T) + (35 a b - 5 c) e e^T + (c - 5 a b) I)
 //
-// where a = p.e, b = m.e, c = p.m, v = b p + a m. All three are harmonic in r: both matrices are free of
-// trace.
+// with a = p.e, b = m.e, c = p.m, v = b p + a m. B is harmonic and free of curl and divergence, so that both
+// matrices are symmetric and free of trace.
 
 Vec3 flux(const Vec3& p, const Vec3& e) {
     return 3.0 * p.dot(e) * e - p;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "magshell/core/errors.h"
 #include "magshell/field/point_loop.h"
