@@ -1,7 +1,7 @@
 """PLY files: ASCII and binary in, binary little endian out, with fields on vertices and faces.
 
-A field of several components is stored as one property each (`name_x`, `name_y`, `name_z`), as other programs expect,
-and a comment in the header says which belong together, so that it is read back in one piece.
+A field of several components is stored as one property each (`name_x`, `name_y`, `name_z`), as other programs
+expect, and a comment in the header says which belong together, so that it is read back in one piece.
 """
 
 from __future__ import annotations
@@ -65,7 +65,9 @@ def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
     return points, faces, _grouped(vertex, groups.get("vertex", {})), _grouped(face, groups.get("face", {}))
 
 
-def write_ply(path: Path, points: np.ndarray, faces: np.ndarray, vertex_fields: dict, face_fields: dict) -> None:
+def write_ply(
+    path: Path, points: np.ndarray, faces: np.ndarray, vertex_fields: dict, face_fields: dict
+) -> None:
     """Fields: name -> (n,) or (n, k), float64 or int32."""
     vertex, vertex_comments = _columns("vertex", vertex_fields)
     face, face_comments = _columns("face", face_fields)
@@ -73,7 +75,12 @@ def write_ply(path: Path, points: np.ndarray, faces: np.ndarray, vertex_fields: 
         vertex = {"xyz"[axis]: points[:, axis].astype("<f8"), **vertex}
     header = ["ply", "format binary_little_endian 1.0", *vertex_comments, *face_comments]
     header += [f"element vertex {len(points)}", *_property_lines(vertex)]
-    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", *_property_lines(face), "end_header"]
+    header += [
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        *_property_lines(face),
+        "end_header",
+    ]
     face = {"count": np.full(len(faces), 3, dtype="u1"), "vertex_indices": faces.astype("<i4"), **face}
     with path.open("wb") as file:
         file.write(("\n".join(header) + "\n").encode())
@@ -122,7 +129,9 @@ def _binary_table(element: _Element, data: bytes, offset: int, order: str) -> tu
     row = np.dtype(columns)
     available = (len(data) - offset) // row.itemsize if row.itemsize else 0
     table = np.frombuffer(data, row, min(element.count, available), offset)
-    _same_lengths(element, {prop.name: table[prop.name + " count"] for prop in element.properties if prop.count_type})
+    _same_lengths(
+        element, {prop.name: table[prop.name + " count"] for prop in element.properties if prop.count_type}
+    )
     if available < element.count:
         raise ValueError(f"it ends in the middle: {available} of {element.count} rows of {element.name}")
     return {prop.name: table[prop.name] for prop in element.properties}, offset + row.itemsize * element.count
@@ -145,7 +154,9 @@ def _ascii_table(element: _Element, lines) -> dict:
             counts = np.array([int(row[column]) for row in rows], dtype=np.int64)
             _same_lengths(element, {prop.name: counts})
             end = column + 1 + (int(counts[0]) if len(counts) else 0)
-            table[prop.name] = np.array([row[column + 1 : end] for row in rows], dtype=np.float64).astype(prop.type)
+            table[prop.name] = np.array([row[column + 1 : end] for row in rows], dtype=np.float64).astype(
+                prop.type
+            )
             column = end
     return table
 
@@ -157,7 +168,9 @@ def _same_lengths(element: _Element, counts: dict[str, np.ndarray]) -> None:
             row = other[0] if lengths[0] == 3 else 0
             raise ValueError(f"face {row} has {lengths[row]} vertices; only triangles are supported")
         if len(other):
-            raise ValueError(f"the list {name} of {element.name} has different lengths, which is not supported")
+            raise ValueError(
+                f"the list {name} of {element.name} has different lengths, which is not supported"
+            )
 
 
 def _grouped(columns: dict[str, np.ndarray], groups: dict[str, list[str]]) -> dict[str, np.ndarray]:
@@ -181,7 +194,9 @@ def _columns(element: str, fields: dict[str, np.ndarray]) -> tuple[dict[str, np.
             comments.append(f"comment {_FIELD_COMMENT} {element} {name} {' '.join(names)}")
         taken = [column for column in names if column in columns or column in _RESERVED]
         if taken:
-            raise ValueError(f"{element} field {name!r} needs the property {taken[0]!r}, which is taken in a PLY file")
+            raise ValueError(
+                f"{element} field {name!r} needs the property {taken[0]!r}, which is taken in a PLY file"
+            )
         columns.update(zip(names, parts, strict=True))
     return columns, comments
 

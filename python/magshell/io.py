@@ -31,8 +31,8 @@ class Fields(NamedTuple):
 def read_mesh(path, drop_unused: bool = False) -> TriangleMesh:
     """The triangle mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (all but PLY need the extra `io`).
 
-    Coordinates are taken to be in m: use `.scaled(1e-3)` on a file in mm. Points in the plane get z = 0. An STL file
-    stores each triangle apart: its corners within 1e-6 of the mesh's size are one vertex.
+    Coordinates are taken to be in m: use `.scaled(1e-3)` on a file in mm. Points in the plane get z = 0. An
+    STL file stores each triangle apart: its corners within 1e-6 of the mesh's size are one vertex.
 
     Args:
         path: the ending tells the format.
@@ -40,8 +40,8 @@ def read_mesh(path, drop_unused: bool = False) -> TriangleMesh:
 
     Raises:
         FileNotFoundError: no such file.
-        ValueError: unknown ending, a file that cannot be read, that holds other faces than triangles or none, or
-            whose mesh `TriangleMesh` refuses.
+        ValueError: unknown ending, a file that cannot be read, that holds other faces than triangles or none,
+            or whose mesh `TriangleMesh` refuses.
         ImportError: without meshio, where it is needed.
     """
     return _read(path, drop_unused)[0]
@@ -134,10 +134,16 @@ def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
     # meshio.read ends the interpreter on a file it cannot read; the readers of the formats raise
     with np.errstate(over="ignore"):  # its STL reader multiplies whatever stands where the count should
         content = _meshio(_READERS[path.suffix.lower()]).read(path)
-    others = {block.type: len(block.data) for block in content.cells if block.type not in ("triangle", *_LOWER_CELLS)}
+    others = {
+        block.type: len(block.data)
+        for block in content.cells
+        if block.type not in ("triangle", *_LOWER_CELLS)
+    }
     if others:
         kind, count = next(iter(others.items()))
-        raise ValueError(f"it holds {count} cells of type {kind!r}; only triangles (of 3 points) are supported")
+        raise ValueError(
+            f"it holds {count} cells of type {kind!r}; only triangles (of 3 points) are supported"
+        )
     triangles = [k for k, block in enumerate(content.cells) if block.type == "triangle"]
     if not triangles:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), {}, {}
