@@ -67,8 +67,9 @@ def distance_to(polygon: np.ndarray, points: np.ndarray) -> np.ndarray:
 def crossings(first: np.ndarray, second: np.ndarray, touching: bool) -> np.ndarray:
     """(k, 2): pairs of segments, one of each list, that cross; with `touching`, or share a point."""
     block = max(1, 1_000_000 // max(len(second), 1))  # rows at a time, so that memory stays bounded
-    found = [_crossings(first[k : k + block], second, touching) + np.array([k, 0]) for k in range(0,
-    len(first), block)] return np.concatenate(found)
+    starts = range(0, len(first), block)
+    found = [np.array([k, 0]) + _crossings(first[k : k + block], second, touching) for k in starts]
+    return np.concatenate(found)
 
 
 def meeting_point(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ def cut(mesh: TriangleMesh, edges) -> TriangleMesh:
 
 
 def _corners_at(mesh: TriangleMesh, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The face corners (3 face + i) at the lower and the higher vertex of interior edges, (n, 2 faces) each."""
+    """Face corners (3 face + i) at the lower and the higher vertex of interior edges, (n, 2 faces) each."""
     lows, highs = [], []
     for side, (at_low, at_high) in enumerate(((1, 2), (2, 1))):  # edge i runs from vertex i + 1 to i + 2
         face = mesh.edge_faces[edges, side].astype(np.int64)

@@ -50,8 +50,7 @@ def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -
     _check_holes(outer, holes)
     _check_slits(outer, holes, slits)
 
-    # gmsh's geometry kernel has absolute tolerances: mesh in units of about the extent. A power of two is
-    # exact.
+    # gmsh's kernel has absolute tolerances: mesh in units of about the extent. A power of two is exact.
     unit = 2.0 ** np.round(np.log2(np.ptp(outer, axis=0).max()))
     points, faces, slit_sides = _mesh_with_gmsh(
         outer / unit, [hole / unit for hole in holes], [slit / unit for slit in slits], size / unit
