@@ -1,11 +1,10 @@
 // TriangleMesh to Python: arrays in, read-only views out.
-#include "magshell/mesh/triangle_mesh.h"
-
 #include <memory>
 #include <string>
 
 #include "bindings/bindings.h"
 #include "magshell/core/errors.h"
+#include "magshell/mesh/triangle_mesh.h"
 
 namespace magshell::bindings {
 

@@ -35,7 +35,7 @@ std::vector<Motion> motions_of(const Array& rows) {
 std::unique_ptr<Model> make_model(const std::shared_ptr<TriangleMesh>& mesh, const py::kwargs& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     const auto indices = [&](const char* name) { return given[name].cast<IndexArray>(); };
-    SceneInput input{.mesh = *mesh};
+    SceneInput input(*mesh);
     input.directors = given["directors"].cast<bool>();
     input.directed_edges = directed_edges(indices("directed_edges"));
     input.directions = to_rows3(array("directions"));

@@ -1,7 +1,7 @@
 """Vertices, edges and faces of a mesh by where they are.
 
-Every selection returns ascending indices. One that finds nothing raises a ValueError that says what is there: an
-empty support would otherwise surface much later, as a sheet that flies away.
+Every selection returns ascending indices. One that finds nothing raises a ValueError that says what is
+there: an empty support would otherwise surface much later, as a sheet that flies away.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class MeshSelection:
     def edges_where(
         self, predicate: Callable[[np.ndarray], np.ndarray], boundary_only: bool = False
     ) -> np.ndarray:
-        """Edges where predicate((n, 3) midpoints [m]) -> (n,) bool holds; of all, or of those on the boundary.
+        """Edges where predicate((n, 3) midpoints [m]) -> (n,) bool holds, of all or those on the boundary.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(2.0, 1.0, cells=(2, 1))

@@ -22,8 +22,9 @@ class TriangleMesh(MeshSelection):
         faces: (n_f, 3) vertex indices, counter-clockwise seen from the side the normal points to.
 
     Raises:
-        ValueError: naming the first offender: coordinates that are not finite, indices out of range, degenerate
-            or doubled faces, edges with more than two faces, neighbours of opposite orientation, unused vertices.
+        ValueError: naming the first offender: coordinates that are not finite, indices out of range,
+            degenerate or doubled faces, edges with more than two faces, neighbours of opposite orientation,
+            unused vertices.
 
     Edge i of a face is opposite its vertex i. Edges run from lower to higher vertex and are sorted.
 
@@ -168,8 +169,9 @@ class TriangleMesh(MeshSelection):
         """The mesh moved by x -> rotation x + translation.
 
         Args:
-            rotation: a (3, 3) matrix or a scipy Rotation. Any invertible matrix will do; under one that mirrors,
-                the faces keep their vertex order, so normals end on the other side of the mirrored surface.
+            rotation: a (3, 3) matrix or a scipy Rotation. Any invertible matrix will do; under one that
+                mirrors, the faces keep their vertex order, so normals end on the other side of the mirrored
+                surface.
             translation: (3,), m.
         """
         positions = self.rest_positions

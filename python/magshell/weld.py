@@ -14,7 +14,7 @@ from .mesh import TriangleMesh
 
 
 class Weld(NamedTuple):
-    """The joined mesh, and where each part's vertices and faces went: weld.vertex_maps[part][vertex of the part]."""
+    """The joined mesh, and where each part went: vertex_maps[part][vertex of the part], faces alike."""
 
     mesh: TriangleMesh
     vertex_maps: tuple[np.ndarray, ...]
@@ -24,16 +24,17 @@ class Weld(NamedTuple):
 def weld(*meshes: TriangleMesh, tolerance: float | None = None) -> Weld:
     """Joins meshes along boundaries that they share vertex by vertex.
 
-    Boundary vertices of different parts within `tolerance` become one, at the position of the first part. Vertices of
-    one part are never joined, so its slits stay open.
+    Boundary vertices of different parts within `tolerance` become one, at the position of the first part.
+    Vertices of one part are never joined, so its slits stay open.
 
     Args:
         meshes: two or more, their normals on the same side along the seams.
         tolerance: m; 1e-6 of the largest part's size by default. Below half the shortest edge.
 
     Raises:
-        ValueError: when a part shares no edge with the others, when the divisions of a shared boundary differ, when
-            two parts are oriented against each other, or when more than two faces would meet at an edge.
+        ValueError: when a part shares no edge with the others, when the divisions of a shared boundary
+            differ, when two parts are oriented against each other, or when more than two faces would meet at
+            an edge.
 
     >>> import magshell as ms
     >>> left = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4))
@@ -66,7 +67,8 @@ def _checked_tolerance(meshes, tolerance: float | None) -> float:
     shortest = min(float(mesh.edge_lengths.min()) for mesh in meshes)
     if not 0 <= tolerance < 0.5 * shortest:
         raise ValueError(
-            f"tolerance [m] must be at least 0 and below half of the shortest edge ({shortest:.4g} m), got {tolerance}"
+            f"tolerance [m] must be at least 0 and below half of the shortest edge ({shortest:.4g} m), "
+            f"got {tolerance}"
         )
     return float(tolerance)
 
@@ -93,8 +95,8 @@ def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
         part = part_of[doubled[0]]
         vertices = doubled[(owner[doubled] == owner[doubled[0]]).all(axis=1)] - offsets[part]
         raise ValueError(
-            f"vertices {vertices[0]} and {vertices[1]} of mesh {part} both coincide with a vertex of another mesh; "
-            "weld would close the slit between them"
+            f"vertices {vertices[0]} and {vertices[1]} of mesh {part} both coincide with a vertex of another "
+            "mesh; weld would close the slit between them"
         )
 
     _, first, number = np.unique(cluster, return_index=True, return_inverse=True)

@@ -25,6 +25,8 @@ struct EdgeCoupleInput {
 
 /// A scene as the caller describes it, in the caller's numbering. Held nodes count vertices first, then directions.
 struct SceneInput {
+    explicit SceneInput(TriangleMesh mesh_) : mesh(std::move(mesh_)) {}
+
     TriangleMesh mesh;
     bool directors = true;  // midedge; false: hinge
     std::vector<DirectedEdge> directed_edges;

@@ -17,8 +17,8 @@ struct HalfEdge {
     bool forward;  // the face runs it from low to high
 };
 
-/// All 3 n_f half-edges, sorted by low, high, face. A counting sort by low leaves a handful to compare at each vertex,
-/// so the time is linear in the number of faces.
+/// All 3 n_f half-edges, sorted by low, high, face. A counting sort by low leaves a handful to compare at
+/// each vertex, so the time is linear in the number of faces.
 inline std::vector<HalfEdge> sorted_half_edges(const Rows3i& faces, Index n_vertices) {
     const auto ends = [&](Eigen::Index face, int corner) {
         return std::pair(faces(face, (corner + 1) % 3), faces(face, (corner + 2) % 3));

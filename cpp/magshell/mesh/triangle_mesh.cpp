@@ -16,8 +16,9 @@ namespace magshell {
 
 namespace {
 
-// Twice the area of a face over its longest edge squared is sqrt(3)/2 when it is equilateral. Below this it is lost in
-// the round-off of the coordinates. The ratio has no unit: a mesh of microns is judged like one of metres.
+// Twice the area of a face over its longest edge squared is sqrt(3)/2 when it is equilateral. Below this it
+// is lost in the round-off of the coordinates. The ratio has no unit: a mesh of microns is judged like one of
+// metres.
 constexpr double degenerate_ratio = 1e-10;
 
 template <class... Parts>
@@ -46,8 +47,8 @@ void check_positions(const Rows3& positions) {
     }
 }
 
-// Half-edges of one edge, in the order of their faces. One alone is a boundary edge, two with opposite directions an
-// interior one; everything else is refused here.
+// Half-edges of one edge, in the order of their faces. One alone is a boundary edge, two with opposite
+// directions an interior one; everything else is refused here.
 void check_edge(std::span<const HalfEdge> group, const Rows3i& faces) {
     const auto opposite = [&](const HalfEdge& h) { return faces(h.face, h.corner); };
     for (std::size_t i = 0; i < group.size(); ++i) {
@@ -61,23 +62,26 @@ void check_edge(std::span<const HalfEdge> group, const Rows3i& faces) {
     }
     const HalfEdge& first = group.front();
     if (group.size() > 2) {
-        refuse("edge (", first.low, ", ", first.high, ") belongs to ", group.size(), " faces (", group[0].face, ", ",
-               group[1].face, ", ", group[2].face, group.size() > 3 ? ", ...)" : ")",
+        refuse("edge (", first.low, ", ", first.high, ") belongs to ", group.size(), " faces (",
+               group[0].face, ", ", group[1].face, ", ", group[2].face, group.size() > 3 ? ", ...)" : ")",
                "; a manifold surface has at most 2 at an edge");
     }
     if (group.size() == 2 && group[0].forward == group[1].forward) {
         const Index from = first.forward ? first.low : first.high;
         const Index to = first.forward ? first.high : first.low;
-        refuse("faces ", group[0].face, " and ", group[1].face, " both run their common edge from vertex ", from,
-               " to ", to, ", so their normals point to opposite sides. Reverse the vertices of one of them, or take ",
-               "flipped() of the part it belongs to; a one-sided surface (a Moebius strip) cannot be oriented and is ",
+        refuse("faces ", group[0].face, " and ", group[1].face, " both run their common edge from vertex ",
+               from, " to ", to,
+               ", so their normals point to opposite sides. Reverse the vertices of one of them, or take ",
+               "flipped() of the part it belongs to; a one-sided surface (a Moebius strip) cannot be "
+               "oriented and is ",
                "not supported");
     }
 }
 
 }  // namespace
 
-TriangleMesh::TriangleMesh(Rows3 rest_positions, const Rows3l& faces) : rest_positions_(std::move(rest_positions)) {
+TriangleMesh::TriangleMesh(Rows3 rest_positions, const Rows3l& faces)
+    : rest_positions_(std::move(rest_positions)) {
     check_positions(rest_positions_);
     check_faces(faces);
     faces_ = faces.cast<Index>();
@@ -107,20 +111,24 @@ void TriangleMesh::check_faces(const Rows3l& faces) const {
         const double double_area = a0.cross(a1).norm();
         const double longest2 = std::max({a0.squaredNorm(), a1.squaredNorm(), (a0 + a1).squaredNorm()});
         if (!(double_area > degenerate_ratio * longest2)) {
-            refuse("face ", f, " ", face, " is degenerate: area ", 0.5 * double_area, " m2 for a longest edge of ",
-                   std::sqrt(longest2), " m; its vertices coincide or lie on a line");
+            refuse("face ", f, " ", face, " is degenerate: area ", 0.5 * double_area,
+                   " m2 for a longest edge of ", std::sqrt(longest2),
+                   " m; its vertices coincide or lie on a line");
         }
     }
     const auto unused = std::find(used.begin(), used.end(), false);
     if (unused != used.end()) {
-        refuse("vertex ", unused - used.begin(), " belongs to no face (", std::count(unused, used.end(), false),
-               " such vertices of ", n_vertices(), "); remove unused vertices and renumber the faces");
+        refuse("vertex ", unused - used.begin(), " belongs to no face (",
+               std::count(unused, used.end(), false), " such vertices of ", n_vertices(),
+               "); remove unused vertices and renumber the faces");
     }
 }
 
 void TriangleMesh::connect() {
     const std::vector<HalfEdge> half_edges = sorted_half_edges(faces_, n_vertices());
-    const auto same_edge = [](const HalfEdge& a, const HalfEdge& b) { return a.low == b.low && a.high == b.high; };
+    const auto same_edge = [](const HalfEdge& a, const HalfEdge& b) {
+        return a.low == b.low && a.high == b.high;
+    };
 
     Index n_edges = 0;
     for (std::size_t i = 0; i < half_edges.size(); ++i) {
@@ -132,8 +140,8 @@ void TriangleMesh::connect() {
 
     Index edge = 0;
     for (auto begin = half_edges.begin(); begin != half_edges.end(); ++edge) {
-        const auto end =
-            std::find_if_not(begin, half_edges.end(), [&](const HalfEdge& h) { return same_edge(*begin, h); });
+        const auto end = std::find_if_not(begin, half_edges.end(),
+                                          [&](const HalfEdge& h) { return same_edge(*begin, h); });
         check_edge({begin, end}, faces_);
         edges_.row(edge) << begin->low, begin->high;
         for (auto h = begin; h != end; ++h) {

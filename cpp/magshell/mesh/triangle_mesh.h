@@ -1,10 +1,12 @@
 // A triangulated surface: rest positions, faces, and how faces meet at edges.
 //
-// Faces run counter-clockwise seen from the side their normal points to. Edge i of a face is opposite its vertex i:
+// Faces run counter-clockwise seen from the side their normal points to. Edge i of a face is opposite its
+// vertex i:
 //
 //   a_i = x_{i+2} - x_{i+1}  (indices mod 3),   a_0 + a_1 + a_2 = 0,   normal ~ a_0 x a_1
 //
-// Edges run from the lower to the higher vertex and are sorted, so the same triangles give the same edges in any order.
+// Edges run from the lower to the higher vertex and are sorted, so the same triangles give the same edges in
+// any order.
 #pragma once
 
 #include "magshell/core/types.h"
@@ -21,10 +23,10 @@ class TriangleMesh {
     /// No face: what an edge_faces entry says on the boundary.
     static constexpr Index none = -1;
 
-    /// rest_positions (n_v, 3) [m], faces (n_f, 3). Throws InvalidInput, naming the first offender, on coordinates that
-    /// are not finite, indices out of range, faces that are degenerate or doubled, edges of three faces or of
-    /// neighbours with opposite orientation, and vertices that no face uses. Faces come in with 64 bits so that an
-    /// index too large is reported rather than wrapped.
+    /// rest_positions (n_v, 3) [m], faces (n_f, 3). Throws InvalidInput, naming the first offender, on
+    /// coordinates that are not finite, indices out of range, faces that are degenerate or doubled, edges of
+    /// three faces or of neighbours with opposite orientation, and vertices that no face uses. Faces come in
+    /// with 64 bits so that an index too large is reported rather than wrapped.
     TriangleMesh(Rows3 rest_positions, const Rows3l& faces);
 
     Index n_vertices() const { return static_cast<Index>(rest_positions_.rows()); }
@@ -34,11 +36,14 @@ class TriangleMesh {
     const Rows3& rest_positions() const { return rest_positions_; }  // (n_v, 3), m
     const Rows3i& faces() const { return faces_; }                   // (n_f, 3)
     const Rows2i& edges() const { return edges_; }                   // (n_e, 2), lower vertex first, sorted
-    /// (n_e, 2): the face that runs the edge forward (lower to higher vertex), then the one that runs it backward.
+    /// (n_e, 2): the face that runs the edge forward (lower to higher vertex), then the one that runs it
+    /// backward.
     const Rows2i& edge_faces() const { return edge_faces_; }
     const Rows3i& face_edges() const { return face_edges_; }  // (n_f, 3): the edge opposite each vertex
 
-    bool is_boundary(Index edge) const { return edge_faces_(edge, 0) == none || edge_faces_(edge, 1) == none; }
+    bool is_boundary(Index edge) const {
+        return edge_faces_(edge, 0) == none || edge_faces_(edge, 1) == none;
+    }
 
   private:
     void check_faces(const Rows3l& faces) const;

@@ -1,7 +1,7 @@
 """The grid of cells that most generators bend into shape.
 
-A grid lies in the unit square of two parameters (u, v), cells[0] cells along u and cells[1] along v. Its faces run
-counter-clockwise in (u, v), so a surface's normal is that of d/du x d/dv.
+A grid lies in the unit square of two parameters (u, v), cells[0] cells along u and cells[1] along v. Its
+faces run counter-clockwise in (u, v), so a surface's normal is that of d/du x d/dv.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ def grid(
 
     Args:
         cells: along u and along v, at least 1 each.
-        diagonals: "aligned" (all from (0, 0) towards (1, 1)), "alternating" (turned from cell to cell, the mirror
-            image of itself for even cells) or "crossed" (both, with a vertex in the middle of each cell).
-        irregular: moves interior vertices by up to this fraction, at most 0.25, of their spacing along u and v.
+        diagonals: "aligned" (all from (0, 0) towards (1, 1)), "alternating" (turned from cell to cell, the
+            mirror image of itself for even cells) or "crossed" (both, and a vertex where they meet).
+        irregular: moves interior vertices by up to this fraction, at most 0.25, of their spacing.
         seed: of those moves.
         periodic: v = 1 is v = 0 again.
         poles: whether all of u = 0, and all of u = 1, is a single point.
@@ -104,7 +104,7 @@ def _halved_faces(corners: list[np.ndarray], towards_one: np.ndarray) -> np.ndar
     c0, c1, c2, c3 = corners
     lower = np.where(towards_one, [c0, c1, c2], [c0, c1, c3])
     upper = np.where(towards_one, [c0, c2, c3], [c1, c2, c3])
-    # at a pole two corners coincide: the half that loses its area goes, the other keeps all of the cell if it can
+    # at a pole two corners coincide: the cell is a triangle, and one face is all of it
     at_first, at_last = c0 == c3, c1 == c2
     lower = np.where(at_first | at_last, [c0, c1, np.where(at_first, c2, c3)], lower)
     upper = np.where(at_first | at_last, -1, upper)

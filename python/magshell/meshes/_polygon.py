@@ -18,7 +18,9 @@ def checked_polyline(name: str, points, least: int) -> np.ndarray:
         raise ValueError(f"{name} [m] must be finite, but point {bad[0]} is {array[bad[0]].tolist()}")
     same = np.flatnonzero((array[1:] == array[:-1]).all(axis=1))
     if len(same):
-        raise ValueError(f"{name} repeats point {same[0]} as point {same[0] + 1}, {array[same[0]].tolist()} m")
+        raise ValueError(
+            f"{name} repeats point {same[0]} as point {same[0] + 1}, {array[same[0]].tolist()} m"
+        )
     return array
 
 
@@ -63,11 +65,10 @@ def distance_to(polygon: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def crossings(first: np.ndarray, second: np.ndarray, touching: bool) -> np.ndarray:
-    """(k, 2): pairs of segments, one from each list, that cross; with `touching`, also those that share a point."""
+    """(k, 2): pairs of segments, one of each list, that cross; with `touching`, or share a point."""
     block = max(1, 1_000_000 // max(len(second), 1))  # rows at a time, so that memory stays bounded
-    found = [
-        _crossings(first[k : k + block], second, touching) + [k, 0] for k in range(0, len(first), block)
-    ]
+    starts = range(0, len(first), block)
+    found = [np.array([k, 0]) + _crossings(first[k : k + block], second, touching) for k in starts]
     return np.concatenate(found)
 
 

@@ -13,8 +13,9 @@ from ..mesh import TriangleMesh
 def cut(mesh: TriangleMesh, edges) -> TriangleMesh:
     """The mesh cut along interior edges: both sides of the cut get vertices of their own.
 
-    The ends of a cut stay joined unless they lie on the boundary or on another cut, so a slit needs at least two edges
-    to open. Faces keep their numbers; vertices keep theirs on one side and are added at the end for the others.
+    The ends of a cut stay joined unless they lie on the boundary or on another cut, so a slit needs at least
+    two edges to open. Faces keep their numbers; vertices keep theirs on one side and are added at the end for
+    the others.
 
     Args:
         mesh: stays as it is.
@@ -52,7 +53,7 @@ def cut(mesh: TriangleMesh, edges) -> TriangleMesh:
 
 
 def _corners_at(mesh: TriangleMesh, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The face corners (3 face + i) at the lower and the higher vertex of interior edges: in both faces, (n, 2) each."""
+    """Face corners (3 face + i) at the lower and the higher vertex of interior edges, (n, 2 faces) each."""
     lows, highs = [], []
     for side, (at_low, at_high) in enumerate(((1, 2), (2, 1))):  # edge i runs from vertex i + 1 to i + 2
         face = mesh.edge_faces[edges, side].astype(np.int64)
@@ -63,7 +64,7 @@ def _corners_at(mesh: TriangleMesh, edges: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _corner_vertices(mesh: TriangleMesh, uncut: np.ndarray) -> np.ndarray:
-    """(3 n_f,): the new vertex at each face corner. Corners at a vertex are one while uncut edges connect them."""
+    """(3 n_f,): the new vertex at each face corner. Uncut edges keep the corners at their ends together."""
     pairs = np.concatenate(_corners_at(mesh, uncut))
     n_corners = 3 * mesh.n_faces
     graph = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(n_corners, n_corners))

@@ -26,8 +26,9 @@ def cylinder(
 
     Args:
         radius, length: m.
-        angle: phi in rad, measured from the top (+z) towards +x: (from, to), or the width of a span symmetric about
-            the top, so that a roof of half angle a has angle = 2 a. A full turn is closed: its seam is joined.
+        angle: phi in rad, measured from the top (+z) towards +x: (from, to), or the width of a span symmetric
+            about the top, so that a roof of half angle a has angle = 2 a. A full turn is closed: its seam is
+            joined.
         cells: (around, along).
         diagonals, irregular, seed: as for `rectangle`.
 

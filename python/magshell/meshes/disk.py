@@ -27,7 +27,7 @@ def disk(radius: float, cells: int) -> TriangleMesh:
 
 
 def _ring_faces(k: int) -> np.ndarray:
-    """Faces between ring k - 1 and ring k: in each of six sectors, k based on the outer ring, k - 1 on the inner."""
+    """Faces between rings k - 1 and k: in each of six sectors, k on the outer one, k - 1 on the inner."""
     sector, i = (index.ravel() for index in np.meshgrid(np.arange(6), np.arange(k), indexing="ij"))
 
     def outer(step):

@@ -9,10 +9,19 @@ import numpy as np
 from .._arrays import positive
 from ..mesh import TriangleMesh
 from ._gmsh_session import gmsh_session
-from ._polygon import checked_polygon, checked_polyline, contains, crossings, distance_to, meeting_point, segments, sides
+from ._polygon import (
+    checked_polygon,
+    checked_polyline,
+    contains,
+    crossings,
+    distance_to,
+    meeting_point,
+    segments,
+    sides,
+)
 from .cut import cut
 
-_ON_BOUNDARY = 1e-7  # of the outline's extent: a slit that ends this close to the boundary reaches it; gmsh's own
+_ON_BOUNDARY = 1e-7  # of the outline's extent: a slit that ends this close to the boundary reaches it
 
 
 def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -> TriangleMesh:
@@ -21,13 +30,13 @@ def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -
     Args:
         outer: (n, 2), m, the corners in either direction, the first one not repeated.
         holes: polygons alike, inside the outer one and apart from each other.
-        slits: polylines (n, 2), m, cut through the sheet: both sides get vertices of their own. Slits may cross and
-            may end on the boundary; an end inside the sheet stays joined.
+        slits: polylines (n, 2), m, cut through the sheet: both sides get vertices of their own. Slits may
+            cross and may end on the boundary; an end inside the sheet stays joined.
         size: the longest edge to aim for, m. Short sides of the polygons make the mesh finer around them.
 
     Raises:
-        ValueError: for polygons that intersect themselves or each other, holes or slits outside of the sheet, and
-            slits too short for two edges of the mesh.
+        ValueError: for polygons that intersect themselves or each other, holes or slits outside of the sheet,
+            and slits too short for two edges of the mesh.
         ImportError: without gmsh.
 
     >>> square = [(0, 0), (1, 0), (1, 1), (0, 1)]
@@ -41,7 +50,7 @@ def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -
     _check_holes(outer, holes)
     _check_slits(outer, holes, slits)
 
-    # gmsh's geometry kernel has absolute tolerances: mesh in units of about the extent. A power of two is exact.
+    # gmsh's kernel has absolute tolerances: mesh in units of about the extent. A power of two is exact.
     unit = 2.0 ** np.round(np.log2(np.ptp(outer, axis=0).max()))
     points, faces, slit_sides = _mesh_with_gmsh(
         outer / unit, [hole / unit for hole in holes], [slit / unit for slit in slits], size / unit
@@ -139,5 +148,6 @@ def _check_slits_open(mesh: TriangleMesh, slit_sides: list[np.ndarray]) -> None:
         others = [mesh.boundary_vertices, *(other.ravel() for other in slit_sides if other is not ends)]
         if len(ends) == 1 and not np.isin(ends, np.concatenate(others)).any():
             raise ValueError(
-                f"slit {k} is a single edge of the mesh and does not open; choose a size below half its length"
+                f"slit {k} is a single edge of the mesh and does not open; "
+                "choose a size below half its length"
             )

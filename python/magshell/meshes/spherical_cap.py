@@ -25,8 +25,8 @@ def spherical_cap(
 
     Args:
         radius: m.
-        angle_from, angle_to: rad from the +z axis, 0 <= angle_from < angle_to <= pi. At 0 and pi the cap closes in a
-            vertex at the pole, with a fan of faces around it.
+        angle_from, angle_to: rad from the +z axis, 0 <= angle_from < angle_to <= pi. At 0 and pi the cap
+            closes in a vertex at the pole, with a fan of faces around it.
         sector_angle: azimuth in rad from the x axis, from 0 to it or (from, to). A full turn joins its seam.
         cells: (around, along the meridian).
         diagonals, irregular, seed: as for `rectangle`.
