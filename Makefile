@@ -10,9 +10,10 @@ PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 sources := CMakeLists.txt pyproject.toml README.md LICENSE \
     $(shell find cpp cmake python/magshell -type f ! -name '*.so' ! -name '*.pyc' 2>/dev/null)
 pythons := python tests examples
+cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint stubs clean
+.PHONY: help demo test lint format stubs clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -20,7 +21,7 @@ help:  ## this list
 
 demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pictures, in out/
 	$(VENV)/bin/python examples/bistable_beam.py
-	@echo "The pictures are in $(CURDIR)/out/:" && ls out
+	@echo "The pictures are in $(CURDIR)/out:" && ls out
 
 test: $(VENV)/.with-test  ## every test, the notebooks and examples included
 	$(VENV)/bin/python -m pytest
@@ -28,7 +29,12 @@ test: $(VENV)/.with-test  ## every test, the notebooks and examples included
 lint: $(VENV)/.with-dev  ## ruff and clang-format, changing nothing
 	$(VENV)/bin/ruff check $(pythons)
 	$(VENV)/bin/ruff format --check $(pythons)
-	find cpp -name '*.h' -o -name '*.cpp' | xargs $(VENV)/bin/clang-format --dry-run -Werror
+	$(VENV)/bin/clang-format --dry-run -Werror $(cpps)
+
+format: $(VENV)/.with-dev  ## put the sources into the form that lint wants
+	$(VENV)/bin/ruff check --fix $(pythons)
+	$(VENV)/bin/ruff format $(pythons)
+	$(VENV)/bin/clang-format -i $(cpps)
 
 stubs: $(VENV)/.with-dev  ## write python/magshell/_core.pyi again, from the built extension
 	$(VENV)/bin/pybind11-stubgen magshell._core --output-dir python --exit-code

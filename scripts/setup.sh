@@ -27,12 +27,12 @@ sys.exit(not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.
 
 # The packages this machine still needs, one a line.
 missing() {
-    local package prefix=python3
+    local package prefix
     if python_works; then  # python3.12-venv for an interpreter that is not the distribution's default one
         prefix=$("$python" -c 'import sys; print("python%d.%d" % sys.version_info[:2])')
         venv_works || echo "$prefix-venv"
         headers_work || echo "$prefix-dev"
-    else
+    elif [ "$python" = python3 ]; then
         printf '%s\n' python3 python3-venv python3-dev
     fi
     compiler_works || echo build-essential
@@ -41,39 +41,42 @@ missing() {
     done
 }
 
-# Runs a command as root: directly, through a sudo that asks nothing, or through one that can ask somebody.
-as_root() {
+# How to become root: directly, through a sudo that asks nothing, or through one that can ask somebody.
+root_prefix() {
     if [ "$(id -u)" -eq 0 ]; then
-        "$@"
+        echo env
     elif command -v sudo >/dev/null && { sudo -n true 2>/dev/null || { [ -t 0 ] && [ -z "${CI:-}" ]; }; }; then
-        sudo "$@"
+        echo sudo env
     else
         return 1
     fi
 }
 
-# One package that the distribution does not have must not keep the others from being installed.
 install_packages() {
-    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@"
+    $as_root DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@"
 }
 
+if python_works && ! python_recent; then
+    say "$python is $("$python" -V); magshell needs Python 3.10 or later (PYTHON=... make)"
+    exit 1
+fi
 if command -v dpkg-query >/dev/null && command -v apt-get >/dev/null; then
     mapfile -t packages < <(missing)
-    if [ "${#packages[@]}" -gt 0 ]; then
+    if [ "${#packages[@]}" -gt 0 ] && as_root=$(root_prefix); then
         say "installing ${packages[*]}"
-        as_root apt-get update -q || say "apt-get update did not work; trying with the lists that are there"
+        $as_root apt-get update -q || say "apt-get update did not work; trying with the lists that are there"
+        # One package that the distribution does not have must not keep the others from being installed.
         install_packages "${packages[@]}" || for package in "${packages[@]}"; do
             install_packages "$package" || true
         done
         mapfile -t packages < <(missing)
     fi
-    [ "${#packages[@]}" -eq 0 ] || say "still missing; as root: apt-get install ${packages[*]}"
+    [ "${#packages[@]}" -eq 0 ] || say "missing; as root: apt-get install ${packages[*]}"
 else
     say "not a Debian-like system: a C++20 compiler, Python's headers and Eigen 3.4 must be there;" \
         "SuiteSparse, OpenBLAS and GL are used where they are"
 fi
 
 python_works || { say "there is no $python"; exit 1; }
-python_recent || { say "$python is $("$python" -V); magshell needs Python 3.10 or later (PYTHON=... make)"; exit 1; }
 venv_works || { say "$python has no venv module"; exit 1; }
 compiler_works || { say "there is no C++ compiler"; exit 1; }

@@ -1,4 +1,4 @@
-"""The shape of the code: the floors of the C++ core, who may see which library, file lengths, light imports."""
+"""The shape of the code: floors of the C++ core, who may see which library, file lengths, light imports."""
 
 import ast
 import re
