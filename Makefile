@@ -6,7 +6,7 @@ PYTHON ?= python3
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 
-# What the installed package is made from; a newer one means another build (incremental, in build/).
+# What the installed package is made from; a newer one means another build, an incremental one.
 sources := CMakeLists.txt pyproject.toml README.md LICENSE \
     $(shell find cpp cmake python/magshell -type f ! -name '*.so' ! -name '*.pyc' 2>/dev/null)
 pythons := python tests examples
@@ -51,7 +51,9 @@ $(VENV)/.created: scripts/setup.sh
 	$(PIP) install --quiet 'scikit-build-core>=0.10' 'pybind11>=2.13' cmake ninja
 	touch $@
 
-# The package with one of pyproject.toml's extras.
+# The package with one of pyproject.toml's extras. build/make is kept for the next time; a plain `pip install .` builds in
+# a directory of its own, so that its options do not end up in this one's cache.
 $(VENV)/.with-%: $(sources) $(VENV)/.created
-	$(PIP) install --quiet --no-build-isolation --check-build-dependencies '.[$*]'
+	$(PIP) install --quiet --no-build-isolation --check-build-dependencies \
+	    --config-settings=build-dir=build/make '.[$*]'
 	touch $@
