@@ -9,7 +9,7 @@ PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 # What the installed package is made from; a newer one means another build, an incremental one.
 sources := CMakeLists.txt pyproject.toml README.md LICENSE \
     $(shell find cpp cmake python/magshell -type f ! -name '*.so' ! -name '*.pyc' 2>/dev/null)
-pythons := python tests examples
+pythons := $(wildcard python tests examples)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help
