@@ -1,0 +1,59 @@
+# One command each: `make demo` and `make test` install what is missing, build, and run. `make help` lists the rest.
+#
+# Everything lives in .venv; the stamps in it make a second call quick. PYTHON=python3.12 chooses the interpreter of a
+# new .venv.
+PYTHON ?= python3
+VENV := .venv
+PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
+
+# What the installed package is made from; a newer one means another build, an incremental one.
+sources := CMakeLists.txt pyproject.toml README.md LICENSE \
+    $(shell find cpp cmake python/magshell -type f ! -name '*.so' ! -name '*.pyc' 2>/dev/null)
+pythons := $(wildcard python tests examples)
+cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint format stubs clean
+.DELETE_ON_ERROR:
+
+help:  ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-7s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pictures, in out/
+	$(VENV)/bin/python examples/bistable_beam.py
+	@echo "The pictures are in $(CURDIR)/out:" && ls out
+
+test: $(VENV)/.with-test  ## every test, the notebooks and examples included
+	$(VENV)/bin/python -m pytest
+
+lint: $(VENV)/.with-dev  ## ruff and clang-format, changing nothing
+	$(VENV)/bin/ruff check $(pythons)
+	$(VENV)/bin/ruff format --check $(pythons)
+	$(VENV)/bin/clang-format --dry-run -Werror $(cpps)
+
+format: $(VENV)/.with-dev  ## put the sources into the form that lint wants
+	$(VENV)/bin/ruff check --fix $(pythons)
+	$(VENV)/bin/ruff format $(pythons)
+	$(VENV)/bin/clang-format -i $(cpps)
+
+stubs: $(VENV)/.with-dev  ## write python/magshell/_core.pyi again, from the built extension
+	$(VENV)/bin/pybind11-stubgen magshell._core --output-dir python --exit-code
+	$(VENV)/bin/ruff check --quiet --fix python/magshell/_core.pyi
+	$(VENV)/bin/ruff format --quiet python/magshell/_core.pyi
+
+clean:  ## remove the environment, the build and what the demo wrote
+	rm -rf $(VENV) build out
+
+# The build tools are in the environment itself, so that a rebuild finds them where the last one did.
+$(VENV)/.created: scripts/setup.sh
+	scripts/setup.sh $(PYTHON)
+	$(PYTHON) -m venv $(VENV)
+	$(PIP) install --quiet 'scikit-build-core>=0.10' 'pybind11>=2.13' cmake ninja
+	touch $@
+
+# The package with one of pyproject.toml's extras. build/make is kept for the next time; a plain `pip install .` builds in
+# a directory of its own, so that its options do not end up in this one's cache.
+$(VENV)/.with-%: $(sources) $(VENV)/.created
+	$(PIP) install --quiet --no-build-isolation --check-build-dependencies \
+	    --config-settings=build-dir=build/make '.[$*]'
+	touch $@

@@ -1,0 +1,18 @@
+"""What every test runs under: one BLAS thread, no display, the same random numbers every time."""
+
+import os
+
+# Before numpy is imported: its BLAS reads these once.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+os.environ["MPLBACKEND"] = "Agg"
+os.environ["PYVISTA_OFF_SCREEN"] = "true"
+
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """A generator with a fixed seed, new for each test, so that no test depends on another's draws."""
+    return np.random.default_rng(20220701)

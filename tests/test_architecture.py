@@ -1,0 +1,181 @@
+"""The shape of the code: floors of the C++ core, who may see which library, file lengths, light imports."""
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+# A file includes files of its own floor and of lower ones.
+FLOORS = {
+    "magshell/core": 0,
+    "magshell/mesh": 1,
+    "magshell/linalg": 1,
+    "magshell/strain": 2,
+    "magshell/field": 2,
+    "magshell/energy": 3,
+    "magshell/force": 3,
+    "magshell/assembly": 4,
+    "magshell/solve": 5,
+    "magshell/adjoint": 6,
+    "bindings": 7,
+}
+# Libraries that one folder hides from the others: a pattern of the include, and the folder.
+HIDDEN_HEADERS = {r"pybind11/|Python\.h": "bindings", r"(?i)cholmod": "magshell/linalg"}
+# Modules that one Python module hides from the others, by its name within the package.
+HIDDEN_MODULES = {"torch.autograd": "autograd", "matplotlib": "plot", "pyvista": "plot"}
+OPTIONAL_MODULES = ["torch", "matplotlib", "pyvista", "meshio", "gmsh", "magpylib"]
+LONGEST_FILE = 400
+
+
+def cpp_files(root: Path) -> list[Path]:
+    return sorted(path for path in (root / "cpp").rglob("*") if path.suffix in {".h", ".cpp"})
+
+
+def python_files(root: Path, *folders: str) -> list[Path]:
+    return sorted(path for folder in folders for path in (root / folder).rglob("*.py"))
+
+
+def includes(path: Path) -> list[tuple[str, str]]:
+    """(delimiter, name) of each include: '"' or '<', and what stands after it."""
+    return re.findall(r'^\s*#\s*include\s*(["<])([^">]+)[">]', path.read_text(), re.MULTILINE)
+
+
+def folder_of(name: str) -> str:
+    return name.rpartition("/")[0]
+
+
+def include_violations(root: Path) -> Iterator[str]:
+    for path in cpp_files(root):
+        file = path.relative_to(root / "cpp").as_posix()
+        if folder_of(file) not in FLOORS:
+            yield f"{file}: its folder has no floor"
+            continue
+        for delimiter, name in includes(path):
+            if folder_of(name) in FLOORS:
+                if FLOORS[folder_of(name)] > FLOORS[folder_of(file)]:
+                    yield f"{file} includes {name}, of a higher floor"
+            elif delimiter == '"':
+                yield f"{file} includes {name}, which is not a path from cpp/"
+            for pattern, owner in HIDDEN_HEADERS.items():
+                if re.search(pattern, name) and folder_of(file) != owner and folder_of(name) not in FLOORS:
+                    yield f"{file} includes {name}, which only {owner}/ may"
+
+
+def imported_names(path: Path) -> Iterator[str]:
+    """Dotted names a file imports, or reaches through a module (`torch.autograd.Function`)."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Attribute):
+            yield ast.unparse(node)
+
+
+def import_violations(root: Path) -> Iterator[str]:
+    package = root / "python" / "magshell"
+    for path in python_files(root, "python/magshell"):
+        owner = path.relative_to(package).parts[0].removesuffix(".py")
+        for name in imported_names(path):
+            for module, only in HIDDEN_MODULES.items():
+                if (name == module or name.startswith(f"{module}.")) and owner != only:
+                    yield f"{path.relative_to(package)} imports {name}, which only {only} may"
+
+
+def length_violations(root: Path) -> Iterator[str]:
+    for path in cpp_files(root) + python_files(root, "python", "tests", "examples"):
+        length = len(path.read_text().splitlines())
+        if length > LONGEST_FILE:
+            yield f"{path.relative_to(root)} has {length} lines"
+
+
+RULES = [include_violations, import_violations, length_violations]
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_rule_holds(rule) -> None:
+    assert list(rule(ROOT)) == []
+
+
+def test_the_rules_look_at_files() -> None:
+    assert cpp_files(ROOT) and python_files(ROOT, "python/magshell")
+
+
+@pytest.mark.parametrize(
+    ("rule", "file", "text", "complaint"),
+    [
+        (include_violations, "cpp/magshell/mesh/a.h", '#include "magshell/solve/b.h"\n', "higher floor"),
+        (include_violations, "cpp/magshell/mesh/a.h", '#include "../solve/b.h"\n', "not a path from cpp/"),
+        (include_violations, "cpp/magshell/plans/a.h", "", "no floor"),
+        (include_violations, "cpp/magshell/solve/a.cpp", "#include <pybind11/numpy.h>\n", "only bindings/"),
+        (
+            include_violations,
+            "cpp/magshell/solve/a.cpp",
+            "#include <suitesparse/cholmod.h>\n",
+            "only magshell/linalg/",
+        ),
+        (
+            include_violations,
+            "cpp/magshell/solve/a.cpp",
+            "#  include <Eigen/CholmodSupport>\n",
+            "only magshell/linalg/",
+        ),
+        (
+            import_violations,
+            "python/magshell/statics.py",
+            "from torch import autograd\n",
+            "only autograd may",
+        ),
+        (
+            import_violations,
+            "python/magshell/statics.py",
+            "class A(torch.autograd.Function): ...\n",
+            "only autograd may",
+        ),
+        (
+            import_violations,
+            "python/magshell/io/vtu.py",
+            "def f():\n    import pyvista as pv\n",
+            "only plot may",
+        ),
+        (length_violations, "tests/test_long.py", "\n" * (LONGEST_FILE + 1), "401 lines"),
+    ],
+)
+def test_rule_sees_a_violation(tmp_path: Path, rule, file: str, text: str, complaint: str) -> None:
+    path = tmp_path / file
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    complaints = list(rule(tmp_path))
+    assert complaints and all(complaint in each for each in complaints)
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        (
+            "cpp/magshell/mesh/a.h",
+            '#include <vector>\n#include "magshell/core/types.h"\n#include "magshell/linalg/b.h"\n',
+        ),
+        ("cpp/magshell/linalg/cholmod.cpp", '#include <cholmod.h>\n#include "magshell/linalg/cholmod.h"\n'),
+        ("cpp/bindings/solve.cpp", '#include <pybind11/stl.h>\n#include "magshell/linalg/cholmod.h"\n'),
+        ("python/magshell/plot/html.py", "import pyvista\nfrom matplotlib import pyplot\n"),
+        ("python/magshell/autograd.py", "from torch.autograd.function import once_differentiable\n"),
+    ],
+)
+def test_rules_let_good_code_through(tmp_path: Path, file: str, text: str) -> None:
+    path = tmp_path / file
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    assert [complaint for rule in RULES for complaint in rule(tmp_path)] == []
+
+
+def test_import_needs_no_optional_module() -> None:
+    code = f"import sys, magshell; print(*(name for name in {OPTIONAL_MODULES} if name in sys.modules))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == []
