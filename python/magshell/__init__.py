@@ -2,22 +2,45 @@
 
 from . import meshes
 from ._core import __version__
+from .equilibrium import Equilibrium
+from .errors import Interrupted, NotConverged
 from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .field_adapters import CustomField, MagpylibField
 from .io import read_fields, read_mesh, write_mesh
+from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .mesh import TriangleMesh
+from .scene import Scene
+from .shell import Shell
+from .solvers import MixedNewton, Newton
+from .statics import equilibrium
+from .supports import Clamp, Pin, SymmetryPlane
 from .weld import Weld, weld
 
 __all__ = [
     "AppliedField",
+    "AreaLoad",
+    "Clamp",
     "CustomField",
     "Dipoles",
+    "EdgeCouple",
+    "EdgeLoad",
+    "Equilibrium",
+    "Interrupted",
     "MagpylibField",
+    "MixedNewton",
+    "Newton",
+    "NotConverged",
+    "Pin",
+    "PointLoad",
     "SampledField",
+    "Scene",
+    "Shell",
+    "SymmetryPlane",
     "TriangleMesh",
     "UniformField",
     "Weld",
     "__version__",
+    "equilibrium",
     "meshes",
     "read_fields",
     "read_mesh",

@@ -1,0 +1,30 @@
+"""torch tensors in, torch tensors out; magshell itself needs no torch."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+
+def is_tensor(value) -> bool:
+    torch = sys.modules.get("torch")
+    return torch is not None and isinstance(value, torch.Tensor)
+
+
+def to_array(name: str, value):
+    """A tensor's numbers; anything else as it came. Tensors that ask for a gradient are refused."""
+    if not is_tensor(value):
+        return value
+    if value.requires_grad:
+        raise ValueError(f"{name} requires a gradient, and this version has none for it: detach it first")
+    return value.detach().cpu().numpy()
+
+
+def like(values: np.ndarray, *inputs):
+    """The array, or a tensor of the dtype of the first tensor among the inputs."""
+    for given in inputs:
+        if is_tensor(given):
+            torch = sys.modules["torch"]
+            return torch.from_numpy(np.ascontiguousarray(values)).to(dtype=given.dtype)
+    return values

@@ -1,0 +1,19 @@
+"""What a solve raises when it cannot finish. Each error hands back what the solve had."""
+
+from __future__ import annotations
+
+
+class NotConverged(RuntimeError):
+    """A solve failed. `last_good` holds the last converged state, as a result of the same kind."""
+
+    def __init__(self, message: str, last_good=None):
+        super().__init__(message)
+        self.last_good = last_good
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C stopped a solve. `last_good` holds the last converged state, as a result of the same kind."""
+
+    def __init__(self, message: str, last_good=None):
+        super().__init__(message)
+        self.last_good = last_good

@@ -1,0 +1,94 @@
+"""Dead loads and edge couples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._quantity import quantity
+from ._selections import indices
+from .mesh import TriangleMesh
+
+
+class PointLoad:
+    """A force [N] on each of some vertices: `force` (3,) on every one of them, or (k, 3), one each."""
+
+    def __init__(self, vertices, force):
+        self.vertices = np.atleast_1d(np.asarray(vertices))
+        self.force = _vectors("force", "N", force)
+
+    def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
+        """(n_v, 3), N."""
+        vertices = indices("PointLoad vertices", self.vertices, mesh.n_vertices)
+        return _spread(mesh, vertices[:, None], _rows("force", self.force, len(vertices)))
+
+
+class EdgeLoad:
+    """A force per rest length [N/m] along some edges, half to each end: (3,) or (k, 3), one an edge."""
+
+    def __init__(self, edges, force_per_length):
+        self.edges = np.atleast_1d(np.asarray(edges))
+        self.force_per_length = _vectors("force_per_length", "N/m", force_per_length)
+
+    def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
+        """(n_v, 3), N."""
+        edges = indices("EdgeLoad edges", self.edges, mesh.n_edges)
+        density = _rows("force_per_length", self.force_per_length, len(edges))
+        return _spread(mesh, mesh.edges[edges], density * (mesh.edge_lengths[edges] / 2.0)[:, None])
+
+
+class AreaLoad:
+    """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face."""
+
+    def __init__(self, force_per_area, faces=None):
+        self.faces = None if faces is None else np.atleast_1d(np.asarray(faces))
+        self.force_per_area = _vectors("force_per_area", "N/m2", force_per_area)
+
+    def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
+        """(n_v, 3), N."""
+        faces = np.arange(mesh.n_faces) if self.faces is None else indices("AreaLoad faces", self.faces, mesh.n_faces)
+        density = _rows("force_per_area", self.force_per_area, len(faces))
+        return _spread(mesh, mesh.faces[faces], density * (mesh.face_areas[faces] / 3.0)[:, None])
+
+
+class EdgeCouple:
+    """A couple per rest length [N] turning the director of free boundary edges about the edge itself.
+
+    couple_per_length: a number, about the edge's direction with the sheet on its left (seen from the side its normals
+        point to); positive lifts nothing but turns as a right hand along that direction does. Or a vector (3,), of which
+        the part along each rest edge counts. The axis follows the edge.
+    """
+
+    def __init__(self, edges, couple_per_length):
+        self.edges = np.atleast_1d(np.asarray(edges))
+        shape = () if np.ndim(couple_per_length) == 0 else (3,)
+        self.couple_per_length = quantity("couple_per_length", "N", couple_per_length, shape)
+
+    def edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """The edges (k,) and their couples (k,), N m."""
+        edges = indices("EdgeCouple edges", self.edges, mesh.n_edges)
+        inside = np.setdiff1d(edges, mesh.boundary_edges)
+        if inside.size:
+            raise ValueError(f"EdgeCouple edges must be on the boundary, but edge {inside[0]} is not")
+        lengths = mesh.edge_lengths[edges]
+        if self.couple_per_length.ndim == 0:
+            return edges, self.couple_per_length * lengths
+        ends = mesh.rest_positions[mesh.edges[edges]]
+        along = (ends[:, 1] - ends[:, 0]) * np.where(mesh.edge_faces[edges, 0] >= 0, 1.0, -1.0)[:, None]
+        return edges, along @ self.couple_per_length
+
+
+def _vectors(name: str, unit: str, values) -> np.ndarray:
+    return quantity(name, unit, values, (3,) if np.ndim(values) == 1 else ("k", 3))
+
+
+def _rows(name: str, vectors: np.ndarray, count: int) -> np.ndarray:
+    if vectors.ndim == 2 and len(vectors) != count:
+        raise ValueError(f"{name} must have shape (3,) or ({count}, 3), got {vectors.shape}")
+    return np.broadcast_to(vectors, (count, 3))
+
+
+def _spread(mesh: TriangleMesh, vertices: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Each row's force on each of the row's vertices."""
+    at_vertices = np.zeros((mesh.n_vertices, 3))
+    np.add.at(at_vertices, vertices, forces[:, None, :])
+    return at_vertices

@@ -1,0 +1,132 @@
+"""A scene: a shell, how it is held, and what acts on it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import _constraints, _core
+from ._quantity import quantity
+from .field import AppliedField, UniformField
+from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
+from .shell import Shell
+from .supports import Clamp, Pin, SymmetryPlane, continuations
+
+_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple)
+_SUPPORTS = (Pin, Clamp, SymmetryPlane)
+
+
+class Scene:
+    """What is modelled. What a scene lacks costs nothing; it can be solved many times.
+
+    shell: Shell.
+    supports: Pin, Clamp and SymmetryPlane objects.
+    loads: PointLoad, EdgeLoad, AreaLoad and EdgeCouple objects.
+    field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
+    gravity: (3,), m/s2; needs the shell's mass density.
+    allow_rigid_motions: accept a scene that supports do not hold entirely, because a field or gravity does.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5)
+    >>> ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField()).n_unknowns
+    158
+    """
+
+    def __init__(
+        self, shell: Shell, *, supports=(), loads=(), field=None, gravity=None, allow_rigid_motions: bool = False
+    ):
+        if not isinstance(shell, Shell):
+            raise ValueError(f"shell must be a Shell, got {type(shell).__name__}")
+        self.shell = shell
+        self.supports = _checked_list("supports", supports, _SUPPORTS)
+        self.loads = _checked_list("loads", loads, _LOADS)
+        self.fields = () if field is None else _checked_list("field", field, (AppliedField,))
+        self.gravity = np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
+        if sum(isinstance(f, UniformField) for f in self.fields) > 1:
+            raise ValueError("field holds several UniformFields: one is enough, its value comes when the scene is solved")
+        self._build(allow_rigid_motions)
+
+    def _build(self, allow_rigid_motions: bool) -> None:
+        shell, mesh = self.shell, self.shell.mesh
+        edges, couples = self._couples()
+        constraints = _constraints.gather(mesh, self.supports, _couple_directions(mesh, edges))
+        if np.intersect1d(edges, constraints.directed_edges[:, 0]).size:
+            raise ValueError("an EdgeCouple acts on an edge that a support holds")
+        free = [] if allow_rigid_motions else _constraints.free_rigid_motions(mesh, constraints)
+        if free:
+            raise ValueError(
+                f"the supports leave the sheet free: {'; '.join(free)}. Hold it, or say allow_rigid_motions=True if a "
+                "field or gravity does"
+            )
+        n_directions, n_couples = len(constraints.directions), len(edges)
+        heavy = bool(self.gravity.any())
+        self._constraints = constraints
+        self._model = _core.Model(
+            mesh._core,
+            directors=shell.bending == "midedge",
+            directed_edges=constraints.directed_edges,
+            directions=constraints.directions,
+            held_nodes=constraints.held_nodes,
+            held_frames=constraints.held_frames,
+            motions=np.array(constraints.motions).reshape(-1, 3, 3),
+            thickness=shell.thickness,
+            young_modulus=shell.young_modulus,
+            poisson_ratio=shell.poisson_ratio,
+            curvature_scale=shell.curvature_scale,
+            vertex_mass=shell.vertex_masses if heavy else np.zeros(0),
+            gravity=self.gravity,
+            vertex_loads=self._vertex_loads(),
+            couple_edges=np.stack([edges, n_directions - n_couples + np.arange(n_couples)], axis=1).astype(np.int32),
+            couples=couples,
+            magnetic=bool(self.fields),
+            field_sources=[f._core for f in self.fields if not isinstance(f, UniformField)],
+        )
+
+    def _vertex_loads(self) -> np.ndarray:
+        forces = [load.vertex_forces(self.shell.mesh) for load in self.loads if not isinstance(load, EdgeCouple)]
+        return np.sum(forces, axis=0) if forces else np.zeros((0, 3))
+
+    def _couples(self) -> tuple[np.ndarray, np.ndarray]:
+        parts = [load.edge_couples(self.shell.mesh) for load in self.loads if isinstance(load, EdgeCouple)]
+        if not parts:
+            return np.zeros(0, dtype=np.int64), np.zeros(0)
+        edges, couples = (np.concatenate(part) for part in zip(*parts, strict=True))
+        unique, inverse = np.unique(edges, return_inverse=True)
+        return unique, np.bincount(inverse, weights=couples)
+
+    @property
+    def mesh(self):
+        return self.shell.mesh
+
+    @property
+    def has_uniform_field(self) -> bool:
+        return any(isinstance(f, UniformField) for f in self.fields)
+
+    @property
+    def n_unknowns(self) -> int:
+        """Free position components and edge rotations."""
+        return self._model.free_size
+
+    def __repr__(self) -> str:
+        lines = [f"Scene: {self.shell!r}"]
+        lines += [f"  held by {support!r}" for support in self.supports]
+        lines += [f"  loaded by {type(load).__name__}" for load in self.loads]
+        lines += [f"  in {field!r}" for field in self.fields]
+        if self.gravity.any():
+            lines.append(f"  under gravity {tuple(self.gravity.tolist())} m/s2")
+        lines.append(f"  {self.n_unknowns} unknowns")
+        return "\n".join(lines)
+
+
+def _checked_list(name: str, items, kinds: tuple[type, ...]) -> tuple:
+    items = (items,) if isinstance(items, kinds) else tuple(items)
+    for item in items:
+        if not isinstance(item, kinds):
+            wanted = ", ".join(kind.__name__ for kind in kinds)
+            raise ValueError(f"{name} must hold {wanted} objects, got {type(item).__name__}")
+    return items
+
+
+def _couple_directions(mesh, edges: np.ndarray) -> np.ndarray:
+    """What each couple's edge angle is measured to: outwards in the plane of its face at rest, (k, 3)."""
+    return continuations(mesh, edges) if len(edges) else np.zeros((0, 3))

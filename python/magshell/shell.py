@@ -1,0 +1,104 @@
+"""A sheet: a mesh with thickness and material."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._quantity import quantity
+from .mesh import TriangleMesh
+
+BENDING = ("midedge", "hinge")
+
+
+class Shell:
+    """A thin sheet of St. Venant-Kirchhoff material under the Kirchhoff-Love assumption.
+
+    Every property is a number, or an array with one entry a face; `curvature_scale` one an edge.
+
+    mesh: TriangleMesh, its positions are the rest shape.
+    thickness: m, positive.
+    young_modulus: Pa, positive.
+    poisson_ratio: in (-1, 1/2].
+    mass_density: kg/m3, positive; only gravity asks for it.
+    curvature_scale: positive factor on every bending strain, [Chen22] k_cur.
+    bending: "midedge" (second order on any mesh, one rotation an edge: the lowest-order Hellan-Herrmann-Johnson
+        element), or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several percent on irregular meshes).
+
+    >>> import magshell as ms
+    >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)
+    Shell(40 faces, thickness 0.001 m, young_modulus 1e+05 Pa, poisson_ratio 0.5, bending midedge)
+    """
+
+    def __init__(
+        self,
+        mesh: TriangleMesh,
+        *,
+        thickness,
+        young_modulus,
+        poisson_ratio=0.5,
+        mass_density=None,
+        curvature_scale=1.0,
+        bending: str = "midedge",
+    ):
+        if not isinstance(mesh, TriangleMesh):
+            raise ValueError(f"mesh must be a TriangleMesh, got {type(mesh).__name__}")
+        if bending not in BENDING:
+            raise ValueError(f"bending must be one of {BENDING}, got {bending!r}")
+        self.mesh = mesh
+        self.bending = bending
+        faces = ("n_f", mesh.n_faces)
+        self.thickness = _positive("thickness", "m", thickness, faces)
+        self.young_modulus = _positive("young_modulus", "Pa", young_modulus, faces)
+        self.poisson_ratio = _property("poisson_ratio", "1", poisson_ratio, faces)
+        _refuse("poisson_ratio [1]", "in (-1, 1/2]", self.poisson_ratio, (self.poisson_ratio <= -1) | (self.poisson_ratio > 0.5))
+        self.mass_density = None if mass_density is None else _positive("mass_density", "kg/m3", mass_density, faces)
+        self.curvature_scale = _positive("curvature_scale", "1", curvature_scale, ("n_e", mesh.n_edges))
+
+    @property
+    def face_volumes(self) -> np.ndarray:
+        """Rest volumes, (n_f,), m3."""
+        return self.mesh.face_areas * self.thickness
+
+    @property
+    def vertex_masses(self) -> np.ndarray:
+        """Lumped masses, (n_v,), kg: a third of each face's. A sheet without mass density has none."""
+        if self.mass_density is None:
+            raise ValueError("the shell has no mass_density [kg/m3]")
+        masses = np.zeros(self.mesh.n_vertices)
+        np.add.at(masses, self.mesh.faces, (self.face_volumes * self.mass_density / 3.0)[:, None])
+        return masses
+
+    def __repr__(self) -> str:
+        parts = [f"{self.mesh.n_faces} faces"]
+        for name, unit in (("thickness", " m"), ("young_modulus", " Pa"), ("poisson_ratio", ""), ("mass_density", " kg/m3")):
+            values = getattr(self, name)
+            if values is not None:
+                parts.append(f"{name} {_range(values)}{unit}")
+        return f"Shell({', '.join(parts)}, bending {self.bending})"
+
+
+def _property(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:
+    """One finite number a row, from an array of that length or from a single number."""
+    if np.ndim(value) == 0:
+        value = np.full(rows[1], float(quantity(name, unit, value, ())))
+    array = quantity(name, unit, value, (rows[0],))
+    if array.shape != (rows[1],):
+        raise ValueError(f"{name} [{unit}] must be a number or have shape ({rows[0]},) = ({rows[1]},), got {array.shape}")
+    return array
+
+
+def _positive(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:
+    array = _property(name, unit, value, rows)
+    _refuse(f"{name} [{unit}]", "positive", array, array <= 0)
+    return array
+
+
+def _refuse(label: str, wanted: str, array: np.ndarray, bad: np.ndarray) -> None:
+    if bad.any():
+        index = int(np.argmax(bad))
+        raise ValueError(f"{label} must be {wanted}, but entry {index} is {array[index]:g}")
+
+
+def _range(values: np.ndarray) -> str:
+    low, high = values.min(), values.max()
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"

@@ -1,0 +1,139 @@
+"""Equilibria of a scene: ms.equilibrium."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from . import _core
+from ._inputs import Inputs
+from ._tensors import like, to_array
+from .equilibrium import Equilibrium
+from .errors import Interrupted, NotConverged
+from .scene import Scene
+from .solvers import MixedNewton, Newton
+
+
+def equilibrium(
+    scene: Scene,
+    *,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    motion_factor: float = 1.0,
+    start: Equilibrium | np.ndarray | None = None,
+    require_stable: bool = True,
+    solver: Newton | None = None,
+    progress: Callable[[float, float], None] | None = None,
+) -> Equilibrium:
+    """A stable equilibrium of a scene.
+
+    remanent_magnetization: A/m, rest frame, world axes: (n_f, 3), or (3,) on every face. Needed in a scene with a field.
+    applied_flux_density: T, (3,): the value of the scene's UniformField.
+    load_factor, gravity_factor, field_factor, motion_factor: on the loads, gravity, the field sources, and on how far
+        supports with a prescribed motion have gone.
+    start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
+        (n_v, 3) m. By default the rest shape, unloaded.
+    require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.
+    solver: MixedNewton() by default.
+    progress: called now and then with how far the controls have come (0 to 1) and the residual.
+
+    Raises NotConverged and Interrupted (on Ctrl-C), both with the last converged state as `last_good`; ValueError on
+    bad input. With torch tensors among the inputs, positions come back as one; gradients are not there yet, and a
+    tensor that requires one is refused.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    >>> rest = ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=(0, 0, 2e-3))
+    >>> rest.stable, bool(rest.positions[:, 2].max() > 0.01)
+    (True, True)
+    """
+    solver = MixedNewton() if solver is None else solver
+    if not isinstance(solver, Newton):
+        raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
+    inputs = Inputs(
+        scene,
+        remanent_magnetization,
+        applied_flux_density,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    state, from_, at_rest = _start(scene, start, inputs)
+    options = solver._options()
+    options.require_stable = require_stable
+    options.start_at_rest = at_rest
+
+    began = time.perf_counter()
+    inputs.magnetize()
+    found = _core.find_equilibrium(scene._model, state, from_, inputs.controls, options, progress)
+    result = _result(scene, inputs, found, time.perf_counter() - began)
+    if found.outcome == _core.Outcome.interrupted:
+        raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
+    if found.outcome == _core.Outcome.failed:
+        raise NotConverged(_failure(found, at_rest), result)
+    return result
+
+
+def _start(scene: Scene, start, inputs: Inputs):
+    """State, controls at which it holds, and whether it is an equilibrium there."""
+    model = scene._model
+    if start is None:
+        return model.rest_state(), _core.Controls(), True
+    if isinstance(start, Equilibrium):
+        if start.scene is not scene:
+            raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
+        same = np.array_equal(start._magnetization, inputs.magnetization)
+        return start._state, start._controls, same
+    positions = np.asarray(to_array("start", start), dtype=np.float64)
+    shape = (scene.mesh.n_vertices, 3)
+    if positions.shape != shape or not np.isfinite(positions).all():
+        raise ValueError(f"start [m] must be an Equilibrium or finite positions of shape (n_v, 3) = {shape}")
+    return model.state(positions, np.zeros(scene.mesh.n_edges)), inputs.controls, False
+
+
+def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibrium:
+    model = scene._model
+    return Equilibrium(
+        scene=scene,
+        positions=like(model.positions(found.state), *inputs.given),
+        edge_rotations=like(model.edge_rotations(found.state), *inputs.given),
+        remanent_magnetization=inputs.given_magnetization,
+        applied_flux_density=like(np.array(found.controls.flux_density), *inputs.given),
+        energies=model.energies(found.state, found.controls),
+        stable=found.stable,
+        unstable_directions=found.unstable_directions,
+        iterations=found.iterations,
+        factorizations=found.factorizations,
+        failed_factorizations=found.failed_factorizations,
+        load_steps=found.load_steps,
+        relaxation_steps=found.relaxation_steps,
+        saddles_left=found.saddles_left,
+        residual=found.residual,
+        progress=found.progress,
+        wall_time=wall_time,
+        memory=found.bytes,
+        factorization=found.factorization,
+        _state=found.state,
+        _controls=found.controls,
+        _magnetization=inputs.magnetization,
+    )
+
+
+def _failure(found, at_rest: bool) -> str:
+    advice = (
+        "Load it in smaller steps (first_load_step of the solver), or start from a nearby equilibrium."
+        if at_rest
+        else "Start from positions closer to an equilibrium."
+    )
+    return (
+        f"the solve stopped at {found.progress:.3g} of the way to the new controls, after {found.iterations} iterations: "
+        f"{found.reason}. {advice} The last converged state is in `error.last_good`."
+    )
