@@ -1,7 +1,7 @@
 // Static solves to Python: the GIL is released, Ctrl-C is looked for, progress is called back.
 #include "magshell/solve/statics.h"
 
-#include "bindings/bindings.h"
+#include "bindings/arrays.h"
 #include "bindings/watch.h"
 
 namespace magshell::bindings {
