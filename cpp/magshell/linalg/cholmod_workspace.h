@@ -18,6 +18,7 @@ class CholmodCommon {
     CholmodCommon& operator=(const CholmodCommon&) = delete;
     operator cholmod_common*() { return &common_; }
     cholmod_common* operator->() { return &common_; }
+    int status() const { return common_.status; }
 
   private:
     cholmod_common common_;

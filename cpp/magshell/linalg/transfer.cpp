@@ -18,9 +18,9 @@ class LaneMove {
   public:
 #ifdef __AVX512F__
     explicit LaneMove(const Transfer& transfer) {
-        const __m512i from = _mm512_cvtepu8_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(transfer.from.data())));
-        index_ = from;
-        wanted_ = _mm512_cmplt_epi64_mask(from, _mm512_set1_epi64(width));
+        const __m128i from = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(transfer.from.data()));
+        index_ = _mm512_maskz_cvtepu8_epi64(0xff, from);
+        wanted_ = _mm512_cmplt_epi64_mask(index_, _mm512_set1_epi64(width));
     }
     void add(const double* source, double* target) const {
         const __m512d moved = _mm512_maskz_permutexvar_pd(wanted_, index_, _mm512_load_pd(source));
