@@ -8,8 +8,8 @@
 namespace magshell {
 
 // Ruiz (2001): divide rows and columns by the square root of their largest entry, repeatedly; twice is enough for pivoting.
-void equilibrate(const SparsePattern& pattern, const double* values, std::vector<double>& scale,
-                 std::vector<double>& scaled) {
+double equilibrate(const SparsePattern& pattern, const double* values, std::vector<double>& scale,
+                   std::vector<double>& scaled) {
     check_finite(values, pattern.rows.size());
     std::copy_n(values, pattern.rows.size(), scaled.begin());
     std::fill(scale.begin(), scale.end(), 1.0);
@@ -35,6 +35,9 @@ void equilibrate(const SparsePattern& pattern, const double* values, std::vector
             }
         }
     }
+    double largest_of_all = 0.0;
+    for (const double value : scaled) largest_of_all = std::max(largest_of_all, std::abs(value));
+    return largest_of_all;
 }
 
 }  // namespace magshell

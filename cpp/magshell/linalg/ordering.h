@@ -1,18 +1,12 @@
 // Fill-reducing orderings.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "magshell/linalg/assembly_tree.h"
 
 namespace magshell {
 
-/// order[k] = the unknown to eliminate k-th. AMD always works; METIS only where CHOLMOD was built with it (without it,
-/// AMD is used).
-std::vector<Index> fill_reducing_order(const SparsePattern& pattern, Ordering ordering);
-
-/// The assembly tree for the ordering asked for; for Ordering::best, of the one that needs fewer operations.
+/// The assembly tree for a fill-reducing ordering. AMD always works; METIS only where CHOLMOD is there and was built with it,
+/// else AMD takes its place. Ordering::best tries both where METIS is quick, and takes the one that needs fewer operations.
 AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, Ordering ordering);
 
 }  // namespace magshell

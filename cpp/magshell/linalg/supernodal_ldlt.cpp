@@ -35,7 +35,7 @@ SupernodalLdlt::SupernodalLdlt(const SparsePattern& pattern, Ordering ordering) 
 FactorReport SupernodalLdlt::factorize(const double* values) {
     report_ = {};
     report_.reason = "the last factorize() did not finish";
-    equilibrate(pattern_, values, scale_, scaled_values_);
+    largest_scaled_ = equilibrate(pattern_, values, scale_, scaled_values_);
     values_.assign(values, values + pattern_.rows.size());
 
     std::vector<PivotTally> tallies(plan_.subtrees.size());
@@ -49,7 +49,7 @@ FactorReport SupernodalLdlt::factorize(const double* values) {
 
     report_.negative_pivots = tally.negative;
     report_.perturbed_pivots = tally.perturbed;
-    report_.pivot_growth = tally.growth;
+    report_.pivot_growth = largest_scaled_ > 0.0 ? tally.growth / largest_scaled_ : 0.0;
     report_.succeeded = true;
     report_.reason.clear();
     if (tally.perturbed > 0 && !recovers_known_solution()) {

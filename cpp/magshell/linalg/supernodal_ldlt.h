@@ -42,6 +42,7 @@ class SupernodalLdlt : public Factor {
     double flops_;
 
     std::vector<double> values_, scaled_values_, scale_;  // of A, of S A S, of S
+    double largest_scaled_ = 0.0;                         // |entry| of S A S
     slabs::Buffer factor_, work_;
     std::vector<double> diagonal_, coupling_;  // D
     std::vector<Index> pivot_order_;           // within each front

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double refined_from_growth = 1e4;  // below it at least 12 digits are there without refinement
 constexpr int most_refinements = 8;
+constexpr double rounding = 1e-15;
 
 // A x from the lower triangle of A.
 VectorXd multiply(const SparsePattern& pattern, const double* values, const VectorXd& x) {
@@ -59,26 +60,33 @@ void SupernodalLdlt::solve(Eigen::Ref<Eigen::MatrixXd> rhs) const {
     for (Index j = 0; j < rhs.cols(); ++j) rhs.col(j) = refined_solution(rhs.col(j));
 }
 
-// x += (L D L^T)^-1 (b - A x) for as long as that halves the residual.
+// x += (L D L^T)^-1 (b - A x), until the residual is down to rounding or does not fall any more.
 VectorXd SupernodalLdlt::refined_solution(const VectorXd& rhs) const {
-    const auto scaled_norm = [&](const VectorXd& residual) {
+    // Norms in the scaled unknowns, where rows are comparable.
+    const auto residual_norm = [&](const VectorXd& residual) {
         double largest = 0.0;
         for (Index j = 0; j < size(); ++j) largest = std::max(largest, std::abs(residual[j] * scale_[j]));
+        return largest;
+    };
+    const auto solution_norm = [&](const VectorXd& solution) {
+        double largest = 0.0;
+        for (Index j = 0; j < size(); ++j) largest = std::max(largest, std::abs(solution[j] / scale_[j]));
         return largest;
     };
     VectorXd solution = rhs;
     solve_factored(solution);
     VectorXd residual = rhs - multiply(pattern_, values_.data(), solution);
+    double norm = residual_norm(residual);
     for (int step = 0; step < most_refinements; ++step) {
-        VectorXd correction = residual;
-        solve_factored(correction);
-        const VectorXd candidate = solution + correction;
-        const VectorXd candidate_residual = rhs - multiply(pattern_, values_.data(), candidate);
-        if (!(scaled_norm(candidate_residual) < scaled_norm(residual))) break;
-        const bool slow = scaled_norm(candidate_residual) > 0.5 * scaled_norm(residual);
-        solution = candidate;
-        residual = candidate_residual;
-        if (slow) break;
+        if (norm <= rounding * (largest_scaled_ * solution_norm(solution) + residual_norm(rhs))) break;
+        VectorXd candidate = residual;
+        solve_factored(candidate);
+        candidate += solution;
+        residual = rhs - multiply(pattern_, values_.data(), candidate);
+        const double candidate_norm = residual_norm(residual);
+        if (!(candidate_norm < norm)) break;
+        std::swap(solution, candidate);
+        norm = candidate_norm;
     }
     return solution;
 }
