@@ -7,6 +7,7 @@ PYBIND11_MODULE(_core, module) {
     module.attr("__version__") = MAGSHELL_VERSION;
     b::register_errors(module);
     b::register_field(module);
+    b::register_linalg(module);
     b::register_mesh(module);
     b::register_model(module);
     b::register_statics(module);

@@ -1,6 +1,7 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
 from . import meshes
+from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
@@ -42,9 +43,12 @@ __all__ = [
     "__version__",
     "equilibrium",
     "meshes",
+    "num_threads",
     "read_fields",
     "read_mesh",
     "residual_to_remanent",
+    "set_num_threads",
+    "show_config",
     "weld",
     "write_mesh",
 ]

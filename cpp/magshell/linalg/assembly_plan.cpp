@@ -1,0 +1,204 @@
+#include "magshell/linalg/assembly_plan.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <string>
+
+#include "magshell/core/errors.h"
+#include "magshell/linalg/slabs.h"
+
+namespace magshell {
+namespace {
+
+using slabs::Panel;
+using slabs::Rectangle;
+using slabs::Triangle;
+using slabs::width;
+
+// Offset of (row, column) of a panel; rows count from the first pivot, then from the first row below.
+std::ptrdiff_t panel_place(const FrontShape& front, Index row, bool is_pivot, Index column) {
+    const Index slab = row / width, lane = row % width;
+    const std::ptrdiff_t start = is_pivot ? Triangle::offset(slab)
+                                          : Triangle::doubles(front.pivots) + Rectangle::doubles(slab * width, front.pivots);
+    return start + std::ptrdiff_t{width} * column + lane;
+}
+
+void place_entries(const SparsePattern& pattern, AssemblyPlan& plan) {
+    std::vector<Index> position(pattern.size), front_of(pattern.size), local_row(pattern.size);
+    for (Index k = 0; k < pattern.size; ++k) position[plan.order[k]] = k;
+    for (Index s = 0; s < plan.front_count(); ++s) {
+        std::fill_n(front_of.begin() + plan.fronts[s].shape.first, plan.fronts[s].shape.pivots, s);
+    }
+
+    struct Entry {
+        Index row, column, entry;
+    };
+    std::vector<Entry> sorted(pattern.rows.size());  // by front
+    std::vector<Index> next(plan.fronts.size() + 1, 0);
+    const auto each_entry = [&](auto&& visit) {
+        for (Index j = 0; j < pattern.size; ++j) {
+            for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
+                const auto [column, row] = std::minmax(position[j], position[pattern.rows[k]]);
+                visit(front_of[column], Entry{row, column, k});
+            }
+        }
+    };
+    each_entry([&](Index front, const Entry&) { ++next[front + 1]; });
+    for (std::size_t s = 0; s + 1 < next.size(); ++s) next[s + 1] += next[s];
+    for (std::size_t s = 0; s < plan.fronts.size(); ++s) plan.fronts[s].first_entry = next[s];
+    each_entry([&](Index front, const Entry& entry) { sorted[next[front]++] = entry; });
+
+    plan.entries.reserve(sorted.size());
+    for (Index s = 0; s < plan.front_count(); ++s) {
+        const FrontShape& front = plan.fronts[s].shape;
+        for (Index k = 0; k < front.below; ++k) local_row[plan.rows[front.rows + k]] = k;
+        for (Index k = plan.fronts[s].first_entry; k < plan.fronts[s + 1].first_entry; ++k) {
+            const Entry& entry = sorted[k];
+            const bool is_pivot = entry.row < front.first + front.pivots;
+            const Index row = is_pivot ? entry.row - front.first : local_row[entry.row];
+            const std::ptrdiff_t place = panel_place(front, row, is_pivot, entry.column - front.first);
+            plan.entries.push_back({entry.entry, static_cast<Index>(place)});
+        }
+    }
+}
+
+// The rows of one slab, grouped by the slab of the parent they land in.
+void add_transfers(const FrontPlan& front, AssemblyPlan& plan) {
+    for (Index first = 0; first < front.shape.below; first += width) {
+        const Index end = std::min(first + width, front.shape.below);
+        for (Index k = first; k < end; ++k) {
+            const Index place = plan.places[front.shape.rows + k];
+            const bool to_pivots = k < front.rows_in_parent_pivots;
+            const bool continues = k > first && plan.transfers.back().to_pivots == to_pivots &&
+                                   plan.transfers.back().parent_slab == place / width;
+            if (!continues) {
+                Transfer transfer{first / width, place / width, 0, to_pivots, {}};
+                transfer.from.fill(width);
+                plan.transfers.push_back(transfer);
+            }
+            plan.transfers.back().from[place % width] = static_cast<std::uint8_t>(k - first);
+            plan.transfers.back().end_column = k + 1;
+        }
+    }
+}
+
+void place_updates(AssemblyPlan& plan) {
+    std::vector<Index> local_row(plan.order.size());
+    plan.places.resize(plan.rows.size());
+    for (Index s = 0; s < plan.front_count(); ++s) {
+        const FrontShape& parent = plan.fronts[s].shape;
+        for (Index k = 0; k < parent.below; ++k) local_row[plan.rows[parent.rows + k]] = k;
+        for (const Index child : plan.fronts[s].children) {
+            FrontPlan& front = plan.fronts[child];
+            for (Index k = 0; k < front.shape.below; ++k) {
+                const Index row = plan.rows[front.shape.rows + k];
+                const bool is_pivot = row < parent.first + parent.pivots;
+                front.rows_in_parent_pivots += is_pivot;
+                plan.places[front.shape.rows + k] = is_pivot ? row - parent.first : local_row[row];
+            }
+        }
+    }
+    for (FrontPlan& front : plan.fronts) {
+        front.first_transfer = static_cast<Index>(plan.transfers.size());
+        if (front.shape.parent != -1) add_transfers(front, plan);
+    }
+}
+
+// First fit in one line of memory.
+class Line {
+  public:
+    std::ptrdiff_t take(std::ptrdiff_t size) {
+        std::ptrdiff_t start = 0;
+        auto at = used_.begin();
+        while (at != used_.end() && at->first - start < size) {
+            start = at->first + at->second;
+            ++at;
+        }
+        used_.emplace_hint(at, start, size);
+        extent_ = std::max(extent_, start + size);
+        return start;
+    }
+    void give_back(std::ptrdiff_t start) { used_.erase(start); }
+    std::ptrdiff_t extent() const { return extent_; }
+
+  private:
+    std::map<std::ptrdiff_t, std::ptrdiff_t> used_;  // start, size
+    std::ptrdiff_t extent_ = 0;
+};
+
+// Work space from `base` on for fronts handled one after another: an update lives until its parent has taken it. Returns
+// where it ends.
+std::ptrdiff_t place_work(AssemblyPlan& plan, const std::vector<Index>& sequence, std::ptrdiff_t base) {
+    Line line;
+    for (const Index s : sequence) {
+        FrontPlan& front = plan.fronts[s];
+        if (front.shape.below > 0) front.update = base + line.take(Triangle::offset(slabs::count(front.shape.below)));
+        for (const Index child : front.children) {
+            // The children of a top front may be roots of subtrees, which have work space of their own.
+            if (std::binary_search(sequence.begin(), sequence.end(), child)) line.give_back(plan.fronts[child].update - base);
+        }
+    }
+    return base + line.extent();
+}
+
+// Splits the tree into subtrees of at most 1/16 of the work and the fronts above them.
+void split(AssemblyPlan& plan, const std::vector<double>& subtree_flops, double total) {
+    std::vector<bool> in_top(plan.front_count(), false);
+    for (Index s = plan.front_count() - 1; s >= 0; --s) {
+        const Index parent = plan.fronts[s].shape.parent;
+        if (parent != -1 && !in_top[parent]) continue;
+        if (subtree_flops[s] > total / 16.0) in_top[s] = true;
+    }
+    Index begin = 0;
+    for (Index s = 0; s < plan.front_count(); ++s) {
+        const Index parent = plan.fronts[s].shape.parent;
+        if (in_top[s]) {
+            plan.top.push_back(s);
+            begin = s + 1;
+        } else if (parent == -1 || in_top[parent]) {
+            plan.subtrees.push_back({begin, s + 1});
+            begin = s + 1;
+        }
+    }
+}
+
+}  // namespace
+
+AssemblyPlan assembly_plan(const SparsePattern& pattern, AssemblyTree tree) {
+    AssemblyPlan plan;
+    const Index count = static_cast<Index>(tree.fronts.size());
+    plan.order = std::move(tree.order);
+    plan.rows = std::move(tree.rows);
+    plan.fronts.resize(count + 1);
+    std::vector<double> subtree_flops(count, 0.0);
+    for (Index s = 0; s < count; ++s) {
+        const FrontShape& shape = tree.fronts[s];
+        plan.fronts[s].shape = shape;
+        plan.fronts[s].panel = plan.factor_doubles;
+        const std::ptrdiff_t doubles = Panel::doubles(shape.pivots, shape.below);
+        if (doubles > std::numeric_limits<Index>::max()) {
+            throw InvalidInput("the matrix fills in too much to be factorized: " + std::to_string(shape.pivots) +
+                               " dense columns of " + std::to_string(shape.pivots + shape.below) + " rows");
+        }
+        plan.factor_doubles += doubles;
+        subtree_flops[s] += elimination_flops(shape.pivots, shape.below);
+        if (shape.parent != -1) {
+            plan.fronts[shape.parent].children.push_back(s);
+            subtree_flops[shape.parent] += subtree_flops[s];
+        }
+    }
+    place_entries(pattern, plan);
+    place_updates(plan);
+    split(plan, subtree_flops, tree.flops());
+    for (const FrontRange& subtree : plan.subtrees) {
+        std::vector<Index> sequence(subtree.end - subtree.begin);
+        std::iota(sequence.begin(), sequence.end(), subtree.begin);
+        plan.work_doubles = place_work(plan, sequence, plan.work_doubles);
+    }
+    plan.work_doubles = place_work(plan, plan.top, plan.work_doubles);
+    return plan;
+}
+
+}  // namespace magshell

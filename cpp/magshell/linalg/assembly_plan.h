@@ -1,0 +1,59 @@
+// Where everything goes during a factorization, worked out once for a pattern: matrix entries into fronts, updates into
+// parents, and which part of the work space each update occupies while it lives.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "magshell/linalg/assembly_tree.h"
+
+namespace magshell {
+
+/// Rows of one slab of an update that land in one slab of the parent. Lane l of the parent receives lane from[l] of the
+/// update, or nothing where from[l] is 8.
+struct Transfer {
+    Index slab;         // of the update
+    Index parent_slab;  // of the parent's pivots if to_pivots, else of its rows below
+    Index end_column;   // one past the last of these rows: the triangle needs no column beyond it
+    bool to_pivots;
+    std::array<std::uint8_t, 8> from;
+};
+
+/// A matrix entry and its place in its front's panel [doubles].
+struct PlacedEntry {
+    Index entry;
+    Index place;
+};
+
+struct FrontPlan {
+    FrontShape shape;
+    std::ptrdiff_t panel = 0;   // its columns of L in the factor's storage [doubles]
+    std::ptrdiff_t update = 0;  // its update in the work space [doubles]
+    Index first_entry = 0, first_transfer = 0;
+    Index rows_in_parent_pivots = 0;  // how many of its rows below are pivots of the parent
+    std::vector<Index> children;
+};
+
+/// A contiguous range of fronts that depends on no other: subtrees, one thread each.
+struct FrontRange {
+    Index begin, end;
+};
+
+struct AssemblyPlan {
+    std::vector<Index> order;
+    std::vector<FrontPlan> fronts;  // and one more, for the ends of entries and transfers
+    std::vector<Index> rows;        // below the pivots of each front, from shape.rows on
+    std::vector<Index> places;      // of those rows in the parent: among its pivots, or among its rows below
+    std::vector<PlacedEntry> entries;
+    std::vector<Transfer> transfers;
+    std::vector<FrontRange> subtrees;  // independent of the number of threads
+    std::vector<Index> top;            // the fronts above them, in order
+    std::ptrdiff_t factor_doubles = 0, work_doubles = 0;
+
+    Index front_count() const { return static_cast<Index>(fronts.size()) - 1; }
+};
+
+AssemblyPlan assembly_plan(const SparsePattern& pattern, AssemblyTree tree);
+
+}  // namespace magshell

@@ -1,0 +1,36 @@
+// The fronts of a multifrontal factorization: which columns are eliminated together, and in what order.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "magshell/linalg/factor.h"
+
+namespace magshell {
+
+/// A set of consecutive columns ("pivots") eliminated together, with the rows below them that their columns of L reach.
+struct FrontShape {
+    Index first = 0;   // the first pivot
+    Index pivots = 0;
+    Index below = 0;   // rows below the pivots
+    Index parent = -1;  // the front that contains the first row below; -1 for a root
+    std::ptrdiff_t rows = 0;  // where its rows below start in AssemblyTree::rows
+};
+
+/// Multiplications and additions of eliminating `pivots` columns with `below` rows below them.
+double elimination_flops(double pivots, double below);
+
+struct AssemblyTree {
+    std::vector<Index> order;        // order[k] = the unknown eliminated k-th
+    std::vector<FrontShape> fronts;  // every child before its parent, subtrees contiguous
+    std::vector<Index> rows;         // in elimination order, ascending within a front
+
+    double flops() const;           // multiplications and additions
+    std::int64_t nonzeros() const;  // entries of L, its diagonal included, explicit zeros counted
+};
+
+/// Columns with the same structure become one front, and fronts are merged where the explicit zeros cost less time than
+/// handling them apart. `order` is any fill-reducing ordering; the tree's own is equivalent to it up to those zeros.
+AssemblyTree assembly_tree(const SparsePattern& pattern, const std::vector<Index>& order);
+
+}  // namespace magshell

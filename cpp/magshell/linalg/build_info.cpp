@@ -1,0 +1,53 @@
+#include "magshell/linalg/build_info.h"
+
+#include <Eigen/Core>
+
+#include "magshell/linalg/single_threaded.h"
+#include "magshell/linalg/slab_kernels.h"
+#ifdef MAGSHELL_HAS_CHOLMOD
+#include <cholmod.h>
+#endif
+
+namespace magshell {
+namespace {
+
+std::string version(int major, int minor, int patch) {
+    return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(patch);
+}
+
+std::string vectors() {
+#if defined(__AVX512F__)
+    return "AVX-512";
+#elif defined(__AVX2__)
+    return "AVX2";
+#elif defined(__AVX__)
+    return "AVX";
+#elif defined(__SSE2__)
+    return "SSE2";
+#else
+    return "the compiler's choice";
+#endif
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> linalg_build_info() {
+    std::vector<std::pair<std::string, std::string>> info;
+#if defined(__clang__)
+    info.emplace_back("compiler", __VERSION__);  // begins with "Clang"
+#elif defined(__GNUC__)
+    info.emplace_back("compiler", "GCC " __VERSION__);
+#endif
+    info.emplace_back("vector instructions", vectors());
+    info.emplace_back("Eigen", version(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION));
+#ifdef MAGSHELL_HAS_CHOLMOD
+    info.emplace_back("CHOLMOD", version(CHOLMOD_MAIN_VERSION, CHOLMOD_SUB_VERSION, CHOLMOD_SUBSUB_VERSION));
+    info.emplace_back("SuiteSparse", version(SUITESPARSE_MAIN_VERSION, SUITESPARSE_SUB_VERSION, SUITESPARSE_SUBSUB_VERSION));
+    info.emplace_back("BLAS of CHOLMOD", blas_path());
+    info.emplace_back("BLAS configuration", blas_config());
+    info.emplace_back("BLAS threads", std::to_string(blas_threads()) + " (1 inside magshell)");
+#endif
+    return info;
+}
+
+}  // namespace magshell

@@ -1,0 +1,82 @@
+// Eigen's SimplicialLDLT: no supernodes, no pivoting; needs nothing but Eigen, and is the yardstick the others are tested by.
+#include <Eigen/SparseCholesky>
+#include <string>
+
+#include "magshell/linalg/backends.h"
+#include "magshell/linalg/pattern_checks.h"
+
+namespace magshell {
+namespace {
+
+class EigenFactor : public Factor {
+  public:
+    explicit EigenFactor(const SparsePattern& pattern)
+        : pattern_(pattern) {
+        const std::vector<double> values(pattern_.rows.size(), 1.0);
+        if (pattern_.size > 0) solver_.analyzePattern(view(values.data()));
+        report_.reason = "factorize() has not been called";
+    }
+
+    FactorReport factorize(const double* values) override {
+        check_finite(values, pattern_.rows.size());
+        report_ = {};
+        report_.succeeded = true;
+        if (pattern_.size == 0) return report_;
+        solver_.factorize(view(values));
+        if (solver_.info() != Eigen::Success) {
+            report_.succeeded = false;
+            report_.reason = "a pivot is exactly zero: the matrix is singular, or indefinite and needs pivoting";
+            return report_;
+        }
+        const VectorXd pivots = solver_.vectorD();
+        for (Index j = 0; j < pattern_.size; ++j) report_.negative_pivots += pivots[j] < 0.0;
+        return report_;
+    }
+
+    void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const override {
+        check_solvable(report_, pattern_.size, rhs);
+        if (rhs.size() == 0) return;
+        const Eigen::MatrixXd solution = solver_.solve(rhs);
+        rhs = solution;
+    }
+
+    std::string name() const override { return "eigen"; }
+    Index size() const override { return pattern_.size; }
+
+    // Eigen tells neither before the first factorization.
+    std::int64_t nonzeros() const override {
+        return report_.succeeded && pattern_.size > 0 ? solver_.matrixL().nestedExpression().nonZeros() + pattern_.size : 0;
+    }
+    double flops() const override {
+        if (nonzeros() == 0) return 0.0;
+        const auto* starts = solver_.matrixL().nestedExpression().outerIndexPtr();
+        double sum = 0.0;
+        for (Index j = 0; j < pattern_.size; ++j) {
+            const double entries = starts[j + 1] - starts[j];
+            sum += entries * (entries + 2.0);
+        }
+        return sum;
+    }
+    std::size_t bytes() const override {
+        return static_cast<std::size_t>(nonzeros()) * (sizeof(double) + sizeof(Index)) +
+               pattern_.rows.size() * (sizeof(double) + sizeof(Index));
+    }
+
+  private:
+    using Matrix = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
+
+    Eigen::Map<const Matrix> view(const double* values) const {
+        return {pattern_.size, pattern_.size, static_cast<Index>(pattern_.rows.size()), pattern_.column_starts.data(),
+                pattern_.rows.data(), values};
+    }
+
+    SparsePattern pattern_;
+    Eigen::SimplicialLDLT<Matrix, Eigen::Lower> solver_;
+    FactorReport report_;
+};
+
+}  // namespace
+
+std::unique_ptr<Factor> make_eigen_factor(const SparsePattern& pattern) { return std::make_unique<EigenFactor>(pattern); }
+
+}  // namespace magshell

@@ -1,0 +1,17 @@
+// What every backend checks the same way.
+#pragma once
+
+#include "magshell/linalg/factor.h"
+
+namespace magshell {
+
+/// Throws InvalidInput unless the pattern is a sorted lower triangle with its whole diagonal.
+void check_pattern(const SparsePattern& pattern);
+
+/// Throws InvalidInput naming the first value that is not finite.
+void check_finite(const double* values, std::size_t count);
+
+/// Throws InvalidInput when there is no factorization, or the right-hand side has the wrong number of rows.
+void check_solvable(const FactorReport& report, Index size, const Eigen::Ref<Eigen::MatrixXd>& rhs);
+
+}  // namespace magshell

@@ -1,0 +1,44 @@
+// L D L^T of a small dense symmetric block, with 1x1 and 2x2 pivots chosen inside it (Bunch and Kaufman 1977).
+#pragma once
+
+#include <array>
+
+#include "magshell/linalg/slabs.h"
+
+namespace magshell {
+
+/// The pivots of some columns of L: D is diagonal[k] with, for a 2x2 pivot in k, k + 1, coupling[k] beside the diagonal;
+/// coupling is zero elsewhere.
+struct Pivots {
+    double* diagonal;
+    double* coupling;
+};
+
+struct PivotTally {
+    Index negative = 0, perturbed = 0;
+    double growth = 0.0;  // max |l_ik w_ik|, w = L D
+    void add(const PivotTally& other) {
+        negative += other.negative;
+        perturbed += other.perturbed;
+        growth = growth < other.growth ? other.growth : growth;
+    }
+};
+
+// The matrix is scaled so that its largest entries are about 1. A pivot below `tiny_pivot` is rounding; it is replaced by
+// `perturbed_pivot`, large enough to divide by and small enough for a few steps of refinement to undo.
+inline constexpr double tiny_pivot = 1e-14;
+inline constexpr double perturbed_pivot = 1e-8;
+
+struct PivotBlock {
+    static constexpr Index max_size = 32;
+    static constexpr Index stride = max_size;
+
+    Index size = 0;
+    bool permuted = false;
+    std::array<std::int8_t, max_size> order;             // row k of the factorization is row order[k] of the block
+    alignas(64) double entries[max_size * stride];  // by columns; in: both triangles; out: unit lower L, zeros above
+
+    void factorize(Pivots pivots, PivotTally& tally);
+};
+
+}  // namespace magshell

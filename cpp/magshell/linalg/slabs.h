@@ -1,0 +1,79 @@
+// Dense matrices in slabs: eight rows side by side, column after column.
+//
+// Eight doubles are one vector register (or two, or four, on older processors), so a slab is already the "packed" operand
+// of a matrix product and the factor is stored, multiplied and solved with in this one layout, never repacked.
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <new>
+
+#include "magshell/core/types.h"
+
+namespace magshell::slabs {
+
+inline constexpr Index width = 8;  // rows of a slab
+
+// Eight doubles, aligned: the compiler maps them to whatever registers the processor has.
+using Lanes [[gnu::vector_size(64), gnu::may_alias]] = double;
+
+inline Lanes& lanes(double* at) { return *reinterpret_cast<Lanes*>(at); }
+inline const Lanes& lanes(const double* at) { return *reinterpret_cast<const Lanes*>(at); }
+
+inline constexpr Index count(Index rows) { return (rows + width - 1) / width; }
+
+/// A lower triangle: slab i holds the columns 0 ... 8 i + 7, of which the last eight contain the diagonal.
+struct Triangle {
+    double* data;
+    double* slab(Index i) const { return data + offset(i); }
+    static constexpr std::ptrdiff_t offset(Index i) { return 32 * std::ptrdiff_t{i} * (i + 1); }
+    /// Doubles taken by a triangle of this many rows, when the columns stop at its last row.
+    static constexpr std::ptrdiff_t doubles(Index rows) {
+        return rows == 0 ? 0 : offset(count(rows) - 1) + std::ptrdiff_t{width} * rows;
+    }
+};
+
+/// Full rows with a given number of columns.
+struct Rectangle {
+    double* data;
+    Index columns;
+    double* slab(Index i) const { return data + std::ptrdiff_t{width} * columns * i; }
+    static constexpr std::ptrdiff_t doubles(Index rows, Index columns) {
+        return std::ptrdiff_t{width} * columns * count(rows);
+    }
+};
+
+/// The eliminated columns of a front: the pivots' own rows on top (a triangle), the other rows below (a rectangle).
+struct Panel {
+    Triangle top;
+    Rectangle below;
+    Index top_slabs;
+
+    Panel(double* data, Index pivots)
+        : top{data}, below{data + Triangle::doubles(pivots), pivots}, top_slabs(count(pivots)) {}
+    double* slab(Index i) const { return i < top_slabs ? top.slab(i) : below.slab(i - top_slabs); }
+    static constexpr std::ptrdiff_t doubles(Index pivots, Index rows_below) {
+        return Triangle::doubles(pivots) + Rectangle::doubles(rows_below, pivots);
+    }
+};
+
+/// Aligned memory, not initialised: pages are touched first by whoever fills them.
+class Buffer {
+  public:
+    Buffer() = default;
+    explicit Buffer(std::ptrdiff_t doubles)
+        : size_(doubles), data_(static_cast<double*>(::operator new(sizeof(double) * doubles, alignment))) {}
+    double* data() const { return data_.get(); }
+    std::ptrdiff_t size() const { return size_; }
+
+  private:
+    static constexpr std::align_val_t alignment{64};
+    struct Free {
+        void operator()(double* data) const { ::operator delete(data, alignment); }
+    };
+    std::ptrdiff_t size_ = 0;
+    std::unique_ptr<double, Free> data_;
+};
+
+}  // namespace magshell::slabs

@@ -1,0 +1,91 @@
+#include "magshell/linalg/supernodal_ldlt.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "magshell/core/errors.h"
+#include "magshell/core/parallel.h"
+#include "magshell/linalg/equilibration.h"
+#include "magshell/linalg/front.h"
+#include "magshell/linalg/ordering.h"
+#include "magshell/linalg/transfer.h"
+
+namespace magshell {
+
+using slabs::Panel;
+using slabs::Triangle;
+using slabs::width;
+
+SupernodalLdlt::SupernodalLdlt(const SparsePattern& pattern, Ordering ordering) : pattern_(pattern) {
+    AssemblyTree tree = ordered_assembly_tree(pattern, ordering);
+    nonzeros_ = tree.nonzeros();
+    flops_ = tree.flops();
+    plan_ = assembly_plan(pattern, std::move(tree));
+    factor_ = slabs::Buffer(plan_.factor_doubles);
+    work_ = slabs::Buffer(plan_.work_doubles);
+    scaled_values_.resize(pattern.rows.size());
+    scale_.resize(pattern.size);
+    diagonal_.resize(pattern.size);
+    coupling_.resize(pattern.size);
+    pivot_order_.resize(pattern.size);
+    report_.reason = "factorize() has not been called";
+}
+
+FactorReport SupernodalLdlt::factorize(const double* values) {
+    report_ = {};
+    report_.reason = "the last factorize() did not finish";
+    largest_scaled_ = equilibrate(pattern_, values, scale_, scaled_values_);
+    values_.assign(values, values + pattern_.rows.size());
+
+    std::vector<PivotTally> tallies(plan_.subtrees.size());
+    parallel_for(static_cast<int>(plan_.subtrees.size()), [&](int task) {
+        const FrontRange& subtree = plan_.subtrees[task];
+        for (Index s = subtree.begin; s < subtree.end; ++s) tallies[task].add(process(s));
+    });
+    PivotTally tally;
+    for (const PivotTally& each : tallies) tally.add(each);
+    for (const Index s : plan_.top) tally.add(process(s));
+
+    report_.negative_pivots = tally.negative;
+    report_.perturbed_pivots = tally.perturbed;
+    report_.pivot_growth = largest_scaled_ > 0.0 ? tally.growth / largest_scaled_ : 0.0;
+    report_.succeeded = true;
+    report_.reason.clear();
+    if (tally.perturbed > 0 && !recovers_known_solution()) {
+        report_.succeeded = false;
+        report_.reason = "the matrix is singular to rounding: " + std::to_string(tally.perturbed) +
+                         " of its pivots vanish. Does the model hold every rigid motion and mechanism?";
+    }
+    return report_;
+}
+
+PivotTally SupernodalLdlt::process(Index s) {
+    const FrontPlan& front = plan_.fronts[s];
+    const FrontShape& shape = front.shape;
+    double* data = factor_.data() + front.panel;
+    std::fill_n(data, Panel::doubles(shape.pivots, shape.below), 0.0);
+    for (Index k = front.first_entry; k < plan_.fronts[s + 1].first_entry; ++k) {
+        data[plan_.entries[k].place] = scaled_values_[plan_.entries[k].entry];
+    }
+    const Panel panel(data, shape.pivots);
+    for (const Index child : front.children) add_to_panel(plan_, child, work_.data(), panel);
+
+    const Pivots pivots{diagonal_.data() + shape.first, coupling_.data() + shape.first};
+    const Index below_slabs = slabs::count(shape.below);
+    PivotTally tally;
+    eliminate_pivots(panel, shape.pivots, below_slabs, {pivots, pivot_order_.data() + shape.first}, tally);
+
+    const Triangle update{work_.data() + front.update};
+    form_update(panel, shape.pivots, below_slabs, pivots, update);
+    for (const Index child : front.children) add_to_update(plan_, child, work_.data(), update);
+    return tally;
+}
+
+std::size_t SupernodalLdlt::bytes() const {
+    const std::size_t doubles = factor_.size() + work_.size() + 2 * pattern_.rows.size() + 3 * pattern_.size;
+    return sizeof(double) * doubles + sizeof(Index) * (pattern_.rows.size() + 2 * plan_.rows.size()) +
+           sizeof(PlacedEntry) * plan_.entries.size() + sizeof(Transfer) * plan_.transfers.size();
+}
+
+}  // namespace magshell

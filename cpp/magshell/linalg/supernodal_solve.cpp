@@ -1,0 +1,109 @@
+// The solving half of SupernodalLdlt: scaling, substitution, and refinement where the factorization was not exact.
+#include <algorithm>
+#include <cmath>
+
+#include "magshell/linalg/pattern_checks.h"
+#include "magshell/linalg/supernodal_ldlt.h"
+#include "magshell/linalg/triangular_solves.h"
+
+namespace magshell {
+namespace {
+
+constexpr double refined_from_growth = 1e4;  // below it at least 12 digits are there without refinement
+constexpr int most_refinements = 8;
+constexpr double rounding = 1e-15;
+
+// A x from the lower triangle of A.
+VectorXd multiply(const SparsePattern& pattern, const double* values, const VectorXd& x) {
+    VectorXd result = VectorXd::Zero(pattern.size);
+    for (Index j = 0; j < pattern.size; ++j) {
+        Index k = pattern.column_starts[j];
+        double row_sum = values[k] * x[j];
+        for (++k; k < pattern.column_starts[j + 1]; ++k) {
+            row_sum += values[k] * x[pattern.rows[k]];
+            result[pattern.rows[k]] += values[k] * x[j];
+        }
+        result[j] += row_sum;
+    }
+    return result;
+}
+
+}  // namespace
+
+void SupernodalLdlt::solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const {
+    const FactorView view{plan_, factor_.data(),
+                          {const_cast<double*>(diagonal_.data()), const_cast<double*>(coupling_.data())},
+                          pivot_order_.data()};
+    const Index size = pattern_.size;
+    for (Index first = 0; first < rhs.cols();) {
+        const Index count = std::min<Index>(slabs::width, static_cast<Index>(rhs.cols()) - first);
+        const Index stride = count == 1 ? 1 : slabs::width;
+        slabs::Buffer x(std::ptrdiff_t{stride} * size);
+        for (Index k = 0; k < size; ++k) {
+            const Index unknown = plan_.order[k];
+            for (Index j = 0; j < count; ++j) x.data()[stride * k + j] = rhs(unknown, first + j) * scale_[unknown];
+            std::fill(x.data() + stride * k + count, x.data() + stride * (k + 1), 0.0);
+        }
+        if (count == 1) substitute_one(view, x.data());
+        else substitute_eight(view, x.data());
+        for (Index k = 0; k < size; ++k) {
+            const Index unknown = plan_.order[k];
+            for (Index j = 0; j < count; ++j) rhs(unknown, first + j) = x.data()[stride * k + j] * scale_[unknown];
+        }
+        first += count;
+    }
+}
+
+void SupernodalLdlt::solve(Eigen::Ref<Eigen::MatrixXd> rhs) const {
+    check_solvable(report_, size(), rhs);
+    if (report_.perturbed_pivots == 0 && report_.pivot_growth < refined_from_growth) return solve_factored(rhs);
+    for (Index j = 0; j < rhs.cols(); ++j) rhs.col(j) = refined_solution(rhs.col(j));
+}
+
+// x += (L D L^T)^-1 (b - A x), until the residual is down to rounding or does not fall any more.
+VectorXd SupernodalLdlt::refined_solution(const VectorXd& rhs) const {
+    // Norms in the scaled unknowns, where rows are comparable.
+    const auto residual_norm = [&](const VectorXd& residual) {
+        double largest = 0.0;
+        for (Index j = 0; j < size(); ++j) largest = std::max(largest, std::abs(residual[j] * scale_[j]));
+        return largest;
+    };
+    const auto solution_norm = [&](const VectorXd& solution) {
+        double largest = 0.0;
+        for (Index j = 0; j < size(); ++j) largest = std::max(largest, std::abs(solution[j] / scale_[j]));
+        return largest;
+    };
+    VectorXd solution = rhs;
+    solve_factored(solution);
+    VectorXd residual = rhs - multiply(pattern_, values_.data(), solution);
+    double norm = residual_norm(residual);
+    for (int step = 0; step < most_refinements; ++step) {
+        if (norm <= rounding * (largest_scaled_ * solution_norm(solution) + residual_norm(rhs))) break;
+        VectorXd candidate = residual;
+        solve_factored(candidate);
+        candidate += solution;
+        residual = rhs - multiply(pattern_, values_.data(), candidate);
+        const double candidate_norm = residual_norm(residual);
+        if (!(candidate_norm < norm)) break;
+        std::swap(solution, candidate);
+        norm = candidate_norm;
+    }
+    return solution;
+}
+
+// A vector of size one in the scaled unknowns, its image, and what solving with that image gives back. Along a null
+// direction nothing can be given back, however small the residual.
+bool SupernodalLdlt::recovers_known_solution() const {
+    VectorXd known(size());
+    for (Index j = 0; j < size(); ++j) {
+        const std::uint32_t hash = static_cast<std::uint32_t>(j + 1) * 2654435769u;  // golden-ratio hashing
+        known[j] = scale_[j] * (hash / 2147483648.0 - 1.0);
+    }
+    const VectorXd found = refined_solution(multiply(pattern_, values_.data(), known));
+    for (Index j = 0; j < size(); ++j) {
+        if (!(std::abs(found[j] - known[j]) <= 1e-3 * scale_[j])) return false;
+    }
+    return true;
+}
+
+}  // namespace magshell

@@ -1,0 +1,333 @@
+"""Sparse symmetric factorizations: every backend against dense linear algebra."""
+
+import os
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from magshell import _core, num_threads, set_num_threads
+
+BACKENDS = _core.factor_backends()
+
+
+def lower(matrix):
+    """The lower triangle by columns, sorted, its whole diagonal kept."""
+    matrix = sp.csc_matrix(matrix)
+    pattern = abs(sp.tril(matrix)).sign() + sp.identity(matrix.shape[0])
+    pattern = sp.csc_matrix(pattern)
+    pattern.sort_indices()
+    dense = matrix.toarray()
+    columns = np.repeat(np.arange(matrix.shape[0]), np.diff(pattern.indptr))
+    return pattern.indptr, pattern.indices, dense[pattern.indices, columns]
+
+
+def factorized(matrix, backend="supernodal", **options):
+    starts, rows, values = lower(matrix)
+    factor = _core.analyze(matrix.shape[0], starts, rows, backend=backend, **options)
+    return factor, factor.factorize(values)
+
+
+def random_symmetric(size, density, seed):
+    generator = np.random.default_rng(seed)
+    half = sp.random(size, size, density, random_state=generator, data_rvs=generator.standard_normal)
+    return sp.csc_matrix(half + half.T)
+
+
+def laplacian(cells):
+    line = sp.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(cells, cells))
+    one = sp.identity(cells)
+    return sp.csc_matrix(sp.kron(line, one) + sp.kron(one, line))
+
+
+def shell_like(cells, seed, unknowns=3):
+    """A grid of vertices with several unknowns each, random entries, no definiteness."""
+    graph = abs(laplacian(cells)).sign() @ abs(laplacian(cells)).sign()
+    pattern = sp.csc_matrix(sp.kron(graph, np.ones((unknowns, unknowns))))
+    generator = np.random.default_rng(seed)
+    values = sp.csc_matrix((generator.standard_normal(pattern.nnz), pattern.indices, pattern.indptr))
+    return sp.csc_matrix(values + values.T)
+
+
+def dominant(matrix):
+    """The same pattern, made positive definite."""
+    matrix = sp.csc_matrix(matrix - sp.diags(matrix.diagonal()))
+    return sp.csc_matrix(matrix + sp.diags(np.asarray(abs(matrix).sum(axis=1)).ravel() + 0.1))
+
+
+def kkt(size, constraints, seed):
+    generator = np.random.default_rng(seed)
+    jacobian = sp.random(constraints, size, 0.2, random_state=generator) + sp.eye(constraints, size)
+    return sp.csc_matrix(sp.block_array([[dominant(random_symmetric(size, 0.1, seed)), jacobian.T], [jacobian, None]]))
+
+
+def badly_scaled(matrix, exponents):
+    scale = sp.diags(10.0**exponents)
+    return sp.csc_matrix(scale @ matrix @ scale)
+
+
+EXPONENTS = {"badly scaled": np.random.default_rng(5).uniform(-8.0, 8.0, 192)}
+
+
+DEFINITE = {
+    "one unknown": sp.csc_matrix([[4.0]]),
+    "diagonal": sp.diags(np.arange(1.0, 30.0)),
+    "dense": dominant(sp.csc_matrix(np.add.outer(np.arange(70.0), np.arange(70.0)) % 7.0)),
+    "random": dominant(random_symmetric(300, 0.02, 1)),
+    "laplacian": laplacian(40),
+    "shell-like": dominant(shell_like(18, 2)),
+    "disconnected": sp.block_diag([laplacian(6), [[3.0]], dominant(random_symmetric(50, 0.1, 3))]),
+    "badly scaled": badly_scaled(dominant(shell_like(8, 4)), EXPONENTS["badly scaled"]),
+}
+INDEFINITE = {
+    "one unknown": sp.csc_matrix([[-4.0]]),
+    "no diagonal": sp.csc_matrix([[0.0, 2.0], [2.0, 0.0]]),
+    "random": sp.csc_matrix(random_symmetric(300, 0.02, 6) + sp.diags(np.linspace(-1.0, 1.0, 300))),
+    "dense": sp.csc_matrix(np.random.default_rng(7).standard_normal((120, 120))),
+    "shifted laplacian": sp.csc_matrix(laplacian(30) - 2.0123 * sp.identity(900)),
+    "shell-like": shell_like(14, 8),
+    "negative": -dominant(shell_like(6, 9)),
+    "saddle point": kkt(150, 40, 10),
+    "badly scaled": badly_scaled(shell_like(8, 11), EXPONENTS["badly scaled"]),
+}
+INDEFINITE["dense"] = sp.csc_matrix(INDEFINITE["dense"] + INDEFINITE["dense"].T)
+
+
+def backward_error(matrix, solution, rhs):
+    """The largest relative change of an entry of matrix and rhs that makes the solution exact (Oettli and Prager 1964)."""
+    residual = abs(rhs - matrix @ solution)
+    return (residual / (abs(matrix) @ abs(solution) + abs(rhs))).max()
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("name", DEFINITE)
+def test_definite_matrices_are_solved_to_rounding(name, backend):
+    matrix = sp.csc_matrix(DEFINITE[name])
+    factor, report = factorized(matrix, backend)
+    assert report.succeeded and report.negative_pivots == 0 and report.perturbed_pivots == 0
+    rhs = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    assert backward_error(matrix, factor.solve(rhs), rhs) < 2e-14
+    assert factor.name == backend and factor.size == matrix.shape[0]
+    assert factor.nonzeros >= sp.tril(matrix).nnz
+
+
+@pytest.mark.parametrize("name", INDEFINITE)
+def test_indefinite_matrices_are_solved_and_their_inertia_is_right(name):
+    matrix = sp.csc_matrix(INDEFINITE[name])
+    factor, report = factorized(matrix)
+    assert report.succeeded, report
+    scale = 10.0 ** -np.array(EXPONENTS.get(name, 0.0))
+    unscaled = scale * matrix.toarray() * np.reshape(scale, (-1, 1))  # a congruence: the inertia stays
+    eigenvalues = np.linalg.eigvalsh(unscaled)
+    assert abs(eigenvalues).min() > 1e-9 * abs(eigenvalues).max()
+    assert report.negative_pivots == (eigenvalues < 0.0).sum()
+    rhs = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    solution = factor.solve(rhs)
+    residual = scale * (rhs - matrix @ solution)
+    size = abs(scale * rhs).max() + (scale * (abs(matrix) @ abs(solution))).max()
+    assert abs(residual).max() < 1e-12 * size
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("columns", [0, 1, 2, 7, 8, 9, 23])
+def test_any_number_of_right_hand_sides(columns, backend):
+    matrix = sp.csc_matrix(DEFINITE["shell-like"])
+    factor, _ = factorized(matrix, backend)
+    rhs = np.random.default_rng(1).standard_normal((matrix.shape[0], columns))
+    solution = factor.solve(rhs)
+    assert solution.shape == rhs.shape
+    assert abs(matrix @ solution - rhs).max(initial=0.0) < 1e-12
+    for j in range(columns):
+        np.testing.assert_allclose(solution[:, j], factor.solve(rhs[:, j]), rtol=1e-12, atol=1e-15)
+
+
+def test_many_right_hand_sides_of_an_indefinite_matrix():
+    matrix = INDEFINITE["shell-like"]
+    factor, _ = factorized(matrix)
+    rhs = np.random.default_rng(2).standard_normal((matrix.shape[0], 11))
+    assert abs(matrix @ factor.solve(rhs) - rhs).max() < 1e-9
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("ordering", ["best", "amd", "metis"])
+def test_every_ordering(ordering, backend):
+    matrix = sp.csc_matrix(DEFINITE["laplacian"])
+    factor, _ = factorized(matrix, backend, ordering=ordering)
+    rhs = np.ones(matrix.shape[0])
+    assert abs(matrix @ factor.solve(rhs) - rhs).max() < 1e-12
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_factor_is_reused_for_other_values(backend):
+    first, second = dominant(shell_like(9, 20)), dominant(shell_like(9, 21))
+    starts, rows, values = lower(first)
+    factor = _core.analyze(first.shape[0], starts, rows, backend=backend)
+    rhs = np.random.default_rng(3).standard_normal(first.shape[0])
+    solutions = []
+    for matrix in (first, second, first):
+        assert factor.factorize(lower(matrix)[2]).succeeded
+        solutions.append(factor.solve(rhs))
+        assert abs(matrix @ solutions[-1] - rhs).max() < 1e-12
+    assert np.array_equal(solutions[0], solutions[2])
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_factor_recovers_from_a_failure(backend):
+    matrix = laplacian(8)
+    starts, rows, values = lower(matrix)
+    factor = _core.analyze(64, starts, rows, backend=backend)
+    assert not factor.factorize(np.zeros_like(values)).succeeded
+    with pytest.raises(ValueError, match="no factorization to solve with"):
+        factor.solve(np.ones(64))
+    assert factor.factorize(values).succeeded
+    assert abs(matrix @ factor.solve(np.ones(64)) - 1.0).max() < 1e-12
+
+
+def test_the_same_bits_on_any_number_of_threads():
+    matrix = shell_like(60, 30)
+    starts, rows, values = lower(matrix)
+    rhs = np.random.default_rng(4).standard_normal((matrix.shape[0], 3))
+    threads, results = num_threads(), []
+    try:
+        for count in (1, 2, 2, 3):
+            set_num_threads(count)
+            factor = _core.analyze(matrix.shape[0], starts, rows)
+            report = factor.factorize(values)
+            results.append((factor.solve(rhs), report.negative_pivots, report.pivot_growth))
+    finally:
+        set_num_threads(threads)
+    for solution, negative, growth in results[1:]:
+        assert np.array_equal(solution, results[0][0])
+        assert (negative, growth) == results[0][1:]
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_threads_may_solve_at_the_same_time(backend):
+    matrix = dominant(shell_like(20, 31))
+    factor, _ = factorized(matrix, backend)
+    rhs = np.random.default_rng(5).standard_normal((4, matrix.shape[0]))
+    wanted = [factor.solve(each) for each in rhs]
+    got = [None] * 4
+
+    def solve(k):
+        for _ in range(20):
+            got[k] = factor.solve(rhs[k])
+
+    workers = [threading.Thread(target=solve, args=(k,)) for k in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert all(np.array_equal(a, b) for a, b in zip(wanted, got, strict=True))
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        sp.csc_matrix((5, 5)),
+        sp.csc_matrix(np.ones((40, 40))),
+        sp.csc_matrix(laplacian(12) - sp.diags(np.asarray(laplacian(12).sum(axis=1)).ravel())),  # free: constants
+    ],
+    ids=["zero", "rank one", "free body"],
+)
+def test_a_singular_matrix_is_reported(matrix):
+    _, report = factorized(matrix)
+    assert not report.succeeded
+    assert report.perturbed_pivots >= 1
+    assert "singular to rounding" in report.reason and "singular to rounding" in repr(report)
+
+
+def test_pivot_growth_tells_definite_from_hard():
+    assert factorized(dominant(shell_like(10, 40)))[1].pivot_growth == pytest.approx(1.0, rel=0.5)
+    assert factorized(shell_like(10, 40))[1].pivot_growth > 2.0
+
+
+@pytest.mark.skipif("cholmod" not in BACKENDS, reason="built without CHOLMOD")
+def test_cholmod_reports_an_indefinite_matrix():
+    _, report = factorized(INDEFINITE["shell-like"], "cholmod")
+    assert not report.succeeded and "not positive definite" in report.reason
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_an_empty_matrix(backend):
+    factor = _core.analyze(0, [0], [], backend=backend)
+    assert factor.factorize([]).succeeded
+    assert factor.solve(np.zeros((0, 2))).shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        ((-1, [0], []), "cannot be -1"),
+        ((2, [0, 1], [0]), "size \\+ 1 = 3 entries, got 2"),
+        ((2, [0, 1, 3], [0, 1]), "run from 0 to the number of rows, 2; it runs from 0 to 3"),
+        ((2, [0, 3, 2], [0, 1]), "column_starts\\[1\\] = 3 exceeds the 2 rows"),
+        ((3, [0, 2, 1, 3], [0, 1, 2]), "decreases after column 1"),
+        ((2, [0, 2, 4], [0, 1, 0, 1]), "rows\\[2\\] = 0 in column 1 is above the diagonal"),
+        ((2, [0, 1, 2], [0, 2]), "rows\\[1\\] = 2 in column 1 is outside the matrix, whose size is 2"),
+        ((3, [0, 3, 4, 5], [0, 2, 1, 1, 2]), "rows\\[2\\] = 1 in column 0 is not greater than the row before"),
+        ((2, [0, 1, 2], [1, 1]), "column 0 lacks its diagonal"),
+        ((2, [0, 1, 1], [0]), "column 1 lacks its diagonal"),
+    ],
+)
+def test_malformed_patterns_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        _core.analyze(*arguments)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_values_that_are_not_finite_are_refused(bad, backend):
+    factor = _core.analyze(2, [0, 2, 3], [0, 1, 1], backend=backend)
+    with pytest.raises(ValueError, match=f"values\\[1\\] is {bad}"):
+        factor.factorize([2.0, bad, 2.0])
+
+
+def test_wrong_sizes_and_names_are_refused():
+    factor = _core.analyze(2, [0, 2, 3], [0, 1, 1])
+    with pytest.raises(ValueError, match="factorize\\(\\) has not been called"):
+        factor.solve([1.0, 1.0])
+    with pytest.raises(ValueError, match="each of the 3 rows of the pattern, got 2"):
+        factor.factorize([1.0, 2.0])
+    factor.factorize([2.0, 1.0, 2.0])
+    with pytest.raises(ValueError, match="must have 2 rows, got 3"):
+        factor.solve(np.ones(3))
+    with pytest.raises(ValueError, match="shape \\(n,\\) or \\(n, k\\)"):
+        factor.solve(np.ones((2, 1, 1)))
+    with pytest.raises(ValueError, match='must be one of "supernodal", "cholmod", "eigen", got "lu"'):
+        _core.analyze(1, [0, 1], [0], backend="lu")
+
+
+COUNT_THREADS = """
+import os
+{first}
+import numpy as np
+from magshell import _core
+n = 3000
+starts = np.append(2 * np.arange(n - 300), 2 * (n - 300))
+dense = 300
+rows, starts, values = [], [0], []
+for j in range(n):
+    column = [j] + list(range(max(j + 1, n - dense), n))
+    rows += column
+    values += [float(n)] + [-0.5] * (len(column) - 1)
+    starts.append(len(rows))
+factor = _core.analyze(n, starts, rows, backend="cholmod")
+before = len(os.listdir("/proc/self/task"))
+assert factor.factorize(values).succeeded
+factor.solve(np.ones(n))
+assert len(os.listdir("/proc/self/task")) == before, "CHOLMOD has started threads"
+"""
+
+
+@pytest.mark.skipif("cholmod" not in BACKENDS, reason="built without CHOLMOD")
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="counts threads through /proc")
+@pytest.mark.parametrize("first", ["", "torch"])
+def test_cholmod_starts_no_threads(first):
+    if first:
+        pytest.importorskip(first)
+    script = COUNT_THREADS.format(first=first and f"import {first}")
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
