@@ -15,6 +15,7 @@ using IndexArray = py::array_t<std::int32_t, py::array::c_style | py::array::for
 
 void register_errors(py::module_& module);
 void register_mesh(py::module_& module);
+void register_continuation(py::module_& module);
 void register_field(py::module_& module);
 void register_linalg(py::module_& module);
 void register_model(py::module_& module);

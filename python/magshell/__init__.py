@@ -10,6 +10,7 @@ from .field_adapters import CustomField, MagpylibField
 from .io import read_fields, read_mesh, write_mesh
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .mesh import TriangleMesh
+from .path import CriticalPoint, Path, follow
 from .scene import Scene
 from .shell import Shell
 from .solvers import MixedNewton, Newton
@@ -21,6 +22,7 @@ __all__ = [
     "AppliedField",
     "AreaLoad",
     "Clamp",
+    "CriticalPoint",
     "CustomField",
     "Dipoles",
     "EdgeCouple",
@@ -31,6 +33,7 @@ __all__ = [
     "MixedNewton",
     "Newton",
     "NotConverged",
+    "Path",
     "Pin",
     "PointLoad",
     "SampledField",
@@ -42,6 +45,7 @@ __all__ = [
     "Weld",
     "__version__",
     "equilibrium",
+    "follow",
     "meshes",
     "num_threads",
     "read_fields",

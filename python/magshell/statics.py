@@ -9,7 +9,8 @@ import numpy as np
 
 from . import _core
 from ._inputs import Inputs
-from ._tensors import like, to_array
+from ._start import starting_point
+from ._tensors import like
 from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
 from .scene import Scene
@@ -66,7 +67,7 @@ def equilibrium(
         field_factor=field_factor,
         motion_factor=motion_factor,
     )
-    state, from_, at_rest = _start(scene, start, inputs)
+    state, from_, at_rest = starting_point(scene, start, inputs)
     options = solver._options()
     options.require_stable = require_stable
     options.start_at_rest = at_rest
@@ -80,23 +81,6 @@ def equilibrium(
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(_failure(found, at_rest), result)
     return result
-
-
-def _start(scene: Scene, start, inputs: Inputs):
-    """State, controls at which it holds, and whether it is an equilibrium there."""
-    model = scene._model
-    if start is None:
-        return model.rest_state(), _core.Controls(), True
-    if isinstance(start, Equilibrium):
-        if start.scene is not scene:
-            raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
-        same = np.array_equal(start._magnetization, inputs.magnetization)
-        return start._state, start._controls, same
-    positions = np.asarray(to_array("start", start), dtype=np.float64)
-    shape = (scene.mesh.n_vertices, 3)
-    if positions.shape != shape or not np.isfinite(positions).all():
-        raise ValueError(f"start [m] must be an Equilibrium or finite positions of shape (n_v, 3) = {shape}")
-    return model.state(positions, np.zeros(scene.mesh.n_edges)), inputs.controls, False
 
 
 def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibrium:

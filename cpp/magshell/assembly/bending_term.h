@@ -21,6 +21,7 @@ class BendingTerm final : public Term {
     void set_material(const std::vector<SheetMaterial>& materials, const VectorXd& curvature_scale);
 
     std::string_view name() const override { return "bending"; }
+    bool driven() const override { return false; }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
     void assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) override;

@@ -15,6 +15,7 @@ class MembraneTerm final : public Term {
     void set_material(const std::vector<SheetMaterial>& materials);
 
     std::string_view name() const override { return Membrane::name; }
+    bool driven() const override { return false; }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
     void assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) override;

@@ -171,6 +171,14 @@ void Model::extrapolate(const VectorXd& p) {
     for (const std::unique_ptr<Term>& term : terms_) term->extrapolate(p.data());
 }
 
+VectorXd Model::gradient_rate(const VectorXd& q, const Controls& rate) {
+    Residual change;
+    change.reset(size());
+    for (const std::unique_ptr<Term>& term : terms_)
+        if (term->driven()) term->evaluate(q.data(), rate, change);
+    return change.gradient;
+}
+
 std::size_t Model::bytes() const {
     std::size_t total = matrix_.bytes() + reduction_.bytes() + faces_.bytes();
     for (const std::unique_ptr<Term>& term : terms_) total += term->bytes();

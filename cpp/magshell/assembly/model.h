@@ -75,6 +75,8 @@ class Model {
     /// The Hessian at the last evaluated state, in matrix().
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
     void extrapolate(const VectorXd& p);
+    /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in them.
+    VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
 
     std::size_t bytes() const;
     std::mutex& in_use() { return in_use_; }

@@ -78,6 +78,12 @@ VectorXd Reduction::prescribed_increment(const VectorXd& q, double progress) con
     return increment;
 }
 
+VectorXd Reduction::prescribed_rate(const VectorXd& q, double progress) const {
+    if (motions_.empty()) return VectorXd::Zero(q.size());
+    constexpr double step = 1e-4;  // motions turn by at most a few radians: exact to 1e-8
+    return (prescribed_increment(q, progress + step) - prescribed_increment(q, progress - step)) / (2.0 * step);
+}
+
 // B_ij -> Q_i^T B_ij Q_j wherever a framed node is i or j. Row triples of a node's three columns stand as
 // system_matrix.h says.
 void Reduction::turn_blocks(SystemMatrix& full) const {

@@ -39,6 +39,9 @@ class Reduction {
     /// Where the supports want their nodes at this progress of their motion, less where they are: zero elsewhere.
     VectorXd prescribed_increment(const VectorXd& q, double progress) const;
 
+    /// d(where the supports want their nodes)/d(progress).
+    VectorXd prescribed_rate(const VectorXd& q, double progress) const;
+
     /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first.
     void matrix(SystemMatrix& full, std::vector<double>& values) const;
     VectorXd vector(const VectorXd& full) const;

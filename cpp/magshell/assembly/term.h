@@ -31,6 +31,9 @@ class Term {
 
     virtual std::string_view name() const = 0;
 
+    /// Whether the controls drive it. Every term that they do is linear in them.
+    virtual bool driven() const { return true; }
+
     /// The energy [J] at q; changes nothing.
     virtual double energy(const double* q, const Controls& controls) const = 0;
 

@@ -43,7 +43,7 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const 
                              options_.tolerance));
 }
 
-FactorReport Newton::factorize(const Anchor& anchor) {
+FactorReport Newton::factorize_assembled(const Anchor& anchor) {
     model_.reduction().matrix(model_.matrix(), values_);
     if (anchor.state) {
         const SparsePattern& pattern = model_.reduction().pattern();
@@ -59,7 +59,18 @@ FactorReport Newton::factorize(const Anchor& anchor) {
 FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls) {
     model_.evaluate(q, controls);
     model_.assemble(q, controls, false);
-    return factorize({});
+    return factorize_assembled({});
+}
+
+FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+                               const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves) {
+    model_.assemble(q, controls, extrapolated_stress);
+    for (Eigen::Index k = 0; k < moves.cols(); ++k) {
+        if (moves.col(k).isZero(0.0)) continue;
+        const VectorXd move = moves.col(k);
+        model_.matrix().multiply(move.data(), moves.col(k).data());
+    }
+    return factorize_assembled(anchor);
 }
 
 VectorXd Newton::solve_with_factor(const VectorXd& rhs) const {
@@ -75,17 +86,18 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
 NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations) {
     NewtonReport report;
     VectorXd move = model_.reduction().prescribed_increment(q, controls.motion);
-    bool moving = move.lpNorm<Eigen::Infinity>() > 0.0, extrapolated = false;
+    bool extrapolated = false;
     double last_step = 0.0;
     model_.evaluate(q, controls);
     for (;; ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);
-        if (watch_) watch_(report.residual);
+        watch(report.residual);
         if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent()) {
             report.reason = "the iteration diverged";
             return report;
         }
-        if (!moving && report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent()) {
+        const bool in_place = move.isZero(0.0);
+        if (in_place && report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent()) {
             report.converged = true;
             return report;
         }
@@ -93,22 +105,15 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
             report.reason = "no convergence in " + std::to_string(max_iterations) + " iterations";
             return report;
         }
-        model_.assemble(q, controls, options_.mixed && extrapolated);
-        VectorXd force = -gradient(q, anchor);
-        if (moving) {
-            VectorXd pull(q.size());
-            model_.matrix().multiply(move.data(), pull.data());
-            force -= pull;
-        }
-        const FactorReport factor = factorize(anchor);
+        Eigen::MatrixXd pull = move;
+        const FactorReport factor = factorize(q, controls, options_.mixed && extrapolated, anchor, pull);
         report.negative_pivots = factor.negative_pivots;
         if (!factor.succeeded) {
             report.reason = factor.reason;
             return report;
         }
-        VectorXd step = solve_with_factor(force);
-        if (moving) step += move;
-        moving = false;
+        const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0));
+        move.setZero();
         if (options_.mixed) model_.extrapolate(step);
         extrapolated = true;
         last_step = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();

@@ -57,6 +57,10 @@ class Newton {
 
     /// Evaluates, assembles with the state's own stresses and factorizes.
     FactorReport factorize_at(const VectorXd& q, const Controls& controls);
+    /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes, is replaced
+    /// by the forces K moves that it causes.
+    FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+                           const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves);
     /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held.
     VectorXd solve_with_factor(const VectorXd& rhs) const;
 
@@ -69,9 +73,13 @@ class Newton {
     int factorizations() const { return factorizations_; }
     int failed_factorizations() const { return failed_factorizations_; }
     int iterations() const { return iterations_; }
+    void count_iteration() { ++iterations_; }
+    void watch(double residual) const {
+        if (watch_) watch_(residual);
+    }
 
   private:
-    FactorReport factorize(const Anchor& anchor);
+    FactorReport factorize_assembled(const Anchor& anchor);
     VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
 
     Model& model_;

@@ -1,0 +1,65 @@
+// Path following to Python.
+#include "magshell/solve/continuation.h"
+
+#include "bindings/arrays.h"
+#include "bindings/watch.h"
+
+namespace magshell::bindings {
+namespace {
+
+PathResult follow(Model& model, const VectorXd& start, const Controls& from, const Controls& to,
+                  const PathOptions& options, const py::object& until, const py::object& progress) {
+    const Watch watch(progress);
+    Until ends;
+    if (!until.is_none())
+        ends = [&](const PathPoint& point) {
+            const py::gil_scoped_acquire locked;
+            return until(point.parameter, model.positions(point.state)).cast<bool>();
+        };
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard lock(model.in_use());
+    return follow_path(model, start, from, to, options, ends, [&](double at, double residual) { watch(at, residual); });
+}
+
+}  // namespace
+
+void register_continuation(py::module_& module) {
+    py::class_<PathOptions>(module, "PathOptions")
+        .def(py::init<>())
+        .def_readwrite("newton", &PathOptions::newton)
+        .def_readwrite("first_step", &PathOptions::first_step)
+        .def_readwrite("largest_step", &PathOptions::largest_step)
+        .def_readwrite("max_points", &PathOptions::max_points)
+        .def_readwrite("lowest_parameter", &PathOptions::lowest_parameter)
+        .def_readwrite("highest_parameter", &PathOptions::highest_parameter)
+        .def_readwrite("locate_critical", &PathOptions::locate_critical);
+
+    py::class_<PathPoint>(module, "PathPoint")
+        .def_readonly("state", &PathPoint::state)
+        .def_readonly("parameter", &PathPoint::parameter)
+        .def_readonly("unstable_directions", &PathPoint::unstable_directions);
+
+    py::enum_<CriticalKind>(module, "CriticalKind")
+        .value("limit", CriticalKind::limit)
+        .value("bifurcation", CriticalKind::bifurcation);
+
+    py::class_<CriticalPoint>(module, "CriticalPoint")
+        .def_readonly("point", &CriticalPoint::point)
+        .def_readonly("kind", &CriticalPoint::kind)
+        .def_readonly("mode", &CriticalPoint::mode)
+        .def_readonly("after_point", &CriticalPoint::after_point);
+
+    py::class_<PathResult>(module, "PathResult")
+        .def_readonly("outcome", &PathResult::outcome)
+        .def_readonly("points", &PathResult::points)
+        .def_readonly("critical", &PathResult::critical)
+        .def_readonly("reason", &PathResult::reason)
+        .def_readonly("iterations", &PathResult::iterations)
+        .def_readonly("factorizations", &PathResult::factorizations)
+        .def_readonly("failed_factorizations", &PathResult::failed_factorizations);
+
+    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("from"), py::arg("to"),
+               py::arg("options"), py::arg("until") = py::none(), py::arg("progress") = py::none());
+}
+
+}  // namespace magshell::bindings

@@ -1,0 +1,202 @@
+"""Paths of equilibria through limit points: ms.follow."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from tqdm.auto import tqdm
+
+from . import _core
+from ._inputs import Inputs
+from ._start import starting_point
+from .equilibrium import Equilibrium
+from .errors import Interrupted, NotConverged
+from .scene import Scene
+from .solvers import MixedNewton, Newton
+
+
+@dataclass(frozen=True)
+class CriticalPoint:
+    """Where a path gains or loses an unstable direction.
+
+    parameter: on the path. kind: "limit" (the path turns round here) or "bifurcation" (another branch crosses).
+    positions: (n_v, 3) m. mode: (n_v, 3), the displacement that costs nothing here, largest component 1.
+    after_point: index of the last point of the path before it.
+    """
+
+    parameter: float
+    kind: str
+    positions: np.ndarray = field(repr=False)
+    mode: np.ndarray = field(repr=False)
+    after_point: int
+
+
+@dataclass(frozen=True, repr=False)
+class Path:
+    """A path of equilibria, stable and unstable.
+
+    parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.
+    unstable_directions: (n,), zero where the equilibrium is stable. critical: CriticalPoints, in order.
+    """
+
+    scene: Scene
+    parameters: np.ndarray
+    positions: np.ndarray
+    unstable_directions: np.ndarray
+    critical: tuple[CriticalPoint, ...]
+    iterations: int
+    factorizations: int
+    failed_factorizations: int
+    wall_time: float
+    reason: str
+    _states: list = field(repr=False)
+    _from: Any = field(repr=False)
+    _to: Any = field(repr=False)
+
+    @property
+    def stable(self) -> np.ndarray:
+        """(n,), bool."""
+        return self.unstable_directions == 0
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    def __repr__(self) -> str:
+        lines = [
+            f"Path: {len(self)} equilibria, {int(self.stable.sum())} of them stable, parameter "
+            f"{self.parameters.min():.4g} to {self.parameters.max():.4g}"
+        ]
+        lines += [f"  {point.kind} at {point.parameter:.6g}, after point {point.after_point}" for point in self.critical]
+        lines.append(f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s")
+        return "\n".join(lines)
+
+
+def follow(
+    scene: Scene,
+    *,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    motion_factor: float = 1.0,
+    start: Equilibrium | None = None,
+    until: Callable[[float, np.ndarray], bool] | None = None,
+    first_step: float = 0.05,
+    largest_step: float = 0.02,
+    lowest_parameter: float = -np.inf,
+    max_points: int = 1000,
+    locate_critical: bool = True,
+    solver: Newton | None = None,
+    progress: bool = True,
+) -> Path:
+    """Follows a path of equilibria by arc length, from `start` as its controls go towards the new ones.
+
+    The path parameter is 0 at the controls of `start` (an Equilibrium of this scene; by default the rest shape,
+    unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
+    parameter passes 1 or `lowest_parameter`, or where until(parameter, positions) says so. Controls as in ms.equilibrium.
+
+    first_step: of the parameter. largest_step: root mean square displacement between points, over the mesh's size.
+    locate_critical: find limit points and bifurcations between points whose numbers of unstable directions differ.
+    progress: show a bar once a path has taken two seconds.
+
+    Raises NotConverged and Interrupted with the path so far as `last_good`; ValueError on bad input.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (-0.4, 0, 0))
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+    >>> path = ms.follow(scene)  # straight, beyond where it buckles
+    >>> path.critical[0].kind
+    'bifurcation'
+    """
+    solver = MixedNewton() if solver is None else solver
+    if not isinstance(solver, Newton):
+        raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
+    for name, value in (("first_step", first_step), ("largest_step", largest_step)):
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be positive, got {value}")
+    if max_points < 2:
+        raise ValueError(f"max_points must be at least 2, got {max_points}")
+    if not lowest_parameter < 0:
+        raise ValueError(f"lowest_parameter must be below 0, where the path starts, got {lowest_parameter}")
+    if start is not None and not isinstance(start, Equilibrium):
+        raise ValueError(f"start must be an Equilibrium of this scene, got {type(start).__name__}")
+    inputs = Inputs(
+        scene,
+        remanent_magnetization,
+        applied_flux_density,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    state, from_, at_rest = starting_point(scene, start, inputs)
+    if not at_rest:
+        raise ValueError("start must have the same remanent_magnetization as the path")
+    options = _core.PathOptions()
+    options.newton = solver._newton_options()
+    options.first_step, options.largest_step = first_step, largest_step
+    options.lowest_parameter, options.max_points = max(lowest_parameter, -1e300), max_points
+    options.locate_critical = locate_critical
+
+    began = time.perf_counter()
+    inputs.magnetize()
+    with tqdm(total=1.0, desc="path", delay=2.0, disable=not progress, bar_format=_BAR) as bar:
+        found = _core.follow_path(scene._model, state, from_, inputs.controls, options, until, _advance(bar))
+    path = _path(scene, found, from_, inputs.controls, time.perf_counter() - began)
+    if found.outcome == _core.Outcome.interrupted:
+        raise Interrupted(f"interrupted after {len(path)} points of the path", path)
+    if found.outcome == _core.Outcome.failed:
+        raise NotConverged(
+            f"the path ended after {len(path)} points, at parameter {path.parameters[-1] if len(path) else 0:.4g}: "
+            f"{found.reason}. What it has so far is in `error.last_good`.",
+            path,
+        )
+    return path
+
+
+_BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
+
+
+def _advance(bar):
+    def advance(parameter: float, residual: float) -> None:
+        bar.n = min(max(parameter, 0.0), 1.0)
+        bar.set_postfix_str(f"parameter {parameter:.4g}")
+
+    return advance
+
+
+def _path(scene: Scene, found, from_, to, wall_time: float) -> Path:
+    model = scene._model
+    states = [point.state for point in found.points]
+    return Path(
+        scene=scene,
+        parameters=np.array([point.parameter for point in found.points]),
+        positions=np.array([model.positions(state) for state in states]).reshape(-1, scene.mesh.n_vertices, 3),
+        unstable_directions=np.array([point.unstable_directions for point in found.points], dtype=int),
+        critical=tuple(_critical(model, point) for point in found.critical),
+        iterations=found.iterations,
+        factorizations=found.factorizations,
+        failed_factorizations=found.failed_factorizations,
+        wall_time=wall_time,
+        reason=found.reason,
+        _states=states,
+        _from=from_,
+        _to=to,
+    )
+
+
+def _critical(model, found) -> CriticalPoint:
+    return CriticalPoint(
+        parameter=found.point.parameter,
+        kind="limit" if found.kind == _core.CriticalKind.limit else "bifurcation",
+        positions=model.positions(found.point.state),
+        mode=model.positions(found.mode),
+        after_point=found.after_point,
+    )
