@@ -106,7 +106,7 @@ def test_obj_numbers_that_count_backwards(tmp_path):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("f 1 2 3 4", "line 5, 'f 1 2 3 4': the face has 4 vertices; only triangles"),
+        ("f 1 2 3 4", "line 5, 'f 1 2 3 4': a face of 4 vertices; only triangles"),
         ("f 0 1 2", "line 5, .*: vertices are numbered from 1"),
         ("f 1 2 5", r"bad\.obj'?: face 0 \(0, 1, 4\) names vertex 4"),
         ("f 1 2 x", "line 5, 'f 1 2 x': invalid literal"),

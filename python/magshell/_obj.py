@@ -23,7 +23,7 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
             raise ValueError(f"line {number}, {line!r}: {error}") from error
         if faces and len(faces[-1]) != 3:
             raise ValueError(
-                f"line {number}, {line!r}: the face has {len(words) - 1} vertices; only triangles are supported"
+                f"line {number}, {line!r}: a face of {len(words) - 1} vertices; only triangles are supported"
             )
     return np.array(points).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3), {}, {}
 
