@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from magshell import _core
 from scipy.spatial.transform import Rotation
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -143,9 +144,9 @@ def changed(array, index, value):
         (SQUARE[:, :2], HALVES, r"rest_positions \[m\] must have shape \(n_v, 3\), got \(4, 2\)"),
         (SQUARE, HALVES.ravel(), r"faces must have shape \(n_f, 3\), got \(6,\)"),
         (SQUARE, HALVES.astype(float), "faces must hold integer indices, got dtype float64"),
-        (SQUARE * 1j, HALVES, "rest_positions .* must hold real numbers, got dtype complex128"),
-        (changed(SQUARE, (2, 1), np.nan), HALVES, r"must be finite, but vertex 2 is at \(1, -?nan, 0\)"),
-        (changed(SQUARE, (3, 0), np.inf), HALVES, r"must be finite, but vertex 3 is at \(inf, 1, 0\)"),
+        (SQUARE * 1j, HALVES, "rest_positions .* must be an array of real numbers, got dtype complex128"),
+        (changed(SQUARE, (2, 1), np.nan), HALVES, r"must be finite, but rest_positions\[2, 1\] is nan"),
+        (changed(SQUARE, (3, 0), np.inf), HALVES, r"must be finite, but rest_positions\[3, 0\] is inf"),
         (SQUARE, np.zeros((0, 3), int), "faces is empty"),
         (
             SQUARE,
@@ -179,6 +180,13 @@ def changed(array, index, value):
 def test_bad_meshes_are_refused(positions, faces, message):
     with pytest.raises(ValueError, match=message):
         ms.TriangleMesh(positions, faces)
+
+
+def test_the_core_does_not_rely_on_python_for_its_checks():
+    with pytest.raises(ValueError, match=r"must be finite, but vertex 3 is at \(inf, 1, 0\)"):
+        _core.TriangleMesh(changed(SQUARE, (3, 0), np.inf), HALVES)
+    with pytest.raises(ValueError, match=r"rest_positions \[m\] must have shape \(n_v, 3\), got \(4, 2\)"):
+        _core.TriangleMesh(SQUARE[:, :2], HALVES)
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e-3, 1.0, 1e6])
@@ -334,7 +342,7 @@ def test_scaled():
         (lambda m: m.scaled(0.0), "factor must be positive and finite, got 0.0"),
         (lambda m: m.scaled(-1.0), "factor must be positive"),
         (lambda m: m.transformed(np.diag([1.0, 1, 0])), "rotation is singular"),
-        (lambda m: m.transformed(np.eye(2)), r"rotation must have shape \(3, 3\), got \(2, 2\)"),
+        (lambda m: m.transformed(np.eye(2)), r"rotation \[1\] must have shape \(3, 3\), got \(2, 2\)"),
         (lambda m: m.transformed(translation=(1.0, np.nan, 0)), "translation .* must be finite"),
     ],
 )

@@ -335,9 +335,9 @@ def test_a_users_gmsh_session_is_left_as_it_was(outline):
     ("arguments", "message"),
     [
         ({"size": 0.0}, r"size \[m\] must be positive"),
-        ({"outer": SQUARE[:2]}, r"outer \[m\] must have shape \(n, 2\) with n >= 3, got \(2, 2\)"),
+        ({"outer": SQUARE[:2]}, "outer must have at least 3 points, got 2"),
         ({"outer": np.eye(3)}, r"outer \[m\] must have shape \(n, 2\)"),
-        ({"outer": [(0, 0), (1, np.nan), (1, 1)]}, "outer .* must be finite, but point 1 is"),
+        ({"outer": [(0, 0), (1, np.nan), (1, 1)]}, r"outer \[m\] must be finite, but outer\[1, 1\] is nan"),
         ({"outer": SQUARE[[0, 1, 1, 2]]}, "outer repeats point 1 as point 2"),
         ({"outer": SQUARE[[0, 1, 2, 3, 0]]}, "outer ends with its first point; leave that out"),
         ({"outer": SQUARE[[0, 2, 1, 3]]}, "outer intersects itself: its sides 0 and 2 meet"),
@@ -346,7 +346,7 @@ def test_a_users_gmsh_session_is_left_as_it_was(outline):
         ({"holes": [HOLE + 0.5]}, "hole 0 meets the outer polygon"),
         ({"holes": [HOLE, HOLE + 0.1]}, "holes 0 and 1 meet"),
         ({"holes": [HOLE, 0.45 + 0.1 * SQUARE]}, "of holes 0 and 1 one lies inside the other"),
-        ({"slits": [[(0.5, 0.5)]]}, r"slit 0 \[m\] must have shape \(n, 2\) with n >= 2"),
+        ({"slits": [[(0.5, 0.5)]]}, "slit 0 must have at least 2 points, got 1"),
         (
             {"slits": [[(0.5, 0.5), (1.5, 0.5)]]},
             "slit 0 leaves the sheet: it crosses side 1 of the outer polygon",

@@ -11,10 +11,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ._arrays import real_array
 from ._mesh_selection import RELATIVE_TOLERANCE
 from ._obj import read_obj
 from ._ply import read_ply, write_ply
+from ._quantity import quantity
 from .mesh import TriangleMesh
 
 _MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
@@ -73,7 +73,7 @@ def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, fac
         raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}")
     points = mesh.rest_positions
     if positions is not None:
-        points = real_array("positions [m]", _detached(positions), shape=(mesh.n_vertices, 3))
+        points = quantity("positions", "m", _detached(positions), (mesh.n_vertices, 3))
     on_vertices = _checked_fields("vertex", vertex_fields, mesh.n_vertices)
     on_faces = _checked_fields("face", face_fields, mesh.n_faces)
     if ending == ".ply":
@@ -182,8 +182,8 @@ def _checked_fields(kind: str, fields, rows: int) -> dict[str, np.ndarray]:
             raise ValueError(
                 f"{kind} field {name!r} must have shape ({rows},) or ({rows}, k), got {array.shape}"
             )
-        if array.dtype.kind in "bi" and np.can_cast(array.dtype, np.int32):
-            checked[name] = array.astype(np.int32)
-        else:
-            checked[name] = real_array(f"{kind} field {name!r}", array)
+        if array.dtype.kind not in "biuf":
+            raise ValueError(f"{kind} field {name!r} must hold real numbers, got dtype {array.dtype}")
+        fits = array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.abs(array).max() < 2**31)
+        checked[name] = array.astype(np.int32 if fits else np.float64)
     return checked
