@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from magshell._mesh_summary import smallest_angle
 
 DIAGONALS = ("alternating", "aligned", "crossed")
 
@@ -292,6 +293,13 @@ def test_both_sides_of_a_slit_have_their_own_vertices(outline):
     x, counts = np.unique(np.round(mesh.rest_positions[on_slit, 0], 9), return_counts=True)
     assert (x[0], x[-1]) == (0.3, 0.7)
     assert counts.tolist() == [1] + [2] * (len(x) - 2) + [1]
+
+
+def test_short_sides_are_graded_into_the_sheet(outline):
+    angle = np.linspace(0, 2 * np.pi, 300, endpoint=False)
+    mesh = outline(np.stack([np.cos(angle), np.sin(angle)], axis=1), size=0.1)
+    assert mesh.n_faces < 4000  # 15000 if all were as small as the sides
+    assert smallest_angle(mesh) > np.radians(25)
 
 
 def test_a_slit_from_a_hole_joins_its_boundary(outline):
