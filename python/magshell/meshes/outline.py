@@ -139,7 +139,7 @@ def _grade(gmsh, size: float) -> None:
     Sides are taken together by octaves of length: a size field for each.
     """
     lengths = {curve: gmsh.model.occ.getMass(1, curve) for _, curve in gmsh.model.getEntities(1)}
-    octaves = {}
+    octaves: dict[int, list[int]] = {}
     for curve, length in lengths.items():
         if length < size:
             octaves.setdefault(int(np.floor(np.log2(length))), []).append(curve)
