@@ -3,9 +3,10 @@
 import struct
 import sys
 
-import magshell as ms
 import numpy as np
 import pytest
+
+import magshell as ms
 
 meshio = pytest.importorskip("meshio")
 

@@ -3,13 +3,14 @@
 import copy
 import pickle
 
-import magshell as ms
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from magshell import _core
 from scipy.spatial.transform import Rotation
+
+import magshell as ms
+from magshell import _core
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])

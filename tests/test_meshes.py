@@ -4,11 +4,12 @@ import math
 import subprocess
 import sys
 
-import magshell as ms
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+import magshell as ms
 from magshell._mesh_summary import smallest_angle
 
 DIAGONALS = ("alternating", "aligned", "crossed")

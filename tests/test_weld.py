@@ -1,10 +1,11 @@
 """Welding: what joins, what is refused, and where everything went."""
 
-import magshell as ms
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+import magshell as ms
 
 UNIT = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4))
 
