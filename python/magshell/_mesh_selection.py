@@ -10,7 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ._arrays import index_array, real_array
+from ._arrays import index_array
+from ._quantity import quantity
 
 RELATIVE_TOLERANCE = 1e-6  # of the mesh's size: far above round-off, far below any edge
 
@@ -69,7 +70,7 @@ class MeshSelection:
 
     def nearest_vertex(self, point) -> int:
         """The vertex nearest to a point (3,) [m]; the lowest index where several are."""
-        point = real_array("point [m]", point, shape=(3,))
+        point = quantity("point", "m", point, (3,))
         return int(np.argmin(np.linalg.norm(self.rest_positions - point, axis=1)))
 
     def edges_between(self, vertex_indices) -> np.ndarray:

@@ -11,12 +11,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ._arrays import real_array
 from ._mesh_selection import RELATIVE_TOLERANCE
+from ._obj import read_obj
 from ._ply import read_ply, write_ply
+from ._quantity import quantity
 from .mesh import TriangleMesh
 
-_READERS = {".obj": "obj", ".ply": None, ".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}  # meshio's modules
+_MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
+_READABLE = (".obj", ".ply", *_MESHIO_MODULES)
 _WRITERS = (".vtu", ".ply")
 _LOWER_CELLS = ("vertex", "line", "line3")  # gmsh writes them beside the surface
 
@@ -29,7 +31,7 @@ class Fields(NamedTuple):
 
 
 def read_mesh(path, drop_unused: bool = False) -> TriangleMesh:
-    """The triangle mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (all but PLY need the extra `io`).
+    """The triangle mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`).
 
     Coordinates are taken to be in m: use `.scaled(1e-3)` on a file in mm. Points in the plane get z = 0. An
     STL file stores each triangle apart: its corners within 1e-6 of the mesh's size are one vertex.
@@ -71,7 +73,7 @@ def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, fac
         raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}")
     points = mesh.rest_positions
     if positions is not None:
-        points = real_array("positions [m]", _detached(positions), shape=(mesh.n_vertices, 3))
+        points = quantity("positions", "m", _detached(positions), (mesh.n_vertices, 3))
     on_vertices = _checked_fields("vertex", vertex_fields, mesh.n_vertices)
     on_faces = _checked_fields("face", face_fields, mesh.n_faces)
     if ending == ".ply":
@@ -86,11 +88,11 @@ def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, fac
 def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields]:
     path = Path(path)
     ending = path.suffix.lower()
-    if ending not in _READERS:
-        raise ValueError(f"cannot read {path.name!r}: the ending must be one of {', '.join(_READERS)}")
+    if ending not in _READABLE:
+        raise ValueError(f"cannot read {path.name!r}: the ending must be one of {', '.join(_READABLE)}")
     if not path.is_file():
         raise FileNotFoundError(f"no file {str(path)!r}")
-    reader = read_ply if ending == ".ply" else _read_with_meshio
+    reader = {".obj": read_obj, ".ply": read_ply}.get(ending, _read_with_meshio)
     try:
         points, faces, vertex_fields, face_fields = reader(path)
     except ImportError:
@@ -133,7 +135,7 @@ def _meshio(module: str | None = None):
 def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
     # meshio.read ends the interpreter on a file it cannot read; the readers of the formats raise
     with np.errstate(over="ignore"):  # its STL reader multiplies whatever stands where the count should
-        content = _meshio(_READERS[path.suffix.lower()]).read(path)
+        content = _meshio(_MESHIO_MODULES[path.suffix.lower()]).read(path)
     others = {
         block.type: len(block.data)
         for block in content.cells
@@ -152,7 +154,7 @@ def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
         name: np.concatenate([blocks[k] for k in triangles]) for name, blocks in content.cell_data.items()
     }
     points = np.asarray(content.points, dtype=np.float64)
-    return points[:, :3], faces, dict(content.point_data), face_fields  # beyond three: OBJ's colours
+    return points, faces, dict(content.point_data), face_fields
 
 
 def _merge_coincident(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -180,8 +182,8 @@ def _checked_fields(kind: str, fields, rows: int) -> dict[str, np.ndarray]:
             raise ValueError(
                 f"{kind} field {name!r} must have shape ({rows},) or ({rows}, k), got {array.shape}"
             )
-        if array.dtype.kind in "bi" and np.can_cast(array.dtype, np.int32):
-            checked[name] = array.astype(np.int32)
-        else:
-            checked[name] = real_array(f"{kind} field {name!r}", array)
+        if array.dtype.kind not in "biuf":
+            raise ValueError(f"{kind} field {name!r} must hold real numbers, got dtype {array.dtype}")
+        fits = array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.abs(array).max() < 2**31)
+        checked[name] = array.astype(np.int32 if fits else np.float64)
     return checked

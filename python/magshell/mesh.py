@@ -9,9 +9,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from . import _core
-from ._arrays import index_array, positive, real_array
+from ._arrays import index_array, positive
 from ._mesh_selection import MeshSelection
 from ._mesh_summary import boundary_loops, summary
+from ._quantity import quantity
 
 
 class TriangleMesh(MeshSelection):
@@ -34,7 +35,7 @@ class TriangleMesh(MeshSelection):
 
     def __init__(self, rest_positions, faces):
         self._core = _core.TriangleMesh(
-            real_array("rest_positions [m]", rest_positions), index_array("faces", faces)
+            quantity("rest_positions", "m", rest_positions, ("n_v", 3)), index_array("faces", faces)
         )
 
     def __reduce__(self):  # copies and worker processes rebuild the connectivity, which is cheap
@@ -177,12 +178,12 @@ class TriangleMesh(MeshSelection):
         positions = self.rest_positions
         if rotation is not None:
             as_matrix = getattr(rotation, "as_matrix", None)
-            matrix = real_array("rotation", as_matrix() if as_matrix else rotation, shape=(3, 3))
+            matrix = quantity("rotation", "1", as_matrix() if as_matrix else rotation, (3, 3))
             if abs(np.linalg.det(matrix)) <= 1e-12 * np.linalg.norm(matrix) ** 3:
                 raise ValueError("rotation is singular: it would flatten the mesh")
             positions = positions @ matrix.T
         if translation is not None:
-            positions = positions + real_array("translation [m]", translation, shape=(3,))
+            positions = positions + quantity("translation", "m", translation, (3,))
         return TriangleMesh(positions, self.faces)
 
     def scaled(self, factor: float) -> TriangleMesh:

@@ -108,12 +108,12 @@ def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
 def _check_seams(meshes, maps: list[np.ndarray], tolerance: float) -> None:
     """Refuses what TriangleMesh would refuse too, but in terms of the parts; and parts that nothing holds."""
     starts, ends, parts = [], [], []
-    for part, (mesh, mapped) in enumerate(zip(meshes, maps, strict=True)):
+    for number, (mesh, mapped) in enumerate(zip(meshes, maps, strict=True)):
         edges = mapped[mesh.edges[mesh.boundary_edges]]
         backward = mesh.edge_faces[mesh.boundary_edges, 0] < 0
         starts.append(np.where(backward, edges[:, 1], edges[:, 0]))
         ends.append(np.where(backward, edges[:, 0], edges[:, 1]))
-        parts.append(np.full(len(edges), part))
+        parts.append(np.full(len(edges), number))
     start, end, part = np.concatenate(starts), np.concatenate(ends), np.concatenate(parts)
 
     low, high = np.minimum(start, end), np.maximum(start, end)

@@ -1,6 +1,5 @@
 #include "magshell/mesh/triangle_mesh.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -12,7 +12,7 @@ _OPTIONS = {
     "Geometry.Tolerance": 1e-8,
     "Mesh.Algorithm": 6,  # Frontal-Delaunay
     "Mesh.ElementOrder": 1,
-    "Mesh.MeshSizeExtendFromBoundary": 1,
+    "Mesh.MeshSizeExtendFromBoundary": 0,
     "Mesh.MeshSizeFactor": 1,
     "Mesh.MeshSizeFromCurvature": 0,
     "Mesh.MeshSizeFromPoints": 1,

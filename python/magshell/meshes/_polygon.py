@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._quantity import quantity
+
 
 def checked_polyline(name: str, points, least: int) -> np.ndarray:
     """(n, 2) finite points, n >= least, no two in a row alike."""
-    array = np.asarray(points)
-    if not np.can_cast(array.dtype, np.float64, casting="same_kind"):
-        raise ValueError(f"{name} [m] must hold real numbers, got dtype {array.dtype}")
-    array = array.astype(np.float64)
-    if array.ndim != 2 or array.shape[1] != 2 or len(array) < least:
-        raise ValueError(f"{name} [m] must have shape (n, 2) with n >= {least}, got {array.shape}")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if len(bad):
-        raise ValueError(f"{name} [m] must be finite, but point {bad[0]} is {array[bad[0]].tolist()}")
+    array = quantity(name, "m", points, ("n", 2))
+    if len(array) < least:
+        raise ValueError(f"{name} must have at least {least} points, got {len(array)}")
     same = np.flatnonzero((array[1:] == array[:-1]).all(axis=1))
     if len(same):
         raise ValueError(

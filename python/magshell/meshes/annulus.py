@@ -8,6 +8,7 @@ from .._arrays import positive
 from ..mesh import TriangleMesh
 from ._angles import angle_span, is_full_turn
 from ._grid import grid
+from ._surface import surface
 
 
 def annulus(
@@ -58,4 +59,4 @@ def sector(
     radius = inner + (outer - inner) * g.parameters[:, 0]
     theta = start + (stop - start) * g.parameters[:, 1]
     points = np.stack([radius * np.cos(theta), radius * np.sin(theta), np.zeros_like(theta)], axis=1)
-    return TriangleMesh(points, g.faces)
+    return surface(points, g.faces, lambda barycenters: np.array([0.0, 0.0, 1.0]))

@@ -8,6 +8,7 @@ from .._arrays import positive
 from ..mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
+from ._surface import surface
 
 
 def cylinder(
@@ -44,4 +45,5 @@ def cylinder(
     g = grid((along, around), diagonals, irregular, seed, periodic=is_full_turn(start, stop))
     y = length * (1 - g.parameters[:, 0])
     phi = start + (stop - start) * g.parameters[:, 1]
-    return TriangleMesh(np.stack([radius * np.sin(phi), y, radius * np.cos(phi)], axis=1), g.faces)
+    points = np.stack([radius * np.sin(phi), y, radius * np.cos(phi)], axis=1)
+    return surface(points, g.faces, lambda barycenters: barycenters * [1, 0, 1])

@@ -21,6 +21,7 @@ from ._polygon import (
 )
 from .cut import cut
 
+_GROWTH = 0.3  # of the mesh size, with the distance from a short side
 _ON_BOUNDARY = 1e-7  # of the outline's extent: a slit that ends this close to the boundary reaches it
 
 
@@ -113,6 +114,7 @@ def _mesh_with_gmsh(outer, holes, slits, size: float) -> tuple[np.ndarray, np.nd
         tools = [(1, line) for tags in slit_lines for line in tags]
         pieces = iter(kernel.fragment([sheet], tools)[1][1:]) if tools else iter(())
         kernel.synchronize()
+        _grade(gmsh, size)
         gmsh.model.mesh.generate(2)
 
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
@@ -128,6 +130,37 @@ def _mesh_with_gmsh(outer, holes, slits, size: float) -> tuple[np.ndarray, np.nd
             nodes = [gmsh.model.mesh.getElementsByType(1, curve)[1] for curve in curves]
             slit_sides.append(np.searchsorted(used, np.concatenate(nodes)).reshape(-1, 2))
     return points, faces.reshape(-1, 3), slit_sides
+
+
+def _grade(gmsh, size: float) -> None:
+    """Wraps short sides in small faces, which grow inwards.
+
+    Left alone, gmsh fills the sheet with faces as small as the shortest side, or sets large ones against it.
+    Sides are taken together by octaves of length: a size field for each.
+    """
+    lengths = {curve: gmsh.model.occ.getMass(1, curve) for _, curve in gmsh.model.getEntities(1)}
+    octaves: dict[int, list[int]] = {}
+    for curve, length in lengths.items():
+        if length < size:
+            octaves.setdefault(int(np.floor(np.log2(length))), []).append(curve)
+    if not octaves:
+        return
+    field = gmsh.model.mesh.field
+    thresholds = []
+    for curves in octaves.values():
+        shortest = min(lengths[curve] for curve in curves)
+        distance, threshold = field.add("Distance"), field.add("Threshold")
+        field.setNumbers(distance, "CurvesList", curves)
+        field.setNumber(distance, "Sampling", 3)
+        field.setNumber(threshold, "InField", distance)
+        field.setNumber(threshold, "SizeMin", shortest)
+        field.setNumber(threshold, "SizeMax", size)
+        field.setNumber(threshold, "DistMin", 0.0)
+        field.setNumber(threshold, "DistMax", (size - shortest) / _GROWTH)
+        thresholds.append(threshold)
+    smallest = field.add("Min")
+    field.setNumbers(smallest, "FieldsList", thresholds)
+    field.setAsBackgroundMesh(smallest)
 
 
 def _upwards(points: np.ndarray, faces: np.ndarray) -> np.ndarray:

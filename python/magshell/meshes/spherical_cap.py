@@ -8,6 +8,7 @@ from .._arrays import positive
 from ..mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
+from ._surface import surface
 
 
 def spherical_cap(
@@ -50,6 +51,5 @@ def spherical_cap(
     theta = angle_from + (angle_to - angle_from) * g.parameters[:, 0]
     phi = start + (stop - start) * g.parameters[:, 1]
     sine = np.sin(theta)
-    return TriangleMesh(
-        radius * np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=1), g.faces
-    )
+    points = radius * np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=1)
+    return surface(points, g.faces, lambda barycenters: barycenters)

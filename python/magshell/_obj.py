@@ -1,0 +1,36 @@
+"""OBJ files as modellers write them: colours, normals, textures, groups and materials are passed over."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+
+def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
+    """(points, faces, no fields). Raises ValueError, with the line, on what is not a vertex or a triangle."""
+    points: list[list[float]] = []
+    faces: list[list[int]] = []
+    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
+        words = line.split()
+        try:
+            if words[:1] == ["v"]:
+                x, y, z = words[1:4]
+                points.append([float(x), float(y), float(z)])
+            elif words[:1] == ["f"]:
+                faces.append([_vertex(word, len(points)) for word in words[1:]])
+        except ValueError as error:
+            raise ValueError(f"line {number}, {line!r}: {error}") from error
+        if faces and len(faces[-1]) != 3:
+            raise ValueError(
+                f"line {number}, {line!r}: a face of {len(words) - 1} vertices; only triangles are supported"
+            )
+    return np.array(points).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3), {}, {}
+
+
+def _vertex(word: str, n_points: int) -> int:
+    """`word` is vertex, vertex/texture, vertex//normal or all three; from 1, or backwards from -1."""
+    index = int(word.split("/")[0])
+    if index == 0:
+        raise ValueError("vertices are numbered from 1")
+    return index - 1 if index > 0 else n_points + index
