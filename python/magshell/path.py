@@ -166,8 +166,8 @@ _BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
 
 def _advance(bar):
     def advance(parameter: float, residual: float) -> None:
-        bar.n = min(max(parameter, 0.0), 1.0)
-        bar.set_postfix_str(f"parameter {parameter:.4g}")
+        bar.set_postfix_str(f"parameter {parameter:.4g}", refresh=False)
+        bar.update(min(max(parameter, 0.0), 1.0) - bar.n)
 
     return advance
 
