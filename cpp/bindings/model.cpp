@@ -130,6 +130,14 @@ void register_model(py::module_& module) {
                  return model.residual().gradient;
              },
              py::call_guard<py::gil_scoped_release>())
+        .def("assemble",
+             [](Model& model, const VectorXd& q, const Controls& controls) {
+                 const std::lock_guard lock(model.in_use());
+                 model.evaluate(q, controls);
+                 model.assemble(q, controls, false);
+             },
+             "Gradient and Hessian, left in the core: what `python -m magshell.bench kernels` times.",
+             py::call_guard<py::gil_scoped_release>())
         .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true);
 }
 

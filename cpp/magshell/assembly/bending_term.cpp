@@ -5,18 +5,9 @@
 
 namespace magshell {
 
-BendingTerm::BendingTerm(const Sheet& sheet, const SystemMatrix& matrix)
+BendingTerm::BendingTerm(const Sheet& sheet, const Schedule& schedule, const SystemMatrix& matrix)
     : sheet_(sheet),
-      face_schedule_(sheet.n_faces(), sheet.n_nodes(),
-                     [&](Index f) {
-                         const Stencil& s = sheet.stencils[f];
-                         return std::vector<Index>(s.nodes.begin(), s.nodes.end());
-                     }),
-      fold_schedule_(static_cast<Index>(sheet.folds.size()), sheet.n_nodes(),
-                     [&](Index h) {
-                         const FoldStencil& fold = sheet.folds[h];
-                         return std::vector<Index>(fold.nodes.begin(), fold.nodes.end());
-                     }),
+      schedule_(schedule),
       stiffness_(face_packs()),
       stress_(face_packs()),
       extrapolated_(face_packs()),
@@ -53,11 +44,12 @@ void BendingTerm::set_material(const std::vector<SheetMaterial>& materials, cons
         }
 }
 
-Fold BendingTerm::fold_at(Index pack, const double* q) const {
+// Lanes past the last fold repeat it.
+Fold BendingTerm::folds_at(Index first, Index last, const double* q) const {
     Pack3 x[4];
     Pack right_is_point;
     for (int lane = 0; lane < Pack::width; ++lane) {
-        const FoldStencil& fold = sheet_.folds[element_of(pack, lane, n_folds())];
+        const FoldStencil& fold = sheet_.folds[std::min(first + lane, last - 1)];
         for (int k = 0; k < 4; ++k) set_lane(x[k], lane, q + 3 * fold.nodes[k]);
         right_is_point.set(lane, fold.right_is_point ? 1.0 : 0.0);
     }
@@ -70,15 +62,16 @@ double BendingTerm::turn_from(double angle, Index fold) const {
 }
 
 void BendingTerm::store_folds(const double* q) {
-    fold_schedule_.each([&](Index first, Index last) {
-        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) {
-            const Fold fold = fold_at(pack, q);
+    schedule_.each([&](const Part& part) {
+        for (Index first = part.first_fold; first < part.last_fold; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, part.last_fold);
+            const Fold fold = folds_at(first, last, q);
             const Pack angle = fold.angle();
             Pack3 g[4];
             fold.gradient(g);
-            for (int lane = 0; lane < Pack::width && pack * Pack::width + lane < last; ++lane) {
-                FoldState& state = folds_[pack * Pack::width + lane];
-                state.turn = turn_from(angle[lane], pack * Pack::width + lane);
+            for (int lane = 0; lane < last - first; ++lane) {
+                FoldState& state = folds_[first + lane];
+                state.turn = turn_from(angle[lane], first + lane);
                 for (int k = 0; k < 4; ++k) {
                     state.gradient[3 * k] = g[k].x[lane];
                     state.gradient[3 * k + 1] = g[k].y[lane];
@@ -105,17 +98,17 @@ void BendingTerm::strain(Index pack, const double* q, const double FoldState::*t
 
 double BendingTerm::energy(const double* q, const Controls&) const {
     std::vector<double> turns(folds_.size());
-    fold_schedule_.each([&](Index first, Index last) {
-        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) {
-            const Pack angle = fold_at(pack, q).angle();
-            for (int lane = 0; lane < Pack::width && pack * Pack::width + lane < last; ++lane)
-                turns[pack * Pack::width + lane] = turn_from(angle[lane], pack * Pack::width + lane);
+    schedule_.each([&](const Part& part) {
+        for (Index first = part.first_fold; first < part.last_fold; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, part.last_fold);
+            const Pack angle = folds_at(first, last, q).angle();
+            for (Index h = first; h < last; ++h) turns[h] = turn_from(angle[h - first], h);
         }
     });
     const double* rotation = q + 3 * sheet_.n_nodes();
-    return face_schedule_.sum([&](Index first, Index last) {
+    return schedule_.sum([&](const Part& part) {
         double total = 0.0;
-        for (Index f = first; f < last; ++f) {
+        for (Index f = part.first_face; f < part.last_face; ++f) {
             double delta[3];
             for (int i = 0; i < 3; ++i) {
                 const FaceSide& side = sheet_.sides[f][i];
@@ -133,8 +126,8 @@ double BendingTerm::energy(const double* q, const Controls&) const {
 
 void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
     store_folds(q);
-    face_schedule_.each([&](Index first, Index last) {
-        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) {
+    schedule_.each([&](const Part& part) {
+        for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) {
             Pack delta[3];
             strain(pack, q, &FoldState::turn, delta);
             stiffness_[pack].times(delta, stress_[pack].at);
@@ -154,17 +147,15 @@ double BendingTerm::moment(const FoldStencil& fold, const std::vector<Stress>& s
 }
 
 void BendingTerm::add_forces(Residual& out) const {
-    fold_schedule_.scatter([&](Index first, Index last) {
-        for (Index h = first; h < last; ++h) {
+    // Faces that share a rotation share an edge and so a node: parts of one colour meet at no rotation either.
+    schedule_.scatter([&](const Part& part) {
+        for (Index h = part.first_fold; h < part.last_fold; ++h) {
             const double m = moment(sheet_.folds[h], stress_);
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)
                     out.add(3 * sheet_.folds[h].nodes[k] + c, m * folds_[h].gradient[3 * k + c]);
         }
-    });
-    // Two faces that share a rotation share an edge and so a node: the faces' colours hold for rotations too.
-    face_schedule_.scatter([&](Index first, Index last) {
-        for (Index f = first; f < last; ++f)
+        for (Index f = part.first_face; f < part.last_face; ++f)
             for (int i = 0; i < 3; ++i) {
                 const FaceSide& side = sheet_.sides[f][i];
                 if (side.rotation >= 0)
@@ -174,14 +165,13 @@ void BendingTerm::add_forces(Residual& out) const {
     });
 }
 
-void BendingTerm::assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) {
-    face_schedule_.scatter([&](Index first, Index last) {
-        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) assemble_faces(pack, out);
-    });
+void BendingTerm::assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+                           SystemMatrix& out) const {
+    for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack)
+        assemble_faces(pack, out);
     const std::vector<Stress>& stress = extrapolated_stress ? extrapolated_ : stress_;
-    fold_schedule_.scatter([&](Index first, Index last) {
-        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) assemble_folds(pack, q, stress, out);
-    });
+    for (Index first = part.first_fold; first < part.last_fold; first += Pack::width)
+        assemble_folds(first, std::min(first + Pack::width, part.last_fold), q, stress, out);
 }
 
 void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
@@ -230,31 +220,27 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
     }
 }
 
-void BendingTerm::assemble_folds(Index pack, const double* q, const std::vector<Stress>& stress,
+void BendingTerm::assemble_folds(Index first, Index last, const double* q, const std::vector<Stress>& stress,
                                  SystemMatrix& out) const {
-    FoldCurvature curvature(fold_at(pack, q));
+    FoldCurvature curvature(folds_at(first, last, q));
     Pack moments(0.0);
-    const int lanes = std::min(Pack::width, n_folds() - pack * Pack::width);
-    for (int lane = 0; lane < lanes; ++lane)
-        moments.set(lane, moment(sheet_.folds[pack * Pack::width + lane], stress));
+    for (Index h = first; h < last; ++h) moments.set(h - first, moment(sheet_.folds[h], stress));
     for (Pack33& block : curvature.block) block = moments * block;
-    for (int lane = 0; lane < lanes; ++lane) {
-        const Index h = pack * Pack::width + lane;
-        scatter_blocks<4>(out, sheet_.folds[h].nodes, fold_slots_[h], curvature.block, lane);
-    }
+    for (Index h = first; h < last; ++h)
+        scatter_blocks<4>(out, sheet_.folds[h].nodes, fold_slots_[h], curvature.block, h - first);
 }
 
 void BendingTerm::extrapolate(const double* p) {
-    fold_schedule_.each([&](Index first, Index last) {
-        for (Index h = first; h < last; ++h) {
+    schedule_.each([&](const Part& part) {
+        for (Index h = part.first_fold; h < part.last_fold; ++h) {
             folds_[h].rate = 0.0;
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)
                     folds_[h].rate += folds_[h].gradient[3 * k + c] * p[3 * sheet_.folds[h].nodes[k] + c];
         }
     });
-    face_schedule_.each([&](Index first, Index last) {
-        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) {
+    schedule_.each([&](const Part& part) {
+        for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) {
             Pack rate[3], change[3];
             strain(pack, p, &FoldState::rate, rate);
             stiffness_[pack].times(rate, change);
@@ -276,7 +262,7 @@ void BendingTerm::add_cancelling_forces(VectorXd& out) const {
 
 std::size_t BendingTerm::bytes() const {
     return bytes_of(face_slots_) + bytes_of(fold_slots_) + bytes_of(stiffness_) + bytes_of(stress_) +
-           bytes_of(extrapolated_) + bytes_of(folds_) + face_schedule_.bytes() + fold_schedule_.bytes();
+           bytes_of(extrapolated_) + bytes_of(folds_);
 }
 
 }  // namespace magshell

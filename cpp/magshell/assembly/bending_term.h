@@ -5,8 +5,6 @@
 #pragma once
 
 #include "magshell/assembly/lanes.h"
-#include "magshell/assembly/schedule.h"
-#include "magshell/assembly/sheet.h"
 #include "magshell/energy/bending.h"
 #include "magshell/energy/material.h"
 #include "magshell/strain/fold_angle.h"
@@ -15,7 +13,7 @@ namespace magshell {
 
 class BendingTerm final : public Term {
   public:
-    BendingTerm(const Sheet& sheet, const SystemMatrix& matrix);
+    BendingTerm(const Sheet& sheet, const Schedule& schedule, const SystemMatrix& matrix);
 
     /// One material a face in our numbering; one curvature scale an edge in the caller's, [Chen22] k_cur.
     void set_material(const std::vector<SheetMaterial>& materials, const VectorXd& curvature_scale);
@@ -24,7 +22,8 @@ class BendingTerm final : public Term {
     bool driven() const override { return false; }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
-    void assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) override;
+    void assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+                  SystemMatrix& out) const override;
     void extrapolate(const double* p) override;
     void add_cancelling_forces(VectorXd& out) const override;
     std::size_t bytes() const override;
@@ -47,19 +46,18 @@ class BendingTerm final : public Term {
     };
 
     Index face_packs() const { return packs_for(sheet_.n_faces()); }
-    Index fold_packs() const { return packs_for(n_folds()); }
-    Index n_folds() const { return static_cast<Index>(sheet_.folds.size()); }
-    Fold fold_at(Index pack, const double* q) const;
+    Fold folds_at(Index first, Index last, const double* q) const;
     double turn_from(double angle, Index fold) const;
     void strain(Index pack, const double* q, const double FoldState::*turn, Pack delta[3]) const;
     double moment(const FoldStencil& fold, const std::vector<Stress>& stress) const;
     void store_folds(const double* q);
     void add_forces(Residual& out) const;
     void assemble_faces(Index pack, SystemMatrix& out) const;
-    void assemble_folds(Index pack, const double* q, const std::vector<Stress>& stress, SystemMatrix& out) const;
+    void assemble_folds(Index first, Index last, const double* q, const std::vector<Stress>& stress,
+                        SystemMatrix& out) const;
 
     const Sheet& sheet_;
-    Schedule face_schedule_, fold_schedule_;
+    const Schedule& schedule_;
     std::vector<FaceSlots> face_slots_;
     std::vector<PairSlots<4>> fold_slots_;
     std::vector<Symmetric3> stiffness_;

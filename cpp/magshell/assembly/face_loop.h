@@ -2,19 +2,16 @@
 #pragma once
 
 #include "magshell/assembly/lanes.h"
-#include "magshell/assembly/schedule.h"
-#include "magshell/assembly/sheet.h"
 
 namespace magshell {
 
 class FaceLoop {
   public:
-    FaceLoop(const Sheet& sheet, const SystemMatrix& matrix);
+    FaceLoop(const Sheet& sheet, const Schedule& schedule, const SystemMatrix& matrix);
 
     Index packs() const { return packs_for(faces_); }
     int lanes_in(Index pack) const { return std::min(Pack::width, faces_ - pack * Pack::width); }
     Index face(Index pack, int lane) const { return element_of(pack, lane, faces_); }
-    const Schedule& schedule() const { return schedule_; }
 
     void gather(Index pack, const double* q, Pack3 x[3]) const {
         for (int lane = 0; lane < Pack::width; ++lane) {
@@ -35,42 +32,43 @@ class FaceLoop {
         }
     }
 
+    /// body(pack) for the packs of a part.
+    template <class Body>
+    static void over_packs(const Part& part, const Body& body) {
+        for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) body(pack);
+    }
+
     /// body(pack) for all packs, in the schedule's order, where body scatters.
     template <class Body>
     void scatter_packs(const Body& body) const {
-        schedule_.scatter([&](Index first, Index last) { over_packs(first, last, body); });
+        schedule_.scatter([&](const Part& part) { over_packs(part, body); });
     }
 
     /// body(pack) for all packs, where body writes only what belongs to them.
     template <class Body>
     void each_pack(const Body& body) const {
-        schedule_.each([&](Index first, Index last) { over_packs(first, last, body); });
+        schedule_.each([&](const Part& part) { over_packs(part, body); });
     }
 
     /// The sum of energy(pack) over the faces.
     template <class Energy>
     double sum(const Energy& energy) const {
-        return schedule_.sum([&](Index first, Index last) {
+        return schedule_.sum([&](const Part& part) {
             double total = 0.0;
-            over_packs(first, last, [&](Index pack) {
-                const Pack parts = energy(pack);
-                for (int lane = 0; lane < lanes_in(pack); ++lane) total += parts[lane];
+            over_packs(part, [&](Index pack) {
+                const Pack shares = energy(pack);
+                for (int lane = 0; lane < lanes_in(pack); ++lane) total += shares[lane];
             });
             return total;
         });
     }
 
-    std::size_t bytes() const { return bytes_of(slots_) + schedule_.bytes(); }
+    std::size_t bytes() const { return bytes_of(slots_); }
 
   private:
-    template <class Body>
-    static void over_packs(Index first, Index last, const Body& body) {
-        for (Index pack = first / Pack::width; pack < packs_for(last); ++pack) body(pack);
-    }
-
     Index faces_;
     const std::vector<std::array<Index, 3>>* corners_;
-    Schedule schedule_;
+    const Schedule& schedule_;
     std::vector<PairSlots<3>> slots_;
 };
 

@@ -25,8 +25,6 @@ class LoadTerm final : public Term {
         for (Index k = 0; k < forces_.size(); ++k) out.add(k, -(controls.*factor_) * forces_[k]);
     }
 
-    void assemble(const double*, const Controls&, bool, SystemMatrix&) override {}
-
     std::size_t bytes() const override { return forces_.size() * sizeof(double); }
 
   private:

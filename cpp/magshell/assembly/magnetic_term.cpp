@@ -96,18 +96,22 @@ void MagneticTerm::evaluate(const double* q, const Controls& controls, Residual&
     });
 }
 
-void MagneticTerm::assemble(const double* q, const Controls& controls, bool, SystemMatrix& out) {
-    const bool varies = sampled(controls);
+void MagneticTerm::prepare_assembly(const double* q, const Controls& controls, SystemMatrix&) {
+    fields_.clear();
+    if (sampled(controls)) fields_ = sample(q, controls, 2);
+}
+
+void MagneticTerm::assemble(const Part& part, const double* q, const Controls& controls, bool, SystemMatrix& out) const {
+    const bool varies = !fields_.empty();
     if (!varies && (!normal_magnetization_ || controls.flux_density.isZero(0.0))) return;
-    const std::vector<Magnetic::Field> fields = varies ? sample(q, controls, 2) : std::vector<Magnetic::Field>();
     const Pack3 uniform = broadcast(controls.flux_density);
-    loop_.scatter_packs([&](Index pack) {
+    FaceLoop::over_packs(part, [&](Index pack) {
         Pack3 x[3];
         Pack33 h[6];
         loop_.gather(pack, q, x);
         const Magnetic face(x);
-        face.hessian(elements_[pack], varies ? fields[pack].flux : uniform, h);
-        if (varies) face.add_hessian_by_place(elements_[pack], fields[pack], h);
+        face.hessian(elements_[pack], varies ? fields_[pack].flux : uniform, h);
+        if (varies) face.add_hessian_by_place(elements_[pack], fields_[pack], h);
         loop_.scatter(pack, h, out);
     });
 }

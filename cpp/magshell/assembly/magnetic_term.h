@@ -22,7 +22,8 @@ class MagneticTerm final : public Term {
     std::string_view name() const override { return Magnetic::name; }
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void assemble(const double* q, const Controls& controls, bool, SystemMatrix& out) override;
+    void prepare_assembly(const double* q, const Controls& controls, SystemMatrix&) override;
+    void assemble(const Part& part, const double* q, const Controls& controls, bool, SystemMatrix& out) const override;
     std::size_t bytes() const override;
 
   private:
@@ -34,6 +35,7 @@ class MagneticTerm final : public Term {
     const FaceLoop& loop_;
     std::vector<std::shared_ptr<const AppliedField>> sources_;
     std::vector<Magnetic::Element> elements_;
+    std::vector<Magnetic::Field> fields_;  // sampled for the assembly at hand; empty in a uniform field
     bool normal_magnetization_ = false;
 };
 

@@ -48,9 +48,10 @@ void MembraneTerm::evaluate(const double* q, const Controls&, Residual& out) {
     });
 }
 
-void MembraneTerm::assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) {
+void MembraneTerm::assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+                            SystemMatrix& out) const {
     const std::vector<Stress>& stress = extrapolated_stress ? extrapolated_ : stress_;
-    loop_.scatter_packs([&](Index pack) {
+    FaceLoop::over_packs(part, [&](Index pack) {
         Pack3 x[3];
         Pack33 h[6];
         loop_.gather(pack, q, x);

@@ -18,7 +18,8 @@ class MembraneTerm final : public Term {
     bool driven() const override { return false; }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
-    void assemble(const double* q, const Controls&, bool extrapolated_stress, SystemMatrix& out) override;
+    void assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+                  SystemMatrix& out) const override;
     void extrapolate(const double* p) override;
     void add_cancelling_forces(VectorXd& out) const override;
     std::size_t bytes() const override;

@@ -57,7 +57,8 @@ Model::Model(SceneInput input)
     : sheet_(input.mesh, input.directed_edges, input.directions, input.directors),
       matrix_(sheet_.n_nodes(), sheet_.n_rotations(), all_stencils(sheet_, input)),
       reduction_(matrix_, renumbered(input.held, sheet_), input.motions, sheet_.rest, sheet_.n_vertices()),
-      faces_(sheet_, matrix_),
+      schedule_(sheet_),
+      faces_(sheet_, schedule_, matrix_),
       metric_(area_metric(sheet_)),
       extent_(extent_of(input.mesh)) {
     const std::vector<SheetMaterial> materials = renumbered(input.materials, sheet_);
@@ -66,7 +67,7 @@ Model::Model(SceneInput input)
     auto membrane = std::make_unique<MembraneTerm>(sheet_, faces_);
     membrane->set_material(materials);
     terms_.push_back(std::move(membrane));
-    auto bending = std::make_unique<BendingTerm>(sheet_, matrix_);
+    auto bending = std::make_unique<BendingTerm>(sheet_, schedule_, matrix_);
     bending->set_material(materials, input.curvature_scale);
     terms_.push_back(std::move(bending));
     if (input.magnetic) {
@@ -164,7 +165,12 @@ void Model::evaluate(const VectorXd& q, const Controls& controls) {
 
 void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress) {
     matrix_.set_zero();
-    for (const std::unique_ptr<Term>& term : terms_) term->assemble(q.data(), controls, extrapolated_stress, matrix_);
+    for (const std::unique_ptr<Term>& term : terms_) term->prepare_assembly(q.data(), controls, matrix_);
+    // All terms of a part before the next part: its share of the matrix stays in the cache.
+    schedule_.scatter([&](const Part& part) {
+        for (const std::unique_ptr<Term>& term : terms_)
+            term->assemble(part, q.data(), controls, extrapolated_stress, matrix_);
+    });
 }
 
 void Model::extrapolate(const VectorXd& p) {
@@ -180,7 +186,7 @@ VectorXd Model::gradient_rate(const VectorXd& q, const Controls& rate) {
 }
 
 std::size_t Model::bytes() const {
-    std::size_t total = matrix_.bytes() + reduction_.bytes() + faces_.bytes();
+    std::size_t total = matrix_.bytes() + reduction_.bytes() + schedule_.bytes() + faces_.bytes();
     for (const std::unique_ptr<Term>& term : terms_) total += term->bytes();
     return total;
 }

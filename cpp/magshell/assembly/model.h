@@ -87,6 +87,7 @@ class Model {
     Sheet sheet_;
     SystemMatrix matrix_;
     Reduction reduction_;
+    Schedule schedule_;
     FaceLoop faces_;
     std::vector<std::unique_ptr<Term>> terms_;
     MagneticTerm* magnetic_ = nullptr;

@@ -5,56 +5,63 @@
 #include "magshell/core/parallel.h"
 
 namespace magshell {
+namespace {
 
-Schedule::Schedule(Index elements, Index nodes, const std::function<std::vector<Index>(Index)>& nodes_of)
-    : elements_(elements), chunks_((elements + chunk_length - 1) / chunk_length) {
-    std::vector<std::vector<Index>> chunks_at(nodes), nodes_in(chunks_);
-    for (Index c = 0; c < chunks_; ++c) {
-        for (Index e = c * chunk_length; e < std::min(elements, (c + 1) * chunk_length); ++e)
-            for (const Index node : nodes_of(e))
-                if (node >= 0 && (chunks_at[node].empty() || chunks_at[node].back() != c)) {
-                    chunks_at[node].push_back(c);
-                    nodes_in[c].push_back(node);
+constexpr Index part_length = 256;  // faces: about 300 kB of Hessian, slots and element data
+
+}  // namespace
+
+Schedule::Schedule(const Sheet& sheet) {
+    Index fold = 0;
+    const Index folds = static_cast<Index>(sheet.folds.size());
+    for (Index first = 0; first < sheet.n_faces(); first += part_length) {
+        const Index last = std::min(sheet.n_faces(), first + part_length);
+        const Index first_fold = fold;
+        while (fold < folds && sheet.folds[fold].first_face() < last) ++fold;
+        parts_.push_back({first, last, first_fold, fold});
+    }
+    colour(sheet);
+}
+
+void Schedule::colour(const Sheet& sheet) {
+    const Index count = static_cast<Index>(parts_.size());
+    std::vector<std::vector<Index>> parts_at(sheet.n_nodes()), nodes_in(count);
+    for (Index p = 0; p < count; ++p)
+        for (Index f = parts_[p].first_face; f < parts_[p].last_face; ++f)
+            for (const Index node : sheet.stencils[f].nodes)
+                if (node >= 0 && (parts_at[node].empty() || parts_at[node].back() != p)) {
+                    parts_at[node].push_back(p);
+                    nodes_in[p].push_back(node);
                 }
-    }
-    std::vector<Index> colour(chunks_, -1);
-    for (Index c = 0; c < chunks_; ++c) {
+    std::vector<Index> colour_of(count, -1);
+    for (Index p = 0; p < count; ++p) {
         std::vector<bool> taken(colours_.size() + 1, false);
-        for (const Index node : nodes_in[c])
-            for (const Index other : chunks_at[node])
-                if (colour[other] >= 0) taken[colour[other]] = true;
-        colour[c] = static_cast<Index>(std::find(taken.begin(), taken.end(), false) - taken.begin());
-        if (colour[c] == static_cast<Index>(colours_.size())) colours_.emplace_back();
-        colours_[colour[c]].push_back(c);
+        for (const Index node : nodes_in[p])
+            for (const Index other : parts_at[node])
+                if (colour_of[other] >= 0) taken[colour_of[other]] = true;
+        colour_of[p] = static_cast<Index>(std::find(taken.begin(), taken.end(), false) - taken.begin());
+        if (colour_of[p] == static_cast<Index>(colours_.size())) colours_.emplace_back();
+        colours_[colour_of[p]].push_back(p);
     }
 }
 
-void Schedule::scatter(const std::function<void(Index, Index)>& body) const {
-    for (const std::vector<Index>& chunks : colours_)
-        parallel_for(static_cast<int>(chunks.size()), [&](int k) {
-            const Index first = chunks[k] * chunk_length;
-            body(first, std::min(elements_, first + chunk_length));
-        });
+void Schedule::scatter(const std::function<void(const Part&)>& body) const {
+    for (const std::vector<Index>& parts : colours_)
+        parallel_for(static_cast<int>(parts.size()), [&](int k) { body(parts_[parts[k]]); });
 }
 
-void Schedule::each(const std::function<void(Index, Index)>& body) const {
-    parallel_for(chunks_, [&](int c) {
-        const Index first = c * chunk_length;
-        body(first, std::min(elements_, first + chunk_length));
-    });
+void Schedule::each(const std::function<void(const Part&)>& body) const {
+    parallel_for(static_cast<int>(parts_.size()), [&](int p) { body(parts_[p]); });
 }
 
-double Schedule::sum(const std::function<double(Index, Index)>& body) const {
-    std::vector<double> parts(chunks_);
-    parallel_for(chunks_, [&](int c) {
-        const Index first = c * chunk_length;
-        parts[c] = body(first, std::min(elements_, first + chunk_length));
-    });
+double Schedule::sum(const std::function<double(const Part&)>& body) const {
+    std::vector<double> shares(parts_.size());
+    parallel_for(static_cast<int>(parts_.size()), [&](int p) { shares[p] = body(parts_[p]); });
     double total = 0.0;
-    for (const double part : parts) total += part;
+    for (const double share : shares) total += share;
     return total;
 }
 
-std::size_t Schedule::bytes() const { return sizeof(*this) + chunks_ * sizeof(Index); }
+std::size_t Schedule::bytes() const { return parts_.size() * (sizeof(Part) + sizeof(Index)); }
 
 }  // namespace magshell

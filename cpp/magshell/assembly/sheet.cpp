@@ -64,7 +64,7 @@ void Sheet::add_folds(const TriangleMesh& mesh, const std::vector<DirectedEdge>&
             const bool forward = mesh.edge_faces()(e, 0) == user_face;
             if (direction_of[e] >= 0) {
                 side.fold = add_fold({from, to, tip, direction_node(direction_of[e])}, false);
-                side.weight = 1.0;
+                side.weight = 1.0f;
                 folds[side.fold].left = {f, i};
                 continue;
             }
@@ -74,10 +74,10 @@ void Sheet::add_folds(const TriangleMesh& mesh, const std::vector<DirectedEdge>&
                     edge_of_rotation.push_back(e);
                 }
                 side.rotation = rotation_of_edge[e];
-                side.sign = forward ? 1.0 : -1.0;
+                side.sign = forward ? 1 : -1;
             }
             if (mesh.is_boundary(e)) continue;
-            side.weight = 0.5;
+            side.weight = 0.5f;
             side.on_left = forward;
             if (fold_of[e] < 0) {
                 const Index other = faces.core[mesh.edge_faces()(e, forward ? 1 : 0)];

@@ -26,15 +26,18 @@ struct FoldStencil {
     struct Side {
         Index face = -1, corner = -1;
     } left, right;  // the faces whose strain this fold enters, and the corner it is opposite to
+
+    Index first_face() const {
+        return left.face < 0 || (right.face >= 0 && right.face < left.face) ? right.face : left.face;
+    }
 };
 
 /// What edge i of a face contributes to its bending strain: weight (theta - theta~) + sign phi.
 struct FaceSide {
-    Index fold = -1;
+    Index fold = -1, rotation = -1;
+    float weight = 0.0f;  // 0, 1/2 or 1
+    std::int8_t sign = 0;
     bool on_left = true;
-    double weight = 0.0;
-    Index rotation = -1;
-    double sign = 0.0;
 };
 
 class Sheet {

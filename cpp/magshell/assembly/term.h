@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "magshell/assembly/system_matrix.h"
+#include "magshell/assembly/schedule.h"
 #include "magshell/energy/controls.h"
 
 namespace magshell {
@@ -23,8 +23,8 @@ struct Residual {
     }
 };
 
-/// The order of calls in a Newton step: evaluate at a state; assemble there, with its own stresses (plain Newton) or
-/// with the extrapolated ones (mixed); once the increment is known, extrapolate.
+/// The order of calls in a Newton step: evaluate at a state; prepare_assembly and assemble there, with its own stresses
+/// (plain Newton) or with the extrapolated ones (mixed); once the increment is known, extrapolate.
 class Term {
   public:
     virtual ~Term() = default;
@@ -40,8 +40,12 @@ class Term {
     /// Adds the gradient at q and keeps what assemble and extrapolate need of this state.
     virtual void evaluate(const double* q, const Controls& controls, Residual& out) = 0;
 
-    /// Adds the Hessian at the state of the last evaluate.
-    virtual void assemble(const double* q, const Controls& controls, bool extrapolated_stress, SystemMatrix& out) = 0;
+    /// What the Hessian at the last evaluated state needs beforehand; and the part of it that is not on faces.
+    virtual void prepare_assembly(const double* /*q*/, const Controls&, SystemMatrix& /*out*/) {}
+
+    /// Adds a part's share of the Hessian; parts that share no node may run at the same time.
+    virtual void assemble(const Part&, const double* /*q*/, const Controls&, bool /*extrapolated_stress*/,
+                          SystemMatrix& /*out*/) const {}
 
     /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J p).
     virtual void extrapolate(const double* /*p*/) {}
