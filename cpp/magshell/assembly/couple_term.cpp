@@ -54,7 +54,7 @@ void CoupleTerm::evaluate(const double* q, const Controls& controls, Residual& o
     }
 }
 
-void CoupleTerm::prepare_assembly(const double* q, const Controls& controls, SystemMatrix& out) {
+void CoupleTerm::finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const {
     for (std::size_t k = 0; k < couples_.size(); ++k) {
         FoldCurvature curvature(fold_at(couples_[k], q));
         for (Pack33& block : curvature.block) block = Pack(-controls.load * couples_[k].couple) * block;

@@ -26,7 +26,7 @@ class CoupleTerm final : public Term {
     std::string_view name() const override { return "couple"; }
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void prepare_assembly(const double* q, const Controls& controls, SystemMatrix& out) override;
+    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
     std::size_t bytes() const override { return bytes_of(couples_) + bytes_of(slots_); }
 
   private:

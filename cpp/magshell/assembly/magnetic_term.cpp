@@ -96,7 +96,7 @@ void MagneticTerm::evaluate(const double* q, const Controls& controls, Residual&
     });
 }
 
-void MagneticTerm::prepare_assembly(const double* q, const Controls& controls, SystemMatrix&) {
+void MagneticTerm::prepare_assembly(const double* q, const Controls& controls) {
     fields_.clear();
     if (sampled(controls)) fields_ = sample(q, controls, 2);
 }

@@ -22,7 +22,7 @@ class MagneticTerm final : public Term {
     std::string_view name() const override { return Magnetic::name; }
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void prepare_assembly(const double* q, const Controls& controls, SystemMatrix&) override;
+    void prepare_assembly(const double* q, const Controls& controls) override;
     void assemble(const Part& part, const double* q, const Controls& controls, bool, SystemMatrix& out) const override;
     std::size_t bytes() const override;
 

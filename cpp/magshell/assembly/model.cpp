@@ -86,6 +86,7 @@ Model::Model(SceneInput input)
             std::make_unique<LoadTerm>("loads", node_forces(input.vertex_loads, sheet_), &Controls::load));
     if (!input.couples.empty()) add_couples(input);
 
+    share_out_columns();
     cancelling_forces_ = VectorXd::Zero(size());
     for (const std::unique_ptr<Term>& term : terms_) term->add_cancelling_forces(cancelling_forces_);
 }
@@ -164,13 +165,37 @@ void Model::evaluate(const VectorXd& q, const Controls& controls) {
 }
 
 void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress) {
-    matrix_.set_zero();
-    for (const std::unique_ptr<Term>& term : terms_) term->prepare_assembly(q.data(), controls, matrix_);
-    // All terms of a part before the next part: its share of the matrix stays in the cache.
+    const auto clear = [&](std::size_t part) {
+        for (const Index node : first_nodes_[part]) matrix_.clear_node(node);
+        for (const Index rotation : first_rotations_[part]) matrix_.clear_rotation(rotation);
+    };
+    clear(first_nodes_.size() - 1);
+    // All terms of a part before the next part: its share of the matrix is cleared and filled in the cache.
+    for (const std::unique_ptr<Term>& term : terms_) term->prepare_assembly(q.data(), controls);
     schedule_.scatter([&](const Part& part) {
+        clear(part.number);
         for (const std::unique_ptr<Term>& term : terms_)
             term->assemble(part, q.data(), controls, extrapolated_stress, matrix_);
     });
+    for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
+}
+
+void Model::share_out_columns() {
+    const std::vector<Part> parts = schedule_.in_order();
+    std::vector<bool> node_taken(sheet_.n_nodes(), false), rotation_taken(sheet_.n_rotations(), false);
+    first_nodes_.resize(parts.size() + 1);
+    first_rotations_.resize(parts.size() + 1);
+    const auto take = [](std::vector<bool>& taken, Index number, std::vector<Index>& list) {
+        if (number < 0 || taken[number]) return;
+        taken[number] = true;
+        list.push_back(number);
+    };
+    for (const Part& part : parts)
+        for (Index f = part.first_face; f < part.last_face; ++f) {
+            for (const Index node : sheet_.stencils[f].nodes) take(node_taken, node, first_nodes_[part.number]);
+            for (const Index r : sheet_.stencils[f].rotations) take(rotation_taken, r, first_rotations_[part.number]);
+        }
+    for (Index node = 0; node < sheet_.n_nodes(); ++node) take(node_taken, node, first_nodes_.back());
 }
 
 void Model::extrapolate(const VectorXd& p) {

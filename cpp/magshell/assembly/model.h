@@ -83,6 +83,7 @@ class Model {
 
   private:
     void add_couples(const SceneInput& input);
+    void share_out_columns();
 
     Sheet sheet_;
     SystemMatrix matrix_;
@@ -90,6 +91,8 @@ class Model {
     Schedule schedule_;
     FaceLoop faces_;
     std::vector<std::unique_ptr<Term>> terms_;
+    // By part: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
+    std::vector<std::vector<Index>> first_nodes_, first_rotations_;
     MagneticTerm* magnetic_ = nullptr;
     std::vector<double> thickness_;  // in our numbering
     Residual residual_;

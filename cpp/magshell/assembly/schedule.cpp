@@ -18,7 +18,7 @@ Schedule::Schedule(const Sheet& sheet) {
         const Index last = std::min(sheet.n_faces(), first + part_length);
         const Index first_fold = fold;
         while (fold < folds && sheet.folds[fold].first_face() < last) ++fold;
-        parts_.push_back({first, last, first_fold, fold});
+        parts_.push_back({static_cast<Index>(parts_.size()), first, last, first_fold, fold});
     }
     colour(sheet);
 }
@@ -43,6 +43,13 @@ void Schedule::colour(const Sheet& sheet) {
         if (colour_of[p] == static_cast<Index>(colours_.size())) colours_.emplace_back();
         colours_[colour_of[p]].push_back(p);
     }
+}
+
+std::vector<Part> Schedule::in_order() const {
+    std::vector<Part> order;
+    for (const std::vector<Index>& parts : colours_)
+        for (const Index p : parts) order.push_back(parts_[p]);
+    return order;
 }
 
 void Schedule::scatter(const std::function<void(const Part&)>& body) const {

@@ -14,6 +14,7 @@
 namespace magshell {
 
 struct Part {
+    Index number;
     Index first_face, last_face;  // first_face is a multiple of every pack width
     Index first_fold, last_fold;
 };
@@ -24,6 +25,9 @@ class Schedule {
 
     /// body(part) for every part, colour after colour, where body scatters into shared arrays.
     void scatter(const std::function<void(const Part&)>& body) const;
+
+    /// The parts in an order in which scatter may come to them.
+    std::vector<Part> in_order() const;
 
     /// body(part) for every part at once, where body writes only to its own faces and folds.
     void each(const std::function<void(const Part&)>& body) const;

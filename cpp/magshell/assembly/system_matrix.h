@@ -6,6 +6,7 @@
 // p + 2 L - 3 in them, with L the length of the first.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -35,7 +36,9 @@ class SystemMatrix {
     const std::vector<Index>& rows() const { return rows_; }
     const std::vector<double>& values() const { return values_; }
     std::vector<double>& values() { return values_; }
-    void set_zero() { std::fill(values_.begin(), values_.end(), 0.0); }
+    /// Clears the three columns of a node, or the column of a rotation.
+    void clear_node(Index node) { clear(3 * node, 3 * node + 3); }
+    void clear_rotation(Index rotation) { clear(3 * nodes_ + rotation, 3 * nodes_ + rotation + 1); }
     std::size_t bytes() const;
 
     /// The slot of the block with rows at node i and columns at node j.
@@ -92,6 +95,9 @@ class SystemMatrix {
 
   private:
     Index find(Index column, Index row) const;
+    void clear(Index first_column, Index last_column) {
+        std::fill(values_.data() + column_starts_[first_column], values_.data() + column_starts_[last_column], 0.0);
+    }
 
     Index nodes_ = 0, rotations_ = 0;
     std::vector<Index> column_starts_, rows_;

@@ -23,7 +23,7 @@ struct Residual {
     }
 };
 
-/// The order of calls in a Newton step: evaluate at a state; prepare_assembly and assemble there, with its own stresses
+/// The order of calls in a Newton step: evaluate at a state; the three of the assembly there, with its own stresses
 /// (plain Newton) or with the extrapolated ones (mixed); once the increment is known, extrapolate.
 class Term {
   public:
@@ -40,12 +40,15 @@ class Term {
     /// Adds the gradient at q and keeps what assemble and extrapolate need of this state.
     virtual void evaluate(const double* q, const Controls& controls, Residual& out) = 0;
 
-    /// What the Hessian at the last evaluated state needs beforehand; and the part of it that is not on faces.
-    virtual void prepare_assembly(const double* /*q*/, const Controls&, SystemMatrix& /*out*/) {}
+    /// What the Hessian at the last evaluated state needs beforehand.
+    virtual void prepare_assembly(const double* /*q*/, const Controls&) {}
 
     /// Adds a part's share of the Hessian; parts that share no node may run at the same time.
     virtual void assemble(const Part&, const double* /*q*/, const Controls&, bool /*extrapolated_stress*/,
                           SystemMatrix& /*out*/) const {}
+
+    /// Adds the share of the Hessian that is not on faces.
+    virtual void finish_assembly(const double* /*q*/, const Controls&, SystemMatrix& /*out*/) const {}
 
     /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J p).
     virtual void extrapolate(const double* /*p*/) {}
