@@ -1,62 +1,110 @@
 #include "magshell/solve/relaxation.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "magshell/solve/modes.h"
 
 namespace magshell {
 namespace {
 
-// Newton without an anchor, taken only if it starts where the Hessian is positive definite and ends lower.
-bool finish(Newton& newton, VectorXd& q, const Controls& controls, double energy, double& residual) {
-    const FactorReport factor = newton.factorize_at(q, controls);
-    if (!factor.succeeded || factor.negative_pivots > 0) return false;
-    VectorXd trial = q;
-    const NewtonReport report = newton.solve(trial, controls);
-    residual = report.residual;
-    if (!report.converged) return false;
-    const double slack = 1e-9 * (std::abs(energy) + 1e-300);
-    if (newton.model().energy(trial, controls) > energy + slack) return false;
-    const FactorReport at_solution = newton.factorize_at(trial, controls);
-    if (!at_solution.succeeded || at_solution.negative_pivots > 0) return false;
-    q = trial;
-    return true;
-}
+constexpr int iterations_a_step = 12, quick_iterations = 6;
+constexpr double above_instability = 1.2;  // the rate, over the most negative eigenvalue's size
+constexpr double rate_change = 4.0;
+constexpr double smallest_step = 1e-12;  // of a rate, over the first one, before giving up
+
+class Relaxation {
+  public:
+    Relaxation(Newton& newton, VectorXd& q, const Controls& controls)
+        : newton_(newton), model_(newton.model()), q_(q), controls_(controls) {
+        q_ += model_.reduction().prescribed_increment(q_, controls.motion);
+        energy_ = model_.energy(q_, controls);
+    }
+
+    RelaxationReport run(int max_steps) {
+        for (; report_.steps < max_steps; ++report_.steps) {
+            if (!choose_rate()) return report_;
+            while (!step()) {
+                rate_ *= rate_change;
+                if (rate_ * smallest_step > first_rate_) {
+                    report_.reason = "no step lowers the energy, however short";
+                    return report_;
+                }
+            }
+            if (stationary()) {
+                report_.converged = true;
+                return report_;
+            }
+        }
+        report_.reason = "not at rest after " + std::to_string(max_steps) + " steps";
+        return report_;
+    }
+
+  private:
+    // From the Hessian at q: done, where Newton finishes from here; otherwise the rate of the next step.
+    bool choose_rate() {
+        const FactorReport factor = newton_.factorize_at(q_, controls_);
+        if (!factor.succeeded) {
+            report_.reason = factor.reason;
+            return false;
+        }
+        const bool convex = factor.negative_pivots == 0;
+        if (!convex || rate_ == 0.0) {
+            const int count = static_cast<int>(std::min<Index>(factor.negative_pivots, 6)) + 1;
+            const double lowest = modes_near_zero(newton_, count).front().eigenvalue;
+            rate_ = above_instability * std::abs(lowest);
+            if (first_rate_ == 0.0) first_rate_ = rate_;
+        }
+        if (convex && finish()) {
+            report_.converged = true;
+            return false;
+        }
+        return true;
+    }
+
+    bool finish() {
+        VectorXd trial = q_;
+        const NewtonReport report = newton_.solve(trial, controls_);
+        if (!report.converged || !lowers(model_.energy(trial, controls_))) return false;
+        report_.residual = report.residual;
+        q_ = trial;
+        return true;
+    }
+
+    bool step() {
+        const VectorXd anchor = q_;
+        VectorXd trial = q_;
+        const NewtonReport report = newton_.solve(trial, controls_, {rate_, &anchor}, iterations_a_step);
+        if (!report.converged) return false;
+        const VectorXd moved = trial - anchor;
+        const double energy = model_.energy(trial, controls_);
+        if (!lowers(energy + 0.5 * rate_ * moved.dot(model_.metric().cwiseProduct(moved)))) return false;
+        q_ = trial;
+        energy_ = energy;
+        if (report.iterations <= quick_iterations) rate_ /= rate_change;
+        return true;
+    }
+
+    bool stationary() {
+        model_.evaluate(q_, controls_);
+        report_.residual = newton_.relative_residual(q_, {});
+        return report_.residual <= newton_.options().tolerance;
+    }
+
+    bool lowers(double energy) const { return energy <= energy_ + 1e-9 * std::abs(energy_); }
+
+    Newton& newton_;
+    Model& model_;
+    VectorXd& q_;
+    const Controls& controls_;
+    RelaxationReport report_;
+    double energy_, rate_ = 0.0, first_rate_ = 0.0;
+};
 
 }  // namespace
 
-RelaxationReport relax(Newton& newton, VectorXd& q, const Controls& controls, double rate, int max_steps) {
-    constexpr int iterations_a_step = 10, quick = 5;
-    constexpr double growth = 4.0, largest_rate_factor = 1e12;
-    RelaxationReport report;
-    const Model& model = newton.model();
-    const double first_rate = rate;
-    q += model.reduction().prescribed_increment(q, controls.motion);
-    double energy = model.energy(q, controls);
-    for (; report.steps < max_steps; ++report.steps) {
-        const VectorXd anchor = q;
-        VectorXd trial = q;
-        const NewtonReport step = newton.solve(trial, controls, {rate, &anchor}, iterations_a_step);
-        const double trial_energy = step.converged ? model.energy(trial, controls) : 0.0;
-        const VectorXd moved = trial - anchor;
-        const double pull = 0.5 * rate * moved.dot(model.metric().cwiseProduct(moved));
-        if (!step.converged || !(trial_energy + pull <= energy + 1e-12 * std::abs(energy))) {
-            rate *= growth;
-            if (rate > largest_rate_factor * first_rate) {
-                report.reason = "no step lowers the energy, however short";
-                return report;
-            }
-            continue;
-        }
-        q = trial;
-        energy = trial_energy;
-        report.residual = step.residual;
-        if (finish(newton, q, controls, energy, report.residual)) {
-            report.converged = true;
-            return report;
-        }
-        rate /= step.iterations <= quick ? growth : 1.0;
-    }
-    report.reason = "not at rest after " + std::to_string(max_steps) + " steps";
-    return report;
+RelaxationReport relax(Newton& newton, VectorXd& q, const Controls& controls, int max_steps) {
+    return Relaxation(newton, q, controls).run(max_steps);
 }
 
 }  // namespace magshell

@@ -1,8 +1,9 @@
 // The fallback that always descends: pseudo-transient continuation.
 //
-// Implicit Euler steps of the gradient flow M dq/dt = - dE/dq, each solved by the mixed Newton. A step is kept only
-// if it lowers the energy; the time step grows while they converge quickly, and shrinks when one does not. Close to a
-// minimum, where the Hessian is positive definite, Newton itself finishes.
+// Implicit Euler steps of the gradient flow M dq/dt = - dE/dq, each solved by the mixed Newton and kept only if it
+// lowers the energy. Where the Hessian has a negative eigenvalue, 1/dt stays just above its size: the unstable mode then
+// grows several times a step, and the step still has one solution. Where it is positive definite the steps get longer and
+// longer, and Newton itself finishes.
 #pragma once
 
 #include "magshell/solve/newton.h"
@@ -16,7 +17,7 @@ struct RelaxationReport {
     std::string reason;
 };
 
-/// From q down to a stable equilibrium at the controls. `rate` [N/m3] is the weight of the first steps.
-RelaxationReport relax(Newton& newton, VectorXd& q, const Controls& controls, double rate, int max_steps = 200);
+/// From q down to an equilibrium at the controls, which may be a saddle where the start has its symmetry.
+RelaxationReport relax(Newton& newton, VectorXd& q, const Controls& controls, int max_steps = 200);
 
 }  // namespace magshell

@@ -39,7 +39,7 @@ class Statics {
             }
             result_.reason = report.reason;
             step = 0.5 * (target - result_.progress);
-            if (step < options_.smallest_step || !options_.start_at_rest) return relax_to_end();
+            if (step < options_.smallest_step || !options_.start_at_rest) return descend(result_.state);
         }
         return check_stability();
     }
@@ -61,8 +61,8 @@ class Statics {
         return factor.succeeded;
     }
 
-    bool descend(VectorXd trial, double rate) {
-        const RelaxationReport report = relax(newton_, trial, to_, rate, options_.max_relaxation_steps);
+    bool descend(VectorXd trial) {
+        const RelaxationReport report = relax(newton_, trial, to_, options_.max_relaxation_steps);
         result_.relaxation_steps += report.steps;
         if (!report.converged) {
             result_.reason = report.reason;
@@ -70,24 +70,6 @@ class Statics {
         }
         accept(trial, to_, 1.0, report.residual);
         return check_stability();
-    }
-
-    bool relax_to_end() {
-        VectorXd trial = result_.state;
-        trial += newton_.model().reduction().prescribed_increment(trial, to_.motion);
-        const FactorReport factor = newton_.factorize_at(trial, to_);
-        if (!factor.succeeded) {
-            result_.reason = factor.reason;
-            return false;
-        }
-        const std::vector<Mode> modes = modes_near_zero(newton_, static_cast<int>(factor.negative_pivots) + 2);
-        return descend(trial, 4.0 * largest(modes));
-    }
-
-    static double largest(const std::vector<Mode>& modes) {
-        double value = 0.0;
-        for (const Mode& mode : modes) value = std::max(value, std::abs(mode.eigenvalue));
-        return value;
     }
 
     // Off the saddle along its most unstable direction, as far as the energy falls, and down from there.
@@ -115,7 +97,7 @@ class Statics {
                 start = trial;
             }
             ++result_.saddles_left;
-            if (!descend(start, 2.0 * std::abs(lowest->eigenvalue))) return false;
+            if (!descend(start)) return false;
         }
         if (!result_.stable) result_.reason = "every equilibrium found was a saddle";
         return result_.stable;
