@@ -8,9 +8,9 @@
 namespace magshell {
 namespace {
 
-constexpr int iterations_a_step = 12, quick_iterations = 6;
-constexpr double above_instability = 1.2;  // the rate, over the most negative eigenvalue's size
-constexpr double rate_change = 4.0;
+constexpr int iterations_a_step = 10, quick_iterations = 6;
+constexpr double above_instability = 1.3;  // the rate, over the most negative eigenvalue's size
+constexpr double rate_growth = 2.0, rate_decay = 4.0;
 constexpr double smallest_step = 1e-12;  // of a rate, over the first one, before giving up
 
 class Relaxation {
@@ -25,7 +25,7 @@ class Relaxation {
         for (; report_.steps < max_steps; ++report_.steps) {
             if (!choose_rate()) return report_;
             while (!step()) {
-                rate_ *= rate_change;
+                rate_ *= rate_growth;
                 if (rate_ * smallest_step > first_rate_) {
                     report_.reason = "no step lowers the energy, however short";
                     return report_;
@@ -81,7 +81,7 @@ class Relaxation {
         if (!lowers(energy + 0.5 * rate_ * moved.dot(model_.metric().cwiseProduct(moved)))) return false;
         q_ = trial;
         energy_ = energy;
-        if (report.iterations <= quick_iterations) rate_ /= rate_change;
+        if (report.iterations <= quick_iterations) rate_ /= rate_decay;
         return true;
     }
 
