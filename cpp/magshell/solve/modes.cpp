@@ -66,4 +66,10 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     return modes;
 }
 
+Mode most_unstable_mode(Newton& newton, Index negative_pivots) {
+    // Stable modes may lie nearer to zero than the most unstable one: look at a few more.
+    constexpr Index most = 12, spare = 6;
+    return modes_near_zero(newton, static_cast<int>(std::min(negative_pivots, most) + spare)).front();
+}
+
 }  // namespace magshell

@@ -14,4 +14,7 @@ struct Mode {
 /// factorization of `newton`, which must be that of the Hessian itself.
 std::vector<Mode> modes_near_zero(Newton& newton, int count);
 
+/// The mode with the most negative eigenvalue, at a point whose factorization has so many negative pivots.
+Mode most_unstable_mode(Newton& newton, Index negative_pivots);
+
 }  // namespace magshell

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "magshell/solve/modes.h"
 
@@ -11,6 +12,7 @@ namespace {
 constexpr int iterations_a_step = 10, quick_iterations = 6;
 constexpr double above_instability = 1.3;  // the rate, over the most negative eigenvalue's size
 constexpr double rate_growth = 2.0, rate_decay = 4.0;
+constexpr double settled = 1e-4;  // of the extent: a step that moves less has come to rest, or to a saddle
 constexpr double smallest_step = 1e-12;  // of a rate, over the first one, before giving up
 
 class Relaxation {
@@ -23,17 +25,13 @@ class Relaxation {
 
     RelaxationReport run(int max_steps) {
         for (; report_.steps < max_steps; ++report_.steps) {
-            if (!choose_rate()) return report_;
+            if (!prepare()) return report_;
             while (!step()) {
                 rate_ *= rate_growth;
                 if (rate_ * smallest_step > first_rate_) {
                     report_.reason = "no step lowers the energy, however short";
                     return report_;
                 }
-            }
-            if (stationary()) {
-                report_.converged = true;
-                return report_;
             }
         }
         report_.reason = "not at rest after " + std::to_string(max_steps) + " steps";
@@ -42,7 +40,7 @@ class Relaxation {
 
   private:
     // From the Hessian at q: done, where Newton finishes from here; otherwise the rate of the next step.
-    bool choose_rate() {
+    bool prepare() {
         const FactorReport factor = newton_.factorize_at(q_, controls_);
         if (!factor.succeeded) {
             report_.reason = factor.reason;
@@ -50,16 +48,27 @@ class Relaxation {
         }
         const bool convex = factor.negative_pivots == 0;
         if (!convex || rate_ == 0.0) {
-            const int count = static_cast<int>(std::min<Index>(factor.negative_pivots, 6)) + 1;
-            const double lowest = modes_near_zero(newton_, count).front().eigenvalue;
-            rate_ = above_instability * std::abs(lowest);
+            const bool at_rest = newton_.relative_residual(q_, {}) <= newton_.options().tolerance;
+            const Mode mode = most_unstable_mode(newton_, factor.negative_pivots);
+            rate_ = above_instability * std::abs(mode.eigenvalue);
             if (first_rate_ == 0.0) first_rate_ = rate_;
+            if (mode.eigenvalue < 0.0 && (at_rest || last_move_ < settled * model_.extent())) leave_saddle(mode);
         }
-        if (convex && finish()) {
-            report_.converged = true;
-            return false;
+        report_.converged = convex && finish();
+        return !report_.converged;
+    }
+
+    void leave_saddle(const Mode& mode) {
+        const VectorXd saddle = q_;
+        ++report_.saddles_left;
+        for (double amplitude = settled * model_.extent(); amplitude < model_.extent(); amplitude *= 2.0) {
+            const VectorXd trial = saddle + amplitude * mode.shape;
+            const double energy = model_.energy(trial, controls_);
+            // The first push may be too small for the energy to tell, but must be made.
+            if (amplitude > settled * model_.extent() && !(energy < energy_)) break;
+            energy_ = energy;
+            q_ = trial;
         }
-        return true;
     }
 
     bool finish() {
@@ -81,14 +90,9 @@ class Relaxation {
         if (!lowers(energy + 0.5 * rate_ * moved.dot(model_.metric().cwiseProduct(moved)))) return false;
         q_ = trial;
         energy_ = energy;
+        last_move_ = moved.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
         if (report.iterations <= quick_iterations) rate_ /= rate_decay;
         return true;
-    }
-
-    bool stationary() {
-        model_.evaluate(q_, controls_);
-        report_.residual = newton_.relative_residual(q_, {});
-        return report_.residual <= newton_.options().tolerance;
     }
 
     bool lowers(double energy) const { return energy <= energy_ + 1e-9 * std::abs(energy_); }
@@ -99,6 +103,7 @@ class Relaxation {
     const Controls& controls_;
     RelaxationReport report_;
     double energy_, rate_ = 0.0, first_rate_ = 0.0;
+    double last_move_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace

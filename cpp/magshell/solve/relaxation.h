@@ -3,7 +3,8 @@
 // Implicit Euler steps of the gradient flow M dq/dt = - dE/dq, each solved by the mixed Newton and kept only if it
 // lowers the energy. Where the Hessian has a negative eigenvalue, 1/dt stays just above its size: the unstable mode then
 // grows several times a step, and the step still has one solution. Where it is positive definite the steps get longer and
-// longer, and Newton itself finishes.
+// longer, and Newton itself finishes. Where the flow settles on a saddle, it is pushed off along the most unstable mode, as far
+// as the energy falls.
 #pragma once
 
 #include "magshell/solve/newton.h"
@@ -12,12 +13,12 @@ namespace magshell {
 
 struct RelaxationReport {
     bool converged = false;
-    int steps = 0;
+    int steps = 0, saddles_left = 0;
     double residual = 0.0;
     std::string reason;
 };
 
-/// From q down to an equilibrium at the controls, which may be a saddle where the start has its symmetry.
+/// From q down to a stable equilibrium at the controls.
 RelaxationReport relax(Newton& newton, VectorXd& q, const Controls& controls, int max_steps = 200);
 
 }  // namespace magshell

@@ -1,10 +1,8 @@
 #include "magshell/solve/statics.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "magshell/core/errors.h"
-#include "magshell/solve/modes.h"
 #include "magshell/solve/relaxation.h"
 
 namespace magshell {
@@ -20,8 +18,7 @@ class Statics {
 
     bool run() {
         if (!load()) return false;
-        if (!result_.stable && options_.require_stable && !leave_saddles()) return false;
-        return true;
+        return result_.stable || !options_.require_stable || descend(result_.state);
     }
 
   private:
@@ -64,42 +61,14 @@ class Statics {
     bool descend(VectorXd trial) {
         const RelaxationReport report = relax(newton_, trial, to_, options_.max_relaxation_steps);
         result_.relaxation_steps += report.steps;
+        result_.saddles_left += report.saddles_left;
         if (!report.converged) {
             result_.reason = report.reason;
             return false;
         }
         accept(trial, to_, 1.0, report.residual);
-        return check_stability();
-    }
-
-    // Off the saddle along its most unstable direction, as far as the energy falls, and down from there.
-    bool leave_saddles() {
-        constexpr int attempts = 5;
-        Model& model = newton_.model();
-        for (int k = 0; k < attempts && !result_.stable; ++k) {
-            const int count = static_cast<int>(std::min<Index>(result_.unstable_directions, 8)) + 1;
-            const std::vector<Mode> modes = modes_near_zero(newton_, count);
-            const auto lowest = std::min_element(modes.begin(), modes.end(), [](const Mode& a, const Mode& b) {
-                return a.eigenvalue < b.eigenvalue;
-            });
-            if (lowest->eigenvalue >= 0.0) {
-                result_.reason = "the equilibrium is neutral: the Hessian is singular there";
-                return false;
-            }
-            const double level = model.energy(result_.state, to_);
-            double amplitude = 1e-4 * model.extent(), best = level;
-            VectorXd start = result_.state + amplitude * lowest->shape;
-            for (double a = amplitude; a < 0.5 * model.extent(); a *= 2.0) {
-                const VectorXd trial = result_.state + a * lowest->shape;
-                const double energy = model.energy(trial, to_);
-                if (!(energy < best)) break;
-                best = energy;
-                start = trial;
-            }
-            ++result_.saddles_left;
-            if (!descend(start)) return false;
-        }
-        if (!result_.stable) result_.reason = "every equilibrium found was a saddle";
+        if (!check_stability()) return false;
+        if (!result_.stable) result_.reason = "the equilibrium is neutral: its Hessian is singular";
         return result_.stable;
     }
 
