@@ -162,7 +162,7 @@ namespace {
 // rows(8, eight right-hand sides) -= slab(8, count) pivots(count, eight right-hand sides)
 void subtract_slab(const double* slab, Index count, const double* pivots, Lanes (&rows)[1][width]) {
     const double* const sources[1] = {pivots};
-    slabs::multiply<1, width, -1>(rows, sources, slab, count);
+    slabs::subtract_multiple<1, width>(rows, sources, slab, count);
 }
 
 // pivots(count, eight) -= slab(8, count)^T rows(8, eight)
