@@ -60,7 +60,9 @@ def dominant(matrix):
 def kkt(size, constraints, seed):
     generator = np.random.default_rng(seed)
     jacobian = sp.random(constraints, size, 0.2, random_state=generator) + sp.eye(constraints, size)
-    return sp.csc_matrix(sp.block_array([[dominant(random_symmetric(size, 0.1, seed)), jacobian.T], [jacobian, None]]))
+    return sp.csc_matrix(
+        sp.block_array([[dominant(random_symmetric(size, 0.1, seed)), jacobian.T], [jacobian, None]])
+    )
 
 
 def badly_scaled(matrix, exponents):
@@ -228,7 +230,9 @@ def test_threads_may_solve_at_the_same_time(backend):
     [
         sp.csc_matrix((5, 5)),
         sp.csc_matrix(np.ones((40, 40))),
-        sp.csc_matrix(laplacian(12) - sp.diags(np.asarray(laplacian(12).sum(axis=1)).ravel())),  # free: constants
+        sp.csc_matrix(
+            laplacian(12) - sp.diags(np.asarray(laplacian(12).sum(axis=1)).ravel())
+        ),  # free: constants
     ],
     ids=["zero", "rank one", "free body"],
 )
@@ -267,7 +271,10 @@ def test_an_empty_matrix(backend):
         ((3, [0, 2, 1, 3], [0, 1, 2]), "decreases after column 1"),
         ((2, [0, 2, 4], [0, 1, 0, 1]), "rows\\[2\\] = 0 in column 1 is above the diagonal"),
         ((2, [0, 1, 2], [0, 2]), "rows\\[1\\] = 2 in column 1 is outside the matrix, whose size is 2"),
-        ((3, [0, 3, 4, 5], [0, 2, 1, 1, 2]), "rows\\[2\\] = 1 in column 0 is not greater than the row before"),
+        (
+            (3, [0, 3, 4, 5], [0, 2, 1, 1, 2]),
+            "rows\\[2\\] = 1 in column 0 is not greater than the row before",
+        ),
         ((2, [0, 1, 2], [1, 1]), "column 0 lacks its diagonal"),
         ((2, [0, 1, 1], [0]), "column 1 lacks its diagonal"),
     ],

@@ -18,7 +18,8 @@ using slabs::width;
 
 constexpr Index block_columns = PivotBlock::max_size;
 constexpr Index block_slabs = block_columns / width;
-constexpr Index depth_block = 192;  // columns of L multiplied at a time: three slabs of it stay in the first-level cache
+constexpr Index depth_block =
+    192;  // columns of L multiplied at a time: three slabs of it stay in the first-level cache
 
 // W = L D, for the rows of one slab and some columns of L.
 void scale_by_pivots(const double* slab, Index first, Index depth, const Pivots& d, double* scaled) {
@@ -41,10 +42,11 @@ struct Range {
     Index begin, end;
 };
 
-// target(I, J) -= L(I, :) D L(J, :)^T over some columns of L, for the slabs J of one block of columns of the target and
-// slabs I = rows, none of them above J. Source and Target hand out slab pointers.
+// target(I, J) -= L(I, :) D L(J, :)^T over some columns of L, for the slabs J of one block of columns of the
+// target and slabs I = rows, none of them above J. Source and Target hand out slab pointers.
 template <bool Overwrite, class Source, class Target>
-void update_block(const Source& source, const Target& target, Range columns, Range rows, Range depth, const Pivots& d) {
+void update_block(const Source& source, const Target& target, Range columns, Range rows, Range depth,
+                  const Pivots& d) {
     static thread_local ScaledBlock scaled;
     const Index count = depth.end - depth.begin;
     const Range slabs_across{columns.begin / width, slabs::count(columns.end)};
@@ -62,8 +64,10 @@ void update_block(const Source& source, const Target& target, Range columns, Ran
         }
     };
     Index i = rows.begin;
-    for (; i < std::min(rows.end, slabs_across.end); ++i) tiles.template operator()<1>(i, i + 1);  // the diagonal's triangle
-    for_groups(i, rows.end, [&]<int S>(Index group) { tiles.template operator()<S>(group, slabs_across.end); });
+    for (; i < std::min(rows.end, slabs_across.end); ++i)
+        tiles.template operator()<1>(i, i + 1);  // the diagonal's triangle
+    for_groups(i, rows.end,
+               [&]<int S>(Index group) { tiles.template operator()<S>(group, slabs_across.end); });
 }
 
 void load_block(const Panel& panel, Index first, PivotBlock& block) {
@@ -71,7 +75,8 @@ void load_block(const Panel& panel, Index first, PivotBlock& block) {
         const Index row = first + i;
         const double* slab = panel.top.slab(row / width) + row % width;
         for (Index j = 0; j <= i; ++j) {
-            block.entries[j * block.stride + i] = block.entries[i * block.stride + j] = slab[width * (first + j)];
+            block.entries[j * block.stride + i] = block.entries[i * block.stride + j] =
+                slab[width * (first + j)];
         }
     }
 }
@@ -119,10 +124,11 @@ struct InversePivots {
     }
 };
 
-// Rows below a factorized block: W = A P^T L^-T by substitution, then L = W D^-1. `slab[s]` begins at the block's first
-// column.
+// Rows below a factorized block: W = A P^T L^-T by substitution, then L = W D^-1. `slab[s]` begins at the
+// block's first column.
 template <int S>
-void solve_rows(double* const (&slab)[S], const PivotBlock& block, const InversePivots& inverse, Lanes& growth) {
+void solve_rows(double* const (&slab)[S], const PivotBlock& block, const InversePivots& inverse,
+                Lanes& growth) {
     if (block.permuted) {
         Lanes old[block_columns];
         for (int s = 0; s < S; ++s) {
@@ -137,7 +143,8 @@ void solve_rows(double* const (&slab)[S], const PivotBlock& block, const Inverse
         Lanes sum[S][width];
         for (int s = 0; s < S; ++s) {
 #pragma GCC unroll 8
-            for (Index j = 0; j < width; ++j) sum[s][j] = j < columns ? lanes(slab[s] + width * (first + j)) : Lanes{};
+            for (Index j = 0; j < width; ++j)
+                sum[s][j] = j < columns ? lanes(slab[s] + width * (first + j)) : Lanes{};
         }
         slabs::subtract_multiple<S, PivotBlock::stride>(sum, rows, block.entries + first, first);
         const double* l = block.entries + first * block.stride + first;
@@ -167,15 +174,13 @@ void solve_rows(double* const (&slab)[S], const PivotBlock& block, const Inverse
                 ++k;
             }
             at = l;
-            const Lanes product = l * w;
-            const Lanes magnitude = product < 0.0 ? -product : product;
-            growth = magnitude > growth ? magnitude : growth;
+            growth.raise_to_magnitude(l * w);
         }
     }
 }
 
-// Calls body(range) for parts of a range of slabs, on several threads where there are many slabs. The parts depend on the
-// range alone.
+// Calls body(range) for parts of a range of slabs, on several threads where there are many slabs. The parts
+// depend on the range alone.
 template <class Body>
 void for_parts(Range range, Body&& body) {
     constexpr Index part = 36;
@@ -189,11 +194,13 @@ void for_parts(Range range, Body&& body) {
 
 }  // namespace
 
-void eliminate_pivots(const Panel& panel, Index pivots, Index below_slabs, const FrontPivots& out, PivotTally& tally) {
+void eliminate_pivots(const Panel& panel, Index pivots, Index below_slabs, const FrontPivots& out,
+                      PivotTally& tally) {
     const auto slab = [&](Index i) { return panel.slab(i); };
     const auto bring_up_to_date = [&](Range columns, Range rows) {
         for (Index k = 0; k < columns.begin; k += depth_block) {
-            update_block<false>(slab, slab, columns, rows, {k, std::min(k + depth_block, columns.begin)}, out.pivots);
+            update_block<false>(slab, slab, columns, rows, {k, std::min(k + depth_block, columns.begin)},
+                                out.pivots);
         }
     };
     std::mutex tally_mutex;
@@ -220,11 +227,13 @@ void eliminate_pivots(const Panel& panel, Index pivots, Index below_slabs, const
             const std::lock_guard lock(tally_mutex);
             for (int lane = 0; lane < width; ++lane) tally.growth = std::max(tally.growth, growth[lane]);
         });
-        if (block.permuted) permute_rows(panel, first, block);  // last: the rows below still used the old order
+        if (block.permuted)
+            permute_rows(panel, first, block);  // last: the rows below still used the old order
     }
 }
 
-void form_update(const Panel& panel, Index pivots, Index below_slabs, const Pivots& d, const slabs::Triangle& update) {
+void form_update(const Panel& panel, Index pivots, Index below_slabs, const Pivots& d,
+                 const slabs::Triangle& update) {
     const auto source = [&](Index i) { return panel.below.slab(i); };
     const auto target = [&](Index i) { return update.slab(i); };
     for_parts({0, below_slabs}, [&](Range part) {

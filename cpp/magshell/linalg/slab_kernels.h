@@ -5,51 +5,39 @@
 
 namespace magshell::slabs {
 
-// The widest vector of the processor: a slab's eight rows are one, two or four of them.
-#if defined(__AVX512F__)
-using Native = Lanes;
-inline constexpr int group = 3;             // slabs multiplied at once: 3 x 8 sums fill the registers
-inline constexpr int columns_at_once = 8;
-#elif defined(__AVX__)
-using Native [[gnu::vector_size(32), gnu::may_alias]] = double;
-inline constexpr int group = 1;
-inline constexpr int columns_at_once = 4;
-#else
-using Native [[gnu::vector_size(16), gnu::may_alias]] = double;
-inline constexpr int group = 1;
-inline constexpr int columns_at_once = 2;
-#endif
-inline constexpr int natives = sizeof(Lanes) / sizeof(Native);  // of a slab
+// How many slabs and columns a product handles at once: as many as leave its sums in registers.
+inline constexpr int group = native_bytes == 64 ? 3 : 1;
+inline constexpr int columns_at_once = native_bytes == 64 ? 8 : native_bytes == 32 ? 4 : 2;
 
-/// sum(8 S, 8) -= rows(8 S, depth) columns(depth, 8); `columns` holds eight numbers every `Stride` for each step.
+/// sum(8 S, 8) -= rows(8 S, depth) columns(depth, 8); `columns` holds eight numbers every `Stride` for each
+/// step.
 template <int S, int Stride>
 [[gnu::always_inline]] inline void subtract_multiple(Lanes (&sum)[S][width], const double* const (&rows)[S],
                                                      const double* columns, Index depth) {
+#pragma GCC unroll 4
     for (int first = 0; first < width; first += columns_at_once) {
-        Native part[S][columns_at_once][natives];
-        const auto at = [&](int s, int j, int n) -> Native& { return reinterpret_cast<Native*>(&sum[s][first + j])[n]; };
-        const auto each = [&](auto&& visit) __attribute__((always_inline)) {
+        Lanes part[S][columns_at_once];
 #pragma GCC unroll 3
-            for (int s = 0; s < S; ++s) {
+        for (int s = 0; s < S; ++s) {
 #pragma GCC unroll 8
-                for (int j = 0; j < columns_at_once; ++j) {
-#pragma GCC unroll 4
-                    for (int n = 0; n < natives; ++n) visit(s, j, n);
-                }
-            }
-        };
-        each([&](int s, int j, int n) __attribute__((always_inline)) { part[s][j][n] = at(s, j, n); });
-        for (Index p = 0; p < depth; ++p) {
-            Native row[S][natives];
-#pragma GCC unroll 3
-            for (int s = 0; s < S; ++s) {
-#pragma GCC unroll 4
-                for (int n = 0; n < natives; ++n) row[s][n] = reinterpret_cast<const Native*>(rows[s] + width * p)[n];
-            }
-            const double* value = columns + Stride * p + first;
-            each([&](int s, int j, int n) __attribute__((always_inline)) { part[s][j][n] -= row[s][n] * value[j]; });
+            for (int j = 0; j < columns_at_once; ++j) part[s][j] = sum[s][first + j];
         }
-        each([&](int s, int j, int n) __attribute__((always_inline)) { at(s, j, n) = part[s][j][n]; });
+        for (Index p = 0; p < depth; ++p) {
+            Lanes row[S];
+#pragma GCC unroll 3
+            for (int s = 0; s < S; ++s) row[s] = lanes(rows[s] + width * p);
+#pragma GCC unroll 8
+            for (int j = 0; j < columns_at_once; ++j) {
+                const double value = columns[Stride * p + first + j];
+#pragma GCC unroll 3
+                for (int s = 0; s < S; ++s) part[s][j] -= row[s] * value;
+            }
+        }
+#pragma GCC unroll 3
+        for (int s = 0; s < S; ++s) {
+#pragma GCC unroll 8
+            for (int j = 0; j < columns_at_once; ++j) sum[s][first + j] = part[s][j];
+        }
     }
 }
 
