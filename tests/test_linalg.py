@@ -245,8 +245,8 @@ def test_a_singular_matrix_is_reported(matrix):
 
 
 @pytest.mark.parametrize("corner", [0.0, 1e-13, 1e-10, 1e-7])
-def test_a_saddle_point_with_a_small_corner_is_solved_or_reported(corner):
-    """Pivots that are tiny in their own front only: the factorization may not claim what it cannot deliver."""
+def test_a_saddle_point_with_a_small_corner_is_solved(corner):
+    """Pivots that are tiny in their own front only: growth that refinement has to undo."""
     cells = 30
     stiffness = dominant(shell_like(cells, 50))
     size, constraints = stiffness.shape[0], 400

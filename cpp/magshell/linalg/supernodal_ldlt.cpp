@@ -65,9 +65,9 @@ FactorReport SupernodalLdlt::factorize(const double* values) {
             tally.perturbed > 0
                 ? "the matrix is singular to rounding: " + std::to_string(tally.perturbed) +
                       " of its pivots vanish. Does the model hold every rigid motion and mechanism?"
-                : "the factorization has lost all its digits (its entries grew " +
-                      std::to_string(report_.pivot_growth) +
-                      " times): the matrix is close to singular, or needs pivots from further away";
+                : "the factorization lost its digits to the growth of its entries (see pivot_growth): the "
+                  "matrix is "
+                  "close to singular, or needs pivots from further away";
     }
     return report_;
 }
