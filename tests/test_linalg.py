@@ -8,6 +8,7 @@ import threading
 import numpy as np
 import pytest
 import scipy.sparse as sp
+
 from magshell import _core, num_threads, set_num_threads
 
 BACKENDS = _core.factor_backends()
@@ -60,7 +61,9 @@ def dominant(matrix):
 def kkt(size, constraints, seed):
     generator = np.random.default_rng(seed)
     jacobian = sp.random(constraints, size, 0.2, random_state=generator) + sp.eye(constraints, size)
-    return sp.csc_matrix(sp.block_array([[dominant(random_symmetric(size, 0.1, seed)), jacobian.T], [jacobian, None]]))
+    return sp.csc_matrix(
+        sp.block_array([[dominant(random_symmetric(size, 0.1, seed)), jacobian.T], [jacobian, None]])
+    )
 
 
 def badly_scaled(matrix, exponents):
@@ -96,7 +99,7 @@ INDEFINITE["dense"] = sp.csc_matrix(INDEFINITE["dense"] + INDEFINITE["dense"].T)
 
 
 def backward_error(matrix, solution, rhs):
-    """The largest relative change of an entry of matrix and rhs that makes the solution exact (Oettli and Prager 1964)."""
+    """The relative change of the entries that makes the solution exact (Oettli and Prager 1964)."""
     residual = abs(rhs - matrix @ solution)
     return (residual / (abs(matrix) @ abs(solution) + abs(rhs))).max()
 
@@ -162,7 +165,7 @@ def test_every_ordering(ordering, backend):
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_factor_is_reused_for_other_values(backend):
     first, second = dominant(shell_like(9, 20)), dominant(shell_like(9, 21))
-    starts, rows, values = lower(first)
+    starts, rows, _ = lower(first)
     factor = _core.analyze(first.shape[0], starts, rows, backend=backend)
     rhs = np.random.default_rng(3).standard_normal(first.shape[0])
     solutions = []
@@ -228,7 +231,9 @@ def test_threads_may_solve_at_the_same_time(backend):
     [
         sp.csc_matrix((5, 5)),
         sp.csc_matrix(np.ones((40, 40))),
-        sp.csc_matrix(laplacian(12) - sp.diags(np.asarray(laplacian(12).sum(axis=1)).ravel())),  # free: constants
+        sp.csc_matrix(
+            laplacian(12) - sp.diags(np.asarray(laplacian(12).sum(axis=1)).ravel())
+        ),  # free: constants
     ],
     ids=["zero", "rank one", "free body"],
 )
@@ -237,6 +242,28 @@ def test_a_singular_matrix_is_reported(matrix):
     assert not report.succeeded
     assert report.perturbed_pivots >= 1
     assert "singular to rounding" in report.reason and "singular to rounding" in repr(report)
+
+
+@pytest.mark.parametrize("corner", [0.0, 1e-13, 1e-10, 1e-7])
+def test_a_saddle_point_with_a_small_corner_is_solved(corner):
+    """Pivots that are tiny in their own front only: growth that refinement has to undo."""
+    cells = 30
+    stiffness = dominant(shell_like(cells, 50))
+    size, constraints = stiffness.shape[0], 400
+    generator = np.random.default_rng(51)
+    tied = generator.choice(size, (constraints, 2), replace=False)
+    jacobian = sp.csc_matrix(
+        (np.tile([1.0, -1.0], constraints), (np.repeat(np.arange(constraints), 2), tied.ravel())),
+        shape=(constraints, size),
+    )
+    matrix = sp.csc_matrix(
+        sp.block_array([[stiffness, jacobian.T], [jacobian, -corner * sp.identity(constraints)]])
+    )
+    factor, report = factorized(matrix)
+    assert report.succeeded, report
+    assert report.negative_pivots == constraints
+    rhs = generator.standard_normal(matrix.shape[0])
+    assert abs(matrix @ factor.solve(rhs) - rhs).max() < 1e-10
 
 
 def test_pivot_growth_tells_definite_from_hard():
@@ -267,7 +294,10 @@ def test_an_empty_matrix(backend):
         ((3, [0, 2, 1, 3], [0, 1, 2]), "decreases after column 1"),
         ((2, [0, 2, 4], [0, 1, 0, 1]), "rows\\[2\\] = 0 in column 1 is above the diagonal"),
         ((2, [0, 1, 2], [0, 2]), "rows\\[1\\] = 2 in column 1 is outside the matrix, whose size is 2"),
-        ((3, [0, 3, 4, 5], [0, 2, 1, 1, 2]), "rows\\[2\\] = 1 in column 0 is not greater than the row before"),
+        (
+            (3, [0, 3, 4, 5], [0, 2, 1, 1, 2]),
+            "rows\\[2\\] = 1 in column 0 is not greater than the row before",
+        ),
         ((2, [0, 1, 2], [1, 1]), "column 0 lacks its diagonal"),
         ((2, [0, 1, 1], [0]), "column 1 lacks its diagonal"),
     ],

@@ -1,20 +1,20 @@
 // Factorizations of sparse symmetric matrices, thread counts, and what this build is made of.
+#include <algorithm>
+#include <mutex>
+#include <shared_mutex>
+
+#include "bindings/bindings.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
 #include "magshell/linalg/build_info.h"
 #include "magshell/linalg/factor.h"
 
-#include "bindings/bindings.h"
-
-#include <algorithm>
-#include <mutex>
-#include <shared_mutex>
-
 namespace magshell::bindings {
 namespace {
 
 template <class Choice>
-Choice chosen(const std::string& name, const char* what, const std::vector<std::pair<std::string, Choice>>& choices) {
+Choice chosen(const std::string& name, const char* what,
+              const std::vector<std::pair<std::string, Choice>>& choices) {
     std::string known;
     for (const auto& [each, choice] : choices) {
         if (each == name) return choice;
@@ -29,17 +29,20 @@ const std::vector<std::pair<std::string, Ordering>> orderings{
     {"best", Ordering::best}, {"amd", Ordering::amd}, {"metis", Ordering::metis}};
 
 std::vector<Index> to_indices(const IndexArray& array, const char* name) {
-    if (array.ndim() != 1) throw InvalidInput(std::string(name) + " must have one axis, got " + std::to_string(array.ndim()));
+    if (array.ndim() != 1)
+        throw InvalidInput(std::string(name) + " must have one axis, got " + std::to_string(array.ndim()));
     return {array.data(), array.data() + array.size()};
 }
 
 // A factor that several Python threads may hold: solves run side by side, a factorization waits for them.
 class SharedFactor {
   public:
-    SharedFactor(Index size, const IndexArray& column_starts, const IndexArray& rows, const std::string& backend,
-                 const std::string& ordering) {
-        const SparsePattern pattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")};
-        const FactorOptions options{chosen(backend, "backend", backends), chosen(ordering, "ordering", orderings)};
+    SharedFactor(Index size, const IndexArray& column_starts, const IndexArray& rows,
+                 const std::string& backend, const std::string& ordering) {
+        const SparsePattern pattern{size, to_indices(column_starts, "column_starts"),
+                                    to_indices(rows, "rows")};
+        const FactorOptions options{chosen(backend, "backend", backends),
+                                    chosen(ordering, "ordering", orderings)};
         entries_ = static_cast<py::ssize_t>(pattern.rows.size());
         const py::gil_scoped_release release;
         factor_ = analyze(pattern, options);
@@ -47,8 +50,9 @@ class SharedFactor {
 
     FactorReport factorize(const Array& values) {
         if (values.ndim() != 1 || values.size() != entries_) {
-            throw InvalidInput("values must have one axis and an entry for each of the " + std::to_string(entries_) +
-                               " rows of the pattern, got " + std::to_string(values.size()));
+            throw InvalidInput("values must have one axis and an entry for each of the " +
+                               std::to_string(entries_) + " rows of the pattern, got " +
+                               std::to_string(values.size()));
         }
         const py::gil_scoped_release release;
         const std::unique_lock lock(mutex_);
@@ -57,7 +61,8 @@ class SharedFactor {
 
     py::array solve(const Array& rhs) const {
         if (rhs.ndim() < 1 || rhs.ndim() > 2) {
-            throw InvalidInput("the right-hand side must have shape (n,) or (n, k), got " + std::to_string(rhs.ndim()) + " axes");
+            throw InvalidInput("the right-hand side must have shape (n,) or (n, k), got " +
+                               std::to_string(rhs.ndim()) + " axes");
         }
         const py::ssize_t columns = rhs.ndim() == 2 ? rhs.shape(1) : 1;
         using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -81,7 +86,8 @@ class SharedFactor {
 };
 
 std::string describe(const FactorReport& report) {
-    std::string text = "<FactorReport: " + (report.succeeded ? std::string("succeeded") : "failed, " + report.reason);
+    std::string text =
+        "<FactorReport: " + (report.succeeded ? std::string("succeeded") : "failed, " + report.reason);
     text += ", " + std::to_string(report.negative_pivots) + " negative pivots";
     if (report.perturbed_pivots > 0) text += ", " + std::to_string(report.perturbed_pivots) + " replaced";
     return text + ">";
@@ -97,20 +103,24 @@ void register_linalg(py::module_& module) {
         .def_readonly("perturbed_pivots", &FactorReport::perturbed_pivots,
                       "pivots that were zero to rounding and were replaced; solve() then refines")
         .def_readonly("pivot_growth", &FactorReport::pivot_growth,
-                      "max l_ik^2 |d_k| over the largest entry: about 1 or less when definite; 10^p costs about p digits")
+                      "max l_ik^2 |d_k| over the largest entry: about 1 or less when definite; 10^p costs "
+                      "about p digits")
         .def("__repr__", &describe);
 
-    py::class_<SharedFactor>(module, "Factor",
-                             "An analysed sparse symmetric pattern; factorize() it with values, then solve().")
+    py::class_<SharedFactor>(
+        module, "Factor", "An analysed sparse symmetric pattern; factorize() it with values, then solve().")
         .def("factorize", &SharedFactor::factorize, py::arg("values"),
              "Factorizes the matrix with these values (nnz,), in the order of the pattern's rows.")
-        .def("solve", &SharedFactor::solve, py::arg("rhs"), "The solution for the right-hand side (n,) or (n, k).")
+        .def("solve", &SharedFactor::solve, py::arg("rhs"),
+             "The solution for the right-hand side (n,) or (n, k).")
         .def_property_readonly("name", [](const SharedFactor& f) { return f.factor().name(); })
         .def_property_readonly("size", [](const SharedFactor& f) { return f.factor().size(); })
-        .def_property_readonly("nonzeros", [](const SharedFactor& f) { return f.factor().nonzeros(); },
-                               "entries of L, its diagonal included")
-        .def_property_readonly("flops", [](const SharedFactor& f) { return f.factor().flops(); },
-                               "additions and multiplications of one factorization")
+        .def_property_readonly(
+            "nonzeros", [](const SharedFactor& f) { return f.factor().nonzeros(); },
+            "entries of L, its diagonal included")
+        .def_property_readonly(
+            "flops", [](const SharedFactor& f) { return f.factor().flops(); },
+            "additions and multiplications of one factorization")
         .def_property_readonly("bytes", [](const SharedFactor& f) { return f.factor().bytes(); });
 
     module.def(
@@ -121,7 +131,8 @@ void register_linalg(py::module_& module) {
         },
         py::arg("size"), py::arg("column_starts"), py::arg("rows"), py::arg("backend") = "supernodal",
         py::arg("ordering") = "best",
-        "Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, diagonal present.");
+        "Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, "
+        "diagonal present.");
 
     module.def("factor_backends", [] {
         std::vector<std::string> built;

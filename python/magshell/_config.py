@@ -13,9 +13,9 @@ def num_threads() -> int:
 
 
 def set_num_threads(count: int) -> None:
-    """Let magshell's parallel loops use ``count`` threads (at least 1). Results are the same bits for any count.
+    """Let magshell's parallel loops use ``count`` threads (at least 1). Results are the same bits for any.
 
-    The initial value is the number of processors, at most 8, or ``MAGSHELL_NUM_THREADS`` from the environment.
+    At first it is the number of processors, at most 8, or ``MAGSHELL_NUM_THREADS`` from the environment.
 
     >>> set_num_threads(2)
     """

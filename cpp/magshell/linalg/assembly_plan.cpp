@@ -20,8 +20,9 @@ using slabs::width;
 // Offset of (row, column) of a panel; rows count from the first pivot, then from the first row below.
 std::ptrdiff_t panel_place(const FrontShape& front, Index row, bool is_pivot, Index column) {
     const Index slab = row / width, lane = row % width;
-    const std::ptrdiff_t start = is_pivot ? Triangle::offset(slab)
-                                          : Triangle::doubles(front.pivots) + Rectangle::doubles(slab * width, front.pivots);
+    const std::ptrdiff_t start =
+        is_pivot ? Triangle::offset(slab)
+                 : Triangle::doubles(front.pivots) + Rectangle::doubles(slab * width, front.pivots);
     return start + std::ptrdiff_t{width} * column + lane;
 }
 
@@ -128,16 +129,18 @@ class Line {
     std::ptrdiff_t extent_ = 0;
 };
 
-// Work space from `base` on for fronts handled one after another: an update lives until its parent has taken it. Returns
-// where it ends.
+// Work space from `base` on for fronts handled one after another: an update lives until its parent has taken
+// it. Returns where it ends.
 std::ptrdiff_t place_work(AssemblyPlan& plan, const std::vector<Index>& sequence, std::ptrdiff_t base) {
     Line line;
     for (const Index s : sequence) {
         FrontPlan& front = plan.fronts[s];
-        if (front.shape.below > 0) front.update = base + line.take(Triangle::offset(slabs::count(front.shape.below)));
+        if (front.shape.below > 0)
+            front.update = base + line.take(Triangle::offset(slabs::count(front.shape.below)));
         for (const Index child : front.children) {
             // The children of a top front may be roots of subtrees, which have work space of their own.
-            if (std::binary_search(sequence.begin(), sequence.end(), child)) line.give_back(plan.fronts[child].update - base);
+            if (std::binary_search(sequence.begin(), sequence.end(), child))
+                line.give_back(plan.fronts[child].update - base);
         }
     }
     return base + line.extent();
@@ -179,8 +182,9 @@ AssemblyPlan assembly_plan(const SparsePattern& pattern, AssemblyTree tree) {
         plan.fronts[s].panel = plan.factor_doubles;
         const std::ptrdiff_t doubles = Panel::doubles(shape.pivots, shape.below);
         if (doubles > std::numeric_limits<Index>::max()) {
-            throw InvalidInput("the matrix fills in too much to be factorized: " + std::to_string(shape.pivots) +
-                               " dense columns of " + std::to_string(shape.pivots + shape.below) + " rows");
+            throw InvalidInput(
+                "the matrix fills in too much to be factorized: " + std::to_string(shape.pivots) +
+                " dense columns of " + std::to_string(shape.pivots + shape.below) + " rows");
         }
         plan.factor_doubles += doubles;
         subtree_flops[s] += elimination_flops(shape.pivots, shape.below);

@@ -1,5 +1,5 @@
-// Where everything goes during a factorization, worked out once for a pattern: matrix entries into fronts, updates into
-// parents, and which part of the work space each update occupies while it lives.
+// Where everything goes during a factorization, worked out once for a pattern: matrix entries into fronts,
+// updates into parents, and which part of the work space each update occupies while it lives.
 #pragma once
 
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace magshell {
 
-/// Rows of one slab of an update that land in one slab of the parent. Lane l of the parent receives lane from[l] of the
-/// update, or nothing where from[l] is 8.
+/// Rows of one slab of an update that land in one slab of the parent. Lane l of the parent receives lane
+/// from[l] of the update, or nothing where from[l] is 8.
 struct Transfer {
     Index slab;         // of the update
     Index parent_slab;  // of the parent's pivots if to_pivots, else of its rows below

@@ -8,7 +8,8 @@
 namespace magshell {
 namespace {
 
-// The time a front takes [ns], fitted to measurements: a constant, arithmetic, panel entries and update entries.
+// The time a front takes [ns], fitted to measurements: a constant, arithmetic, panel entries and update
+// entries.
 double front_time(double pivots, double below) {
     const double panel_entries = pivots * (0.5 * pivots + below);
     return 600.0 + 0.020 * elimination_flops(pivots, below) + 0.6 * panel_entries + 0.25 * below * below;
@@ -29,7 +30,8 @@ std::vector<Index> relabel(const std::vector<Index>& parent, const std::vector<I
 }
 
 // Columns whose structure differs only by the column itself, joined.
-std::vector<FrontShape> fundamental_fronts(const std::vector<Index>& parent, const std::vector<Index>& counts) {
+std::vector<FrontShape> fundamental_fronts(const std::vector<Index>& parent,
+                                           const std::vector<Index>& counts) {
     const Index size = static_cast<Index>(parent.size());
     std::vector<FrontShape> fronts;
     std::vector<Index> front_of(size);
@@ -50,7 +52,8 @@ std::vector<FrontShape> fundamental_fronts(const std::vector<Index>& parent, con
 
 // Which front absorbs each front: itself, or an ancestor.
 //
-// A child merged into its parent takes all rows of the parent: pivots add up, the rows below stay the parent's.
+// A child merged into its parent takes all rows of the parent: pivots add up, the rows below stay the
+// parent's.
 std::vector<Index> merge_fronts(const std::vector<FrontShape>& fronts) {
     const Index count = static_cast<Index>(fronts.size());
     std::vector<std::vector<Index>> children(count);
@@ -67,7 +70,8 @@ std::vector<Index> merge_fronts(const std::vector<FrontShape>& fronts) {
                          [&](Index a, Index b) { return fronts[a].below > fronts[b].below; });
         std::vector<Index> kept;
         for (const Index child : candidates) {
-            const double apart = front_time(pivots[child], fronts[child].below) + front_time(pivots[s], fronts[s].below);
+            const double apart =
+                front_time(pivots[child], fronts[child].below) + front_time(pivots[s], fronts[s].below);
             if (front_time(pivots[child] + pivots[s], fronts[s].below) < apart) {
                 pivots[s] += pivots[child];
                 absorbed_by[child] = s;
@@ -94,7 +98,8 @@ std::vector<Index> rows_below(const UpperPattern& upper, const std::vector<Front
     if (!fronts.empty()) rows.resize(fronts.back().rows + fronts.back().below);
     for (Index i = 0; i < size; ++i) {
         for (Index k = upper.starts[i]; k < upper.starts[i + 1]; ++k) {
-            for (Index s = front_of[upper.rows[k]]; s != front_of[i] && last_row[s] != i; s = fronts[s].parent) {
+            for (Index s = front_of[upper.rows[k]]; s != front_of[i] && last_row[s] != i;
+                 s = fronts[s].parent) {
                 last_row[s] = i;
                 rows[next[s]++] = i;
             }
@@ -137,7 +142,8 @@ AssemblyTree assembly_tree(const SparsePattern& pattern, const std::vector<Index
     const std::vector<FrontShape> simple = fundamental_fronts(parent, column_counts(upper, parent));
     const std::vector<Index> absorbed_by = merge_fronts(simple);
 
-    // The merged fronts form a tree; its postorder, and within a front the old order, is the new order of elimination.
+    // The merged fronts form a tree; its postorder, and within a front the old order, is the new order of
+    // elimination.
     std::vector<Index> merged_parent, merged_label(simple.size(), -1), survivors;
     for (std::size_t s = 0; s < simple.size(); ++s) {
         if (absorbed_by[s] != static_cast<Index>(s)) continue;

@@ -8,12 +8,13 @@
 
 namespace magshell {
 
-/// A set of consecutive columns ("pivots") eliminated together, with the rows below them that their columns of L reach.
+/// A set of consecutive columns ("pivots") eliminated together, with the rows below them that their columns
+/// of L reach.
 struct FrontShape {
-    Index first = 0;   // the first pivot
+    Index first = 0;  // the first pivot
     Index pivots = 0;
-    Index below = 0;   // rows below the pivots
-    Index parent = -1;  // the front that contains the first row below; -1 for a root
+    Index below = 0;          // rows below the pivots
+    Index parent = -1;        // the front that contains the first row below; -1 for a root
     std::ptrdiff_t rows = 0;  // where its rows below start in AssemblyTree::rows
 };
 
@@ -29,8 +30,9 @@ struct AssemblyTree {
     std::int64_t nonzeros() const;  // entries of L, its diagonal included, explicit zeros counted
 };
 
-/// Columns with the same structure become one front, and fronts are merged where the explicit zeros cost less time than
-/// handling them apart. `order` is any fill-reducing ordering; the tree's own is equivalent to it up to those zeros.
+/// Columns with the same structure become one front, and fronts are merged where the explicit zeros cost less
+/// time than handling them apart. `order` is any fill-reducing ordering; the tree's own is equivalent to it
+/// up to those zeros.
 AssemblyTree assembly_tree(const SparsePattern& pattern, const std::vector<Index>& order);
 
 }  // namespace magshell

@@ -42,7 +42,8 @@ std::vector<std::pair<std::string, std::string>> linalg_build_info() {
     info.emplace_back("Eigen", version(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION));
 #ifdef MAGSHELL_HAS_CHOLMOD
     info.emplace_back("CHOLMOD", version(CHOLMOD_MAIN_VERSION, CHOLMOD_SUB_VERSION, CHOLMOD_SUBSUB_VERSION));
-    info.emplace_back("SuiteSparse", version(SUITESPARSE_MAIN_VERSION, SUITESPARSE_SUB_VERSION, SUITESPARSE_SUBSUB_VERSION));
+    info.emplace_back("SuiteSparse",
+                      version(SUITESPARSE_MAIN_VERSION, SUITESPARSE_SUB_VERSION, SUITESPARSE_SUBSUB_VERSION));
     info.emplace_back("BLAS of CHOLMOD", blas_path());
     info.emplace_back("BLAS configuration", blas_config());
     info.emplace_back("BLAS threads", std::to_string(blas_threads()) + " (1 inside magshell)");

@@ -1,7 +1,7 @@
 // CHOLMOD's supernodal L L^T.
 //
-// This is the one file that calls CHOLMOD's Supernodal module, which is under the GPL (version 2 or later); magshell's own
-// sources are under the MIT licence, and the default backend does without that module.
+// This is the one file that calls CHOLMOD's Supernodal module, which is under the GPL (version 2 or later);
+// magshell's own sources are under the MIT licence, and the default backend does without that module.
 #include <string>
 
 #include "magshell/core/errors.h"
@@ -36,7 +36,8 @@ class CholmodFactor : public Factor {
         common_->nmethods = 0;
         for (const Ordering each : {Ordering::amd, Ordering::metis}) {
             if (ordering != Ordering::best && ordering != each) continue;
-            common_->method[common_->nmethods++].ordering = each == Ordering::amd ? CHOLMOD_AMD : CHOLMOD_METIS;
+            common_->method[common_->nmethods++].ordering =
+                each == Ordering::amd ? CHOLMOD_AMD : CHOLMOD_METIS;
         }
         cholmod_sparse view = cholmod_view(pattern_, nullptr);
         factor_ = cholmod_analyze(&view, common_);
@@ -58,7 +59,8 @@ class CholmodFactor : public Factor {
         if (!done || common_->status != CHOLMOD_OK) {
             report_.succeeded = false;
             report_.reason = common_->status == CHOLMOD_NOT_POSDEF
-                                 ? "the matrix is not positive definite; the backend \"supernodal\" factorizes such matrices, too"
+                                 ? "the matrix is not positive definite; the backend \"supernodal\" "
+                                   "factorizes such matrices, too"
                                  : "CHOLMOD could not factorize the matrix" + status();
         }
         return report_;
@@ -79,7 +81,8 @@ class CholmodFactor : public Factor {
         view.dtype = CHOLMOD_DOUBLE;
         cholmod_dense* solution = cholmod_solve(CHOLMOD_A, factor_, &view, common);
         if (!solution) throw std::bad_alloc();
-        rhs = Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(solution->x), rhs.rows(), rhs.cols());
+        rhs = Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(solution->x), rhs.rows(),
+                                                rhs.cols());
         cholmod_free_dense(&solution, common);
     }
 
@@ -88,7 +91,8 @@ class CholmodFactor : public Factor {
     std::int64_t nonzeros() const override { return nonzeros_; }
     double flops() const override { return flops_; }
     std::size_t bytes() const override {
-        const std::size_t factor = factor_ ? factor_->xsize * sizeof(double) + factor_->ssize * sizeof(int) : 0;
+        const std::size_t factor =
+            factor_ ? factor_->xsize * sizeof(double) + factor_->ssize * sizeof(int) : 0;
         return factor + pattern_.rows.size() * sizeof(Index);
     }
 

@@ -1,4 +1,5 @@
-// What the files that call CHOLMOD share: its settings object and a view of a pattern. Included by linalg/*.cpp only.
+// What the files that call CHOLMOD share: its settings object and a view of a pattern. Included by
+// linalg/*.cpp only.
 #pragma once
 
 #include <cholmod.h>

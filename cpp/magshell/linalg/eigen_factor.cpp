@@ -1,4 +1,5 @@
-// Eigen's SimplicialLDLT: no supernodes, no pivoting; needs nothing but Eigen, and is the yardstick the others are tested by.
+// Eigen's SimplicialLDLT: no supernodes, no pivoting; needs nothing but Eigen, and is the yardstick the
+// others are tested by.
 #include <Eigen/SparseCholesky>
 #include <string>
 
@@ -10,8 +11,7 @@ namespace {
 
 class EigenFactor : public Factor {
   public:
-    explicit EigenFactor(const SparsePattern& pattern)
-        : pattern_(pattern) {
+    explicit EigenFactor(const SparsePattern& pattern) : pattern_(pattern) {
         const std::vector<double> values(pattern_.rows.size(), 1.0);
         if (pattern_.size > 0) solver_.analyzePattern(view(values.data()));
         report_.reason = "factorize() has not been called";
@@ -25,7 +25,8 @@ class EigenFactor : public Factor {
         solver_.factorize(view(values));
         if (solver_.info() != Eigen::Success) {
             report_.succeeded = false;
-            report_.reason = "a pivot is exactly zero: the matrix is singular, or indefinite and needs pivoting";
+            report_.reason =
+                "a pivot is exactly zero: the matrix is singular, or indefinite and needs pivoting";
             return report_;
         }
         const VectorXd pivots = solver_.vectorD();
@@ -45,7 +46,9 @@ class EigenFactor : public Factor {
 
     // Eigen tells neither before the first factorization.
     std::int64_t nonzeros() const override {
-        return report_.succeeded && pattern_.size > 0 ? solver_.matrixL().nestedExpression().nonZeros() + pattern_.size : 0;
+        return report_.succeeded && pattern_.size > 0
+                   ? solver_.matrixL().nestedExpression().nonZeros() + pattern_.size
+                   : 0;
     }
     double flops() const override {
         if (nonzeros() == 0) return 0.0;
@@ -66,8 +69,12 @@ class EigenFactor : public Factor {
     using Matrix = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
 
     Eigen::Map<const Matrix> view(const double* values) const {
-        return {pattern_.size, pattern_.size, static_cast<Index>(pattern_.rows.size()), pattern_.column_starts.data(),
-                pattern_.rows.data(), values};
+        return {pattern_.size,
+                pattern_.size,
+                static_cast<Index>(pattern_.rows.size()),
+                pattern_.column_starts.data(),
+                pattern_.rows.data(),
+                values};
     }
 
     SparsePattern pattern_;
@@ -77,6 +84,8 @@ class EigenFactor : public Factor {
 
 }  // namespace
 
-std::unique_ptr<Factor> make_eigen_factor(const SparsePattern& pattern) { return std::make_unique<EigenFactor>(pattern); }
+std::unique_ptr<Factor> make_eigen_factor(const SparsePattern& pattern) {
+    return std::make_unique<EigenFactor>(pattern);
+}
 
 }  // namespace magshell

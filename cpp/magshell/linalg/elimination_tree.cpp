@@ -72,7 +72,8 @@ std::vector<Index> postorder(const std::vector<Index>& parent) {
     return order;
 }
 
-// Row i of L has an entry in column j exactly when j lies on a path of the tree from an entry of row i of A up to i.
+// Row i of L has an entry in column j exactly when j lies on a path of the tree from an entry of row i of A
+// up to i.
 std::vector<Index> column_counts(const UpperPattern& upper, const std::vector<Index>& parent) {
     const Index size = static_cast<Index>(parent.size());
     std::vector<Index> counts(size, 1), seen(size, -1);

@@ -7,7 +7,8 @@
 
 namespace magshell {
 
-// Ruiz (2001): divide rows and columns by the square root of their largest entry, repeatedly; twice is enough for pivoting.
+// Ruiz (2001): divide rows and columns by the square root of their largest entry, repeatedly; twice is enough
+// for pivoting.
 double equilibrate(const SparsePattern& pattern, const double* values, std::vector<double>& scale,
                    std::vector<double>& scaled) {
     check_finite(values, pattern.rows.size());

@@ -10,9 +10,12 @@ namespace magshell {
 std::unique_ptr<Factor> analyze(const SparsePattern& pattern, const FactorOptions& options) {
     check_pattern(pattern);
     switch (options.backend) {
-        case Backend::supernodal: return std::make_unique<SupernodalLdlt>(pattern, options.ordering);
-        case Backend::cholmod: return make_cholmod_factor(pattern, options.ordering);
-        case Backend::eigen: return make_eigen_factor(pattern);
+        case Backend::supernodal:
+            return std::make_unique<SupernodalLdlt>(pattern, options.ordering);
+        case Backend::cholmod:
+            return make_cholmod_factor(pattern, options.ordering);
+        case Backend::eigen:
+            return make_eigen_factor(pattern);
     }
     throw InvalidInput("unknown backend");
 }

@@ -1,7 +1,8 @@
 // Factorizations of sparse symmetric matrices, definite or not, behind one face.
 //
-// A scene's Hessian keeps its pattern, so the work that needs only the pattern (a fill-reducing ordering and the symbolic
-// analysis) is done once, by analyze(); factorize() and solve() may then be called any number of times.
+// A scene's Hessian keeps its pattern, so the work that needs only the pattern (a fill-reducing ordering and
+// the symbolic analysis) is done once, by analyze(); factorize() and solve() may then be called any number of
+// times.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +15,8 @@
 
 namespace magshell {
 
-/// The lower triangle, by columns: the rows of column j are rows[column_starts[j]] ... rows[column_starts[j + 1] - 1],
-/// sorted, the first of them j itself.
+/// The lower triangle, by columns: the rows of column j are rows[column_starts[j]] ... rows[column_starts[j +
+/// 1] - 1], sorted, the first of them j itself.
 struct SparsePattern {
     Index size = 0;
     std::vector<Index> column_starts, rows;
@@ -37,23 +38,27 @@ struct FactorOptions {
 /// How a factorization went.
 struct FactorReport {
     bool succeeded = false;
-    std::string reason;        // why not, and what it means; empty on success
-    Index negative_pivots = 0;  // the number of negative eigenvalues (Sylvester); of no meaning after a failure
+    std::string reason;  // why not, and what it means; empty on success
+    Index negative_pivots =
+        0;  // the number of negative eigenvalues (Sylvester); of no meaning after a failure
     Index perturbed_pivots = 0;  // pivots that were zero to rounding and were replaced; solve() then refines
-    /// max l_ik^2 |d_k| over the largest entry of the (scaled) matrix: at most 1 for a positive definite matrix; 10^p
-    /// costs about p digits of a solution. 0 where a backend does not measure it.
+    /// max l_ik^2 |d_k| over the largest entry of the (scaled) matrix: at most 1 for a positive definite
+    /// matrix; 10^p costs about p digits of a solution. 0 where a backend does not measure it.
     double pivot_growth = 0.0;
 };
 
-/// An analysed pattern, and after factorize() a factorization. One thread at a time may factorize; any number may solve.
+/// An analysed pattern, and after factorize() a factorization. One thread at a time may factorize; any number
+/// may solve.
 class Factor {
   public:
     virtual ~Factor() = default;
 
-    /// Factorizes the matrix with these values, in the order of the pattern. Throws InvalidInput on NaN or infinity.
+    /// Factorizes the matrix with these values, in the order of the pattern. Throws InvalidInput on NaN or
+    /// infinity.
     virtual FactorReport factorize(const double* values) = 0;
 
-    /// Replaces each column of `rhs` (size, k) by the solution. Throws InvalidInput unless the last factorize() succeeded.
+    /// Replaces each column of `rhs` (size, k) by the solution. Throws InvalidInput unless the last
+    /// factorize() succeeded.
     virtual void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const = 0;
 
     virtual std::string name() const = 0;
@@ -63,7 +68,8 @@ class Factor {
     virtual std::size_t bytes() const = 0;      // of the factor and its work space
 };
 
-/// Orders and analyses a pattern. Throws InvalidInput when the pattern is malformed or the backend was not built.
+/// Orders and analyses a pattern. Throws InvalidInput when the pattern is malformed or the backend was not
+/// built.
 std::unique_ptr<Factor> analyze(const SparsePattern& pattern, const FactorOptions& options = {});
 
 /// Whether this build contains the backend.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
+#include "magshell/core/parallel.h"
 #include "magshell/linalg/slab_kernels.h"
 
 namespace magshell {
@@ -16,7 +18,8 @@ using slabs::width;
 
 constexpr Index block_columns = PivotBlock::max_size;
 constexpr Index block_slabs = block_columns / width;
-constexpr Index depth_block = 192;  // columns of L multiplied at a time: three slabs of it stay in the first-level cache
+constexpr Index depth_block =
+    192;  // columns of L multiplied at a time: three slabs of it stay in the first-level cache
 
 // W = L D, for the rows of one slab and some columns of L.
 void scale_by_pivots(const double* slab, Index first, Index depth, const Pivots& d, double* scaled) {
@@ -34,27 +37,37 @@ struct ScaledBlock {
     alignas(64) double data[block_slabs][width * depth_block];
 };
 
-// target(I, J) -= L(I, :) D L(J, :)^T for the slabs J of one block and I from that block on, over `depth` columns of L from
-// `first_column` on. Source and Target hand out slab pointers; columns of the target count from its slabs' beginning.
+// A range of slabs, or of columns.
+struct Range {
+    Index begin, end;
+};
+
+// target(I, J) -= L(I, :) D L(J, :)^T over some columns of L, for the slabs J of one block of columns of the
+// target and slabs I = rows, none of them above J. Source and Target hand out slab pointers.
 template <bool Overwrite, class Source, class Target>
-void update_block(const Source& source, const Target& target, Index first_slab, Index end_column, Index last_slab,
-                  Index first_column, Index depth, const Pivots& d, ScaledBlock& scaled) {
-    const Index end_slab = slabs::count(end_column);
-    for (Index j = first_slab; j < end_slab; ++j) {
-        scale_by_pivots(source(j), first_column, depth, d, scaled.data[j - first_slab]);
+void update_block(const Source& source, const Target& target, Range columns, Range rows, Range depth,
+                  const Pivots& d) {
+    static thread_local ScaledBlock scaled;
+    const Index count = depth.end - depth.begin;
+    const Range slabs_across{columns.begin / width, slabs::count(columns.end)};
+    for (Index j = slabs_across.begin; j < slabs_across.end; ++j) {
+        scale_by_pivots(source(j), depth.begin, count, d, scaled.data[j - slabs_across.begin]);
     }
     const auto tiles = [&]<int S>(Index i, Index end) {
-        const double* rows[S];
-        for (int s = 0; s < S; ++s) rows[s] = source(i + s) + width * first_column;
-        for (Index j = first_slab; j < end; ++j) {
+        const double* from[S];
+        for (int s = 0; s < S; ++s) from[s] = source(i + s) + width * depth.begin;
+        for (Index j = slabs_across.begin; j < end; ++j) {
             double* to[S];
             for (int s = 0; s < S; ++s) to[s] = target(i + s) + width * width * j;
-            slabs::subtract_product<S, Overwrite>(to, rows, scaled.data[j - first_slab], depth,
-                                                  std::min(width, end_column - width * j));
+            slabs::subtract_product<S, Overwrite>(to, from, scaled.data[j - slabs_across.begin], count,
+                                                  std::min(width, columns.end - width * j));
         }
     };
-    for (Index i = first_slab; i < end_slab; ++i) tiles.template operator()<1>(i, i + 1);  // the triangle on the diagonal
-    for_groups(end_slab, last_slab, [&]<int S>(Index i) { tiles.template operator()<S>(i, end_slab); });
+    Index i = rows.begin;
+    for (; i < std::min(rows.end, slabs_across.end); ++i)
+        tiles.template operator()<1>(i, i + 1);  // the diagonal's triangle
+    for_groups(i, rows.end,
+               [&]<int S>(Index group) { tiles.template operator()<S>(group, slabs_across.end); });
 }
 
 void load_block(const Panel& panel, Index first, PivotBlock& block) {
@@ -62,7 +75,8 @@ void load_block(const Panel& panel, Index first, PivotBlock& block) {
         const Index row = first + i;
         const double* slab = panel.top.slab(row / width) + row % width;
         for (Index j = 0; j <= i; ++j) {
-            block.entries[j * block.stride + i] = block.entries[i * block.stride + j] = slab[width * (first + j)];
+            block.entries[j * block.stride + i] = block.entries[i * block.stride + j] =
+                slab[width * (first + j)];
         }
     }
 }
@@ -110,10 +124,11 @@ struct InversePivots {
     }
 };
 
-// Rows below a factorized block: W = A P^T L^-T by substitution, then L = W D^-1. `slab[s]` begins at the block's first
-// column.
+// Rows below a factorized block: W = A P^T L^-T by substitution, then L = W D^-1. `slab[s]` begins at the
+// block's first column.
 template <int S>
-void solve_rows(double* const (&slab)[S], const PivotBlock& block, const InversePivots& inverse, Lanes& growth) {
+void solve_rows(double* const (&slab)[S], const PivotBlock& block, const InversePivots& inverse,
+                Lanes& growth) {
     if (block.permuted) {
         Lanes old[block_columns];
         for (int s = 0; s < S; ++s) {
@@ -128,9 +143,10 @@ void solve_rows(double* const (&slab)[S], const PivotBlock& block, const Inverse
         Lanes sum[S][width];
         for (int s = 0; s < S; ++s) {
 #pragma GCC unroll 8
-            for (Index j = 0; j < width; ++j) sum[s][j] = j < columns ? lanes(slab[s] + width * (first + j)) : Lanes{};
+            for (Index j = 0; j < width; ++j)
+                sum[s][j] = j < columns ? lanes(slab[s] + width * (first + j)) : Lanes{};
         }
-        slabs::multiply<S, PivotBlock::stride, -1>(sum, rows, block.entries + first, first);
+        slabs::subtract_multiple<S, PivotBlock::stride>(sum, rows, block.entries + first, first);
         const double* l = block.entries + first * block.stride + first;
 #pragma GCC unroll 8
         for (Index p = 0; p < width; ++p) {
@@ -158,55 +174,78 @@ void solve_rows(double* const (&slab)[S], const PivotBlock& block, const Inverse
                 ++k;
             }
             at = l;
-            const Lanes product = l * w;
-            const Lanes magnitude = product < 0.0 ? -product : product;
-            growth = magnitude > growth ? magnitude : growth;
+            growth.raise_to_magnitude(l * w);
         }
     }
+}
+
+// Calls body(range) for parts of a range of slabs, on several threads where there are many slabs. The parts
+// depend on the range alone.
+template <class Body>
+void for_parts(Range range, Body&& body) {
+    constexpr Index part = 36;
+    const Index parts = (range.end - range.begin + part - 1) / part;
+    if (parts <= 2) return body(range);
+    parallel_for(parts, [&](int k) {
+        const Index begin = range.begin + part * k;
+        body(Range{begin, std::min(begin + part, range.end)});
+    });
 }
 
 }  // namespace
 
-void eliminate_pivots(const Panel& panel, Index pivots, Index below_slabs, const FrontPivots& out, PivotTally& tally) {
-    const Index last_slab = panel.top_slabs + below_slabs;
+void eliminate_pivots(const Panel& panel, Index pivots, Index below_slabs, const FrontPivots& out,
+                      PivotTally& tally) {
     const auto slab = [&](Index i) { return panel.slab(i); };
-    static thread_local ScaledBlock scaled;
-    static thread_local PivotBlock block;
-    Lanes growth{};
+    const auto bring_up_to_date = [&](Range columns, Range rows) {
+        for (Index k = 0; k < columns.begin; k += depth_block) {
+            update_block<false>(slab, slab, columns, rows, {k, std::min(k + depth_block, columns.begin)},
+                                out.pivots);
+        }
+    };
+    std::mutex tally_mutex;
+    PivotBlock block;
     for (Index first = 0; first < pivots; first += block_columns) {
         block.size = std::min(block_columns, pivots - first);
-        for (Index k = 0; k < first; k += depth_block) {
-            update_block<false>(slab, slab, first / width, first + block.size, last_slab, k,
-                                std::min(depth_block, first - k), out.pivots, scaled);
-        }
+        const Range columns{first, first + block.size};
+        const Index end_slab = slabs::count(columns.end);
+        bring_up_to_date(columns, {first / width, end_slab});
         load_block(panel, first, block);
         block.factorize({out.pivots.diagonal + first, out.pivots.coupling + first}, tally);
         store_block(panel, first, block);
-        if (block.permuted) permute_rows(panel, first, block);
         for (Index k = 0; k < block.size; ++k) out.order[first + k] = first + block.order[k];
 
         const InversePivots inverse(out.pivots, first, block.size);
-        for_groups(slabs::count(first + block.size), last_slab, [&]<int S>(Index i) {
-            double* rows[S];
-            for (int s = 0; s < S; ++s) rows[s] = slab(i + s) + width * first;
-            solve_rows<S>(rows, block, inverse, growth);
+        for_parts({end_slab, panel.top_slabs + below_slabs}, [&](Range rows) {
+            bring_up_to_date(columns, rows);
+            Lanes growth{};
+            for_groups(rows.begin, rows.end, [&]<int S>(Index i) {
+                double* at[S];
+                for (int s = 0; s < S; ++s) at[s] = slab(i + s) + width * first;
+                solve_rows<S>(at, block, inverse, growth);
+            });
+            const std::lock_guard lock(tally_mutex);
+            for (int lane = 0; lane < width; ++lane) tally.growth = std::max(tally.growth, growth[lane]);
         });
+        if (block.permuted)
+            permute_rows(panel, first, block);  // last: the rows below still used the old order
     }
-    for (int lane = 0; lane < width; ++lane) tally.growth = std::max(tally.growth, growth[lane]);
 }
 
-void form_update(const Panel& panel, Index pivots, Index below_slabs, const Pivots& d, const slabs::Triangle& update) {
-    static thread_local ScaledBlock scaled;
+void form_update(const Panel& panel, Index pivots, Index below_slabs, const Pivots& d,
+                 const slabs::Triangle& update) {
     const auto source = [&](Index i) { return panel.below.slab(i); };
     const auto target = [&](Index i) { return update.slab(i); };
-    for (Index k = 0; k < pivots; k += depth_block) {
-        const Index depth = std::min(depth_block, pivots - k);
-        for (Index j = 0; j < below_slabs; j += block_slabs) {
-            const Index end = std::min(below_slabs, j + block_slabs) * width;
-            if (k == 0) update_block<true>(source, target, j, end, below_slabs, k, depth, d, scaled);
-            else update_block<false>(source, target, j, end, below_slabs, k, depth, d, scaled);
+    for_parts({0, below_slabs}, [&](Range part) {
+        for (Index j = part.begin; j < part.end; j += block_slabs) {
+            const Range columns{width * j, width * std::min(j + block_slabs, part.end)};
+            const Range rows{j, below_slabs};
+            update_block<true>(source, target, columns, rows, {0, std::min(depth_block, pivots)}, d);
+            for (Index k = depth_block; k < pivots; k += depth_block) {
+                update_block<false>(source, target, columns, rows, {k, std::min(k + depth_block, pivots)}, d);
+            }
         }
-    }
+    });
 }
 
 }  // namespace magshell

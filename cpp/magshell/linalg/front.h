@@ -13,7 +13,8 @@ struct FrontPivots {
 };
 
 /// Turns the assembled columns of a front into L and D. `pivots` columns, `below_slabs` slabs of rows below.
-/// Pivots are chosen among 32 consecutive columns; no row leaves its front, so the pattern of L stays what was analysed.
+/// Pivots are chosen among 32 consecutive columns; no row leaves its front, so the pattern of L stays what
+/// was analysed.
 void eliminate_pivots(const slabs::Panel& panel, Index pivots, Index below_slabs, const FrontPivots& out,
                       PivotTally& tally);
 

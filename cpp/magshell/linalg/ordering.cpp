@@ -1,5 +1,5 @@
-// Of SuiteSparse this file calls AMD (BSD) and METIS (Apache) through CHOLMOD's Core, Cholesky and Partition modules
-// (LGPL); nothing of its Supernodal module, which is GPL.
+// Of SuiteSparse this file calls AMD (BSD) and METIS (Apache) through CHOLMOD's Core, Cholesky and Partition
+// modules (LGPL); nothing of its Supernodal module, which is GPL.
 #include "magshell/linalg/ordering.h"
 
 #include <Eigen/OrderingMethods>
@@ -32,7 +32,8 @@ std::vector<Index> order_nodes(const SparsePattern& pattern, Ordering ordering) 
     CholmodCommon common;
     cholmod_sparse view = cholmod_view(pattern, nullptr);
     std::vector<Index> order(pattern.size);
-    if (ordering == Ordering::metis && cholmod_metis(&view, nullptr, 0, 0, order.data(), common)) return order;
+    if (ordering == Ordering::metis && cholmod_metis(&view, nullptr, 0, 0, order.data(), common))
+        return order;
     if (cholmod_amd(&view, nullptr, 0, order.data(), common)) return order;
 #endif
     (void)ordering;
@@ -54,10 +55,12 @@ std::vector<Index> order_unknowns(const SparsePattern& pattern, const Quotient& 
 AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, Ordering ordering) {
     if (pattern.size == 0) return {};
     const Quotient quotient = quotient_graph(pattern);
-    if (ordering != Ordering::best) return assembly_tree(pattern, order_unknowns(pattern, quotient, ordering));
+    if (ordering != Ordering::best)
+        return assembly_tree(pattern, order_unknowns(pattern, quotient, ordering));
 
-    // With three unknowns a vertex METIS saves a fifth of the operations. With one an edge besides, it would have to order
-    // the unknowns themselves, which takes it 20 times as long as AMD and saves a twentieth at most (measured).
+    // With three unknowns a vertex METIS saves a fifth of the operations. With one an edge besides, it would
+    // have to order the unknowns themselves, which takes it 20 times as long as AMD and saves a twentieth at
+    // most (measured).
     AssemblyTree amd = assembly_tree(pattern, order_unknowns(pattern, quotient, Ordering::amd));
     if (!quotient.is_even()) return amd;
     AssemblyTree metis = assembly_tree(pattern, order_unknowns(pattern, quotient, Ordering::metis));

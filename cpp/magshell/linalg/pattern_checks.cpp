@@ -9,7 +9,9 @@
 namespace magshell {
 namespace {
 
-std::string text(Index number) { return std::to_string(number); }
+std::string text(Index number) {
+    return std::to_string(number);
+}
 
 }  // namespace
 
@@ -22,14 +24,15 @@ void check_pattern(const SparsePattern& pattern) {
                            std::to_string(starts.size()));
     }
     if (starts.front() != 0 || static_cast<std::size_t>(starts.back()) != rows.size()) {
-        throw InvalidInput("column_starts must run from 0 to the number of rows, " + std::to_string(rows.size()) +
-                           "; it runs from " + text(starts.front()) + " to " + text(starts.back()));
+        throw InvalidInput("column_starts must run from 0 to the number of rows, " +
+                           std::to_string(rows.size()) + "; it runs from " + text(starts.front()) + " to " +
+                           text(starts.back()));
     }
     for (Index j = 0; j < pattern.size; ++j) {
         if (starts[j + 1] < starts[j]) throw InvalidInput("column_starts decreases after column " + text(j));
         if (static_cast<std::size_t>(starts[j + 1]) > rows.size()) {
-            throw InvalidInput("column_starts[" + text(j + 1) + "] = " + text(starts[j + 1]) + " exceeds the " +
-                               std::to_string(rows.size()) + " rows given");
+            throw InvalidInput("column_starts[" + text(j + 1) + "] = " + text(starts[j + 1]) +
+                               " exceeds the " + std::to_string(rows.size()) + " rows given");
         }
         Index previous = -1;
         for (Index k = starts[j]; k < starts[j + 1]; ++k) {
@@ -44,14 +47,16 @@ void check_pattern(const SparsePattern& pattern) {
             previous = rows[k];
         }
         if (starts[j] == starts[j + 1] || rows[starts[j]] != j) {
-            throw InvalidInput("column " + text(j) + " lacks its diagonal entry; keep it, with value 0 if need be");
+            throw InvalidInput("column " + text(j) +
+                               " lacks its diagonal entry; keep it, with value 0 if need be");
         }
     }
 }
 
 void check_finite(const double* values, std::size_t count) {
     bool all_finite = true;  // without a branch, so that the usual case is one vectorized pass
-    for (std::size_t k = 0; k < count; ++k) all_finite &= std::abs(values[k]) <= std::numeric_limits<double>::max();
+    for (std::size_t k = 0; k < count; ++k)
+        all_finite &= std::abs(values[k]) <= std::numeric_limits<double>::max();
     if (all_finite) return;
     for (std::size_t k = 0; k < count; ++k) {
         if (std::isfinite(values[k])) continue;
@@ -63,7 +68,8 @@ void check_finite(const double* values, std::size_t count) {
 void check_solvable(const FactorReport& report, Index size, const Eigen::Ref<Eigen::MatrixXd>& rhs) {
     if (!report.succeeded) throw InvalidInput("there is no factorization to solve with: " + report.reason);
     if (rhs.rows() != size) {
-        throw InvalidInput("the right-hand side must have " + text(size) + " rows, got " + std::to_string(rhs.rows()));
+        throw InvalidInput("the right-hand side must have " + text(size) + " rows, got " +
+                           std::to_string(rhs.rows()));
     }
 }
 

@@ -53,7 +53,8 @@ PivotSize choose_pivot(PivotBlock& block, Index k) {
     return PivotSize::two;
 }
 
-// column j -= w_j l for all columns right of the pivot; both triangles are kept, so that rows and columns swap alike.
+// column j -= w_j l for all columns right of the pivot; both triangles are kept, so that rows and columns
+// swap alike.
 void subtract_outer(PivotBlock& block, Index first, const double* l, const double* w) {
     const Index from = first / slabs::width * slabs::width;
     for (Index j = first; j < block.size; ++j) {
@@ -91,7 +92,8 @@ void PivotBlock::factorize(Pivots pivots, PivotTally& tally) {
             column[k] = 1.0;
             k += 1;
         } else {
-            // A 2x2 pivot has |coupling| beyond both its diagonals, so its determinant is negative: one of each sign.
+            // A 2x2 pivot has |coupling| beyond both its diagonals, so its determinant is negative: one of
+            // each sign.
             double* next = column + stride;
             const double a = column[k], b = column[k + 1], c = next[k + 1];
             const double determinant = a * c - b * b;
@@ -106,7 +108,8 @@ void PivotBlock::factorize(Pivots pivots, PivotTally& tally) {
                 w[1][i] = next[i];
                 column[i] = (c * w[0][i] - b * w[1][i]) / determinant;
                 next[i] = (a * w[1][i] - b * w[0][i]) / determinant;
-                tally.growth = std::max({tally.growth, std::abs(w[0][i] * column[i]), std::abs(w[1][i] * next[i])});
+                tally.growth =
+                    std::max({tally.growth, std::abs(w[0][i] * column[i]), std::abs(w[1][i] * next[i])});
             }
             subtract_outer(*this, k + 2, column, w[0]);
             subtract_outer(*this, k + 2, next, w[1]);

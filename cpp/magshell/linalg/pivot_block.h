@@ -1,4 +1,5 @@
-// L D L^T of a small dense symmetric block, with 1x1 and 2x2 pivots chosen inside it (Bunch and Kaufman 1977).
+// L D L^T of a small dense symmetric block, with 1x1 and 2x2 pivots chosen inside it (Bunch and Kaufman
+// 1977).
 #pragma once
 
 #include <array>
@@ -7,8 +8,8 @@
 
 namespace magshell {
 
-/// The pivots of some columns of L: D is diagonal[k] with, for a 2x2 pivot in k, k + 1, coupling[k] beside the diagonal;
-/// coupling is zero elsewhere.
+/// The pivots of some columns of L: D is diagonal[k] with, for a 2x2 pivot in k, k + 1, coupling[k] beside
+/// the diagonal; coupling is zero elsewhere.
 struct Pivots {
     double* diagonal;
     double* coupling;
@@ -24,8 +25,9 @@ struct PivotTally {
     }
 };
 
-// The matrix is scaled so that its largest entries are about 1. A pivot below `tiny_pivot` is rounding; it is replaced by
-// `perturbed_pivot`, large enough to divide by and small enough for a few steps of refinement to undo.
+// The matrix is scaled so that its largest entries are about 1. A pivot below `tiny_pivot` is rounding; it is
+// replaced by `perturbed_pivot`, large enough to divide by and small enough for a few steps of refinement to
+// undo.
 inline constexpr double tiny_pivot = 1e-14;
 inline constexpr double perturbed_pivot = 1e-8;
 
@@ -35,8 +37,9 @@ struct PivotBlock {
 
     Index size = 0;
     bool permuted = false;
-    std::array<std::int8_t, max_size> order;             // row k of the factorization is row order[k] of the block
-    alignas(64) double entries[max_size * stride];  // by columns; in: both triangles; out: unit lower L, zeros above
+    std::array<std::int8_t, max_size> order;  // row k of the factorization is row order[k] of the block
+    alignas(64) double entries[max_size *
+                               stride];  // by columns; in: both triangles; out: unit lower L, zeros above
 
     void factorize(Pivots pivots, PivotTally& tally);
 };

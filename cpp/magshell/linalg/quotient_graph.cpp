@@ -7,7 +7,8 @@
 namespace magshell {
 namespace {
 
-std::uint64_t mixed(std::uint64_t value) {  // the finalizer of splitmix64: each bit depends on all bits of the argument
+std::uint64_t mixed(
+    std::uint64_t value) {  // the finalizer of splitmix64: each bit depends on all bits of the argument
     value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9u;
     value = (value ^ (value >> 27)) * 0x94d049bb133111ebu;
     return value ^ (value >> 31);
@@ -24,7 +25,8 @@ bool Quotient::is_even() const {
 }
 
 Quotient quotient_graph(const SparsePattern& pattern) {
-    // Equal sums over the neighbours stand for equal neighbours; a coincidence would spoil the ordering's quality only.
+    // Equal sums over the neighbours stand for equal neighbours; a coincidence would spoil the ordering's
+    // quality only.
     std::vector<std::uint64_t> fingerprint(pattern.size, 0);
     for (Index j = 0; j < pattern.size; ++j) {
         const std::uint64_t own = mixed(static_cast<std::uint64_t>(j) + 1);

@@ -12,7 +12,8 @@ struct Quotient {
     SparsePattern pattern;                    // of the nodes
     std::vector<std::vector<Index>> members;  // the unknowns of each node
 
-    /// Whether nearly all nodes have the same number of members. Orderings count nodes, so only then do they count right.
+    /// Whether nearly all nodes have the same number of members. Orderings count nodes, so only then do they
+    /// count right.
     bool is_even() const;
 };
 

@@ -13,8 +13,8 @@ namespace magshell {
 
 namespace {
 
-// What CHOLMOD's own dependencies offer, looked up at run time: which BLAS and which OpenMP are loaded is for the system to
-// say, not for the build, and another package may have brought a second one of either.
+// What CHOLMOD's own dependencies offer, looked up at run time: which BLAS and which OpenMP are loaded is for
+// the system to say, not for the build, and another package may have brought a second one of either.
 struct Dependencies {
     void* cholmod = handle();
     int (*openmp_levels)() = symbol<int()>("omp_get_max_active_levels");
@@ -64,20 +64,31 @@ SingleThreaded::~SingleThreaded() {
 
 std::string blas_path() {
     Dl_info info;
-    return loaded().blas_routine && dladdr(loaded().blas_routine, &info) && info.dli_fname ? info.dli_fname : "";
+    return loaded().blas_routine && dladdr(loaded().blas_routine, &info) && info.dli_fname ? info.dli_fname
+                                                                                           : "";
 }
 
-std::string blas_config() { return loaded().blas_config ? loaded().blas_config() : ""; }
+std::string blas_config() {
+    return loaded().blas_config ? loaded().blas_config() : "";
+}
 
-int blas_threads() { return loaded().blas_threads ? loaded().blas_threads() : 0; }
+int blas_threads() {
+    return loaded().blas_threads ? loaded().blas_threads() : 0;
+}
 
 #else
 
 SingleThreaded::SingleThreaded() : openmp_levels_(0) {}
 SingleThreaded::~SingleThreaded() = default;
-std::string blas_config() { return ""; }
-std::string blas_path() { return ""; }
-int blas_threads() { return 0; }
+std::string blas_config() {
+    return "";
+}
+std::string blas_path() {
+    return "";
+}
+int blas_threads() {
+    return 0;
+}
 
 #endif
 

@@ -5,29 +5,38 @@
 
 namespace magshell::slabs {
 
-// How many slabs a product handles at once: as many as leave their sums in registers, eight columns each.
-#if defined(__AVX512F__)
-inline constexpr int group = 3;
-#else
-inline constexpr int group = 1;
-#endif
+// How many slabs and columns a product handles at once: as many as leave its sums in registers.
+inline constexpr int group = native_bytes == 64 ? 3 : 1;
+inline constexpr int columns_at_once = native_bytes == 64 ? 8 : native_bytes == 32 ? 4 : 2;
 
-/// sum(8 S, 8) += sign * rows(8 S, depth) columns(depth, 8); `columns` holds eight numbers every `Stride` for each step.
-template <int S, int Stride, int Sign>
-[[gnu::always_inline]] inline void multiply(Lanes (&sum)[S][width], const double* const (&rows)[S],
-                                            const double* columns, Index depth) {
-    for (Index p = 0; p < depth; ++p) {
-        Lanes row[S];
+/// sum(8 S, 8) -= rows(8 S, depth) columns(depth, 8); `columns` holds eight numbers every `Stride` for each
+/// step.
+template <int S, int Stride>
+[[gnu::always_inline]] inline void subtract_multiple(Lanes (&sum)[S][width], const double* const (&rows)[S],
+                                                     const double* columns, Index depth) {
+#pragma GCC unroll 4
+    for (int first = 0; first < width; first += columns_at_once) {
+        Lanes part[S][columns_at_once];
 #pragma GCC unroll 3
-        for (int s = 0; s < S; ++s) row[s] = lanes(rows[s] + width * p);
+        for (int s = 0; s < S; ++s) {
 #pragma GCC unroll 8
-        for (int j = 0; j < width; ++j) {
-            const double value = columns[Stride * p + j];
+            for (int j = 0; j < columns_at_once; ++j) part[s][j] = sum[s][first + j];
+        }
+        for (Index p = 0; p < depth; ++p) {
+            Lanes row[S];
 #pragma GCC unroll 3
-            for (int s = 0; s < S; ++s) {
-                if constexpr (Sign > 0) sum[s][j] += row[s] * value;
-                else sum[s][j] -= row[s] * value;
+            for (int s = 0; s < S; ++s) row[s] = lanes(rows[s] + width * p);
+#pragma GCC unroll 8
+            for (int j = 0; j < columns_at_once; ++j) {
+                const double value = columns[Stride * p + first + j];
+#pragma GCC unroll 3
+                for (int s = 0; s < S; ++s) part[s][j] -= row[s] * value;
             }
+        }
+#pragma GCC unroll 3
+        for (int s = 0; s < S; ++s) {
+#pragma GCC unroll 8
+            for (int j = 0; j < columns_at_once; ++j) sum[s][first + j] = part[s][j];
         }
     }
 }
@@ -37,7 +46,7 @@ template <int S, bool Overwrite>
 [[gnu::noinline]] void subtract_product(double* const (&target)[S], const double* const (&rows)[S],
                                         const double* weights, Index depth, Index columns) {
     Lanes sum[S][width] = {};
-    multiply<S, width, -1>(sum, rows, weights, depth);
+    subtract_multiple<S, width>(sum, rows, weights, depth);
     if (columns == width) {
 #pragma GCC unroll 3
         for (int s = 0; s < S; ++s) {

@@ -1,7 +1,8 @@
 // Dense matrices in slabs: eight rows side by side, column after column.
 //
-// Eight doubles are one vector register (or two, or four, on older processors), so a slab is already the "packed" operand
-// of a matrix product and the factor is stored, multiplied and solved with in this one layout, never repacked.
+// Eight doubles are one vector register (or two, or four, on older processors), so a slab is already the
+// "packed" operand of a matrix product and the factor is stored, multiplied and solved with in this one
+// layout, never repacked.
 #pragma once
 
 #include <cstddef>
@@ -15,13 +16,81 @@ namespace magshell::slabs {
 
 inline constexpr Index width = 8;  // rows of a slab
 
-// Eight doubles, aligned: the compiler maps them to whatever registers the processor has.
-using Lanes [[gnu::vector_size(64), gnu::may_alias]] = double;
+// The widest vector of the processor.
+#if defined(__AVX512F__)
+inline constexpr int native_bytes = 64;
+#elif defined(__AVX__)
+inline constexpr int native_bytes = 32;
+#else
+inline constexpr int native_bytes = 16;
+#endif
+using Native [[gnu::vector_size(native_bytes), gnu::may_alias]] = double;
 
-inline Lanes& lanes(double* at) { return *reinterpret_cast<Lanes*>(at); }
-inline const Lanes& lanes(const double* at) { return *reinterpret_cast<const Lanes*>(at); }
+/// Eight doubles, 64-byte aligned: one, two or four registers. (GCC keeps vectors wider than a register in
+/// memory, so these are spelled out.)
+struct [[gnu::may_alias]] alignas(64) Lanes {
+    static constexpr int natives = 64 / native_bytes;
+    Native part[natives];
 
-inline constexpr Index count(Index rows) { return (rows + width - 1) / width; }
+    double& operator[](Index lane) { return reinterpret_cast<double*>(part)[lane]; }
+    double operator[](Index lane) const { return reinterpret_cast<const double*>(part)[lane]; }
+
+    /// this = f(this, other), register by register.
+    template <class F>
+    [[gnu::always_inline]] Lanes& apply(const Lanes& other, F&& f) {
+#pragma GCC unroll 4
+        for (int n = 0; n < natives; ++n) part[n] = f(part[n], other.part[n]);
+        return *this;
+    }
+    [[gnu::always_inline]] Lanes& operator+=(const Lanes& b) {
+        return apply(b, [](const Native& x, const Native& y) -> Native { return x + y; });
+    }
+    [[gnu::always_inline]] Lanes& operator-=(const Lanes& b) {
+        return apply(b, [](const Native& x, const Native& y) -> Native { return x - y; });
+    }
+    [[gnu::always_inline]] Lanes& operator*=(const Lanes& b) {
+        return apply(b, [](const Native& x, const Native& y) -> Native { return x * y; });
+    }
+    [[gnu::always_inline]] Lanes& operator*=(double b) {
+        return apply(*this, [b](const Native& x, const Native&) -> Native { return x * b; });
+    }
+    [[gnu::always_inline]] Lanes& operator/=(double b) {
+        return apply(*this, [b](const Native& x, const Native&) -> Native { return x / b; });
+    }
+    /// this = max(this, |other|)
+    [[gnu::always_inline]] void raise_to_magnitude(const Lanes& b) {
+        apply(b, [](const Native& x, const Native& y) -> Native {
+            const Native magnitude = y < 0.0 ? -y : y;
+            return magnitude > x ? magnitude : x;
+        });
+    }
+    [[gnu::always_inline]] friend Lanes operator+(const Lanes& a, const Lanes& b) {
+        return Lanes(a) += b;
+    }
+    [[gnu::always_inline]] friend Lanes operator-(const Lanes& a, const Lanes& b) {
+        return Lanes(a) -= b;
+    }
+    [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, const Lanes& b) {
+        return Lanes(a) *= b;
+    }
+    [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, double b) {
+        return Lanes(a) *= b;
+    }
+    [[gnu::always_inline]] friend Lanes operator/(const Lanes& a, double b) {
+        return Lanes(a) /= b;
+    }
+};
+
+inline Lanes& lanes(double* at) {
+    return *reinterpret_cast<Lanes*>(at);
+}
+inline const Lanes& lanes(const double* at) {
+    return *reinterpret_cast<const Lanes*>(at);
+}
+
+inline constexpr Index count(Index rows) {
+    return (rows + width - 1) / width;
+}
 
 /// A lower triangle: slab i holds the columns 0 ... 8 i + 7, of which the last eight contain the diagonal.
 struct Triangle {
@@ -44,7 +113,8 @@ struct Rectangle {
     }
 };
 
-/// The eliminated columns of a front: the pivots' own rows on top (a triangle), the other rows below (a rectangle).
+/// The eliminated columns of a front: the pivots' own rows on top (a triangle), the other rows below (a
+/// rectangle).
 struct Panel {
     Triangle top;
     Rectangle below;

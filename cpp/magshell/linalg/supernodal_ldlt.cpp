@@ -17,6 +17,12 @@ using slabs::Panel;
 using slabs::Triangle;
 using slabs::width;
 
+namespace {
+
+constexpr double doubtful_growth = 1e8;  // half of the digits are gone: check before claiming success
+
+}  // namespace
+
 SupernodalLdlt::SupernodalLdlt(const SparsePattern& pattern, Ordering ordering) : pattern_(pattern) {
     AssemblyTree tree = ordered_assembly_tree(pattern, ordering);
     nonzeros_ = tree.nonzeros();
@@ -52,10 +58,16 @@ FactorReport SupernodalLdlt::factorize(const double* values) {
     report_.pivot_growth = largest_scaled_ > 0.0 ? tally.growth / largest_scaled_ : 0.0;
     report_.succeeded = true;
     report_.reason.clear();
-    if (tally.perturbed > 0 && !recovers_known_solution()) {
+    const bool doubtful = tally.perturbed > 0 || !(report_.pivot_growth < doubtful_growth);
+    if (doubtful && !recovers_known_solution()) {
         report_.succeeded = false;
-        report_.reason = "the matrix is singular to rounding: " + std::to_string(tally.perturbed) +
-                         " of its pivots vanish. Does the model hold every rigid motion and mechanism?";
+        report_.reason =
+            tally.perturbed > 0
+                ? "the matrix is singular to rounding: " + std::to_string(tally.perturbed) +
+                      " of its pivots vanish. Does the model hold every rigid motion and mechanism?"
+                : "the factorization lost its digits to the growth of its entries (see pivot_growth): the "
+                  "matrix is "
+                  "close to singular, or needs pivots from further away";
     }
     return report_;
 }

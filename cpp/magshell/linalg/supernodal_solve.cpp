@@ -1,4 +1,5 @@
-// The solving half of SupernodalLdlt: scaling, substitution, and refinement where the factorization was not exact.
+// The solving half of SupernodalLdlt: scaling, substitution, and refinement where the factorization was not
+// exact.
 #include <algorithm>
 #include <cmath>
 
@@ -31,7 +32,8 @@ VectorXd multiply(const SparsePattern& pattern, const double* values, const Vect
 }  // namespace
 
 void SupernodalLdlt::solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const {
-    const FactorView view{plan_, factor_.data(),
+    const FactorView view{plan_,
+                          factor_.data(),
                           {const_cast<double*>(diagonal_.data()), const_cast<double*>(coupling_.data())},
                           pivot_order_.data()};
     const Index size = pattern_.size;
@@ -41,14 +43,18 @@ void SupernodalLdlt::solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const {
         slabs::Buffer x(std::ptrdiff_t{stride} * size);
         for (Index k = 0; k < size; ++k) {
             const Index unknown = plan_.order[k];
-            for (Index j = 0; j < count; ++j) x.data()[stride * k + j] = rhs(unknown, first + j) * scale_[unknown];
+            for (Index j = 0; j < count; ++j)
+                x.data()[stride * k + j] = rhs(unknown, first + j) * scale_[unknown];
             std::fill(x.data() + stride * k + count, x.data() + stride * (k + 1), 0.0);
         }
-        if (count == 1) substitute_one(view, x.data());
-        else substitute_eight(view, x.data());
+        if (count == 1)
+            substitute_one(view, x.data());
+        else
+            substitute_eight(view, x.data());
         for (Index k = 0; k < size; ++k) {
             const Index unknown = plan_.order[k];
-            for (Index j = 0; j < count; ++j) rhs(unknown, first + j) = x.data()[stride * k + j] * scale_[unknown];
+            for (Index j = 0; j < count; ++j)
+                rhs(unknown, first + j) = x.data()[stride * k + j] * scale_[unknown];
         }
         first += count;
     }
@@ -56,7 +62,8 @@ void SupernodalLdlt::solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const {
 
 void SupernodalLdlt::solve(Eigen::Ref<Eigen::MatrixXd> rhs) const {
     check_solvable(report_, size(), rhs);
-    if (report_.perturbed_pivots == 0 && report_.pivot_growth < refined_from_growth) return solve_factored(rhs);
+    if (report_.perturbed_pivots == 0 && report_.pivot_growth < refined_from_growth)
+        return solve_factored(rhs);
     for (Index j = 0; j < rhs.cols(); ++j) rhs.col(j) = refined_solution(rhs.col(j));
 }
 
@@ -91,8 +98,8 @@ VectorXd SupernodalLdlt::refined_solution(const VectorXd& rhs) const {
     return solution;
 }
 
-// A vector of size one in the scaled unknowns, its image, and what solving with that image gives back. Along a null
-// direction nothing can be given back, however small the residual.
+// A vector of size one in the scaled unknowns, its image, and what solving with that image gives back. Along
+// a null direction nothing can be given back, however small the residual.
 bool SupernodalLdlt::recovers_known_solution() const {
     VectorXd known(size());
     for (Index j = 0; j < size(); ++j) {

@@ -48,10 +48,11 @@ class LaneMove {
 #endif
 };
 
-void add_columns(const Transfer& transfer, const double* source, double* target, const Index* places, Index first,
-                 Index end) {
+void add_columns(const Transfer& transfer, const double* source, double* target, const Index* places,
+                 Index first, Index end) {
     const LaneMove move(transfer);
-    for (Index j = first; j < end; ++j) move.add(source + width * j, target + std::ptrdiff_t{width} * places[j]);
+    for (Index j = first; j < end; ++j)
+        move.add(source + width * j, target + std::ptrdiff_t{width} * places[j]);
 }
 
 }  // namespace
@@ -62,7 +63,8 @@ void add_to_panel(const AssemblyPlan& plan, Index child, double* work, const sla
     const Index* places = plan.places.data() + front.shape.rows;
     for (Index t = front.first_transfer; t < plan.fronts[child + 1].first_transfer; ++t) {
         const Transfer& transfer = plan.transfers[t];
-        double* target = transfer.to_pivots ? parent.top.slab(transfer.parent_slab) : parent.below.slab(transfer.parent_slab);
+        double* target = transfer.to_pivots ? parent.top.slab(transfer.parent_slab)
+                                            : parent.below.slab(transfer.parent_slab);
         add_columns(transfer, update.slab(transfer.slab), target, places, 0,
                     std::min(transfer.end_column, front.rows_in_parent_pivots));
     }

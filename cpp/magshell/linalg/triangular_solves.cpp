@@ -12,7 +12,8 @@ using slabs::Lanes;
 using slabs::Panel;
 using slabs::width;
 
-constexpr int row_group = 4;  // slabs multiplied at once by one vector: enough chains of additions to hide their latency
+constexpr int row_group =
+    4;  // slabs multiplied at once by one vector: enough chains of additions to hide their latency
 
 Index most_pivots(const AssemblyPlan& plan) {
     Index most = 0;
@@ -20,9 +21,12 @@ Index most_pivots(const AssemblyPlan& plan) {
     return most;
 }
 
-double sum(const Lanes& v) { return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7])); }
+double sum(const Lanes& v) {
+    return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
+}
 
-// D z = y for the 1x1 or 2x2 pivot that begins at k; T is a number or eight of them. Returns how many rows it has.
+// D z = y for the 1x1 or 2x2 pivot that begins at k; T is a number or eight of them. Returns how many rows it
+// has.
 template <class T>
 Index divide_by_pivot(const Pivots& d, Index k, T& first, T* second) {
     const double a = d.diagonal[k], b = d.coupling[k];
@@ -38,7 +42,8 @@ Index divide_by_pivot(const Pivots& d, Index k, T& first, T* second) {
     return 2;
 }
 
-// One right-hand side. `pivots` is the part of x on a front's pivots, in the order they were taken, padded to whole slabs.
+// One right-hand side. `pivots` is the part of x on a front's pivots, in the order they were taken, padded to
+// whole slabs.
 
 void forward_top(const Panel& panel, Index count, double* pivots) {
     for (Index i = 0; i < panel.top_slabs; ++i) {
@@ -53,15 +58,16 @@ void forward_top(const Panel& panel, Index count, double* pivots) {
         const Index end = std::min(width, count - width * i);
         for (Index lane = 0; lane < end; ++lane) {
             const double solved = result[lane];
-            result -= lanes(slab + width * (width * i + lane)) * solved;  // L is unit: clears the lane itself, too
+            result -=
+                lanes(slab + width * (width * i + lane)) * solved;  // L is unit: clears the lane itself, too
             result[lane] = solved;
         }
     }
 }
 
 template <int S>
-void subtract_below(const Panel& panel, Index first_slab, Index count, const double* pivots, const Index* rows,
-                    Index below, double* x) {
+void subtract_below(const Panel& panel, Index first_slab, Index count, const double* pivots,
+                    const Index* rows, Index below, double* x) {
     const double* slab[S];
     for (int s = 0; s < S; ++s) slab[s] = panel.below.slab(first_slab + s);
     Lanes value[S] = {};
@@ -131,7 +137,8 @@ void substitute_one(const FactorView& factor, double* x) {
         for (; slab + row_group <= slab_count; slab += row_group) {
             subtract_below<row_group>(panel, slab, shape.pivots, pivots, rows, shape.below, x);
         }
-        for (; slab < slab_count; ++slab) subtract_below<1>(panel, slab, shape.pivots, pivots, rows, shape.below, x);
+        for (; slab < slab_count; ++slab)
+            subtract_below<1>(panel, slab, shape.pivots, pivots, rows, shape.below, x);
     }
 
     for (Index s = plan.front_count() - 1; s >= 0; --s) {
@@ -162,7 +169,7 @@ namespace {
 // rows(8, eight right-hand sides) -= slab(8, count) pivots(count, eight right-hand sides)
 void subtract_slab(const double* slab, Index count, const double* pivots, Lanes (&rows)[1][width]) {
     const double* const sources[1] = {pivots};
-    slabs::multiply<1, width, -1>(rows, sources, slab, count);
+    slabs::subtract_multiple<1, width>(rows, sources, slab, count);
 }
 
 // pivots(count, eight) -= slab(8, count)^T rows(8, eight)
@@ -195,11 +202,13 @@ void substitute_eight(const FactorView& factor, double* x) {
         for (Index i = 0; i < panel.top_slabs; ++i) {
             const Index end = std::min(width, shape.pivots - width * i);
             Lanes rows[1][width] = {};
-            for (Index lane = 0; lane < end; ++lane) rows[0][lane] = lanes(pivots + width * (width * i + lane));
+            for (Index lane = 0; lane < end; ++lane)
+                rows[0][lane] = lanes(pivots + width * (width * i + lane));
             subtract_slab(panel.top.slab(i), width * i, pivots, rows);
             for (Index lane = 0; lane < end; ++lane) {
                 const double* column = panel.top.slab(i) + width * (width * i + lane);
-                for (Index other = lane + 1; other < end; ++other) rows[0][other] -= rows[0][lane] * column[other];
+                for (Index other = lane + 1; other < end; ++other)
+                    rows[0][other] -= rows[0][lane] * column[other];
                 lanes(pivots + width * (width * i + lane)) = rows[0][lane];
             }
         }
@@ -221,7 +230,8 @@ void substitute_eight(const FactorView& factor, double* x) {
         double* own = x + std::ptrdiff_t{width} * shape.first;
         std::copy_n(own, width * shape.pivots, pivots);
         const Pivots d{factor.pivots.diagonal + shape.first, factor.pivots.coupling + shape.first};
-        for (Index k = 0; k < shape.pivots;) k += divide_by_pivot(d, k, lanes(pivots + width * k), &lanes(pivots + width * (k + 1)));
+        for (Index k = 0; k < shape.pivots;)
+            k += divide_by_pivot(d, k, lanes(pivots + width * k), &lanes(pivots + width * (k + 1)));
 
         const Index* rows_below = plan.rows.data() + shape.rows;
         for (Index first = 0; first < shape.below; first += width) {
