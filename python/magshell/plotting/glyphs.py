@@ -1,0 +1,86 @@
+"""Where arrows stand and how long they are: magnetization on the sheet, a field around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..mesh import TriangleMesh
+from .states import State
+
+ARROWS = 60  # on a sheet, about
+LENGTH = 0.85  # of the longest arrow, in spacings
+RADIUS = 0.05  # of the shafts, in spacings
+NEGLIGIBLE = 1e-3  # of the longest vector: not drawn
+
+
+@dataclass(frozen=True)
+class Glyphs:
+    """Arrows: starts and vectors, (k, 3), m; the radius of their shafts, m."""
+
+    starts: np.ndarray
+    vectors: np.ndarray
+    radius: float
+
+
+def largest(states: list[State]) -> float:
+    """The largest magnetization in all states, A/m."""
+    return max(float(np.linalg.norm(state.magnetization, axis=1).max()) for state in states)
+
+
+def spacing_of(mesh: TriangleMesh, count: int) -> float:
+    """The distance between `count` arrows spread over the sheet, m."""
+    return float(np.sqrt(mesh.face_areas.sum() / count))
+
+
+def spread_faces(mesh: TriangleMesh, spacing: float) -> np.ndarray:
+    """Faces about a spacing apart: the one next to the centre of each box of a lattice over the rest shape."""
+    centers = mesh.face_barycenters
+    low, extent = mesh.rest_positions.min(axis=0), np.ptp(mesh.rest_positions, axis=0)
+    counts = np.maximum(1, np.round(extent / spacing)).astype(np.int64)
+    step = np.where(extent > 0, extent / counts, 1.0)
+    box = np.minimum((centers - low) // step, counts - 1)
+    distance = np.linalg.norm(centers - low - (box + 0.5) * step, axis=1)
+    nearest_first = np.lexsort((distance, *box.T))
+    _, first = np.unique(box[nearest_first], axis=0, return_index=True)
+    return np.sort(nearest_first[first])
+
+
+def magnetization_glyphs(state: State, faces: np.ndarray, spacing: float, unit_vector: float) -> Glyphs:
+    """F_0 M_r on the given faces; a vector of length `unit_vector` [A/m] is drawn LENGTH spacings long.
+
+    An arrow in the sheet is centred on its face, one that leaves it starts there.
+    """
+    vectors = state.magnetization[faces]
+    shown = np.linalg.norm(vectors, axis=1) > NEGLIGIBLE * unit_vector
+    vectors = vectors[shown] * (LENGTH * spacing / unit_vector)
+    x0, x1, x2 = np.moveaxis(state.positions[state.mesh.faces[faces[shown]]], 1, 0)
+    normal = np.cross(x1 - x0, x2 - x0)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    tangential = vectors - np.einsum("ki,ki->k", vectors, normal)[:, None] * normal
+    return Glyphs((x0 + x1 + x2) / 3.0 - 0.5 * tangential, vectors, RADIUS * spacing)
+
+
+def halo(states: list[State], size: float) -> np.ndarray:
+    """Points (k, 3), m, of a coarse lattice around the sheets, neither on them nor far off."""
+    positions = np.concatenate([state.positions for state in states])
+    spacing = size / 7.0
+    low, high = positions.min(axis=0) - spacing, positions.max(axis=0) + spacing
+    counts = np.maximum(2, np.round((high - low) / spacing)).astype(np.int64) + 1
+    axes = [np.linspace(a, b, n) for a, b, n in zip(low, high, counts.tolist(), strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    barycenters = np.concatenate([state.barycenters for state in states])
+    distance, _ = cKDTree(barycenters).query(points)
+    return points[(distance > 0.55 * spacing) & (distance < 1.4 * spacing)]
+
+
+def field_glyphs(points: np.ndarray, flux_densities: np.ndarray, size: float, unit_vector: float) -> Glyphs:
+    """B (k, 3) at points (k, 3) outside NaN, each arrow centred on its point."""
+    spacing = size / 7.0
+    magnitude = np.linalg.norm(flux_densities, axis=1)
+    shown = magnitude > 0.02 * unit_vector  # False for NaN
+    vectors = flux_densities[shown] * np.minimum(1.0, unit_vector / magnitude[shown])[:, None]
+    vectors = vectors * (0.7 * spacing / unit_vector)
+    return Glyphs(points[shown] - 0.5 * vectors, vectors, 0.022 * spacing)
