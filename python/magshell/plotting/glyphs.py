@@ -18,16 +18,18 @@ NEGLIGIBLE = 1e-3  # of the longest vector: not drawn
 
 @dataclass(frozen=True)
 class Glyphs:
-    """Arrows: starts and vectors, (k, 3), m; the radius of their shafts, m."""
+    """Arrows: starts and vectors, (k, 3), m; the radius of their shafts, m; how far to lift them off a sheet, m."""
 
     starts: np.ndarray
     vectors: np.ndarray
     radius: float
+    lift: float = 0.0
 
 
 def largest(states: list[State]) -> float:
-    """The largest magnetization in all states, A/m."""
-    return max(float(np.linalg.norm(state.magnetization, axis=1).max()) for state in states)
+    """The largest remanent magnetization in all states, A/m; 0 if none is magnetized."""
+    given = [state.remanent_magnetization for state in states if state.remanent_magnetization is not None]
+    return max((float(np.linalg.norm(m, axis=1).max()) for m in given), default=0.0)
 
 
 def spacing_of(mesh: TriangleMesh, count: int) -> float:
@@ -48,11 +50,13 @@ def spread_faces(mesh: TriangleMesh, spacing: float) -> np.ndarray:
     return np.sort(nearest_first[first])
 
 
-def magnetization_glyphs(state: State, faces: np.ndarray, spacing: float, unit_vector: float) -> Glyphs:
-    """F_0 M_r on the given faces; a vector of length `unit_vector` [A/m] is drawn LENGTH spacings long.
+def magnetization_glyphs(state: State, count: int, unit_vector: float) -> Glyphs:
+    """About `count` arrows F_0 M_r; a vector of length `unit_vector` [A/m] is drawn LENGTH spacings long.
 
     An arrow in the sheet is centred on its face, one that leaves it starts there.
     """
+    spacing = spacing_of(state.mesh, count)
+    faces = spread_faces(state.mesh, spacing)
     vectors = state.magnetization[faces]
     shown = np.linalg.norm(vectors, axis=1) > NEGLIGIBLE * unit_vector
     vectors = vectors[shown] * (LENGTH * spacing / unit_vector)
@@ -60,7 +64,9 @@ def magnetization_glyphs(state: State, faces: np.ndarray, spacing: float, unit_v
     normal = np.cross(x1 - x0, x2 - x0)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     tangential = vectors - np.einsum("ki,ki->k", vectors, normal)[:, None] * normal
-    return Glyphs((x0 + x1 + x2) / 3.0 - 0.5 * tangential, vectors, RADIUS * spacing)
+    # an arrow in the sheet would sink into it where it bends; one that leaves it would show through
+    flat = np.linalg.norm(tangential) / max(np.linalg.norm(vectors), 1e-300)
+    return Glyphs((x0 + x1 + x2) / 3.0 - 0.5 * tangential, vectors, RADIUS * spacing, 0.5 * flat * spacing)
 
 
 def halo(states: list[State], size: float) -> np.ndarray:
@@ -77,10 +83,27 @@ def halo(states: list[State], size: float) -> np.ndarray:
 
 
 def field_glyphs(points: np.ndarray, flux_densities: np.ndarray, size: float, unit_vector: float) -> Glyphs:
-    """B (k, 3) at points (k, 3) outside NaN, each arrow centred on its point."""
+    """B (k, 3) at points (k, 3), where it has a value, each arrow centred on its point.
+
+    Fields of `unit_vector` [T] and more are drawn at full length.
+    """
     spacing = size / 7.0
     magnitude = np.linalg.norm(flux_densities, axis=1)
     shown = magnitude > 0.02 * unit_vector  # False for NaN
     vectors = flux_densities[shown] * np.minimum(1.0, unit_vector / magnitude[shown])[:, None]
     vectors = vectors * (0.7 * spacing / unit_vector)
     return Glyphs(points[shown] - 0.5 * vectors, vectors, 0.022 * spacing)
+
+
+def sources_glyphs(groups: list[list[State]], size: float) -> tuple[list[Glyphs | None], float]:
+    """The fields that vary in space, around the sheets of each group, and the flux density [T] of full length."""
+    sampled = []
+    for group in groups:
+        points = halo(group, size) if group[-1].sources else np.zeros((0, 3))
+        sampled.append((points, group[-1].flux_density_at(points)))
+    magnitudes = np.concatenate([np.linalg.norm(values, axis=1) for _, values in sampled])
+    magnitudes = magnitudes[np.isfinite(magnitudes)]
+    if not magnitudes.any():
+        return [None] * len(groups), 0.0
+    strong = float(np.quantile(magnitudes, 0.9))  # a field next to its source would leave nothing of the rest
+    return [field_glyphs(*one, size, strong) if len(one[0]) else None for one in sampled], strong

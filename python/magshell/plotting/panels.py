@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..mesh import TriangleMesh
 from . import colors, glyphs
@@ -20,12 +21,12 @@ LINE = 0.0022  # width, in sizes of the drawing
 
 @dataclass(frozen=True)
 class Label:
-    """Text at a point (3,), m; `above` or below it."""
+    """Text beside a point (3,), m, on the side that `towards` (right, up) says."""
 
     point: np.ndarray
     text: str
     color: str
-    above: bool = True
+    towards: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass
@@ -131,9 +132,8 @@ def _sheet(state: State, shades: np.ndarray, view: View, size: float, options: O
 def _magnetization(state: State, strongest: float, count: int) -> list[Solid]:
     if not state.is_magnetized:
         return []
-    spacing = glyphs.spacing_of(state.mesh, count)
-    chosen = glyphs.magnetization_glyphs(state, glyphs.spread_faces(state.mesh, spacing), spacing, strongest)
-    return [arrows(chosen.starts, chosen.vectors, chosen.radius, colors.MAGNETIZATION, lift=0.5 * spacing)]
+    chosen = glyphs.magnetization_glyphs(state, count, strongest)
+    return [arrows(chosen.starts, chosen.vectors, chosen.radius, colors.MAGNETIZATION, chosen.lift)]
 
 
 def _uniform_fields(panels: list[Panel], groups: list[list[State]], view: View, size: float) -> None:
@@ -152,10 +152,10 @@ def _uniform_fields(panels: list[Panel], groups: list[list[State]], view: View, 
             vector = flux_density * (longest / strongest)
             width = abs(vector @ right)
             center = (place - 0.5 * width) * right + middle[1] * up + middle[2] * eye
-            low = center - (0.5 * abs(vector @ up) + 0.035 * size) * up
-            panel.labels.append(Label(low, f"$B$ = {with_unit(np.linalg.norm(flux_density), 'T')}", colors.FIELD, False))
+            low = center - (0.5 * abs(vector @ up) + 0.015 * size) * up
+            panel.labels.append(Label(low, f"$B$ = {with_unit(np.linalg.norm(flux_density), 'T')}", colors.FIELD, (0.0, -1.0)))
             if vector.any():
-                panel.solids.append(arrows(center[None] - vector / 2, vector[None], 0.008 * size, colors.FIELD))
+                panel.solids.append(arrows(center[None] - vector / 2, vector[None], 0.0065 * size, colors.FIELD))
             place -= width + 0.12 * size
 
 
@@ -168,28 +168,23 @@ def _distinct(vectors: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> list[tuple[str, str]]:
-    """Arrows of the fields that vary in space, around the sheets of each panel, and what the legend says."""
-    around = [(panel, glyphs.halo(group, size), group[-1]) for panel, group in zip(panels, groups, strict=True)]
-    sampled = [(panel, points, state.flux_density_at(points)) for panel, points, state in around if state.sources]
-    magnitudes = [np.linalg.norm(values, axis=1) for _, _, values in sampled]
-    finite = np.concatenate([m[np.isfinite(m)] for m in magnitudes]) if magnitudes else np.zeros(0)
-    if not finite.any():
-        return []
-    strong = float(np.quantile(finite, 0.9))  # a field next to its source would leave nothing of the rest
-    for panel, points, values in sampled:
-        chosen = glyphs.field_glyphs(points, values, size, strong)
-        panel.solids.append(arrows(chosen.starts, chosen.vectors, chosen.radius, colors.FIELD))
-    return [(f"$B$, longest {with_unit(strong, 'T')} or more", colors.FIELD)]
+    """Arrows of the fields that vary in space, and what the legend says."""
+    around, strong = glyphs.sources_glyphs(groups, size)
+    for panel, chosen in zip(panels, around, strict=True):
+        if chosen is not None:
+            panel.solids.append(arrows(chosen.starts, chosen.vectors, chosen.radius, colors.FIELD))
+    return [(f"$B$, full length at {with_unit(strong, 'T')}", colors.FIELD)] if strong else []
 
 
 def _series_labels(group: list[State], titles: list[str], view: View) -> list[Label]:
-    """Each state's title where it is farthest from the others on the screen."""
+    """Each state's title where it is farthest from the others on the screen, on the side away from them."""
     labels = []
     screens = [view.project(state.positions)[:, :2] for state in group]
     for state, screen, title in zip(group, screens, titles, strict=True):
-        others = [other for other in screens if other is not screen and len(other) == len(screen)]
-        clearance = np.min([np.linalg.norm(screen - other, axis=1) for other in others], axis=0) if others else screen[:, 1]
-        vertex = int(np.argmax(clearance))
-        below = bool(others) and screen[vertex, 1] < np.mean([other[vertex, 1] for other in others])
-        labels.append(Label(state.positions[vertex], title, colors.OUTLINE, not below))
-    return [label for label in labels if label.text]
+        others = np.concatenate([other for other in screens if other is not screen])
+        distance, nearest = cKDTree(others).query(screen)
+        vertex = int(np.argmax(distance))
+        away = (screen[vertex] - others[nearest[vertex]]) / max(distance[vertex], 1e-300)
+        if title:
+            labels.append(Label(state.positions[vertex], title, colors.OUTLINE, (float(away[0]), float(away[1]))))
+    return labels

@@ -114,14 +114,18 @@ def _write(axes, label: Label, drawing: Drawing) -> None:
     axes.annotate(
         label.text,
         drawing.view.project(label.point)[:2],
-        xytext=(0, 4 if label.above else -2),
+        xytext=(4 * label.towards[0], 4 * label.towards[1]),
         textcoords="offset points",
-        ha="center",
-        va="bottom" if label.above else "top",
+        ha=_side(label.towards[0], "right", "left"),
+        va=_side(label.towards[1], "top", "bottom"),
         fontsize=TEXT,
         color=label.color,
         path_effects=[withStroke(linewidth=2.5, foreground="white")],
     )
+
+
+def _side(towards: float, behind: str, ahead: str) -> str:
+    return "center" if abs(towards) < 0.5 else ahead if towards > 0 else behind
 
 
 def _with_room(drawing: Drawing, inches: float) -> np.ndarray:
@@ -132,10 +136,10 @@ def _with_room(drawing: Drawing, inches: float) -> np.ndarray:
         for panel in drawing.panels:
             for label in panel.labels:
                 x, y, _depth = drawing.view.project(label.point)
-                half = 0.5 * scale * 0.075 * len(label.text) * TEXT / 8.0
-                rise = scale * 0.2
-                left, right = min(left, x - half), max(right, x + half)
-                bottom, top = min(bottom, y - (not label.above) * rise), max(top, y + label.above * rise)
+                long, high = scale * 0.075 * len(label.text), scale * 0.22
+                x, y = x + 0.5 * long * label.towards[0], y + 0.5 * high * label.towards[1]
+                left, right = min(left, x - long / 2), max(right, x + long / 2)
+                bottom, top = min(bottom, y - high / 2), max(top, y + high / 2)
     width, height = right - left, top - bottom
     extra = max(FLATTEST * width - height, 0.0) / 2
     bottom, top = bottom - extra, top + extra
@@ -144,10 +148,16 @@ def _with_room(drawing: Drawing, inches: float) -> np.ndarray:
 
 
 def _best_columns(count: int, window: np.ndarray) -> int:
-    """Columns for a picture about one and a half times as wide as high."""
+    """Columns for a picture about twice as wide as high, with few empty places."""
     shape = (window[1] - window[0]) / (window[3] - window[2])
     shape = min(shape, 1.0 / FLATTEST)
-    return min(range(1, count + 1), key=lambda n: (abs(np.log(n * shape / (-(-count // n)) / 1.5)), -n))
+
+
+    def cost(columns: int) -> float:
+        rows = -(-count // columns)
+        return abs(np.log(columns * shape / rows / 2.0)) + 2.0 * (rows * columns / count - 1.0)
+
+    return min(range(1, count + 1), key=cost)
 
 
 def _legend(axes, drawing: Drawing, inches: float, inches_per_meter: float) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from .view import View
 
 LIGHT = np.array([-0.35, 0.55, 0.76])  # to the light: right, up, towards the eye
-AMBIENT, DIFFUSE = 0.58, 0.46
+AMBIENT, DIFFUSE = 0.74, 0.30
 
 
 def shade(colors: np.ndarray, normals: np.ndarray, view: View) -> np.ndarray:

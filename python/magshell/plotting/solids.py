@@ -8,7 +8,7 @@ import numpy as np
 
 from .colors import rgb
 
-ARROW_SIDES = 8
+ARROW_SIDES = 12
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,11 @@ def ribbons(segments: np.ndarray, eye: np.ndarray, width: float, color: str, lif
 
 
 def arrows(starts: np.ndarray, vectors: np.ndarray, radius: float, color: str, lift: float = 0.0) -> Solid:
-    """Arrows from starts (k, 3) along vectors (k, 3), m: a shaft of the given radius and a cone."""
+    """Arrows from starts (k, 3) along vectors (k, 3), m: a shaft of the given radius, less on short ones, and a cone."""
     length = np.linalg.norm(vectors, axis=1)
     starts, vectors, length = starts[length > 0], vectors[length > 0], length[length > 0, None]
     along = vectors / length
+    width = np.minimum(radius, 0.11 * length)[:, :, None]
     helper = np.eye(3)[np.argmin(np.abs(along), axis=1)]
     side = np.cross(along, helper)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
@@ -62,11 +63,11 @@ def arrows(starts: np.ndarray, vectors: np.ndarray, radius: float, color: str, l
 
     angles = 2 * np.pi * np.arange(ARROW_SIDES) / ARROW_SIDES
     circle = np.cos(angles)[:, None] * side[:, None] + np.sin(angles)[:, None] * other[:, None]  # (k, sides, 3)
-    neck = starts + (length - np.minimum(0.45 * length, 6.5 * radius)) * along
+    neck = starts + (length - np.minimum(0.55 * length, 6.5 * radius)) * along
     rings = [
-        starts[:, None] + radius * circle,
-        neck[:, None] + radius * circle,
-        neck[:, None] + 2.6 * radius * circle,
+        starts[:, None] + width * circle,
+        neck[:, None] + width * circle,
+        neck[:, None] + 2.6 * width * circle,
         np.broadcast_to((starts + vectors)[:, None], circle.shape),
     ]
     positions = np.stack(rings, axis=1).reshape(-1, 3)

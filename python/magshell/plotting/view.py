@@ -49,7 +49,7 @@ def _default(rest: np.ndarray) -> View:
     if aspect < 1.2:
         return View(30.0, -60.0)
     across = _nearest(_azimuth(long) + 90.0, -80.0)
-    return View(20.0, across + 15.0) if aspect > 3.0 else View(28.0, across + 25.0)
+    return View(24.0, across + 25.0) if aspect > 3.0 else View(28.0, across + 25.0)
 
 
 def _azimuth(vector: np.ndarray) -> float:
