@@ -111,7 +111,7 @@ def _states(mesh: TriangleMesh, fields, strength: float, given: dict[str, Any]) 
 def _positions(mesh: TriangleMesh, values) -> np.ndarray:
     if values is None:
         return mesh.rest_positions[None]
-    array = quantity("positions", "m", _detached(values), ("...", mesh.n_vertices, 3))
+    array = quantity("positions", "m", _detached(values), ("...", "n_v", 3))
     if array.shape[-2] != mesh.n_vertices or array.ndim not in (2, 3) or not array.size:
         wanted = f"(n_v, 3) = ({mesh.n_vertices}, 3), or (k, n_v, 3) for k states"
         raise ValueError(f"positions [m] must have shape {wanted}, got {array.shape}")

@@ -38,18 +38,20 @@ def view_of(states: list[State], view) -> View:
 
 
 def _default(rest: np.ndarray) -> View:
-    """A flat sheet is seen obliquely and a strip across the picture; anything else from the usual corner."""
+    """A flat sheet is seen obliquely, neither edge-on nor a strip end-on; anything else from the usual corner."""
     _, extents, axes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
     long, normal = axes[0], axes[2]
     if extents[2] > 0.2 * extents[1]:
         return View(25.0, -60.0)
-    if abs(normal[2]) < 0.7:  # an upright sheet, seen from its front, turned a little
-        return View(20.0, _nearest(_azimuth(normal), -60.0) + 25.0)
-    aspect = extents[0] / max(extents[1], 1e-12 * extents[0])
-    if aspect < 1.2:
-        return View(30.0, -60.0)
-    across = _nearest(_azimuth(long) + 90.0, -80.0)
-    return View(24.0, across + 25.0) if aspect > 3.0 else View(28.0, across + 25.0)
+    if abs(normal[2]) < 0.7:  # an upright sheet, seen from its front
+        elevation, azimuth = 20.0, _nearest(_azimuth(normal), -60.0)
+    elif extents[0] < 1.2 * extents[1]:
+        elevation, azimuth = 30.0, -85.0
+    else:
+        elevation, azimuth = 24.0, _nearest(_azimuth(long) + 90.0, -80.0)
+    views = [View(elevation, azimuth + turn) for turn in (25.0, -25.0, 205.0, 155.0)]
+    seen = [abs(view.axes[2] @ normal) for view in views]
+    return next((view for view, share in zip(views, seen, strict=True) if share > 0.35), views[int(np.argmax(seen))])
 
 
 def _azimuth(vector: np.ndarray) -> float:
