@@ -62,7 +62,9 @@ def path_(mesh) -> dict:
 
 
 def test_a_page_holds_the_mesh_and_its_states(mesh, path_, tmp_path) -> None:
-    file = ms.write_page(mesh, tmp_path / "a.html", titles=["one", "two", "</script> three"], title="1 < 2 & 3", **path_)
+    file = ms.write_page(
+        mesh, tmp_path / "a.html", titles=["one", "two", "</script> three"], title="1 < 2 & 3", **path_
+    )
     page = Page(file.read_text(encoding="utf-8"))
     assert page.open == [] and page.heading == "1 < 2 & 3" and len(set(page.ids)) == len(page.ids)
     data = page.data
@@ -79,10 +81,20 @@ def test_a_page_holds_the_mesh_and_its_states(mesh, path_, tmp_path) -> None:
 
 def test_arrows_and_scalars(mesh, path_, tmp_path) -> None:
     color = np.arange(mesh.n_faces)
-    data = Page(ms.write_page(mesh, tmp_path / "a.html", color=color, color_label="number", **path_).read_text()).data
-    assert [scalar["label"] for scalar in data["scalars"]] == ["number", "Mᵣ along x [kA/m]", "displacement [mm]"]
+    data = Page(
+        ms.write_page(mesh, tmp_path / "a.html", color=color, color_label="number", **path_).read_text()
+    ).data
+    assert [scalar["label"] for scalar in data["scalars"]] == [
+        "number",
+        "Mᵣ along x [kA/m]",
+        "displacement [mm]",
+    ]
     np.testing.assert_array_equal(numbers(data["scalars"][0]["values"][0], "<f4"), color)
-    assert [len(scalar["values"]) for scalar in data["scalars"]] == [1, 1, 3]  # what does not change is held once
+    assert [len(scalar["values"]) for scalar in data["scalars"]] == [
+        1,
+        1,
+        3,
+    ]  # what does not change is held once
     displacement = numbers(data["scalars"][2]["values"][2], "<f4")
     np.testing.assert_allclose(displacement, 2e3 * mesh.rest_positions[:, 0] ** 2, rtol=1e-6, atol=1e-9)
     arrows = numbers(data["states"][2]["magnetization"]["arrows"], "<f4").reshape(-1, 6)
@@ -96,7 +108,11 @@ def test_varying_fields_surround_the_sheet(mesh, tmp_path) -> None:
     [state] = Page(ms.write_page(mesh, tmp_path / "a.html", field=field).read_text()).data["states"]
     arrows = numbers(state["field"]["arrows"], "<f4").reshape(-1, 6)
     along = field.flux_density(arrows[:, :3] + 0.5 * arrows[:, 3:])
-    cosine = np.einsum("ki,ki->k", along, arrows[:, 3:]) / np.linalg.norm(along, axis=1) / np.linalg.norm(arrows[:, 3:], axis=1)
+    cosine = (
+        np.einsum("ki,ki->k", along, arrows[:, 3:])
+        / np.linalg.norm(along, axis=1)
+        / np.linalg.norm(arrows[:, 3:], axis=1)
+    )
     assert len(arrows) > 10 and cosine.min() > 1 - 1e-5
     assert "magnetization" not in state and "fluxDensity" not in state
 
@@ -104,7 +120,9 @@ def test_varying_fields_surround_the_sheet(mesh, tmp_path) -> None:
 def test_a_page_needs_no_network(mesh, path_, tmp_path) -> None:
     text = ms.write_page(mesh, tmp_path / "a.html", **path_).read_text()
     assert Page(text).links == []
-    assert not re.search(r"(https?:)?//[a-z]|@import|url\(|fetch\(|XMLHttp|WebSocket|\bimport\b", text.replace("// ", ""))
+    assert not re.search(
+        r"(https?:)?//[a-z]|@import|url\(|fetch\(|XMLHttp|WebSocket|\bimport\b", text.replace("// ", "")
+    )
     assert "{{" not in text
 
 
@@ -114,7 +132,9 @@ def test_a_page_is_as_large_as_its_mesh(tmp_path) -> None:
         mesh = ms.meshes.rectangle(0.1, 0.1, cells=cells)
         sizes.append((mesh.n_vertices, ms.write_page(mesh, tmp_path / "a.html").stat().st_size))
     (n0, s0), (n1, s1) = sizes
-    assert (s1 - s0) / (n1 - n0) == pytest.approx(4 / 3 * (24 + 24 + 24), rel=0.02)  # faces, edges, two positions
+    assert (s1 - s0) / (n1 - n0) == pytest.approx(
+        4 / 3 * (24 + 24 + 24), rel=0.02
+    )  # faces, edges, two positions
     assert s0 - 96 * n0 < 30e3  # the viewer itself
 
 

@@ -80,7 +80,12 @@ def test_a_result_is_painted(tmp_path, result, backend) -> None:
 
 def test_arrows_are_there_when_magnetized(mesh, backend) -> None:
     dark = [
-        share(pixels(ms.plot(mesh, remanent_magnetization=m, color=None, arrows=count, backend=backend, width=800)), colors.MAGNETIZATION)
+        share(
+            pixels(
+                ms.plot(mesh, remanent_magnetization=m, color=None, arrows=count, backend=backend, width=800)
+            ),
+            colors.MAGNETIZATION,
+        )
         for m, count in ((None, True), (MAGNETIZATION, False), (MAGNETIZATION, True))
     ]
     assert dark[2] > 2 * max(dark[:2]) + 2e-3
@@ -104,7 +109,19 @@ def test_a_field_of_dipoles_surrounds_the_sheet(mesh) -> None:
 
 def test_the_rest_shape_is_an_outline(mesh, bent) -> None:
     ink = [
-        painted(pixels(ms.plot(mesh, positions=bent, color=None, rest=rest, backend="matplotlib", view=(0, -90), width=800))[:-150])
+        painted(
+            pixels(
+                ms.plot(
+                    mesh,
+                    positions=bent,
+                    color=None,
+                    rest=rest,
+                    backend="matplotlib",
+                    view=(0, -90),
+                    width=800,
+                )
+            )[:-150]
+        )
         for rest in (False, True)
     ]
     assert ink[0] < ink[1] < ink[0] + 0.02
@@ -127,7 +144,9 @@ def test_near_parts_hide_far_ones(backend) -> None:
         heights = [np.full(lower.n_faces, sheet.rest_positions[0, 2]) for sheet in sheets]
         picture = ms.plot(sheets, overlay=True, color=heights, view=(89, -90), backend=backend, width=600)
         image = pixels(picture)[:-150]
-        near_is_red.append(share(image, colors.SCALES["sequential"][-1]) > 10 * share(image, colors.SCALES["sequential"][0]))
+        near_is_red.append(
+            share(image, colors.SCALES["sequential"][-1]) > 10 * share(image, colors.SCALES["sequential"][0])
+        )
     assert near_is_red == [True, True]
 
 
@@ -173,7 +192,9 @@ def test_arrows_spread_evenly(mesh) -> None:
 def test_named_scalars(mesh, bent) -> None:
     mm = length_unit(0.1)
     halves = np.where(mesh.face_barycenters[:, :1] < 0.05, 1.0, -1.0) * MAGNETIZATION
-    [state] = states_of(mesh, positions=bent, remanent_magnetization=halves, applied_flux_density=(0, 0, 0.01))
+    [state] = states_of(
+        mesh, positions=bent, remanent_magnetization=halves, applied_flux_density=(0, 0, 0.01)
+    )
     signed = scalar_of([state], "magnetization", None, None, mm)
     assert signed.label == "$M_r$ along x [kA/m]" and signed.limits == (-40.0, 40.0)
     np.testing.assert_allclose(signed.values[0], halves[:, 0] / 1e3)
@@ -201,7 +222,9 @@ def test_a_scale_runs_between_its_ends() -> None:
 def test_flat_sheets_are_seen_obliquely(normal) -> None:
     normal = np.array(normal) / np.linalg.norm(normal)
     helper = np.cross(normal, (0.3, 0.5, 0.8))
-    frame = np.stack([helper / np.linalg.norm(helper), np.cross(normal, helper) / np.linalg.norm(helper), normal], axis=1)
+    frame = np.stack(
+        [helper / np.linalg.norm(helper), np.cross(normal, helper) / np.linalg.norm(helper), normal], axis=1
+    )
     for sides in ((0.1, 0.1), (0.1, 0.004)):
         sheet = ms.meshes.rectangle(*sides, cells=(4, 4)).transformed(frame)
         axes = view_of(states_of(sheet), None).axes
@@ -237,7 +260,10 @@ def test_units() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"color": "colour"}, "color must be None, 'auto', 'magnetization', 'displacement', 'magnetic_energy' or an array"),
+        (
+            {"color": "colour"},
+            "color must be None, 'auto', 'magnetization', 'displacement', 'magnetic_energy' or an array",
+        ),
         ({"color": "magnetization"}, "needs a magnetized sheet"),
         ({"color": "magnetic_energy"}, "needs a magnetized sheet in a field"),
         ({"color": np.zeros(7)}, r"a number a face, \(160,\), or a vertex, \(105,\), got \(7,\)"),
@@ -258,7 +284,9 @@ def test_bad_input_is_refused(mesh, arguments, message) -> None:
         ms.plot(mesh, **{"backend": "matplotlib", **arguments})
 
 
-@pytest.mark.parametrize(("what", "message"), [("sheet", "cannot draw a str"), ([], "the list is empty"), (3, "cannot draw a int")])
+@pytest.mark.parametrize(
+    ("what", "message"), [("sheet", "cannot draw a str"), ([], "the list is empty"), (3, "cannot draw a int")]
+)
 def test_only_sheets_are_drawn(what, message) -> None:
     with pytest.raises(ValueError, match=message):
         ms.plot(what, backend="matplotlib")
@@ -309,6 +337,8 @@ def test_a_driver_that_fails_leaves_matplotlib(monkeypatch, program, reason) -> 
 
 def test_without_a_library_the_extra_is_named(mesh, monkeypatch) -> None:
     found = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "matplotlib" else found(name))
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "matplotlib" else found(name)
+    )
     with pytest.raises(ImportError, match=r'pip install "magshell\[plot\]"'):
         ms.plot(mesh)

@@ -71,7 +71,9 @@ def scalar_of(states: list[State], color, label: str | None, limits, unit: Lengt
         return None
     if isinstance(color, str):
         if color not in NAMED:
-            raise ValueError(f"color must be None, 'auto', {', '.join(map(repr, NAMED))} or an array, got {color!r}")
+            raise ValueError(
+                f"color must be None, 'auto', {', '.join(map(repr, NAMED))} or an array, got {color!r}"
+            )
         scalar = NAMED[color](states, unit)
         label = label or scalar.label
         return Scalar(label, scalar.values, _limits(limits, scalar.limits), scalar.scale)
@@ -91,7 +93,8 @@ def _magnetization(states: list[State], _: LengthUnit) -> Scalar:
     if not any(state.is_magnetized for state in states):
         raise ValueError("color='magnetization' needs a magnetized sheet: give remanent_magnetization [A/m]")
     vectors = [
-        np.zeros((s.mesh.n_faces, 3)) if s.remanent_magnetization is None else s.remanent_magnetization for s in states
+        np.zeros((s.mesh.n_faces, 3)) if s.remanent_magnetization is None else s.remanent_magnetization
+        for s in states
     ]
     together = np.concatenate(vectors)
     _, spread, axes = np.linalg.svd(together, full_matrices=False)
@@ -125,7 +128,9 @@ def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
     for state in states:
         if not state.is_magnetized or (state.flux_density is None and state.sources is None):
             raise ValueError("color='magnetic_energy' needs a magnetized sheet in a field, in every state")
-        densities.append(-np.einsum("fi,fi->f", state.magnetization, state.flux_density_at(state.barycenters)))
+        densities.append(
+            -np.einsum("fi,fi->f", state.magnetization, state.flux_density_at(state.barycenters))
+        )
     factor, unit = prefixed(max(float(np.nanmax(np.abs(d))) for d in densities), "J/m$^3$")
     values = [density / factor for density in densities]
     return Scalar(f"magnetic energy [{unit}]", values, _range(values))

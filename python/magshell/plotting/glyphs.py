@@ -12,7 +12,7 @@ from .states import State
 
 ARROWS = 60  # on a sheet, about
 LENGTH = 0.85  # of the longest arrow, in spacings
-RADIUS = 0.05  # of the shafts, in spacings
+RADIUS = 0.04  # of the shafts, in spacings
 NEGLIGIBLE = 1e-3  # of the longest vector: not drawn
 
 
@@ -66,7 +66,8 @@ def magnetization_glyphs(state: State, count: int, unit_vector: float) -> Glyphs
     tangential = vectors - np.einsum("ki,ki->k", vectors, normal)[:, None] * normal
     # an arrow in the sheet would sink into it where it bends; one that leaves it would show through
     flat = np.linalg.norm(tangential) / max(np.linalg.norm(vectors), 1e-300)
-    return Glyphs((x0 + x1 + x2) / 3.0 - 0.5 * tangential, vectors, RADIUS * spacing, 0.5 * flat * spacing)
+    starts = (x0 + x1 + x2) / 3.0 - 0.5 * tangential + 0.02 * (vectors - tangential)
+    return Glyphs(starts, vectors, RADIUS * spacing, 0.5 * flat * spacing)
 
 
 def halo(states: list[State], size: float) -> np.ndarray:

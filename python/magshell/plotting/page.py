@@ -59,7 +59,9 @@ def write_page(
     )
     mesh = states[0].mesh
     if any(not np.array_equal(state.mesh.faces, mesh.faces) for state in states):
-        raise ValueError("a page shows the states of one mesh, but these have different faces: write a page for each")
+        raise ValueError(
+            "a page shows the states of one mesh, but these have different faces: write a page for each"
+        )
     size = size_of(states)
     unit = length_unit(size)
     data = {
@@ -72,7 +74,9 @@ def write_page(
         "edges": _packed(mesh.edges, "<u4"),
         "rest": _packed(mesh.rest_positions, "<f4"),
         "scalars": [_scalar(s) for s in _scalars(states, color, color_label, color_range, unit)],
-        "states": _states(states, checked_titles(titles, len(states)), int(arrows) if arrows is not True else glyphs.ARROWS),
+        "states": _states(
+            states, checked_titles(titles, len(states)), int(arrows) if arrows is not True else glyphs.ARROWS
+        ),
     }
     template = files(__package__).joinpath("page.html").read_text(encoding="utf-8")
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")

@@ -50,7 +50,10 @@ class Drawing:
     def window(self) -> np.ndarray:
         """(left, right, bottom, top), m, on the screen: holds every panel."""
         points = [self.view.project(s.positions)[:, :2] for panel in self.panels for s in panel.solids]
-        low, high = np.min([p.min(axis=0) for p in points], axis=0), np.max([p.max(axis=0) for p in points], axis=0)
+        low, high = (
+            np.min([p.min(axis=0) for p in points], axis=0),
+            np.max([p.max(axis=0) for p in points], axis=0),
+        )
         margin = 0.03 * (high - low).max()
         return np.array([low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin])
 
@@ -119,10 +122,12 @@ def _sheet(state: State, shades: np.ndarray, view: View, size: float, options: O
     step = float(mesh.edge_lengths.mean())
     solids = [sheet(state.positions, mesh.faces, shades)]
     if options.mesh_lines:
-        solids.append(ribbons(state.positions[mesh.edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.2 * step))
+        solids.append(
+            ribbons(state.positions[mesh.edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step)
+        )
     lines = outline(mesh)
     if len(lines):
-        solids.append(ribbons(state.positions[lines], eye, LINE * size, colors.OUTLINE, 0.3 * step))
+        solids.append(ribbons(state.positions[lines], eye, LINE * size, colors.OUTLINE, 0.8 * step))
     if options.rest and state.displacements.any():
         lines = lines if len(lines) else mesh.edges
         solids.append(ribbons(mesh.rest_positions[lines], eye, 0.8 * LINE * size, colors.REST, 0.0))
@@ -153,9 +158,13 @@ def _uniform_fields(panels: list[Panel], groups: list[list[State]], view: View, 
             width = abs(vector @ right)
             center = (place - 0.5 * width) * right + middle[1] * up + middle[2] * eye
             low = center - (0.5 * abs(vector @ up) + 0.015 * size) * up
-            panel.labels.append(Label(low, f"$B$ = {with_unit(np.linalg.norm(flux_density), 'T')}", colors.FIELD, (0.0, -1.0)))
+            panel.labels.append(
+                Label(low, f"$B$ = {with_unit(np.linalg.norm(flux_density), 'T')}", colors.FIELD, (0.0, -1.0))
+            )
             if vector.any():
-                panel.solids.append(arrows(center[None] - vector / 2, vector[None], 0.0065 * size, colors.FIELD))
+                panel.solids.append(
+                    arrows(center[None] - vector / 2, vector[None], 0.0065 * size, colors.FIELD)
+                )
             place -= width + 0.12 * size
 
 
@@ -186,5 +195,7 @@ def _series_labels(group: list[State], titles: list[str], view: View) -> list[La
         vertex = int(np.argmax(distance))
         away = (screen[vertex] - others[nearest[vertex]]) / max(distance[vertex], 1e-300)
         if title:
-            labels.append(Label(state.positions[vertex], title, colors.OUTLINE, (float(away[0]), float(away[1]))))
+            labels.append(
+                Label(state.positions[vertex], title, colors.OUTLINE, (float(away[0]), float(away[1])))
+            )
     return labels

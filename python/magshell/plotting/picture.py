@@ -94,7 +94,9 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str) -> Pi
     return Picture(figure, backend)
 
 
-def _paint_panel(axes, panel: Panel, drawing: Drawing, window, inches: tuple[float, float], backend: str) -> None:
+def _paint_panel(
+    axes, panel: Panel, drawing: Drawing, window, inches: tuple[float, float], backend: str
+) -> None:
     axes.set_axis_off()
     axes.set_xlim(window[0], window[1])
     axes.set_ylim(window[2], window[3])
@@ -152,7 +154,6 @@ def _best_columns(count: int, window: np.ndarray) -> int:
     shape = (window[1] - window[0]) / (window[3] - window[2])
     shape = min(shape, 1.0 / FLATTEST)
 
-
     def cost(columns: int) -> float:
         rows = -(-count // columns)
         return abs(np.log(columns * shape / rows / 2.0)) + 2.0 * (rows * columns / count - 1.0)
@@ -176,7 +177,10 @@ def _legend(axes, drawing: Drawing, inches: float, inches_per_meter: float) -> N
     for row, (text, color) in enumerate(drawing.arrows):
         y = 0.36 + (0.11 - 0.22 * row if len(drawing.arrows) > 1 else 0.0)
         axes.annotate(
-            "", (x + 0.3, y), (x, y), arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0}
+            "",
+            (x + 0.3, y),
+            (x, y),
+            arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0},
         )
         axes.text(x + 0.38, y, text, ha="left", va="center", fontsize=TEXT, color=colors.OUTLINE)
     if drawing.scalar is not None:
@@ -188,7 +192,17 @@ def _triad(axes, drawing: Drawing, origin: np.ndarray) -> None:
         if np.linalg.norm(tip) < 0.03:  # it points at the eye
             continue
         axes.annotate(
-            "", origin + tip, origin, arrowprops={"arrowstyle": "-|>", "color": colors.OUTLINE, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
+            "",
+            origin + tip,
+            origin,
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": colors.OUTLINE,
+                "linewidth": 0.9,
+                "shrinkA": 0,
+                "shrinkB": 0,
+                "mutation_scale": 6,
+            },
         )
         place = origin + tip * (1 + 0.07 / np.linalg.norm(tip))
         axes.text(*place, name, ha="center", va="center", fontsize=TEXT - 1, color=colors.OUTLINE)
@@ -209,8 +223,18 @@ def _color_bar(axes, scalar: Scalar, inches: float) -> None:
         if low - 1e-9 * (high - low) <= tick <= high + 1e-9 * (high - low):
             x = left + (tick - low) / (high - low) * width
             axes.plot([x, x], [0.27, 0.30], color=colors.OUTLINE, linewidth=0.7)
-            axes.text(x, 0.25, f"{round(tick, 12):g}", ha="center", va="top", fontsize=TEXT - 1, color=colors.OUTLINE)
-    axes.text((left + right) / 2, 0.47, scalar.label, ha="center", va="bottom", fontsize=TEXT, color=colors.OUTLINE)
+            axes.text(
+                x,
+                0.25,
+                f"{round(tick, 12):g}",
+                ha="center",
+                va="top",
+                fontsize=TEXT - 1,
+                color=colors.OUTLINE,
+            )
+    axes.text(
+        (left + right) / 2, 0.47, scalar.label, ha="center", va="bottom", fontsize=TEXT, color=colors.OUTLINE
+    )
 
 
 def _interactive_backends() -> set[str]:

@@ -72,7 +72,9 @@ def plot(
     if count < 0:
         raise ValueError(f"arrows must be True, False or a count, got {arrows}")
     if width < 400 or (columns is not None and columns < 1):
-        raise ValueError(f"width must be at least 400 pixels and columns at least 1, got {width} and {columns}")
+        raise ValueError(
+            f"width must be at least 400 pixels and columns at least 1, got {width} and {columns}"
+        )
     groups = [states] if overlay else [[state] for state in states]
     options = Options(count, show_field, rest, mesh_lines)
     drawing = draw(groups, titles, scalar, view_of(states, view), unit, options)

@@ -20,7 +20,9 @@ def paint(axes, panel: Panel, view: View) -> None:
     colors = colors[order]
     # an edge in the colour of its face closes the hairline between neighbours
     axes.add_collection(
-        PolyCollection(corners[order], facecolors=colors, edgecolors=colors, linewidths=0.25, joinstyle="round")
+        PolyCollection(
+            corners[order], facecolors=colors, edgecolors=colors, linewidths=0.25, joinstyle="round"
+        )
     )
 
 

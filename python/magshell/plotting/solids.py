@@ -62,7 +62,9 @@ def arrows(starts: np.ndarray, vectors: np.ndarray, radius: float, color: str, l
     other = np.cross(along, side)
 
     angles = 2 * np.pi * np.arange(ARROW_SIDES) / ARROW_SIDES
-    circle = np.cos(angles)[:, None] * side[:, None] + np.sin(angles)[:, None] * other[:, None]  # (k, sides, 3)
+    circle = (
+        np.cos(angles)[:, None] * side[:, None] + np.sin(angles)[:, None] * other[:, None]
+    )  # (k, sides, 3)
     neck = starts + (length - np.minimum(0.55 * length, 6.5 * radius)) * along
     rings = [
         starts[:, None] + width * circle,
@@ -74,7 +76,12 @@ def arrows(starts: np.ndarray, vectors: np.ndarray, radius: float, color: str, l
     n = ARROW_SIDES
     here, there = np.arange(n), (np.arange(n) + 1) % n
     bands = [
-        np.concatenate([np.stack([a + here, a + there, a + n + there], 1), np.stack([a + here, a + n + there, a + n + here], 1)])
+        np.concatenate(
+            [
+                np.stack([a + here, a + there, a + n + there], 1),
+                np.stack([a + here, a + n + there, a + n + here], 1),
+            ]
+        )
         for a in (0, n, 2 * n)
     ]
     bands[2] = bands[2][:n]  # the tip's ring has no width, and one of its two triangles no area

@@ -93,7 +93,9 @@ def states_of(
         if states:
             return states
         raise ValueError("there is nothing to draw: the list is empty")
-    raise ValueError(f"cannot draw a {type(what).__name__}: give a mesh, a Shell, a Scene, a result, or a list of them")
+    raise ValueError(
+        f"cannot draw a {type(what).__name__}: give a mesh, a Shell, a Scene, a result, or a list of them"
+    )
 
 
 def _states(mesh: TriangleMesh, fields, strength: float, given: dict[str, Any]) -> list[State]:

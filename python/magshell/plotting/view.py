@@ -21,7 +21,9 @@ class View:
     def axes(self) -> np.ndarray:
         """(3, 3): rows are the unit vectors to the right, upwards and to the eye."""
         elevation, azimuth = np.radians([self.elevation, self.azimuth])
-        eye = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+        eye = np.array(
+            [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+        )
         right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
         return np.stack([right, np.cross(eye, right), eye])
 
@@ -48,10 +50,13 @@ def _default(rest: np.ndarray) -> View:
     elif extents[0] < 1.2 * extents[1]:
         elevation, azimuth = 30.0, -85.0
     else:
-        elevation, azimuth = 24.0, _nearest(_azimuth(long) + 90.0, -80.0)
-    views = [View(elevation, azimuth + turn) for turn in (25.0, -25.0, 205.0, 155.0)]
+        elevation, azimuth = 20.0, _nearest(_azimuth(long) + 90.0, -80.0)
+    turn = 18.0 if extents[0] > 3.0 * extents[1] else 25.0
+    views = [View(elevation, azimuth + angle) for angle in (turn, -turn, 180.0 + turn, 180.0 - turn)]
     seen = [abs(view.axes[2] @ normal) for view in views]
-    return next((view for view, share in zip(views, seen, strict=True) if share > 0.35), views[int(np.argmax(seen))])
+    return next(
+        (view for view, share in zip(views, seen, strict=True) if share > 0.3), views[int(np.argmax(seen))]
+    )
 
 
 def _azimuth(vector: np.ndarray) -> float:

@@ -19,7 +19,9 @@ def paint(axes, panel: Panel, view: View, window: np.ndarray, pixels: tuple[int,
     """
     image = render(panel.solids, view, window, (OVERSAMPLING * pixels[0], OVERSAMPLING * pixels[1]))
     blocks = image.reshape(pixels[1], OVERSAMPLING, pixels[0], OVERSAMPLING, 3)
-    axes.imshow(blocks.mean(axis=(1, 3)) / 255.0, extent=window, interpolation="none", aspect="auto", zorder=0)
+    axes.imshow(
+        blocks.mean(axis=(1, 3)) / 255.0, extent=window, interpolation="none", aspect="auto", zorder=0
+    )
 
 
 def render(solids: list[Solid], view: View, window: np.ndarray, pixels: tuple[int, int]) -> np.ndarray:
