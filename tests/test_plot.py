@@ -254,6 +254,36 @@ def test_units() -> None:
     assert [round_below(x) for x in (0.034, 0.05, 9.9, 1.0)] == [0.02, 0.05, 5.0, 1.0]
 
 
+def test_a_path_knows_its_fields(mesh) -> None:
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    source = ms.Dipoles([[0.05, 0.01, -0.2]], [[0.0, 0.0, 1.0]])
+    clamp = ms.Clamp(mesh.edges_at(x=0.0))
+    scene = ms.Scene(sheet, supports=[clamp], field=[ms.UniformField(), source])
+    path = ms.follow(
+        scene,
+        remanent_magnetization=MAGNETIZATION,
+        applied_flux_density=(0, 0, 1e-3),
+        field_factor=0.5,
+        first_step=0.5,
+        progress=False,
+    )
+    states = states_of(path, remanent_magnetization=MAGNETIZATION)
+    assert len(states) == len(path) > 2
+    far = np.array([[0.0, 0.0, 0.1]])
+    for state, positions, parameter in zip(states, path.positions, path.parameters, strict=True):
+        np.testing.assert_array_equal(state.positions, positions)
+        expected = parameter * (np.array([0, 0, 1e-3]) + 0.5 * source.flux_density(far))
+        np.testing.assert_allclose(state.flux_density_at(far), expected, atol=1e-15)
+    picture = ms.plot(path, states=[0, -1], backend="matplotlib", width=400)
+    last = f"parameter {path.parameters[-1]:.4g}"
+    assert [axes.get_title() for axes in picture.figure.axes] == ["parameter 0", last, ""]
+
+
+def test_of_many_states_some_are_drawn(mesh) -> None:
+    many = np.repeat(mesh.rest_positions[None], 30, axis=0)
+    assert len(ms.plot(mesh, positions=many, backend="matplotlib", width=400).figure.axes) == 9 + 1
+
+
 # Bad input
 
 
@@ -274,6 +304,7 @@ def test_units() -> None:
         ({"applied_flux_density": np.zeros((2, 3))}, r"applied_flux_density \[T\] must have shape"),
         ({"view": (1, 2, 3)}, r"view \[degrees\] must have shape"),
         ({"titles": ["a", "b"]}, "titles must be 1 strings"),
+        ({"states": [0, 1]}, "states must be numbers of the 1 states"),
         ({"arrows": -1}, "arrows must be"),
         ({"width": 10}, "width must be at least 400"),
         ({"backend": "opengl"}, "backend must be 'pyvista' or 'matplotlib', got 'opengl'"),

@@ -45,7 +45,10 @@ def choose(backend: str | None = None) -> str:
 
 @functools.cache
 def why_not_pyvista() -> str | None:
-    """None where pyvista renders off the screen. A GL driver may end or hang the process that asks it, so another one does."""
+    """None where pyvista renders off the screen.
+
+    A GL driver may end or hang the process that asks it, so another process does.
+    """
     if importlib.util.find_spec("pyvista") is None:
         return "it is not installed"
     try:

@@ -1,4 +1,4 @@
-"""The colours of a picture: a few fixed ones, three scales, and the scalars that a sheet can be coloured by."""
+"""The colours of a picture: a few fixed ones, three scales, and the scalars that can colour a sheet."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def scale_colors(scale: str, values: np.ndarray, limits: tuple[float, float]) ->
 def scalar_of(states: list[State], color, label: str | None, limits, unit: LengthUnit) -> Scalar | None:
     """The scalar that `color` asks for: None, "auto", a name, an array, or one array a state.
 
-    Raises ValueError on a name that is not known, a name whose data is missing, or an array of a wrong length.
+    Raises ValueError on an unknown name, one whose data is missing, or an array of a wrong length.
     """
     if isinstance(color, str) and color == "auto":
         color = _automatic(states)

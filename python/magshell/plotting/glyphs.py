@@ -18,7 +18,7 @@ NEGLIGIBLE = 1e-3  # of the longest vector: not drawn
 
 @dataclass(frozen=True)
 class Glyphs:
-    """Arrows: starts and vectors, (k, 3), m; the radius of their shafts, m; how far to lift them off a sheet, m."""
+    """Arrows: starts and vectors, (k, 3), m; the radius of their shafts and their lift off a sheet, m."""
 
     starts: np.ndarray
     vectors: np.ndarray
@@ -38,7 +38,7 @@ def spacing_of(mesh: TriangleMesh, count: int) -> float:
 
 
 def spread_faces(mesh: TriangleMesh, spacing: float) -> np.ndarray:
-    """Faces about a spacing apart: the one next to the centre of each box of a lattice over the rest shape."""
+    """Faces about a spacing apart: the one next to the centre of each box of a lattice at rest."""
     centers = mesh.face_barycenters
     low, extent = mesh.rest_positions.min(axis=0), np.ptp(mesh.rest_positions, axis=0)
     counts = np.maximum(1, np.round(extent / spacing)).astype(np.int64)
@@ -65,7 +65,7 @@ def magnetization_glyphs(state: State, count: int, unit_vector: float) -> Glyphs
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     tangential = vectors - np.einsum("ki,ki->k", vectors, normal)[:, None] * normal
     # an arrow in the sheet would sink into it where it bends; one that leaves it would show through
-    flat = np.linalg.norm(tangential) / max(np.linalg.norm(vectors), 1e-300)
+    flat = float(np.linalg.norm(tangential)) / max(float(np.linalg.norm(vectors)), 1e-300)
     starts = (x0 + x1 + x2) / 3.0 - 0.5 * tangential + 0.02 * (vectors - tangential)
     return Glyphs(starts, vectors, RADIUS * spacing, 0.5 * flat * spacing)
 
@@ -97,7 +97,7 @@ def field_glyphs(points: np.ndarray, flux_densities: np.ndarray, size: float, un
 
 
 def sources_glyphs(groups: list[list[State]], size: float) -> tuple[list[Glyphs | None], float]:
-    """The fields that vary in space, around the sheets of each group, and the flux density [T] of full length."""
+    """Arrows of the fields that vary in space around each group, and the flux density [T] of full length."""
     sampled = []
     for group in groups:
         points = halo(group, size) if group[-1].sources else np.zeros((0, 3))

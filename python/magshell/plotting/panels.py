@@ -142,7 +142,7 @@ def _magnetization(state: State, strongest: float, count: int) -> list[Solid]:
 
 
 def _uniform_fields(panels: list[Panel], groups: list[list[State]], view: View, size: float) -> None:
-    """An arrow to the left of the sheets of each panel, as long as its field is strong, with the magnitude."""
+    """An arrow to the left of the sheets of each panel, as long as the field is strong, and its magnitude."""
     strongest = max((_magnitude(state) for group in groups for state in group), default=0.0)
     if strongest == 0.0:
         return
@@ -159,7 +159,12 @@ def _uniform_fields(panels: list[Panel], groups: list[list[State]], view: View, 
             center = (place - 0.5 * width) * right + middle[1] * up + middle[2] * eye
             low = center - (0.5 * abs(vector @ up) + 0.015 * size) * up
             panel.labels.append(
-                Label(low, f"$B$ = {with_unit(np.linalg.norm(flux_density), 'T')}", colors.FIELD, (0.0, -1.0))
+                Label(
+                    low,
+                    f"$B$ = {with_unit(float(np.linalg.norm(flux_density)), 'T')}",
+                    colors.FIELD,
+                    (0.0, -1.0),
+                )
             )
             if vector.any():
                 panel.solids.append(

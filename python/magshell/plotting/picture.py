@@ -29,7 +29,10 @@ class Picture:
         self.backend = backend
 
     def save(self, path) -> Path:
-        """Writes a PNG. Raises ValueError on another ending, FileNotFoundError or another OSError on a bad folder."""
+        """Writes a PNG.
+
+        Raises ValueError on another ending, FileNotFoundError or another OSError on a bad folder.
+        """
         path = Path(path)
         if path.suffix.lower() != ".png":
             raise ValueError(f"a picture is saved as .png, got {path.name!r}")

@@ -1,4 +1,4 @@
-"""Everything in a panel is a set of coloured triangles: sheets, arrows and lines. A painter knows nothing else."""
+"""Everything in a panel is coloured triangles: sheets, arrows and lines. A painter knows nothing else."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def ribbons(segments: np.ndarray, eye: np.ndarray, width: float, color: str, lif
 
 
 def arrows(starts: np.ndarray, vectors: np.ndarray, radius: float, color: str, lift: float = 0.0) -> Solid:
-    """Arrows from starts (k, 3) along vectors (k, 3), m: a shaft of the given radius, less on short ones, and a cone."""
+    """Arrows from starts (k, 3) along vectors (k, 3), m, of a shaft and a cone; short ones are thinner."""
     length = np.linalg.norm(vectors, axis=1)
     starts, vectors, length = starts[length > 0], vectors[length > 0], length[length > 0, None]
     along = vectors / length

@@ -11,6 +11,7 @@ import numpy as np
 from .._quantity import quantity
 from ..field import UniformField
 from ..mesh import TriangleMesh
+from ..path import Path
 from ..scene import Scene
 from ..shell import Shell
 
@@ -22,6 +23,7 @@ class State:
     positions: (n_v, 3), m. remanent_magnetization: (n_f, 3), A/m, at rest, or None.
     flux_density: (3,), T, the uniform field, or None without one.
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
+    title: what the result calls it.
     """
 
     mesh: TriangleMesh
@@ -29,6 +31,7 @@ class State:
     remanent_magnetization: np.ndarray | None = None
     flux_density: np.ndarray | None = None
     sources: Callable[[np.ndarray], np.ndarray] | None = None
+    title: str = ""
 
     @property
     def magnetization(self) -> np.ndarray:
@@ -67,7 +70,7 @@ class State:
 def states_of(
     what, *, positions=None, remanent_magnetization=None, applied_flux_density=None, field=None
 ) -> list[State]:
-    """The states in a mesh, a Shell, a Scene, a result, or a list of those; the keywords add to or replace theirs.
+    """The states in a mesh, a Shell, a Scene, a result, or a list of those; keywords come before their own.
 
     A result is anything with a `scene` and `positions`: (n_v, 3) is one state, (k, n_v, 3) are k of them.
     """
@@ -78,35 +81,62 @@ def states_of(
         "field": field,
     }
     if isinstance(what, TriangleMesh):
-        return _states(what, (), 1.0, given)
+        return _states(what, given)
     if isinstance(what, Shell):
-        return _states(what.mesh, (), 1.0, given)
+        return _states(what.mesh, given)
     if isinstance(what, Scene):
-        return _states(what.mesh, what.fields, 1.0, given)
+        return _states(what.mesh, given, what.fields)
     if isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions"):
-        own = {name: getattr(what, name, None) for name in given}
-        replaced = {name: own[name] if value is None else value for name, value in given.items()}
-        strength = getattr(getattr(what, "_controls", None), "field", 1.0)
-        return _states(what.scene.mesh, what.scene.fields, strength, replaced)
+        own = _held_by(what)
+        merged = {name: own[name] if value is None else value for name, value in given.items()}
+        return _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
         states = [state for item in what for state in states_of(item, **given)]
         if states:
             return states
         raise ValueError("there is nothing to draw: the list is empty")
-    raise ValueError(
-        f"cannot draw a {type(what).__name__}: give a mesh, a Shell, a Scene, a result, or a list of them"
-    )
+    kinds = "a mesh, a Shell, a Scene, a result, or a list of them"
+    raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
 
 
-def _states(mesh: TriangleMesh, fields, strength: float, given: dict[str, Any]) -> list[State]:
+def _held_by(result) -> dict[str, Any]:
+    """What a result says of its states; `strengths` are the factors on the fields that vary in space."""
+    held = {name: getattr(result, name, None) for name in ("positions", "remanent_magnetization", "field")}
+    if isinstance(result, Path):  # its controls go in a straight line
+        start, end, along = result._from, result._to, result.parameters[:, None]
+        flux_densities = (1 - along) * np.array(start.flux_density) + along * np.array(end.flux_density)
+        strengths = ((1 - along) * start.field + along * end.field)[:, 0].tolist()
+        titles = [f"parameter {parameter:.4g}" for parameter in result.parameters]
+    else:
+        flux_densities = getattr(result, "applied_flux_density", None)
+        strengths = [getattr(getattr(result, "_controls", None), "field", 1.0)]
+        titles = [""]
+    if not result.scene.has_uniform_field:
+        flux_densities = None
+    return held | {"applied_flux_density": flux_densities, "strengths": strengths, "titles": titles}
+
+
+def _states(
+    mesh: TriangleMesh, given: dict[str, Any], fields=(), strengths=(1.0,), titles=("",)
+) -> list[State]:
     frames = _positions(mesh, given["positions"])
+    count = len(frames)
     magnetization = _magnetization(mesh, given["remanent_magnetization"])
     sources = [f for f in _listed(given["field"]) or fields if not isinstance(f, UniformField)]
-    sampled = _sum_of(sources, strength) if sources and strength else None
-    flux_densities = _flux_densities(given["applied_flux_density"], len(frames))
+    flux_densities = _flux_densities(given["applied_flux_density"], count)
+    strengths, titles = (
+        list(each) if len(each) == count else [each[0]] * count for each in (strengths, titles)
+    )
     return [
-        State(mesh, frame, magnetization, flux, sampled)
-        for frame, flux in zip(frames, flux_densities, strict=True)
+        State(
+            mesh,
+            frame,
+            magnetization,
+            flux,
+            _sum_of(sources, strength) if sources and strength else None,
+            title,
+        )
+        for frame, flux, strength, title in zip(frames, flux_densities, strengths, titles, strict=True)
     ]
 
 

@@ -40,7 +40,7 @@ def view_of(states: list[State], view) -> View:
 
 
 def _default(rest: np.ndarray) -> View:
-    """A flat sheet is seen obliquely, neither edge-on nor a strip end-on; anything else from the usual corner."""
+    """A flat sheet is seen obliquely, a strip lies across; anything else is seen from the usual corner."""
     _, extents, axes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
     long, normal = axes[0], axes[2]
     if extents[2] > 0.2 * extents[1]:
