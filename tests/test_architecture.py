@@ -28,7 +28,7 @@ FLOORS = {
 # Libraries that one folder hides from the others: a pattern of the include, and the folder.
 HIDDEN_HEADERS = {r"pybind11/|Python\.h": "bindings", r"(?i)cholmod": "magshell/linalg"}
 # Modules that one Python module hides from the others, by its name within the package.
-HIDDEN_MODULES = {"torch.autograd": "autograd", "matplotlib": "plot", "pyvista": "plot"}
+HIDDEN_MODULES = {"torch.autograd": "autograd", "matplotlib": "plotting", "pyvista": "plotting"}
 OPTIONAL_MODULES = ["torch", "matplotlib", "pyvista", "meshio", "gmsh", "magpylib"]
 LONGEST_FILE = 400
 
@@ -142,7 +142,7 @@ def test_the_rules_look_at_files() -> None:
             import_violations,
             "python/magshell/io/vtu.py",
             "def f():\n    import pyvista as pv\n",
-            "only plot may",
+            "only plotting may",
         ),
         (length_violations, "tests/test_long.py", "\n" * (LONGEST_FILE + 1), "401 lines"),
     ],
@@ -164,7 +164,7 @@ def test_rule_sees_a_violation(tmp_path: Path, rule, file: str, text: str, compl
         ),
         ("cpp/magshell/linalg/cholmod.cpp", '#include <cholmod.h>\n#include "magshell/linalg/cholmod.h"\n'),
         ("cpp/bindings/solve.cpp", '#include <pybind11/stl.h>\n#include "magshell/linalg/cholmod.h"\n'),
-        ("python/magshell/plot/html.py", "import pyvista\nfrom matplotlib import pyplot\n"),
+        ("python/magshell/plotting/html.py", "import pyvista\nfrom matplotlib import pyplot\n"),
         ("python/magshell/autograd.py", "from torch.autograd.function import once_differentiable\n"),
     ],
 )

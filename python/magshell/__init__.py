@@ -11,6 +11,7 @@ from .io import read_fields, read_mesh, write_mesh
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .mesh import TriangleMesh
 from .path import CriticalPoint, Path, follow
+from .plotting import Picture, plot, write_page
 from .scene import Scene
 from .shell import Shell
 from .solvers import MixedNewton, Newton
@@ -34,6 +35,7 @@ __all__ = [
     "Newton",
     "NotConverged",
     "Path",
+    "Picture",
     "Pin",
     "PointLoad",
     "SampledField",
@@ -48,6 +50,7 @@ __all__ = [
     "follow",
     "meshes",
     "num_threads",
+    "plot",
     "read_fields",
     "read_mesh",
     "residual_to_remanent",
@@ -55,4 +58,5 @@ __all__ = [
     "show_config",
     "weld",
     "write_mesh",
+    "write_page",
 ]

@@ -1,0 +1,64 @@
+"""Which library paints: pyvista where it can render off the screen, else matplotlib."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import os
+import subprocess
+import sys
+
+VARIABLE = "MAGSHELL_PLOT"
+BACKENDS = ("pyvista", "matplotlib")
+_INSTALL = 'pip install "magshell[plot]"'
+_PROBE = """
+import pyvista
+plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
+plotter.set_background("white")
+plotter.add_mesh(pyvista.Plane(), color="black", lighting=False)
+print("painted" if plotter.screenshot(return_img=True).min() < 128 else "blank")
+"""
+
+
+def choose(backend: str | None = None) -> str:
+    """The backend asked for here or in the environment, or the best there is.
+
+    Raises:
+        ValueError: a name that is none of BACKENDS.
+        ImportError: matplotlib is not installed, or pyvista was asked for and is not.
+        RuntimeError: pyvista was asked for and cannot render here.
+    """
+    asked = backend or os.environ.get(VARIABLE) or None
+    if asked is not None and asked not in BACKENDS:
+        source = "backend" if backend else f"the environment variable {VARIABLE}"
+        raise ValueError(f"{source} must be 'pyvista' or 'matplotlib', got {asked!r}")
+    if importlib.util.find_spec("matplotlib") is None:
+        raise ImportError(f"pictures need matplotlib, and better ones pyvista as well: {_INSTALL}")
+    if asked == "pyvista" and importlib.util.find_spec("pyvista") is None:
+        raise ImportError(f"pyvista was asked for, and it is not installed: {_INSTALL}")
+    if asked == "matplotlib" or (reason := why_not_pyvista()) is None:
+        return asked or "pyvista"
+    if asked == "pyvista":
+        raise RuntimeError(f"pyvista cannot render off the screen here ({reason}); use backend='matplotlib'")
+    return "matplotlib"
+
+
+@functools.cache
+def why_not_pyvista() -> str | None:
+    """None where pyvista renders off the screen.
+
+    A GL driver may end or hang the process that asks it, so another process does.
+    """
+    if importlib.util.find_spec("pyvista") is None:
+        return "it is not installed"
+    try:
+        run = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, text=True, timeout=60)
+    except subprocess.TimeoutExpired:
+        return "a trial did not end within 60 s"
+    except OSError as error:
+        return f"no trial could be started: {error}"
+    if run.returncode < 0:
+        return f"a trial died of signal {-run.returncode}"
+    if run.returncode:
+        return f"a trial failed: {(run.stderr.strip().splitlines() or ['no message'])[-1]}"
+    return None if "painted" in run.stdout else "a trial came out blank"

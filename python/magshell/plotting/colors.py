@@ -1,0 +1,176 @@
+"""The colours of a picture: a few fixed ones, three scales, and the scalars that can colour a sheet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._quantity import quantity
+from .states import State
+from .units import LengthUnit, prefixed
+
+
+def rgb(code: str) -> np.ndarray:
+    """(3,), 0 to 1, of "#rrggbb"."""
+    return np.array([int(code[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+
+
+SHEET = "#c3ccd6"
+OUTLINE = "#3a4048"
+REST = "#9aa3ad"
+MAGNETIZATION = "#23272e"
+FIELD = "#1b7f5c"
+NO_VALUE = "#d9dbde"
+# Sheets that lie over each other in one picture, when no scalar colours them.
+SERIES = ("#7fa8d1", "#e8b36a", "#8fbf9f", "#d58b8b", "#b3a2d0", "#9fa8b2")
+
+# Anchors at equal distances, linear in between. All are light enough for dark arrows to be seen on them.
+SCALES = {
+    "sequential": ("#6c76b8", "#5b9ec4", "#62bdb0", "#a9d37f", "#f7e57a"),
+    "diverging": ("#5b8fc9", "#aecbe8", "#f3f1ee", "#f3b9a2", "#d8705f"),
+    "cyclic": ("#e0907f", "#e3c46f", "#93c78d", "#74b6d3", "#b199d4", "#e0907f"),
+}
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """Numbers on the faces or the vertices of each state, and how to show them.
+
+    values: one array a state; NaN is drawn grey. limits: the ends of the scale, in the unit of the values.
+    """
+
+    label: str
+    values: list[np.ndarray]
+    limits: tuple[float, float]
+    scale: str = "sequential"
+
+    def colors(self, state: int) -> np.ndarray:
+        """(n, 3), 0 to 1."""
+        return scale_colors(self.scale, self.values[state], self.limits)
+
+
+def scale_colors(scale: str, values: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
+    """(n, 3), 0 to 1, of values (n,)."""
+    anchors = np.array([rgb(code) for code in SCALES[scale]])
+    low, high = limits
+    place = np.clip((values - low) / (high - low), 0.0, 1.0) * (len(anchors) - 1)
+    colors = np.stack([np.interp(place, np.arange(len(anchors)), channel) for channel in anchors.T], axis=1)
+    colors[np.isnan(values)] = rgb(NO_VALUE)
+    return colors
+
+
+def scalar_of(states: list[State], color, label: str | None, limits, unit: LengthUnit) -> Scalar | None:
+    """The scalar that `color` asks for: None, "auto", a name, an array, or one array a state.
+
+    Raises ValueError on an unknown name, one whose data is missing, or an array of a wrong length.
+    """
+    if isinstance(color, str) and color == "auto":
+        color = _automatic(states)
+    if color is None:
+        return None
+    if isinstance(color, str):
+        if color not in NAMED:
+            raise ValueError(
+                f"color must be None, 'auto', {', '.join(map(repr, NAMED))} or an array, got {color!r}"
+            )
+        scalar = NAMED[color](states, unit)
+        label = label or scalar.label
+        return Scalar(label, scalar.values, _limits(limits, scalar.limits), scalar.scale)
+    values = _given(states, color)
+    return Scalar(label or "", values, _limits(limits, _range(values)))
+
+
+def _automatic(states: list[State]) -> str | None:
+    magnetizations = [s.remanent_magnetization for s in states if s.is_magnetized]
+    if any(np.ptp(m, axis=0).any() for m in magnetizations):
+        return "magnetization"
+    return "displacement" if any(state.displacements.any() for state in states) else None
+
+
+def _magnetization(states: list[State], _: LengthUnit) -> Scalar:
+    """The component along the axis all share; else the angle in the plane all share; else the magnitude."""
+    if not any(state.is_magnetized for state in states):
+        raise ValueError("color='magnetization' needs a magnetized sheet: give remanent_magnetization [A/m]")
+    vectors = [
+        np.zeros((s.mesh.n_faces, 3)) if s.remanent_magnetization is None else s.remanent_magnetization
+        for s in states
+    ]
+    together = np.concatenate(vectors)
+    _, spread, axes = np.linalg.svd(together, full_matrices=False)
+    magnitudes = np.linalg.norm(together, axis=1)
+    factor, unit = prefixed(magnitudes.max(), "A/m")
+    if spread[1] <= 1e-6 * spread[0]:
+        axis = axes[0] * np.sign(axes[0][np.argmax(np.abs(axes[0]))])
+        values = [v @ axis / factor for v in vectors]
+        bound = magnitudes.max() / factor
+        return Scalar(f"$M_r$ along {_direction(axis)} [{unit}]", values, (-bound, bound), "diverging")
+    uniform = np.ptp(magnitudes[magnitudes > 0]) <= 1e-6 * magnitudes.max()
+    flat = np.flatnonzero(np.ptp(together, axis=0) + np.abs(together).max(axis=0) <= 1e-9 * magnitudes.max())
+    if uniform and len(flat) == 1:
+        first, second = (k for k in range(3) if k != flat[0])
+        values = [np.degrees(np.arctan2(v[:, second], v[:, first])) % 360.0 for v in vectors]
+        values = [np.where(v.any(axis=1), angle, np.nan) for v, angle in zip(vectors, values, strict=True)]
+        label = f"$M_r$ at rest, from {'xyz'[first]} to {'xyz'[second]} [deg]"
+        return Scalar(label, values, (0.0, 360.0), "cyclic")
+    values = [np.linalg.norm(v, axis=1) / factor for v in vectors]
+    return Scalar(f"$|M_r|$ [{unit}]", values, (0.0, magnitudes.max() / factor))
+
+
+def _displacement(states: list[State], unit: LengthUnit) -> Scalar:
+    values = [np.linalg.norm(state.displacements, axis=1) / unit.meters for state in states]
+    return Scalar(f"displacement [{unit.name}]", values, (0.0, _range(values)[1]))
+
+
+def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
+    """- (F_0 M_r) . B at the barycentres, per rest volume, [Chen22] (24)."""
+    densities = []
+    for state in states:
+        if not state.is_magnetized or (state.flux_density is None and state.sources is None):
+            raise ValueError("color='magnetic_energy' needs a magnetized sheet in a field, in every state")
+        densities.append(
+            -np.einsum("fi,fi->f", state.magnetization, state.flux_density_at(state.barycenters))
+        )
+    factor, unit = prefixed(max(float(np.nanmax(np.abs(d))) for d in densities), "J/m$^3$")
+    values = [density / factor for density in densities]
+    return Scalar(f"magnetic energy [{unit}]", values, _range(values))
+
+
+NAMED = {"magnetization": _magnetization, "displacement": _displacement, "magnetic_energy": _magnetic_energy}
+
+
+def _given(states: list[State], color) -> list[np.ndarray]:
+    several = len(states) > 1 and len(color) == len(states) and np.ndim(color[0]) == 1
+    arrays = list(color) if several else [color] * len(states)
+    values = []
+    for state, given in zip(states, arrays, strict=True):
+        given = given.detach().cpu() if hasattr(given, "detach") else given
+        array = quantity("color", "the caller's unit", given, ("n",))
+        if len(array) not in (state.mesh.n_faces, state.mesh.n_vertices):
+            raise ValueError(
+                f"color must hold a number a face, ({state.mesh.n_faces},), or a vertex, "
+                f"({state.mesh.n_vertices},), got {array.shape}"
+            )
+        values.append(array)
+    return values
+
+
+def _range(values: list[np.ndarray]) -> tuple[float, float]:
+    low, high = min(map(np.nanmin, values)), max(map(np.nanmax, values))
+    return (float(low), float(high)) if high > low else (float(low), float(low) + (abs(float(low)) or 1.0))
+
+
+def _limits(given, default: tuple[float, float]) -> tuple[float, float]:
+    if given is None:
+        return default
+    low, high = quantity("color_range", "the color's unit", given, (2,)).tolist()
+    if low >= high:
+        raise ValueError(f"color_range must rise, got ({low:g}, {high:g})")
+    return low, high
+
+
+def _direction(axis: np.ndarray) -> str:
+    largest = int(np.argmax(np.abs(axis)))
+    if abs(axis[largest]) > 1 - 1e-9:
+        return "xyz"[largest]
+    return "(" + ", ".join(f"{value:.2g}" for value in axis + 0.0) + ")"

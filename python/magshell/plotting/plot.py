@@ -1,0 +1,111 @@
+"""ms.plot: a picture of sheets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import index_array
+from . import backend as backends
+from .colors import scalar_of
+from .glyphs import ARROWS
+from .panels import Options, draw, size_of
+from .picture import Picture, paint
+from .states import State, states_of
+from .units import length_unit
+from .view import view_of
+
+MOST_STATES = 9  # of a path, unless asked for more
+
+
+def plot(
+    what,
+    *,
+    positions=None,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    field=None,
+    states=None,
+    color="auto",
+    color_label: str | None = None,
+    color_range=None,
+    arrows: bool | int = True,
+    show_field: bool = True,
+    rest: bool = False,
+    mesh_lines: bool = False,
+    titles=None,
+    overlay: bool = False,
+    columns: int | None = None,
+    view=None,
+    width: int = 1600,
+    backend: str | None = None,
+) -> Picture:
+    """A picture of a sheet, its magnetization and the field; of several, side by side or over each other.
+
+    what: a mesh, a Shell, a Scene, a result, or a list of those.
+    positions, remanent_magnetization, applied_flux_density, field: (n_v, 3) m, (n_f, 3) A/m, (3,) T and
+        fields that vary in space: for a mesh, which has none, or instead of a result's own.
+    states: numbers of those to draw, of a path; by default all, or nine evenly spread ones.
+    color: "magnetization" (the component of M_r along the axis that all of it shares, else its angle or
+        magnitude), "displacement", "magnetic_energy" (a rest volume), an array with a number a face or a
+        vertex, a list of such arrays, one a state, or None for plain sheets. "auto": magnetization if it
+        varies, else displacement.
+    color_label, color_range: the text, with the unit, and the ends of the colour bar.
+    arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
+    show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it.
+    rest: the rest shape as a faint outline. mesh_lines: the edges of the mesh.
+    titles: one a state. overlay: all states in one panel. columns: of panels, by default what fits best.
+    view: (elevation, azimuth) in degrees of the eye, as in matplotlib; by default what suits the sheet.
+    width: pixels.
+    backend: "pyvista" or "matplotlib"; by default the environment variable MAGSHELL_PLOT, else pyvista where
+        it can render off the screen, else matplotlib.
+
+    Raises ValueError on bad input, ImportError without matplotlib.
+
+    >>> import magshell as ms
+    >>> ms.plot(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), backend="matplotlib", width=800)
+    Picture(800 x 287 pixels, painted by matplotlib)
+    """
+    painter = backends.choose(backend)
+    drawn = states_of(
+        what,
+        positions=positions,
+        remanent_magnetization=remanent_magnetization,
+        applied_flux_density=applied_flux_density,
+        field=field,
+    )
+    drawn = _chosen(drawn, states)
+    titles = checked_titles(titles, drawn)
+    unit = length_unit(size_of(drawn))
+    scalar = scalar_of(drawn, color, color_label, color_range, unit)
+    count = ARROWS if arrows is True else int(arrows)
+    if count < 0:
+        raise ValueError(f"arrows must be True, False or a count, got {arrows}")
+    if width < 400 or (columns is not None and columns < 1):
+        raise ValueError(
+            f"width must be at least 400 pixels and columns at least 1, got {width} and {columns}"
+        )
+    groups = [drawn] if overlay else [[state] for state in drawn]
+    options = Options(count, show_field, rest, mesh_lines)
+    drawing = draw(groups, titles, scalar, view_of(drawn, view), unit, options)
+    return paint(drawing, width, columns, painter)
+
+
+def checked_titles(titles, states: list[State]) -> list[str]:
+    """One title a state; by default what its result calls it."""
+    if titles is None:
+        return [state.title for state in states]
+    listed = [titles] if isinstance(titles, str) else list(titles)
+    if len(listed) != len(states) or not all(isinstance(title, str) for title in listed):
+        raise ValueError(f"titles must be {len(states)} strings, one a state, got {titles!r}")
+    return listed
+
+
+def _chosen(states: list[State], chosen) -> list[State]:
+    """The states of the given numbers; by default all, and of many some evenly spread ones."""
+    if chosen is None:
+        some = np.round(np.linspace(0, len(states) - 1, min(len(states), MOST_STATES))).astype(np.int64)
+        return [states[k] for k in some]
+    numbers = np.atleast_1d(index_array("states", chosen))
+    if not numbers.size or numbers.min() < -len(states) or numbers.max() >= len(states):
+        raise ValueError(f"states must be numbers of the {len(states)} states, got {numbers.tolist()}")
+    return [states[k] for k in numbers]

@@ -1,0 +1,92 @@
+"""Everything in a panel is coloured triangles: sheets, arrows and lines. A painter knows nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .colors import rgb
+
+ARROW_SIDES = 12
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Triangles with colours.
+
+    positions: (n, 3), m. faces: (m, 3). colors: (m, 3) a face or (n, 3) a vertex, 0 to 1, as `per_face` says.
+    smooth: shade with the normals averaged at the vertices. lit: shade at all.
+    lift: m, towards the eye, which hides less of it and moves nothing in a parallel projection.
+    """
+
+    positions: np.ndarray
+    faces: np.ndarray
+    colors: np.ndarray
+    per_face: bool
+    smooth: bool = False
+    lit: bool = True
+    lift: float = 0.0
+
+
+def sheet(positions: np.ndarray, faces: np.ndarray, colors: np.ndarray) -> Solid:
+    """A surface; colors (3,), (n_f, 3) or (n_v, 3)."""
+    if colors.ndim == 1:
+        colors = np.broadcast_to(colors, (len(faces), 3))
+    return Solid(positions, faces, colors, per_face=len(colors) == len(faces), smooth=True)
+
+
+def ribbons(segments: np.ndarray, eye: np.ndarray, width: float, color: str, lift: float) -> Solid:
+    """Lines (m, 2, 3) as bands that face the eye (3,), two triangles each."""
+    along = segments[:, 1] - segments[:, 0]
+    across = np.cross(along, eye)
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    across = np.divide(across, length, out=np.zeros_like(across), where=length > 0) * (0.5 * width)
+    start, end = segments[:, 0], segments[:, 1]
+    corners = np.stack([start - across, end - across, end + across, start + across], axis=1).reshape(-1, 3)
+    first = 4 * np.arange(len(segments))[:, None, None]
+    faces = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    colors = np.broadcast_to(rgb(color), (len(faces), 3))
+    return Solid(corners, faces, colors, per_face=True, lit=False, lift=lift)
+
+
+def arrows(starts: np.ndarray, vectors: np.ndarray, radius: float, color: str, lift: float = 0.0) -> Solid:
+    """Arrows from starts (k, 3) along vectors (k, 3), m, of a shaft and a cone; short ones are thinner."""
+    length = np.linalg.norm(vectors, axis=1)
+    starts, vectors, length = starts[length > 0], vectors[length > 0], length[length > 0, None]
+    along = vectors / length
+    width = np.minimum(radius, 0.11 * length)[:, :, None]
+    helper = np.eye(3)[np.argmin(np.abs(along), axis=1)]
+    side = np.cross(along, helper)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    other = np.cross(along, side)
+
+    angles = 2 * np.pi * np.arange(ARROW_SIDES) / ARROW_SIDES
+    circle = (
+        np.cos(angles)[:, None] * side[:, None] + np.sin(angles)[:, None] * other[:, None]
+    )  # (k, sides, 3)
+    neck = starts + (length - np.minimum(0.55 * length, 6.5 * radius)) * along
+    rings = [
+        starts[:, None] + width * circle,
+        neck[:, None] + width * circle,
+        neck[:, None] + 2.6 * width * circle,
+        np.broadcast_to((starts + vectors)[:, None], circle.shape),
+    ]
+    positions = np.stack(rings, axis=1).reshape(-1, 3)
+    n = ARROW_SIDES
+    here, there = np.arange(n), (np.arange(n) + 1) % n
+    bands = [
+        np.concatenate(
+            [
+                np.stack([a + here, a + there, a + n + there], 1),
+                np.stack([a + here, a + n + there, a + n + here], 1),
+            ]
+        )
+        for a in (0, n, 2 * n)
+    ]
+    bands[2] = bands[2][:n]  # the tip's ring has no width, and one of its two triangles no area
+    bands.append(np.stack([np.zeros(n - 2, dtype=int), here[2:], here[1:-1]], 1))
+    pattern = np.concatenate(bands)
+    faces = (4 * n * np.arange(len(starts))[:, None, None] + pattern).reshape(-1, 3)
+    colors = np.broadcast_to(rgb(color), (len(faces), 3))
+    return Solid(positions, faces, colors, per_face=True, lift=lift)

@@ -1,0 +1,196 @@
+"""What there is to draw: the states of a sheet, from whatever holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._quantity import quantity
+from ..field import UniformField
+from ..mesh import TriangleMesh
+from ..path import Path
+from ..scene import Scene
+from ..shell import Shell
+
+
+@dataclass(frozen=True)
+class State:
+    """A sheet at one moment.
+
+    positions: (n_v, 3), m. remanent_magnetization: (n_f, 3), A/m, at rest, or None.
+    flux_density: (3,), T, the uniform field, or None without one.
+    sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
+    title: what the result calls it.
+    """
+
+    mesh: TriangleMesh
+    positions: np.ndarray
+    remanent_magnetization: np.ndarray | None = None
+    flux_density: np.ndarray | None = None
+    sources: Callable[[np.ndarray], np.ndarray] | None = None
+    title: str = ""
+
+    @property
+    def magnetization(self) -> np.ndarray:
+        """F_0 M_r, (n_f, 3), A/m: the magnetization as the sheet carries it along, [Chen22] (20)."""
+        if self.remanent_magnetization is None:
+            return np.zeros((self.mesh.n_faces, 3))
+        coordinates = np.linalg.solve(
+            _frames(self.mesh.rest_positions, self.mesh.faces), self.remanent_magnetization[:, :, None]
+        )
+        return (_frames(self.positions, self.mesh.faces) @ coordinates)[:, :, 0]
+
+    @property
+    def is_magnetized(self) -> bool:
+        return self.remanent_magnetization is not None and bool(self.remanent_magnetization.any())
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """(n_v, 3), m, from the rest shape."""
+        return self.positions - self.mesh.rest_positions
+
+    @property
+    def barycenters(self) -> np.ndarray:
+        """(n_f, 3), m."""
+        return self.positions[self.mesh.faces].mean(axis=1)
+
+    def flux_density_at(self, points: np.ndarray) -> np.ndarray:
+        """All of B, (n, 3), T, at points (n, 3), m."""
+        total = np.zeros_like(points)
+        if self.flux_density is not None:
+            total = total + self.flux_density
+        if self.sources is not None:
+            total = total + self.sources(points)
+        return total
+
+
+def states_of(
+    what, *, positions=None, remanent_magnetization=None, applied_flux_density=None, field=None
+) -> list[State]:
+    """The states in a mesh, a Shell, a Scene, a result, or a list of those; keywords come before their own.
+
+    A result is anything with a `scene` and `positions`: (n_v, 3) is one state, (k, n_v, 3) are k of them.
+    """
+    given = {
+        "positions": positions,
+        "remanent_magnetization": remanent_magnetization,
+        "applied_flux_density": applied_flux_density,
+        "field": field,
+    }
+    if isinstance(what, TriangleMesh):
+        return _states(what, given)
+    if isinstance(what, Shell):
+        return _states(what.mesh, given)
+    if isinstance(what, Scene):
+        return _states(what.mesh, given, what.fields)
+    if isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions"):
+        own = _held_by(what)
+        merged = {name: own[name] if value is None else value for name, value in given.items()}
+        return _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
+    if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
+        states = [state for item in what for state in states_of(item, **given)]
+        if states:
+            return states
+        raise ValueError("there is nothing to draw: the list is empty")
+    kinds = "a mesh, a Shell, a Scene, a result, or a list of them"
+    raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
+
+
+def _held_by(result) -> dict[str, Any]:
+    """What a result says of its states; `strengths` are the factors on the fields that vary in space."""
+    held = {name: getattr(result, name, None) for name in ("positions", "remanent_magnetization", "field")}
+    if isinstance(result, Path):  # its controls go in a straight line
+        start, end, along = result._from, result._to, result.parameters[:, None]
+        flux_densities = (1 - along) * np.array(start.flux_density) + along * np.array(end.flux_density)
+        strengths = ((1 - along) * start.field + along * end.field)[:, 0].tolist()
+        titles = [f"parameter {parameter:.4g}" for parameter in result.parameters]
+    else:
+        flux_densities = getattr(result, "applied_flux_density", None)
+        strengths = [getattr(getattr(result, "_controls", None), "field", 1.0)]
+        titles = [""]
+    if not result.scene.has_uniform_field:
+        flux_densities = None
+    return held | {"applied_flux_density": flux_densities, "strengths": strengths, "titles": titles}
+
+
+def _states(
+    mesh: TriangleMesh, given: dict[str, Any], fields=(), strengths=(1.0,), titles=("",)
+) -> list[State]:
+    frames = _positions(mesh, given["positions"])
+    count = len(frames)
+    magnetization = _magnetization(mesh, given["remanent_magnetization"])
+    sources = [f for f in _listed(given["field"]) or fields if not isinstance(f, UniformField)]
+    flux_densities = _flux_densities(given["applied_flux_density"], count)
+    strengths, titles = (
+        list(each) if len(each) == count else [each[0]] * count for each in (strengths, titles)
+    )
+    return [
+        State(
+            mesh,
+            frame,
+            magnetization,
+            flux,
+            _sum_of(sources, strength) if sources and strength else None,
+            title,
+        )
+        for frame, flux, strength, title in zip(frames, flux_densities, strengths, titles, strict=True)
+    ]
+
+
+def _positions(mesh: TriangleMesh, values) -> np.ndarray:
+    if values is None:
+        return mesh.rest_positions[None]
+    array = quantity("positions", "m", _detached(values), ("...", "n_v", 3))
+    if array.shape[-2] != mesh.n_vertices or array.ndim not in (2, 3) or not array.size:
+        wanted = f"(n_v, 3) = ({mesh.n_vertices}, 3), or (k, n_v, 3) for k states"
+        raise ValueError(f"positions [m] must have shape {wanted}, got {array.shape}")
+    return array.reshape(-1, mesh.n_vertices, 3)
+
+
+def _magnetization(mesh: TriangleMesh, values) -> np.ndarray | None:
+    if values is None:
+        return None
+    array = quantity("remanent_magnetization", "A/m", _detached(values), ("...", 3))
+    if array.shape not in ((3,), (mesh.n_faces, 3)):
+        wanted = f"(n_f, 3) = ({mesh.n_faces}, 3) or (3,)"
+        raise ValueError(f"remanent_magnetization [A/m] must have shape {wanted}, got {array.shape}")
+    return np.broadcast_to(array, (mesh.n_faces, 3))
+
+
+def _flux_densities(values, count: int) -> list[np.ndarray | None]:
+    if values is None:
+        return [None] * count
+    array = quantity("applied_flux_density", "T", _detached(values), ("...", 3))
+    if array.shape not in ((3,), (count, 3)):
+        raise ValueError(f"applied_flux_density [T] must have shape (3,) or ({count}, 3), got {array.shape}")
+    return list(np.broadcast_to(array, (count, 3)))
+
+
+def _sum_of(fields, strength: float) -> Callable[[np.ndarray], np.ndarray]:
+    def flux_density(points: np.ndarray) -> np.ndarray:
+        return strength * np.sum([field.flux_density(points) for field in fields], axis=0)
+
+    return flux_density
+
+
+def _listed(value) -> tuple:
+    if value is None:
+        return ()
+    return tuple(value) if isinstance(value, list | tuple) else (value,)
+
+
+def _frames(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Columns a_1, a_2 and the unit normal of each face, (n_f, 3, 3)."""
+    x0, x1, x2 = np.moveaxis(positions[faces], 1, 0)
+    normal = np.cross(x1 - x0, x2 - x0)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    return np.stack([x1 - x0, x2 - x0, normal], axis=2)
+
+
+def _detached(values):
+    """A torch tensor without its history: a picture passes no gradient back."""
+    return values.detach().cpu() if hasattr(values, "detach") else values

@@ -1,0 +1,76 @@
+"""Solids painted by pyvista off the screen, into an image."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .panels import Panel
+from .shading import AMBIENT, DIFFUSE, LIGHT
+from .solids import Solid
+from .view import View
+
+OVERSAMPLING = 2
+
+
+def paint(axes, panel: Panel, view: View, window: np.ndarray, pixels: tuple[int, int]) -> None:
+    """Adds the image of a panel to matplotlib axes whose coordinates are metres on the screen.
+
+    window: (left, right, bottom, top), m. pixels: (width, height) of the image.
+    """
+    image = render(panel.solids, view, window, (OVERSAMPLING * pixels[0], OVERSAMPLING * pixels[1]))
+    blocks = image.reshape(pixels[1], OVERSAMPLING, pixels[0], OVERSAMPLING, 3)
+    axes.imshow(
+        blocks.mean(axis=(1, 3)) / 255.0, extent=window, interpolation="none", aspect="auto", zorder=0
+    )
+
+
+def render(solids: list[Solid], view: View, window: np.ndarray, pixels: tuple[int, int]) -> np.ndarray:
+    """(height, width, 3), 0 to 255."""
+    import pyvista
+
+    right, up, eye = view.axes
+    depths = np.concatenate([view.project(solid.positions)[:, 2] for solid in solids])
+    reach = np.ptp(depths) + window[1] - window[0]
+    center = (window[0] + window[1]) / 2 * right + (window[2] + window[3]) / 2 * up + depths.mean() * eye
+    plotter = pyvista.Plotter(off_screen=True, window_size=pixels, lighting="none")
+    try:
+        plotter.set_background("white")
+        plotter.add_light(
+            pyvista.Light(position=tuple(LIGHT @ view.axes), light_type="scene light", intensity=1.0)
+        )
+        for solid in solids:
+            _add(plotter, solid, eye)
+        plotter.camera.position = tuple(center + 4 * reach * eye)
+        plotter.camera.focal_point = tuple(center)
+        plotter.camera.up = tuple(up)
+        plotter.enable_parallel_projection()
+        plotter.camera.parallel_scale = (window[3] - window[2]) / 2
+        plotter.camera.clipping_range = (reach, 8 * reach)
+        return np.array(plotter.screenshot(return_img=True))[:, :, :3]
+    finally:
+        plotter.close()
+
+
+def _add(plotter, solid: Solid, eye: np.ndarray) -> None:
+    import pyvista
+
+    if not len(solid.faces):
+        return
+    corners = np.column_stack([np.full(len(solid.faces), 3), solid.faces]).ravel()
+    surface = pyvista.PolyData(solid.positions + solid.lift * eye, corners)
+    colors = np.round(255 * np.clip(solid.colors, 0.0, 1.0)).astype(np.uint8)
+    (surface.cell_data if solid.per_face else surface.point_data)["colors"] = colors
+    if solid.smooth:
+        surface = surface.compute_normals(cell_normals=False, split_vertices=True, feature_angle=40.0)
+    plotter.add_mesh(
+        surface,
+        scalars="colors",
+        rgb=True,
+        lighting=solid.lit,
+        smooth_shading=False if not solid.smooth else None,
+        interpolation="Phong" if solid.smooth else "Flat",
+        ambient=AMBIENT,
+        diffuse=DIFFUSE,
+        specular=0.0,
+        reset_camera=False,
+    )

@@ -1,0 +1,152 @@
+"""A page holds the data it shows, and needs nothing from elsewhere."""
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import magshell as ms
+
+VOID = {"meta", "input", "br", "link"}
+
+
+class Page(HTMLParser):
+    """The data of a page; `open` is what is left open, `links` what it refers to."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.open: list[str] = []
+        self.links: list[str] = []
+        self.ids: list[str] = []
+        self.heading = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        self.links += [attributes[name] for name in ("src", "href", "action") if name in attributes]
+        self.ids += [attributes["id"]] if "id" in attributes else []
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, text):
+        if self.open[-1:] == ["script"] and text.startswith("{"):
+            self.data = json.loads(text)
+        if self.open[-1:] == ["h1"]:
+            self.heading += text
+
+
+def numbers(text: str, dtype: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype=dtype)
+
+
+@pytest.fixture(scope="module")
+def mesh() -> ms.TriangleMesh:
+    return ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+
+
+@pytest.fixture
+def path_(mesh) -> dict:
+    """Three states of a sheet that rises, in a growing field."""
+    rise = mesh.rest_positions[:, :1] ** 2 * (0.0, 0.0, 1.0)
+    return {
+        "positions": mesh.rest_positions + np.arange(3)[:, None, None] * rise,
+        "remanent_magnetization": (4e4, 0.0, 0.0),
+        "applied_flux_density": np.arange(3)[:, None] * (0.0, 0.0, 2e-3),
+    }
+
+
+def test_a_page_holds_the_mesh_and_its_states(mesh, path_, tmp_path) -> None:
+    file = ms.write_page(
+        mesh, tmp_path / "a.html", titles=["one", "two", "</script> three"], title="1 < 2 & 3", **path_
+    )
+    page = Page(file.read_text(encoding="utf-8"))
+    assert page.open == [] and page.heading == "1 < 2 & 3" and len(set(page.ids)) == len(page.ids)
+    data = page.data
+    np.testing.assert_array_equal(numbers(data["faces"], "<u4").reshape(-1, 3), mesh.faces)
+    np.testing.assert_array_equal(numbers(data["rest"], "<f4"), mesh.rest_positions.ravel().astype("<f4"))
+    assert [state["title"] for state in data["states"]] == ["one", "two", "</script> three"]
+    for state, positions, flux_density in zip(
+        data["states"], path_["positions"], path_["applied_flux_density"], strict=True
+    ):
+        np.testing.assert_array_equal(numbers(state["positions"], "<f4"), positions.ravel().astype("<f4"))
+        assert state["fluxDensity"] == flux_density.tolist()
+    assert data["states"][2]["fluxDensityLabel"] == "B = 4 mT"
+
+
+def test_arrows_and_scalars(mesh, path_, tmp_path) -> None:
+    color = np.arange(mesh.n_faces)
+    data = Page(
+        ms.write_page(mesh, tmp_path / "a.html", color=color, color_label="number", **path_).read_text()
+    ).data
+    assert [scalar["label"] for scalar in data["scalars"]] == [
+        "number",
+        "Mᵣ along x [kA/m]",
+        "displacement [mm]",
+    ]
+    np.testing.assert_array_equal(numbers(data["scalars"][0]["values"][0], "<f4"), color)
+    assert [len(scalar["values"]) for scalar in data["scalars"]] == [
+        1,
+        1,
+        3,
+    ]  # what does not change is held once
+    displacement = numbers(data["scalars"][2]["values"][2], "<f4")
+    np.testing.assert_allclose(displacement, 2e3 * mesh.rest_positions[:, 0] ** 2, rtol=1e-6, atol=1e-9)
+    arrows = numbers(data["states"][2]["magnetization"]["arrows"], "<f4").reshape(-1, 6)
+    slope = arrows[:, 5] / arrows[:, 3]  # dz/dx = 4 x along the sheet, at the middle of the arrow
+    middle = arrows[:, 0] + 0.5 * arrows[:, 3]
+    assert len(arrows) > 10 and np.abs(slope - 4 * middle).max() < 0.05
+
+
+def test_varying_fields_surround_the_sheet(mesh, tmp_path) -> None:
+    field = ms.Dipoles([[0.05, 0.01, -0.05]], [[0.0, 0.0, 1.0]])
+    [state] = Page(ms.write_page(mesh, tmp_path / "a.html", field=field).read_text()).data["states"]
+    arrows = numbers(state["field"]["arrows"], "<f4").reshape(-1, 6)
+    along = field.flux_density(arrows[:, :3] + 0.5 * arrows[:, 3:])
+    cosine = (
+        np.einsum("ki,ki->k", along, arrows[:, 3:])
+        / np.linalg.norm(along, axis=1)
+        / np.linalg.norm(arrows[:, 3:], axis=1)
+    )
+    assert len(arrows) > 10 and cosine.min() > 1 - 1e-5
+    assert "magnetization" not in state and "fluxDensity" not in state
+
+
+def test_a_page_needs_no_network(mesh, path_, tmp_path) -> None:
+    text = ms.write_page(mesh, tmp_path / "a.html", **path_).read_text()
+    assert Page(text).links == []
+    assert not re.search(
+        r"(https?:)?//[a-z]|@import|url\(|fetch\(|XMLHttp|WebSocket|\bimport\b", text.replace("// ", "")
+    )
+    assert "{{" not in text
+
+
+def test_a_page_is_as_large_as_its_mesh(tmp_path) -> None:
+    sizes = []
+    for cells in ((40, 40), (80, 80)):
+        mesh = ms.meshes.rectangle(0.1, 0.1, cells=cells)
+        sizes.append((mesh.n_vertices, ms.write_page(mesh, tmp_path / "a.html").stat().st_size))
+    (n0, s0), (n1, s1) = sizes
+    assert (s1 - s0) / (n1 - n0) == pytest.approx(
+        4 / 3 * (24 + 24 + 24), rel=0.02
+    )  # faces, edges, two positions
+    assert s0 - 96 * n0 < 30e3  # the viewer itself
+
+
+def test_bad_input_is_refused(mesh, tmp_path) -> None:
+    with pytest.raises(FileNotFoundError, match="there is no folder"):
+        ms.write_page(mesh, tmp_path / "none" / "a.html")
+    with pytest.raises(ValueError, match=r"saved as \.html"):
+        ms.write_page(mesh, tmp_path / "a.png")
+    with pytest.raises(ValueError, match="different faces"):
+        ms.write_page([mesh, mesh.flipped()], tmp_path / "a.html")
+    with pytest.raises(ValueError, match="titles must be 1 strings"):
+        ms.write_page(mesh, tmp_path / "a.html", titles=["a", "b"])
+    with pytest.raises(ValueError, match="color must be"):
+        ms.write_page(mesh, tmp_path / "a.html", color="colour")
+    assert list(tmp_path.iterdir()) == []
