@@ -296,6 +296,7 @@ def test_of_many_states_some_are_drawn(mesh) -> None:
         ),
         ({"color": "magnetization"}, "needs a magnetized sheet"),
         ({"color": "magnetic_energy"}, "needs a magnetized sheet in a field"),
+        ({"color": 7}, "color must be None, a name or an array, got 7"),
         ({"color": np.zeros(7)}, r"a number a face, \(160,\), or a vertex, \(105,\), got \(7,\)"),
         ({"color": np.full(160, np.nan)}, "must be finite"),
         ({"color": "displacement", "color_range": (1, 0)}, "color_range must rise"),

@@ -140,6 +140,8 @@ NAMED = {"magnetization": _magnetization, "displacement": _displacement, "magnet
 
 
 def _given(states: list[State], color) -> list[np.ndarray]:
+    if not hasattr(color, "__len__"):
+        raise ValueError(f"color must be None, a name or an array, got {color!r}")
     several = len(states) > 1 and len(color) == len(states) and np.ndim(color[0]) == 1
     arrays = list(color) if several else [color] * len(states)
     values = []

@@ -16,6 +16,7 @@ DPI = 200
 LEGEND, TITLE, MARGIN = 0.72, 0.26, 0.08  # inches
 FLATTEST, TALLEST = 0.16, 1.1  # of a panel's height to its width
 TEXT = 8.0  # points
+_WITHOUT_WINDOWS = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}  # of matplotlib's backends
 
 
 class Picture:
@@ -43,16 +44,15 @@ class Picture:
 
     def show(self) -> None:
         """Opens a window, or displays in a notebook. Raises RuntimeError where neither is to be had."""
-        import matplotlib
+        from matplotlib import pyplot
 
-        if "inline" in matplotlib.get_backend() or "nbagg" in matplotlib.get_backend():
+        backend = pyplot.get_backend().lower()
+        if "inline" in backend or "nbagg" in backend:
             from IPython.display import display
 
             display(self)
             return
-        from matplotlib import pyplot
-
-        if matplotlib.get_backend().lower() not in _interactive_backends():
+        if backend in _WITHOUT_WINDOWS:
             raise RuntimeError("there is no display to show it on: use .save('picture.png')")
         image = pyplot.imread(io.BytesIO(self._repr_png_()))
         window = pyplot.figure(figsize=self.figure.get_size_inches())
@@ -65,7 +65,7 @@ class Picture:
         return buffer.getvalue()
 
     def __repr__(self) -> str:
-        width, height = (round(DPI * inches) for inches in self.figure.get_size_inches())
+        width, height = self.figure.canvas.get_width_height()
         return f"Picture({width} x {height} pixels, painted by {self.backend})"
 
 
@@ -83,7 +83,7 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str) -> Pi
     panel_height = panel_width * (window[3] - window[2]) / (window[1] - window[0])
     title = TITLE if any(panel.title for panel in drawing.panels) else 0.0
     height = rows * (panel_height + title) + LEGEND + 2 * MARGIN
-    figure = Figure(figsize=(inches, height), facecolor="white")
+    figure = Figure(figsize=(inches, height), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
 
     for number, panel in enumerate(drawing.panels):
@@ -238,9 +238,3 @@ def _color_bar(axes, scalar: Scalar, inches: float) -> None:
     axes.text(
         (left + right) / 2, 0.47, scalar.label, ha="center", va="bottom", fontsize=TEXT, color=colors.OUTLINE
     )
-
-
-def _interactive_backends() -> set[str]:
-    from matplotlib.backends import BackendFilter, backend_registry
-
-    return {name.lower() for name in backend_registry.list_builtin(BackendFilter.INTERACTIVE)}

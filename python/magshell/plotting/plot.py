@@ -63,7 +63,7 @@ def plot(
 
     >>> import magshell as ms
     >>> ms.plot(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), backend="matplotlib", width=800)
-    Picture(800 x 287 pixels, painted by matplotlib)
+    Picture(800 x 343 pixels, painted by matplotlib)
     """
     painter = backends.choose(backend)
     drawn = states_of(
