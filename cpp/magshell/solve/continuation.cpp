@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/modes.h"
@@ -11,6 +12,7 @@ namespace {
 
 constexpr int corrector_iterations = 8, wanted_iterations = 3;
 constexpr double smallest_turn_cosine = 0.5;  // of successive tangents; a sharper bend asks for a shorter step
+constexpr double coincident = 1e-6;           // of a step: critical points closer than that count as one
 
 struct Tangent {
     VectorXd state;
@@ -150,7 +152,7 @@ class Follower {
             }
             if (turn < smallest_turn_cosine) continue;
             if (options_.locate_critical && next.unstable_directions != base.unstable_directions)
-                locate(base, tangent, next);
+                locate({0.0, base}, {step_, next}, tangent);
             model_.evaluate(next.state, controls(next.parameter));
             result_.points.push_back(std::move(next));
             tangent = std::move(there);
@@ -167,27 +169,51 @@ class Follower {
         return point.unstable_directions == count ? size : -size;
     }
 
-    // Between two points of different stability, by the Illinois variant of regula falsi on that eigenvalue.
-    void locate(const PathPoint& base, const Tangent& along, const PathPoint& beyond) {
-        const Index count = base.unstable_directions;
+    // A point of the path between two of its points, `step` along the tangent of the first.
+    struct Probe {
+        double step;
+        PathPoint point;
+    };
+
+    // Factorizes at a point between; the model and the factor are there afterwards. Empty: no convergence.
+    std::optional<Probe> probe(const PathPoint& base, const Tangent& along, double step) {
+        Probe found{step, base};
         Tangent unused;
-        PathPoint probe = base;
-        if (!find_tangent(probe, unused)) return;
+        int iterations = 0;
+        model_.evaluate(base.state, controls(base.parameter));
+        const bool there = step == 0.0 || correct(base, along, step, found.point, iterations);
+        return there && find_tangent(found.point, unused) ? std::optional(found) : std::nullopt;
+    }
+
+    // Every critical point between two points of different stability; halves until each stands alone.
+    void locate(const Probe& low, const Probe& high, const Tangent& along) {
+        const Index crossings = std::abs(high.point.unstable_directions - low.point.unstable_directions);
+        if (crossings == 0) return;
+        if (crossings == 1 || high.step - low.step <= coincident * step_) return locate_one(low, high, along);
+        const std::optional<Probe> middle = probe(result_.points.back(), along, 0.5 * (low.step + high.step));
+        if (!middle) return;
+        locate(low, *middle, along);
+        locate(*middle, high, along);
+    }
+
+    // By the Illinois variant of regula falsi on the eigenvalue next to zero.
+    void locate_one(const Probe& below, const Probe& above, const Tangent& along) {
+        const PathPoint& base = result_.points.back();
+        const Index count = below.point.unstable_directions;
         VectorXd mode;
-        double low = 0.0, high = step_, at_low = signed_eigenvalue(base, count, nullptr);
-        probe = beyond;
-        if (!find_tangent(probe, unused)) return;
-        double at_high = signed_eigenvalue(beyond, count, &mode);
+        if (!probe(base, along, below.step)) return;
+        double low = below.step, high = above.step, at_low = signed_eigenvalue(below.point, count, nullptr);
+        if (!probe(base, along, above.step)) return;
+        double at_high = signed_eigenvalue(above.point, count, &mode);
         const double tolerance = 1e-6 * std::max(std::abs(at_low), std::abs(at_high));
-        PathPoint best = beyond;
+        PathPoint best = above.point;
         int side = 0;
         for (int k = 0; k < 30 && high - low > 1e-9 * step_; ++k) {
             const double step = low + (high - low) * at_low / (at_low - at_high);
-            model_.evaluate(base.state, controls(base.parameter));
-            int iterations = 0;
-            if (!correct(base, along, step, probe, iterations) || !find_tangent(probe, unused)) break;
-            const double value = signed_eigenvalue(probe, count, &mode);
-            best = probe;
+            const std::optional<Probe> between = probe(base, along, step);
+            if (!between) break;
+            const double value = signed_eigenvalue(between->point, count, &mode);
+            best = between->point;
             if (std::abs(value) <= tolerance) break;
             if (value > 0.0) {
                 low = step;

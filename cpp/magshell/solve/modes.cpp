@@ -31,16 +31,20 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     const Index massive = (metric.array() > 0.0).count();
     const int columns = static_cast<int>(std::min<Index>(count + 3, massive));
 
-    // With X = K^-1 M Y: X^T K X = X^T M Y, so K itself is not needed.
+    // With X = K^-1 M Y: X^T K X = X^T M Y, so K itself is not needed. X = Q R is made orthonormal in M first: next to a
+    // critical point all its columns are almost the same.
+    const VectorXd root = metric.cwiseSqrt();
     MatrixXd y = generic_start(model.reduction().size(), columns);
     VectorXd eigenvalues = VectorXd::Zero(columns);
     for (int round = 0; round < 40; ++round) {
-        const MatrixXd my = metric.asDiagonal() * y;
-        MatrixXd x = my;
+        MatrixXd my = metric.asDiagonal() * y, x = my;
         newton.factor().solve(x);
-        const MatrixXd k = x.transpose() * my, m = x.transpose() * metric.asDiagonal() * x;
-        const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> ritz(0.5 * (k + k.transpose()),
-                                                                      0.5 * (m + m.transpose()));
+        const Eigen::HouseholderQR<MatrixXd> qr(root.asDiagonal() * x);
+        const MatrixXd r = qr.matrixQR().topRows(columns);
+        r.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(x);
+        r.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(my);
+        const MatrixXd k = x.transpose() * my;
+        const Eigen::SelfAdjointEigenSolver<MatrixXd> ritz(0.5 * (k + k.transpose()));
         const VectorXd before = eigenvalues;
         eigenvalues = ritz.eigenvalues();
         y = x * ritz.eigenvectors();
