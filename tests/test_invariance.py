@@ -141,9 +141,8 @@ def test_numbering_does_not_matter(bending, rng):
     here = at_rest(cantilever(mesh, x, bending=bending))
     vertices, faces = rng.permutation(mesh.n_vertices), rng.permutation(mesh.n_faces)
     new_number = np.argsort(vertices)
-    turned = np.stack(
-        [np.roll(face, k) for face, k in zip(mesh.faces[faces], rng.integers(3, size=mesh.n_faces), strict=True)]
-    )
+    rolls = rng.integers(3, size=mesh.n_faces)
+    turned = np.stack([np.roll(face, k) for face, k in zip(mesh.faces[faces], rolls, strict=True)])
     shuffled = ms.TriangleMesh(mesh.rest_positions[vertices], new_number[turned])
     there = at_rest(cantilever(shuffled, x[vertices], bending=bending))
     assert np.abs(there.positions - here.positions[vertices]).max() < 1e-10 * mesh.size
