@@ -109,8 +109,10 @@ void register_model(py::module_& module) {
         .def(py::init(&make_model), py::arg("mesh"))
         .def("set_magnetization",
              [](Model& model, const Array& magnetization) {
+                 const Rows3 rows = to_rows3(magnetization);
+                 const py::gil_scoped_release unlocked;  // a solve that holds the lock may be waiting for the GIL
                  const std::lock_guard lock(model.in_use());
-                 model.set_magnetization(to_rows3(magnetization));
+                 model.set_magnetization(rows);
              })
         .def_property_readonly("size", &Model::size)
         .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })

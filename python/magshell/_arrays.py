@@ -7,7 +7,10 @@ import numpy as np
 
 def index_array(name: str, values) -> np.ndarray:
     """An int64 copy. Numbers that are not integers are refused rather than truncated."""
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except ValueError as error:  # a ragged list
+        raise ValueError(f"{name} must hold integer indices: {error}") from None
     if array.size and not np.issubdtype(array.dtype, np.integer):
         raise ValueError(f"{name} must hold integer indices, got dtype {array.dtype}")
     return array.astype(np.int64)

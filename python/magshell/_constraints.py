@@ -9,6 +9,8 @@ import numpy as np
 from .mesh import TriangleMesh
 from .supports import DirectedEdges, Held, RigidMotion
 
+_LOOKED_AT = (0.37, 1.0)  # a full turn ends where it began, but is elsewhere on its way
+
 
 @dataclass(frozen=True)
 class Constraints:
@@ -87,7 +89,8 @@ def _check_same_motion(mesh, vertex: int, a: RigidMotion, b: RigidMotion) -> Non
     if a is b:
         return
     point = mesh.rest_positions[[vertex]]
-    if np.abs(a.moved(point) - b.moved(point)).max() > 1e-12 * mesh.size or not np.allclose(a.rotation, b.rotation):
+    apart = max(np.abs(a.moved(point, at) - b.moved(point, at)).max() for at in _LOOKED_AT)
+    if apart > 1e-12 * mesh.size or not np.allclose(a.rotation, b.rotation):
         raise ValueError(f"two supports move vertex {vertex} to different places")
 
 
@@ -101,7 +104,8 @@ def _check_against_still(mesh, held: list[Held], motion_of: dict[int, RigidMotio
             if motion is None:
                 continue
             point = mesh.rest_positions[[vertex]]
-            if np.abs(along @ (motion.moved(point) - point)[0]).max() > 1e-9 * mesh.size:
+            moves = np.array([(motion.moved(point, at) - point)[0] for at in _LOOKED_AT])
+            if np.abs(moves @ along.T).max() > 1e-9 * mesh.size:
                 raise ValueError(f"one support holds vertex {vertex} along a direction in which another moves it")
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+
 import numpy as np
 
 from . import _core
-from ._quantity import quantity
+from ._quantity import quantity, real_numbers
 from ._tensors import to_array
 from .scene import Scene
 
@@ -33,7 +35,8 @@ class Inputs:
         if given is None:
             raise ValueError("the scene has a field, so remanent_magnetization [A/m] is needed")
         n_faces = self.scene.mesh.n_faces
-        shape = np.shape(given)
+        given = real_numbers("remanent_magnetization [A/m]", given)
+        shape = given.shape
         if shape not in ((3,), (n_faces, 3)):
             raise ValueError(
                 f"remanent_magnetization [A/m] must have shape (n_f, 3) = ({n_faces}, 3) or (3,), got {shape}"
@@ -49,7 +52,10 @@ class Inputs:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
         return quantity("applied_flux_density", "T", given, (3,))
 
-    def magnetize(self) -> None:
-        """Sets the magnetization in the core."""
-        if self.magnetization is not None:
-            self.scene._model.set_magnetization(self.magnetization)
+    @contextmanager
+    def in_core(self):
+        """The scene's core with this magnetization in it, for one solve; those of other threads wait."""
+        with self.scene._exclusive():
+            if self.magnetization is not None:
+                self.scene._model.set_magnetization(self.magnetization)
+            yield

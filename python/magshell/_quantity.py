@@ -14,16 +14,10 @@ def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.n
     (1, 3)
     """
     label = f"{name} [{unit}]"
-    if getattr(values, "requires_grad", False):
-        raise ValueError(f"{label} requires a gradient, and nothing passes one back to it: detach it first")
-    try:
-        array = np.asarray(values)
-        if not np.can_cast(array.dtype, np.float64, casting="same_kind"):
-            raise TypeError(f"dtype {array.dtype}")
-        array = array.astype(np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{label} must be an array of real numbers, got {error}") from None
+    array = real_numbers(label, values)
     if not _fits(array.shape, shape):
+        if shape == ():
+            raise ValueError(f"{label} must be a number, got shape {array.shape}")
         wanted = ", ".join(str(size) for size in shape) + ("," if len(shape) == 1 else "")
         raise ValueError(f"{label} must have shape ({wanted}), got {array.shape}")
     if not np.isfinite(array).all():
@@ -32,6 +26,22 @@ def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.n
         raise ValueError(f"{label} must be finite, but {entry} is {array[index]}")
     array.flags.writeable = False
     return array
+
+
+def real_numbers(label: str, values) -> np.ndarray:
+    """A float64 copy of any shape. Truth values, masked entries and strings are no numbers."""
+    if getattr(values, "requires_grad", False):
+        raise ValueError(f"{label} requires a gradient, and nothing passes one back to it: detach it first")
+    if np.ma.is_masked(values):
+        raise ValueError(f"{label} has masked entries: fill them first")
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError, RuntimeError) as error:  # ragged lists, tensors that numpy cannot take
+        raise ValueError(f"{label} must be an array of real numbers: {error}") from None
+    if array.dtype == bool or not np.can_cast(array.dtype, np.float64, casting="same_kind"):
+        what = f"{values!r:.60}" if array.ndim == 0 else f"dtype {array.dtype}"
+        raise ValueError(f"{label} must be an array of real numbers, got {what}")
+    return array.astype(np.float64)
 
 
 def _fits(actual: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 
 from . import _core
 from ._inputs import Inputs
+from ._quantity import quantity
 from ._tensors import to_array
 from .equilibrium import Equilibrium
 from .scene import Scene
@@ -21,8 +22,19 @@ def starting_point(scene: Scene, start, inputs: Inputs):
             raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
         same = np.array_equal(start._magnetization, inputs.magnetization)
         return start._state, start._controls, same
-    positions = np.asarray(to_array("start", start), dtype=np.float64)
-    shape = (scene.mesh.n_vertices, 3)
-    if positions.shape != shape or not np.isfinite(positions).all():
-        raise ValueError(f"start [m] must be an Equilibrium or finite positions of shape (n_v, 3) = {shape}")
+    positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
+    n_v = scene.mesh.n_vertices
+    if len(positions) != n_v:
+        raise ValueError(f"start [m] must have shape (n_v, 3) = ({n_v}, 3), got {positions.shape}")
+    _check_faces(scene.mesh, positions)
     return model.state(positions, np.zeros(scene.mesh.n_edges)), inputs.controls, False
+
+
+def _check_faces(mesh, positions: np.ndarray) -> None:
+    """A face without area has no normal, and no forces either."""
+    corners = positions[mesh.faces]
+    a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = 0.5 * np.linalg.norm(np.cross(a1, a2), axis=1)
+    flat = np.flatnonzero(area <= 1e-12 * mesh.face_areas)
+    if flat.size:
+        raise ValueError(f"start [m] leaves face {flat[0]} without area: {area[flat[0]]:.3g} m2")

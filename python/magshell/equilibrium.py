@@ -59,6 +59,8 @@ class Equilibrium:
     def __repr__(self) -> str:
         moved = float(np.linalg.norm(np.asarray(self.displacements), axis=1).max())
         kind = "stable" if self.stable else f"unstable in {self.unstable_directions} directions"
+        if not self.stable and self.unstable_directions == 0:
+            kind = "not known to be stable"
         if self.progress < 1.0:
             kind += f", {self.progress:.1%} of the way"
         energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())

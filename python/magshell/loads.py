@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._quantity import quantity
-from ._selections import indices
+from ._quantity import quantity, real_numbers
+from ._selections import indices, selection
 from .mesh import TriangleMesh
 
 
@@ -13,26 +13,26 @@ class PointLoad:
     """A force [N] on each of some vertices: `force` (3,) on every one of them, or (k, 3), one each."""
 
     def __init__(self, vertices, force):
-        self.vertices = np.atleast_1d(np.asarray(vertices))
+        self.vertices = selection("PointLoad vertices", vertices)
         self.force = _vectors("force", "N", force)
 
     def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
         """(n_v, 3), N."""
         vertices = indices("PointLoad vertices", self.vertices, mesh.n_vertices)
-        return _spread(mesh, vertices[:, None], _rows("force", self.force, len(vertices)))
+        return _spread(mesh, vertices[:, None], _rows("force [N]", self.force, len(vertices)))
 
 
 class EdgeLoad:
     """A force per rest length [N/m] along some edges, half to each end: (3,) or (k, 3), one an edge."""
 
     def __init__(self, edges, force_per_length):
-        self.edges = np.atleast_1d(np.asarray(edges))
+        self.edges = selection("EdgeLoad edges", edges)
         self.force_per_length = _vectors("force_per_length", "N/m", force_per_length)
 
     def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
         """(n_v, 3), N."""
         edges = indices("EdgeLoad edges", self.edges, mesh.n_edges)
-        density = _rows("force_per_length", self.force_per_length, len(edges))
+        density = _rows("force_per_length [N/m]", self.force_per_length, len(edges))
         return _spread(mesh, mesh.edges[edges], density * (mesh.edge_lengths[edges] / 2.0)[:, None])
 
 
@@ -40,13 +40,13 @@ class AreaLoad:
     """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face."""
 
     def __init__(self, force_per_area, faces=None):
-        self.faces = None if faces is None else np.atleast_1d(np.asarray(faces))
+        self.faces = None if faces is None else selection("AreaLoad faces", faces)
         self.force_per_area = _vectors("force_per_area", "N/m2", force_per_area)
 
     def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
         """(n_v, 3), N."""
         faces = np.arange(mesh.n_faces) if self.faces is None else indices("AreaLoad faces", self.faces, mesh.n_faces)
-        density = _rows("force_per_area", self.force_per_area, len(faces))
+        density = _rows("force_per_area [N/m2]", self.force_per_area, len(faces))
         return _spread(mesh, mesh.faces[faces], density * (mesh.face_areas[faces] / 3.0)[:, None])
 
 
@@ -59,9 +59,11 @@ class EdgeCouple:
     """
 
     def __init__(self, edges, couple_per_length):
-        self.edges = np.atleast_1d(np.asarray(edges))
-        shape = () if np.ndim(couple_per_length) == 0 else (3,)
-        self.couple_per_length = quantity("couple_per_length", "N", couple_per_length, shape)
+        self.edges = selection("EdgeCouple edges", edges)
+        array = real_numbers("couple_per_length [N]", couple_per_length)
+        if array.shape not in ((), (3,)):
+            raise ValueError(f"couple_per_length [N] must be a number or have shape (3,), got {array.shape}")
+        self.couple_per_length = quantity("couple_per_length", "N", array, array.shape)
 
     def edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
         """The edges (k,) and their couples (k,), N m."""
@@ -78,12 +80,15 @@ class EdgeCouple:
 
 
 def _vectors(name: str, unit: str, values) -> np.ndarray:
-    return quantity(name, unit, values, (3,) if np.ndim(values) == 1 else ("k", 3))
+    array = real_numbers(f"{name} [{unit}]", values)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3:
+        raise ValueError(f"{name} [{unit}] must have shape (3,) or (k, 3), got {array.shape}")
+    return quantity(name, unit, array, array.shape)
 
 
-def _rows(name: str, vectors: np.ndarray, count: int) -> np.ndarray:
+def _rows(label: str, vectors: np.ndarray, count: int) -> np.ndarray:
     if vectors.ndim == 2 and len(vectors) != count:
-        raise ValueError(f"{name} must have shape (3,) or ({count}, 3), got {vectors.shape}")
+        raise ValueError(f"{label} must have shape (3,) or ({count}, 3), got {vectors.shape}")
     return np.broadcast_to(vectors, (count, 3))
 
 

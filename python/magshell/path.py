@@ -125,6 +125,8 @@ def follow(
         raise ValueError(f"max_points must be at least 2, got {max_points}")
     if not lowest_parameter < 0:
         raise ValueError(f"lowest_parameter must be below 0, where the path starts, got {lowest_parameter}")
+    if until is not None and not callable(until):
+        raise ValueError(f"until must be a function of (parameter, positions), got {until!r}")
     if start is not None and not isinstance(start, Equilibrium):
         raise ValueError(f"start must be an Equilibrium of this scene, got {type(start).__name__}")
     inputs = Inputs(
@@ -146,8 +148,8 @@ def follow(
     options.locate_critical = locate_critical
 
     began = time.perf_counter()
-    inputs.magnetize()
-    with tqdm(total=1.0, desc="path", delay=2.0, disable=not progress, bar_format=_BAR) as bar:
+    bar_options = {"total": 1.0, "desc": "path", "delay": 2.0, "disable": not progress, "bar_format": _BAR}
+    with inputs.in_core(), tqdm(**bar_options) as bar:
         found = _core.follow_path(scene._model, state, from_, inputs.controls, options, until, _advance(bar))
     path = _path(scene, found, from_, inputs.controls, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:

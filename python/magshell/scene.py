@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Iterable
+from contextlib import contextmanager
+
 import numpy as np
 
 from . import _constraints, _core
@@ -42,6 +46,10 @@ class Scene:
         self.loads = _checked_list("loads", loads, _LOADS)
         self.fields = () if field is None else _checked_list("field", field, (AppliedField,))
         self.gravity = np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
+        if any(f._core is None and not isinstance(f, UniformField) for f in self.fields):
+            raise ValueError("field holds an AppliedField without a value: use a CustomField")
+        if not isinstance(allow_rigid_motions, bool):
+            raise ValueError(f"allow_rigid_motions must be True or False, got {allow_rigid_motions!r}")
         if sum(isinstance(f, UniformField) for f in self.fields) > 1:
             raise ValueError("field holds several UniformFields: one is enough, its value comes when the scene is solved")
         self._build(allow_rigid_motions)
@@ -50,8 +58,9 @@ class Scene:
         shell, mesh = self.shell, self.shell.mesh
         edges, couples = self._couples()
         constraints = _constraints.gather(mesh, self.supports, _couple_directions(mesh, edges))
-        if np.intersect1d(edges, constraints.directed_edges[:, 0]).size:
-            raise ValueError("an EdgeCouple acts on an edge that a support holds")
+        held = np.intersect1d(edges, constraints.directed_edges[:, 0])
+        if held.size:
+            raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
         free = [] if allow_rigid_motions else _constraints.free_rigid_motions(mesh, constraints)
         if free:
             raise ValueError(
@@ -61,6 +70,7 @@ class Scene:
         n_directions, n_couples = len(constraints.directions), len(edges)
         heavy = bool(self.gravity.any())
         self._constraints = constraints
+        self._turn, self._solving = threading.RLock(), False
         self._model = _core.Model(
             mesh._core,
             directors=shell.bending == "midedge",
@@ -94,6 +104,18 @@ class Scene:
         unique, inverse = np.unique(edges, return_inverse=True)
         return unique, np.bincount(inverse, weights=couples)
 
+    @contextmanager
+    def _exclusive(self):
+        """One solve at a time: the core keeps the magnetization and the last evaluated state."""
+        with self._turn:
+            if self._solving:
+                raise RuntimeError("the scene is being solved: what a solve calls cannot solve it again")
+            self._solving = True
+            try:
+                yield
+            finally:
+                self._solving = False
+
     @property
     def mesh(self):
         return self.shell.mesh
@@ -119,12 +141,13 @@ class Scene:
 
 
 def _checked_list(name: str, items, kinds: tuple[type, ...]) -> tuple:
-    items = (items,) if isinstance(items, kinds) else tuple(items)
-    for item in items:
+    wanted = ", ".join(kind.__name__ for kind in kinds)
+    listed = [items] if isinstance(items, (*kinds, type)) or not isinstance(items, Iterable) else list(items)
+    for item in listed:
         if not isinstance(item, kinds):
-            wanted = ", ".join(kind.__name__ for kind in kinds)
-            raise ValueError(f"{name} must hold {wanted} objects, got {type(item).__name__}")
-    return items
+            what = f"the class {item.__name__}: call it" if isinstance(item, type) else type(item).__name__
+            raise ValueError(f"{name} must hold {wanted} objects, got {what}")
+    return tuple(listed)
 
 
 def _couple_directions(mesh, edges: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._quantity import quantity
+from ._quantity import quantity, real_numbers
 from .mesh import TriangleMesh
 
 BENDING = ("midedge", "hinge")
@@ -79,12 +79,10 @@ class Shell:
 
 def _property(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:
     """One finite number a row, from an array of that length or from a single number."""
-    if np.ndim(value) == 0:
-        value = np.full(rows[1], float(quantity(name, unit, value, ())))
-    array = quantity(name, unit, value, (rows[0],))
-    if array.shape != (rows[1],):
+    array = real_numbers(f"{name} [{unit}]", value)
+    if array.shape not in ((), (rows[1],)):
         raise ValueError(f"{name} [{unit}] must be a number or have shape ({rows[0]},) = ({rows[1]},), got {array.shape}")
-    return array
+    return np.broadcast_to(quantity(name, unit, array, array.shape), (rows[1],))
 
 
 def _positive(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:

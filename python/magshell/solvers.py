@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 
 from . import _core
+from ._quantity import quantity
 
 
 @dataclass(frozen=True)
@@ -27,14 +29,15 @@ class Newton:
     _mixed = False
 
     def __post_init__(self):
-        if not 0.0 < self.tolerance < 1.0:
+        if not 0.0 < quantity("tolerance", "1", self.tolerance, ()) < 1.0:
             raise ValueError(f"tolerance must be in (0, 1), got {self.tolerance}")
         for name in ("first_load_step", "smallest_load_step"):
-            if not 0.0 < getattr(self, name) <= 1.0:
+            if not 0.0 < quantity(name, "1", getattr(self, name), ()) <= 1.0:
                 raise ValueError(f"{name} must be in (0, 1], got {getattr(self, name)}")
         for name in ("max_iterations", "max_relaxation_steps"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+            count = getattr(self, name)
+            if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= count < 2**31:
+                raise ValueError(f"{name} must be an integer of at least 1, got {count!r}")
 
     def _newton_options(self) -> _core.NewtonOptions:
         return _core.NewtonOptions(mixed=self._mixed, tolerance=self.tolerance, max_iterations=self.max_iterations)

@@ -58,6 +58,10 @@ def equilibrium(
     solver = MixedNewton() if solver is None else solver
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
+    if not isinstance(require_stable, bool):
+        raise ValueError(f"require_stable must be True or False, got {require_stable!r}")
+    if progress is not None and not callable(progress):
+        raise ValueError(f"progress must be a function of (progress, residual), got {progress!r}")
     inputs = Inputs(
         scene,
         remanent_magnetization,
@@ -73,9 +77,9 @@ def equilibrium(
     options.start_at_rest = at_rest
 
     began = time.perf_counter()
-    inputs.magnetize()
-    found = _core.find_equilibrium(scene._model, state, from_, inputs.controls, options, progress)
-    result = _result(scene, inputs, found, time.perf_counter() - began)
+    with inputs.in_core():
+        found = _core.find_equilibrium(scene._model, state, from_, inputs.controls, options, progress)
+        result = _result(scene, inputs, found, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
     if found.outcome == _core.Outcome.failed:

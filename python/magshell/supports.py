@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
 
 from ._quantity import quantity
-from ._selections import indices
+from ._selections import indices, selection
 from .mesh import TriangleMesh
 
 _AXES = "xyz"
+_ORDERS = {"".join(axes) for n in (1, 2, 3) for axes in permutations(_AXES, n)}
 
 
 class RigidMotion(NamedTuple):
@@ -20,9 +22,10 @@ class RigidMotion(NamedTuple):
     rotation: np.ndarray
     translation: np.ndarray
 
-    def moved(self, points: np.ndarray) -> np.ndarray:
-        """Where points (k, 3) end up."""
-        return self.center + (points - self.center) @ rotation_matrix(self.rotation).T + self.translation
+    def moved(self, points: np.ndarray, progress: float = 1.0) -> np.ndarray:
+        """Where points (k, 3) are at this progress, 1 at the end."""
+        turned = (points - self.center) @ rotation_matrix(progress * self.rotation).T
+        return self.center + turned + progress * self.translation
 
 
 class Held(NamedTuple):
@@ -53,11 +56,15 @@ class Pin:
     """
 
     def __init__(self, vertices, components: str = "xyz", *, displacement=None, rotation=None, center=None):
-        self.vertices = np.atleast_1d(np.asarray(vertices))
-        if not components or set(components) - set(_AXES) or len(set(components)) != len(components):
+        self.vertices = selection("Pin vertices", vertices)
+        if not isinstance(components, str) or components not in _ORDERS:
             raise ValueError(f'components must be some of "x", "y", "z", got {components!r}')
         self.components = components
         self._motion = _Motion(displacement, rotation, center)
+        moves = np.zeros(3) if displacement is None else self._motion.displacement
+        for axis, move in zip(_AXES, moves, strict=True):
+            if move != 0.0 and axis not in components:
+                raise ValueError(f"displacement [m] moves along {axis}, but the Pin holds only {components}")
 
     def held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = indices("Pin vertices", self.vertices, mesh.n_vertices)
@@ -84,7 +91,7 @@ class Clamp:
     """
 
     def __init__(self, edges, *, displacement=None, rotation=None, center=None):
-        self.edges = np.atleast_1d(np.asarray(edges))
+        self.edges = selection("Clamp edges", edges)
         self._motion = _Motion(displacement, rotation, center)
 
     def held(self, mesh: TriangleMesh) -> list[Held]:
@@ -121,14 +128,22 @@ class SymmetryPlane:
             raise ValueError("normal must not be zero")
         self.normal = normal / length
         self.point = quantity("point", "m", point, (3,))
-        self.tolerance = tolerance
+        self.tolerance = None if tolerance is None else float(quantity("tolerance", "m", tolerance, ()))
+        if self.tolerance is not None and self.tolerance < 0.0:
+            raise ValueError(f"tolerance [m] must not be negative, got {self.tolerance:g}")
 
     def _vertices(self, mesh: TriangleMesh) -> np.ndarray:
-        distance = np.abs((mesh.rest_positions - self.point) @ self.normal)
+        height = (mesh.rest_positions - self.point) @ self.normal
         tolerance = 1e-9 * mesh.size if self.tolerance is None else self.tolerance
-        vertices = np.flatnonzero(distance <= tolerance)
+        vertices = np.flatnonzero(np.abs(height) <= tolerance)
         if vertices.size == 0:
-            raise ValueError(f"no vertex lies in {self!r}; the nearest is {distance.min():.3g} m away")
+            raise ValueError(f"no vertex lies in {self!r}; the nearest is {np.abs(height).min():.3g} m away")
+        above, below = int(np.argmax(height)), int(np.argmin(height))
+        if height[above] > tolerance and height[below] < -tolerance:
+            raise ValueError(
+                f"the sheet lies on both sides of {self!r}, vertex {above} on one and vertex {below} on the "
+                "other: model one half"
+            )
         return vertices
 
     def held(self, mesh: TriangleMesh) -> list[Held]:
@@ -142,7 +157,11 @@ class SymmetryPlane:
         edges = boundary[on_plane[mesh.edges[boundary]].all(axis=1)]
         if edges.size == 0:
             return []
-        outwards = np.sign(continuations(mesh, edges) @ self.normal)
+        steepness = continuations(mesh, edges) @ self.normal
+        lying = np.flatnonzero(np.abs(steepness) < 1e-6)
+        if lying.size:
+            raise ValueError(f"the sheet lies in {self!r} at edge {edges[lying[0]]}: its image would lie on it")
+        outwards = np.sign(steepness)
         return [DirectedEdges(edges, outwards[:, None] * self.normal, None)]
 
     def __repr__(self) -> str:

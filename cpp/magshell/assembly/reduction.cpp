@@ -134,16 +134,17 @@ void Reduction::matrix(SystemMatrix& full, std::vector<double>& values) const {
 }
 
 VectorXd Reduction::vector(const VectorXd& full) const {
-    VectorXd reduced(size());
-    if (frame_of_.empty()) {
-        for (Index k = 0; k < size(); ++k) reduced[k] = full[free_unknowns_[k]];
-        return reduced;
-    }
+    if (frame_of_.empty()) return weights(full);
     VectorXd turned = full;
     for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
         if (frame_of_[node] >= 0)
             turned.segment<3>(3 * node) = held_[frame_of_[node]].frame.transpose() * full.segment<3>(3 * node);
-    for (Index k = 0; k < size(); ++k) reduced[k] = turned[free_unknowns_[k]];
+    return weights(turned);
+}
+
+VectorXd Reduction::weights(const VectorXd& full) const {
+    VectorXd reduced(size());
+    for (Index k = 0; k < size(); ++k) reduced[k] = full[free_unknowns_[k]];
     return reduced;
 }
 

@@ -45,6 +45,8 @@ class Reduction {
     /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first.
     void matrix(SystemMatrix& full, std::vector<double>& values) const;
     VectorXd vector(const VectorXd& full) const;
+    /// A diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses, areas.
+    VectorXd weights(const VectorXd& full) const;
     /// A free vector back among all unknowns, zero where they are held.
     VectorXd expand(const VectorXd& reduced) const;
 

@@ -27,7 +27,7 @@ MatrixXd generic_start(Index rows, int columns) {
 
 std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     const Model& model = newton.model();
-    const VectorXd metric = model.reduction().vector(model.metric());
+    const VectorXd metric = model.reduction().weights(model.metric());
     const Index massive = (metric.array() > 0.0).count();
     const int columns = static_cast<int>(std::min<Index>(count + 3, massive));
 

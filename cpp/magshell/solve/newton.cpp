@@ -1,5 +1,6 @@
 #include "magshell/solve/newton.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -13,7 +14,9 @@ constexpr double round_off = std::numeric_limits<double>::epsilon();
 double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd& cancelling, double tolerance) {
     if (part.size() == 0) return 0.0;
     const double scale = magnitude.norm() + 4.0 * round_off / tolerance * cancelling.norm();
-    return scale > 0.0 ? part.norm() / scale : part.norm() > 0.0 ? 1.0 : 0.0;
+    const double length = part.norm();
+    if (!std::isfinite(length) || !std::isfinite(scale)) return std::numeric_limits<double>::infinity();
+    return scale > 0.0 ? length / scale : length > 0.0 ? 1.0 : 0.0;
 }
 
 }  // namespace
@@ -23,9 +26,8 @@ Newton::Newton(Model& model, const NewtonOptions& options, Watch watch)
       options_(options),
       watch_(std::move(watch)),
       factor_(analyze(model.reduction().pattern())),
-      reduced_metric_(model.reduction().vector(model.metric())) {}
+      reduced_metric_(model.reduction().weights(model.metric())) {}
 
-// Frames leave the metric alone: it is the same along the three axes of a node.
 VectorXd Newton::gradient(const VectorXd& q, const Anchor& anchor) const {
     VectorXd g = model_.residual().gradient;
     if (anchor.state) g += anchor.weight * model_.metric().cwiseProduct(q - *anchor.state);
@@ -51,7 +53,10 @@ FactorReport Newton::factorize_assembled(const Anchor& anchor) {
             values_[pattern.column_starts[k]] += anchor.weight * reduced_metric_[k];
     }
     ++factorizations_;
-    const FactorReport report = factor_->factorize(values_.data());
+    FactorReport report;
+    if (std::all_of(values_.begin(), values_.end(), [](double value) { return std::isfinite(value); }))
+        report = factor_->factorize(values_.data());
+    else report.reason = "the forces are not finite: a face has no area, or lies where a field has no value";
     if (!report.succeeded) ++failed_factorizations_;
     return report;
 }

@@ -1,0 +1,146 @@
+"""A solve that cannot finish says why, and hands back the last good state."""
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import magshell as ms
+
+LENGTH, WIDTH, THICKNESS, YOUNG = 0.1, 0.01, 1e-3, 1e6  # m, Pa
+HASTY = ms.MixedNewton(max_iterations=3, smallest_load_step=0.5, max_relaxation_steps=1)
+
+
+def cantilever(field, cells=(20, 2)):
+    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=cells)
+    shell = ms.Shell(mesh, thickness=THICKNESS, young_modulus=YOUNG, poisson_ratio=0.0)
+    return ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=field)
+
+
+def short_grid(height):
+    """A field that ends `height` above and below the strip."""
+    return ms.SampledField.from_function(
+        lambda x: np.tile((0.0, 0.0, 5e-3), (len(x), 1)),
+        (-0.02, -0.02, -height),
+        (0.12, 0.03, height),
+        (4, 4, 4),
+    )
+
+
+def test_too_few_iterations():
+    scene = cantilever(ms.UniformField())
+    with pytest.raises(
+        ms.NotConverged, match=r"stopped at .* of the way .* iterations: .*`error.last_good`"
+    ) as caught:
+        ms.equilibrium(
+            scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=(0, 0, 20e-3), solver=HASTY
+        )
+    good = caught.value.last_good
+    assert isinstance(good, ms.Equilibrium) and good.scene is scene
+    assert 0.0 <= good.progress < 1.0 and not good.stable
+    assert np.isfinite(good.positions).all() and "of the way" in repr(good)
+    # What it hands back holds at its own controls, and is a start.
+    assert good.applied_flux_density[2] == pytest.approx(20e-3 * good.progress)
+    found = ms.equilibrium(
+        scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=(0, 0, 20e-3), start=good
+    )
+    assert found.stable and found.positions[:, 2].max() > 0.05
+
+
+def test_a_sheet_that_leaves_a_sampled_field():
+    """NaN outside the grid is neither an equilibrium nor a complaint about a matrix."""
+    with pytest.raises(ms.NotConverged) as caught:
+        ms.equilibrium(cantilever(short_grid(2e-3)), remanent_magnetization=(4e4, 0, 0))
+    good = caught.value.last_good
+    assert good.progress < 1.0 and np.isfinite(good.positions).all() and np.isfinite(good.energy)
+
+
+def test_a_sheet_that_starts_outside_a_sampled_field():
+    field = short_grid(2e-3)
+    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=(20, 2)).transformed(translation=(0, 0, 0.05))
+    shell = ms.Shell(mesh, thickness=THICKNESS, young_modulus=YOUNG)
+    scene = ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=field)
+    with pytest.raises(
+        ms.NotConverged, match="not finite: a face has no area, or lies where a field has no value"
+    ):
+        ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0))
+
+
+def test_a_neutral_equilibrium_is_no_stable_one():
+    """Nothing holds this sheet, and nothing pulls at it: its Hessian is singular."""
+    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=(6, 2))
+    scene = ms.Scene(ms.Shell(mesh, thickness=THICKNESS, young_modulus=YOUNG), allow_rigid_motions=True)
+    with pytest.raises(ms.NotConverged) as caught:
+        ms.equilibrium(scene)
+    assert not caught.value.last_good.stable
+
+
+def test_what_a_field_raises_comes_through():
+    def broken(points):
+        raise ZeroDivisionError("the coil is off")
+
+    scene = cantilever(ms.CustomField(broken, length_scale=LENGTH))
+    with pytest.raises(ZeroDivisionError, match="the coil is off"):
+        ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0))
+
+
+def slow_field():
+    def flux_density(points):
+        time.sleep(0.02)
+        return np.tile((0.0, 0.0, 5e-3), (len(points), 1))
+
+    return ms.CustomField(flux_density, length_scale=LENGTH)
+
+
+def press_ctrl_c(after):
+    """From another thread, once; returns when it was pressed."""
+    pressed = []
+
+    def press():
+        pressed.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(after, press)
+    timer.start()
+    return pressed
+
+
+def long_solve(progress):
+    """Plain Newton in an extreme field, in tiny steps: minutes."""
+    scene = cantilever(ms.UniformField(), cells=(150, 12))
+    ms.equilibrium(
+        scene,
+        remanent_magnetization=(4e4, 0, 0),
+        applied_flux_density=(1e-3, 0, 0.5),
+        solver=ms.Newton(max_iterations=500, smallest_load_step=1e-6, max_relaxation_steps=10**6),
+        progress=progress,
+    )
+
+
+def long_solve_in_a_slow_field(progress):
+    ms.equilibrium(
+        cantilever(slow_field()),
+        remanent_magnetization=(4e5, 0, 0),
+        solver=ms.Newton(max_iterations=500),
+        progress=progress,
+    )
+
+
+@pytest.mark.parametrize("solve", [long_solve, long_solve_in_a_slow_field])
+def test_ctrl_c_hands_back_the_last_good_state(solve):
+    pressed = []
+
+    def press_once(progress, residual):
+        if not pressed:
+            pressed.append(press_ctrl_c(0.3))
+
+    with pytest.raises(ms.Interrupted, match=r"interrupted at .* of the way") as caught:
+        solve(press_once)
+    assert time.perf_counter() - pressed[0][0] < 1.0
+    assert isinstance(caught.value, KeyboardInterrupt)
+    good = caught.value.last_good
+    assert isinstance(good, ms.Equilibrium) and np.isfinite(good.positions).all()
+    assert 0.0 <= good.progress < 1.0

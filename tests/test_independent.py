@@ -1,0 +1,199 @@
+"""The core against formulas written down a second time, in torch, and differentiated by it.
+
+Nothing here is shared with the core: strains come from deformation gradients and second fundamental forms in
+space, angles from face normals, and the magnetic energy from a matrix inverse, as the paper has them.
+"""
+
+import numpy as np
+import pytest
+from model_access import Problem
+
+import magshell as ms
+from magshell._core import Controls
+
+torch = pytest.importorskip("torch")
+
+# The term that carries the sheet's energy -> thickness [m] and modulus [Pa] that make it so.
+CARRIERS = {"membrane": (1e-3, 1e8), "bending": (30.0, 1e6), "magnetic": (1e-2, 1e-3)}
+MAGNETIZATION = (3e4, -2e4, 5e4)  # A/m
+FLUX_DENSITY = (0.03, -0.05, 0.08)  # T
+
+
+def make_mesh():
+    """Irregular, curved, with boundary."""
+    mesh = ms.meshes.rectangle(1.0, 0.7, cells=(3, 3), irregular=0.2, seed=11)
+    x, y, _ = mesh.rest_positions.T
+    return ms.TriangleMesh(np.stack([x, y, 0.25 * x**2 - 0.2 * y * x + 0.1 * y**2], axis=1), mesh.faces)
+
+
+def make_problem(bending, carrier):
+    mesh = make_mesh()
+    thickness, modulus = CARRIERS[carrier]
+    draw = np.random.default_rng(8).uniform
+    sheet = ms.Shell(
+        mesh,
+        thickness=thickness * draw(0.5, 1.5, mesh.n_faces),
+        young_modulus=modulus * draw(0.3, 3.0, mesh.n_faces),
+        poisson_ratio=draw(-0.5, 0.5, mesh.n_faces),
+        curvature_scale=draw(0.5, 2.0, mesh.n_edges),
+        bending=bending,
+    )
+    clamped = np.concatenate([mesh.edges_at(x=0.0), mesh.edges_at(x=1.0)[:1]])
+    scene = ms.Scene(sheet, supports=[ms.Clamp(clamped)], field=ms.UniformField())
+    return Problem(scene, Controls(flux_density=np.array(FLUX_DENSITY)), np.array(MAGNETIZATION)), clamped
+
+
+class Formulas:
+    """Energies of a sheet as functions of z = (positions, edge rotations), in the caller's order."""
+
+    def __init__(self, scene, clamped):
+        mesh, self.shell = scene.mesh, scene.shell
+        self.hinge = scene.shell.bending == "hinge"
+        self.clamped = set(clamped.tolist())
+        self.n_vertices, self.faces = mesh.n_vertices, torch.tensor(mesh.faces.astype(np.int64))
+        self.mesh = mesh
+        self.rest = torch.tensor(mesh.rest_positions)
+        a1, a2, normal = self.frame(self.rest)
+        self.area = 0.5 * torch.linalg.norm(torch.linalg.cross(a1, a2), dim=1)
+        self.inverse = torch.linalg.inv(torch.stack([a1, a2, normal], dim=2))
+        self.rest_normal = normal
+        self.edge_shapes = self.rest_edge_shapes()
+        self.directions = {e: self.continuation(e) for e in self.clamped}
+        self.rest_angles = self.angles(self.rest)
+
+    def frame(self, x):
+        """(a_1 a_2 n) of every face, [Chen22] (20)."""
+        corners = x[self.faces]
+        a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        normal = torch.linalg.cross(a1, a2)
+        return a1, a2, normal / torch.linalg.norm(normal, dim=1, keepdim=True)
+
+    def rest_edge_shapes(self):
+        """t~ (x) t~ / (A~ |a~|) for the edges of every face, (n_f, 3, 3, 3)."""
+        corners = self.rest[self.faces]
+        edges = torch.roll(corners, -2, dims=1) - torch.roll(corners, -1, dims=1)
+        turned = torch.linalg.cross(edges, self.rest_normal[:, None].expand_as(edges))
+        scale = self.area[:, None] * torch.linalg.norm(edges, dim=2)
+        return torch.einsum("fij,fik->fijk", turned, turned) / scale[..., None, None]
+
+    def deformation_gradient(self, x):
+        return torch.stack(self.frame(x), dim=2) @ self.inverse
+
+    def plane_stress(self, strain):
+        """(1 - nu) tr G^2 + nu (tr G)^2, over 1 - nu^2."""
+        nu = torch.tensor(self.shell.poisson_ratio)
+        trace = torch.einsum("fii->f", strain)
+        return ((1 - nu) * torch.einsum("fij,fji->f", strain, strain) + nu * trace**2) / (1 - nu**2)
+
+    def membrane(self, z):
+        """[Chen22] (22) with the Green strain of F_0 in the rest plane, which is what (18) comes to."""
+        f = self.deformation_gradient(z[: 3 * self.n_vertices].reshape(-1, 3))
+        stretch = f.transpose(1, 2) @ f - torch.eye(3, dtype=torch.float64)
+        in_plane = torch.eye(3, dtype=torch.float64) - torch.einsum(
+            "fi,fj->fij", self.rest_normal, self.rest_normal
+        )
+        green = 0.5 * in_plane @ stretch @ in_plane
+        modulus = torch.tensor(self.shell.young_modulus * self.shell.thickness)
+        return 0.5 * torch.sum(modulus * self.area * self.plane_stress(green))
+
+    def bending(self, z):
+        """[Chen22] (23) with (19), delta as in the table of the two discretisations."""
+        x, rotations = z[: 3 * self.n_vertices].reshape(-1, 3), z[3 * self.n_vertices :]
+        angles = self.angles(x)
+        deltas = [
+            self.delta(f, e, angles, rotations) * self.shell.curvature_scale[e]
+            for f, edges in enumerate(self.mesh.face_edges.tolist())
+            for e in edges
+        ]
+        shapes = torch.einsum("fi,fijk->fjk", torch.stack(deltas).reshape(-1, 3), self.edge_shapes)
+        modulus = torch.tensor(self.shell.young_modulus * self.shell.thickness**3 / 12.0)
+        return 0.5 * torch.sum(modulus * self.area * self.plane_stress(shapes))
+
+    def magnetic(self, z):
+        """[Chen22] (24)."""
+        f = self.deformation_gradient(z[: 3 * self.n_vertices].reshape(-1, 3))
+        magnetization = torch.tensor(MAGNETIZATION, dtype=torch.float64)
+        flux_density = torch.tensor(FLUX_DENSITY, dtype=torch.float64)
+        volume = self.area * torch.tensor(self.shell.thickness)
+        return -torch.sum(volume * (f @ magnetization @ flux_density))
+
+    def delta(self, f, e, angles, rotations):
+        if e in self.clamped:
+            return angles[f, e] - self.rest_angles[f, e]
+        inside = bool((self.mesh.edge_faces[e] >= 0).all())
+        turn = 0.5 * (angles[f, e] - self.rest_angles[f, e]) if inside else torch.zeros_like(rotations[e])
+        sign = 1.0 if self.mesh.edge_faces[e, 0] == f else -1.0
+        return turn + (0.0 if self.hinge else sign * rotations[e])
+
+    def angles(self, x):
+        """The angle from the normal of each face to what is beyond each of its edges, about that edge."""
+        _, _, normal = self.frame(x)
+        found = {}
+        for e, pair in enumerate(self.mesh.edge_faces.tolist()):
+            for f, beyond in (pair, pair[::-1]):
+                if f < 0 or (beyond < 0 and e not in self.clamped):
+                    continue
+                start, end = self.mesh.edges[e] if f == pair[0] else self.mesh.edges[e][::-1]
+                along = (x[end] - x[start]) / torch.linalg.norm(x[end] - x[start])
+                other = normal[beyond]
+                if e in self.clamped:
+                    other = torch.linalg.cross(self.directions[e], along)
+                    other = other / torch.linalg.norm(other)
+                # Positive where the normals lean together: the sheet is folded up, towards its normal.
+                sine = torch.linalg.cross(other, normal[f]) @ along
+                found[f, e] = torch.atan2(sine, normal[f] @ other)
+        return found
+
+    def continuation(self, e):
+        """Out of the edge's face, in the face's plane: what a clamp holds the face to."""
+        f = int(self.mesh.edge_faces[e].max())
+        start, end = self.mesh.edges[e] if f == self.mesh.edge_faces[e, 0] else self.mesh.edges[e][::-1]
+        _, _, normal = self.frame(self.rest)
+        return torch.linalg.cross(self.rest[end] - self.rest[start], normal[f])
+
+
+def in_callers_order(problem, vector):
+    """(3 n_v + n_e,): zero for rotations that the core has none of. Columns of a matrix likewise."""
+    order = problem.order
+    known = order >= 0
+    mesh = problem.scene.mesh
+    out = np.zeros((3 * mesh.n_vertices + mesh.n_edges, *vector.shape[1:]))
+    out[order[known]] = vector[known]
+    return out
+
+
+def deformed(problem, rng):
+    """Positions and rotations in the caller's order, and the core's state; clamps are moved as well."""
+    mesh = problem.scene.mesh
+    strain = np.diag([1.3, 0.75, 1.1]) + 0.1 * rng.normal(size=(3, 3))
+    positions = mesh.rest_positions @ strain.T + 0.03 * rng.normal(size=(mesh.n_vertices, 3))
+    rotations = 0.3 * rng.normal(size=mesh.n_edges)
+    return np.concatenate([positions.ravel(), rotations]), problem.model.state(positions, rotations)
+
+
+@pytest.mark.parametrize("bending", ["midedge", "hinge"])
+@pytest.mark.parametrize("carrier", CARRIERS)
+def test_energies_gradients_and_hessians(carrier, bending, rng):
+    problem, clamped = make_problem(bending, carrier)
+    formulas = Formulas(problem.scene, clamped)
+    z, q = deformed(problem, rng)
+    z = torch.tensor(z, requires_grad=True)
+
+    energies = problem.model.energies(q, problem.controls)
+    for name in CARRIERS:
+        assert energies[name] == pytest.approx(getattr(formulas, name)(z).item(), rel=1e-12)
+        assert name == carrier or abs(energies[name]) < 1e-2 * abs(energies[carrier])
+
+    def total(unknowns):
+        return sum(getattr(formulas, name)(unknowns) for name in CARRIERS)
+
+    expected = torch.autograd.functional.jacobian(total, z).numpy()
+    assert_close(in_callers_order(problem, problem.gradient(q)), expected)
+    order = problem.order
+    hessian = np.zeros((len(z), len(z)))
+    hessian[:, order[order >= 0]] = in_callers_order(problem, problem.hessian(q)[:, order >= 0])
+    assert_close(hessian, torch.autograd.functional.hessian(total, z, vectorize=True).numpy())
+
+
+def assert_close(actual, expected):
+    assert np.abs(actual - expected).max() < 1e-9 * np.abs(expected).max()
