@@ -54,6 +54,7 @@ void register_statics(py::module_& module) {
         .def_readonly("residual", &StaticsResult::residual)
         .def_readonly("stable", &StaticsResult::stable)
         .def_readonly("unstable_directions", &StaticsResult::unstable_directions)
+        .def_readonly("linear_time", &StaticsResult::linear_time)
         .def_readonly("bytes", &StaticsResult::bytes)
         .def_readonly("factorization", &StaticsResult::factorization);
 

@@ -18,6 +18,7 @@ class Equilibrium:
     remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
     energies: J, by term. stable: no direction lowers the energy; unstable_directions: how many do.
     residual: relative to the forces that cancel in it. progress: how far the controls got, 1 unless a solve failed.
+    wall_time, linear_time: s, in all and in factorizations and back-substitutions. memory: bytes, of the core.
     """
 
     scene: Scene
@@ -37,6 +38,7 @@ class Equilibrium:
     residual: float
     progress: float
     wall_time: float
+    linear_time: float
     memory: int
     factorization: str
     _state: np.ndarray = field(repr=False)

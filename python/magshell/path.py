@@ -17,6 +17,7 @@ from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
 from .scene import Scene
 from .solvers import MixedNewton, Newton
+from .statics import solve
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class Path:
 
     parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.
     unstable_directions: (n,), zero where the equilibrium is stable. critical: CriticalPoints, in order.
+    remanent_magnetization: (n_f, 3) or (3,) A/m, or None.
     """
 
     scene: Scene
@@ -48,14 +50,23 @@ class Path:
     positions: np.ndarray
     unstable_directions: np.ndarray
     critical: tuple[CriticalPoint, ...]
+    remanent_magnetization: Any
     iterations: int
     factorizations: int
     failed_factorizations: int
     wall_time: float
     reason: str
     _states: list = field(repr=False)
+    _inputs: Inputs = field(repr=False)
     _from: Any = field(repr=False)
     _to: Any = field(repr=False)
+
+    def equilibrium(self, index: int) -> Equilibrium:
+        """One of the points, stable or not, as an Equilibrium: to look at, or to start another solve from."""
+        controls = self._from.towards(self._to, self.parameters[index])
+        options = MixedNewton()._options()
+        options.require_stable = False
+        return solve(self._inputs, self._states[index], controls, controls, options)
 
     @property
     def stable(self) -> np.ndarray:
@@ -151,7 +162,7 @@ def follow(
     bar_options = {"total": 1.0, "desc": "path", "delay": 2.0, "disable": not progress, "bar_format": _BAR}
     with inputs.in_core(), tqdm(**bar_options) as bar:
         found = _core.follow_path(scene._model, state, from_, inputs.controls, options, until, _advance(bar))
-    path = _path(scene, found, from_, inputs.controls, time.perf_counter() - began)
+    path = _path(inputs, found, from_, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {len(path)} points of the path", path)
     if found.outcome == _core.Outcome.failed:
@@ -174,7 +185,8 @@ def _advance(bar):
     return advance
 
 
-def _path(scene: Scene, found, from_, to, wall_time: float) -> Path:
+def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
+    scene = inputs.scene
     model = scene._model
     states = [point.state for point in found.points]
     return Path(
@@ -183,14 +195,16 @@ def _path(scene: Scene, found, from_, to, wall_time: float) -> Path:
         positions=np.array([model.positions(state) for state in states]).reshape(-1, scene.mesh.n_vertices, 3),
         unstable_directions=np.array([point.unstable_directions for point in found.points], dtype=int),
         critical=tuple(_critical(model, point) for point in found.critical),
+        remanent_magnetization=inputs.given_magnetization,
         iterations=found.iterations,
         factorizations=found.factorizations,
         failed_factorizations=found.failed_factorizations,
         wall_time=wall_time,
         reason=found.reason,
         _states=states,
+        _inputs=inputs,
         _from=from_,
-        _to=to,
+        _to=inputs.controls,
     )
 
 

@@ -76,14 +76,20 @@ def equilibrium(
     options.require_stable = require_stable
     options.start_at_rest = at_rest
 
+    return solve(inputs, state, from_, inputs.controls, options, progress)
+
+
+def solve(inputs: Inputs, state: np.ndarray, from_, to, options, progress=None) -> Equilibrium:
+    """The core's search for an equilibrium at the controls `to`, from a state at `from_`."""
+    scene = inputs.scene
     began = time.perf_counter()
     with inputs.in_core():
-        found = _core.find_equilibrium(scene._model, state, from_, inputs.controls, options, progress)
+        found = _core.find_equilibrium(scene._model, state, from_, to, options, progress)
         result = _result(scene, inputs, found, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
     if found.outcome == _core.Outcome.failed:
-        raise NotConverged(_failure(found, at_rest), result)
+        raise NotConverged(_failure(found, options.start_at_rest), result)
     return result
 
 
@@ -107,6 +113,7 @@ def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibriu
         residual=found.residual,
         progress=found.progress,
         wall_time=wall_time,
+        linear_time=found.linear_time,
         memory=found.bytes,
         factorization=found.factorization,
         _state=found.state,

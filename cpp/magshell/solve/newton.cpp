@@ -1,6 +1,7 @@
 #include "magshell/solve/newton.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -18,6 +19,18 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
     if (!std::isfinite(length) || !std::isfinite(scale)) return std::numeric_limits<double>::infinity();
     return scale > 0.0 ? length / scale : length > 0.0 ? 1.0 : 0.0;
 }
+
+// Adds the time it lives to a sum.
+class Stopwatch {
+  public:
+    explicit Stopwatch(double& sum) : sum_(sum) {}
+    ~Stopwatch() { sum_ += std::chrono::duration<double>(Clock::now() - began_).count(); }
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    double& sum_;
+    Clock::time_point began_ = Clock::now();
+};
 
 }  // namespace
 
@@ -53,6 +66,7 @@ FactorReport Newton::factorize_assembled(const Anchor& anchor) {
             values_[pattern.column_starts[k]] += anchor.weight * reduced_metric_[k];
     }
     ++factorizations_;
+    const Stopwatch running(linear_time_);
     FactorReport report;
     if (std::all_of(values_.begin(), values_.end(), [](double value) { return std::isfinite(value); }))
         report = factor_->factorize(values_.data());
@@ -79,6 +93,7 @@ FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool
 }
 
 VectorXd Newton::solve_with_factor(const VectorXd& rhs) const {
+    const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
     factor_->solve(reduced);
     return model_.reduction().expand(reduced);

@@ -73,6 +73,7 @@ class Newton {
     int factorizations() const { return factorizations_; }
     int failed_factorizations() const { return failed_factorizations_; }
     int iterations() const { return iterations_; }
+    double linear_time() const { return linear_time_; }  // [s] in factorizations and solves
     void count_iteration() { ++iterations_; }
     void watch(double residual) const {
         if (watch_) watch_(residual);
@@ -89,6 +90,7 @@ class Newton {
     VectorXd reduced_metric_;
     std::vector<double> values_;
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
+    mutable double linear_time_ = 0.0;
 };
 
 }  // namespace magshell

@@ -98,6 +98,7 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Contro
     result.iterations = newton.iterations();
     result.factorizations = newton.factorizations();
     result.failed_factorizations = newton.failed_factorizations();
+    result.linear_time = newton.linear_time();
     result.bytes = model.bytes() + newton.factor().bytes();
     result.factorization = newton.factor().name();
     return result;

@@ -27,6 +27,7 @@ struct StaticsResult {
     double residual = 0.0;
     bool stable = false;
     Index unstable_directions = 0;
+    double linear_time = 0.0;  // [s] in factorizations and solves
     std::size_t bytes = 0;     // of the model and the factorization
     std::string factorization; // which
 };
