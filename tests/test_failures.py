@@ -129,7 +129,19 @@ def long_solve_in_a_slow_field(progress):
     )
 
 
-@pytest.mark.parametrize("solve", [long_solve, long_solve_in_a_slow_field])
+def long_solve_with_a_slow_progress(progress):
+    def slow(*arguments):
+        progress(*arguments)
+        time.sleep(0.05)
+
+    long_solve(slow)
+
+
+@pytest.mark.parametrize(
+    "solve",
+    [long_solve, long_solve_in_a_slow_field, long_solve_with_a_slow_progress],
+    ids=lambda f: f.__name__,
+)
 def test_ctrl_c_hands_back_the_last_good_state(solve):
     pressed = []
 

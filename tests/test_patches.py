@@ -179,3 +179,58 @@ def test_a_magnetized_strip_is_a_strip_under_its_edge_load():
     )
     assert np.abs(loaded.displacements).max() > 0.03
     assert np.abs(magnetized.positions - loaded.positions).max() < 1e-9 * mesh.size
+
+
+# Loads
+
+
+@pytest.mark.parametrize("bending", ["midedge", "hinge"])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_a_couple_bends_a_strip_to_a_circle_about_its_axis(bending, flipped):
+    """Small: tip height C L^2 / (2 D). A vector turns as the right hand does, whatever the normals."""
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    mesh = mesh.flipped() if flipped else mesh
+    shell = ms.Shell(mesh, thickness=THICKNESS, young_modulus=YOUNG, poisson_ratio=0.0, bending=bending)
+    stiffness = YOUNG * THICKNESS**3 / 12.0
+    couple = 1e-3 * stiffness / 0.1  # N: bends the strip by a thousandth of a radian
+    clamp = ms.Clamp(mesh.edges_at(x=0.0))
+    tip, ends = mesh.vertices_at(x=0.1), mesh.edges_at(x=0.1)
+    heights = []
+    for given in ((0.0, -couple, 0.0), -couple if flipped else couple):
+        found = ms.equilibrium(ms.Scene(shell, supports=[clamp], loads=[ms.EdgeCouple(ends, given)]))
+        heights.append(found.displacements[tip, 2].mean())
+    exact = couple * 0.1**2 / (2.0 * stiffness)
+    assert heights[0] == pytest.approx(exact, rel=2e-2 if bending == "midedge" else 6e-2)
+    assert abs(heights[1]) == pytest.approx(heights[0], rel=1e-9)
+
+
+def test_loads_are_what_they_say_in_total():
+    shell = sheet(mass_density=1e3)
+    mesh = shell.mesh
+    area, edges, force = 0.3 * 0.2, mesh.edges_at(x=0.3), np.array([1.0, -2.0, 3.0])
+    totals = {
+        "area": (ms.AreaLoad(force), force * area),
+        "two faces": (ms.AreaLoad(force, faces=[3, 8]), force * mesh.face_areas[[3, 8]].sum()),
+        "edge": (ms.EdgeLoad(edges, force), force * 0.2),
+        "points": (ms.PointLoad([0, 4, 7], force), 3.0 * force),
+    }
+    for load, expected in totals.values():
+        np.testing.assert_allclose(load.vertex_forces(mesh).sum(axis=0), expected, rtol=1e-12)
+    assert shell.vertex_masses.sum() == pytest.approx(1e3 * THICKNESS * area, rel=1e-12)
+    # Their potentials fall by force times way.
+    scene = ms.Scene(
+        shell, loads=[load for load, _ in totals.values()], gravity=(0, 0, -9.81), allow_rigid_motions=True
+    )
+    problem = Problem(scene, Controls(load=1.0, gravity=1.0))
+    way = np.array([0.1, 0.2, -0.3])
+    before, after = (
+        problem.model.energies(
+            problem.model.state(mesh.rest_positions + shift, np.zeros(mesh.n_edges)), problem.controls
+        )
+        for shift in (np.zeros(3), way)
+    )
+    work = sum(expected @ way for _, expected in totals.values())
+    assert before["loads"] - after["loads"] == pytest.approx(work, rel=1e-10)
+    assert before["gravity"] - after["gravity"] == pytest.approx(
+        shell.vertex_masses.sum() * 9.81 * 0.3, rel=1e-10
+    )

@@ -2,6 +2,7 @@
 #include "magshell/solve/continuation.h"
 
 #include "bindings/arrays.h"
+#include "bindings/call_python.h"
 #include "bindings/watch.h"
 
 namespace magshell::bindings {
@@ -14,7 +15,7 @@ PathResult follow(Model& model, const VectorXd& start, const Controls& from, con
     if (!until.is_none())
         ends = [&](const PathPoint& point) {
             const py::gil_scoped_acquire locked;
-            return until(point.parameter, model.positions(point.state)).cast<bool>();
+            return call_python(until, point.parameter, model.positions(point.state)).cast<bool>();
         };
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bindings/bindings.h"
+#include "bindings/call_python.h"
 #include "magshell/core/errors.h"
 #include "magshell/field/dipoles.h"
 #include "magshell/field/sampled_field.h"
@@ -58,7 +58,7 @@ class PythonField final : public AppliedField {
                      FieldSamples& out) const override {
         if (points.empty()) return;
         const py::gil_scoped_acquire gil;
-        const py::tuple samples = sampler_(from_vectors(points), from_vectors(moments), order);
+        const py::tuple samples = call_python(sampler_, from_vectors(points), from_vectors(moments), order);
         if (samples.size() != static_cast<std::size_t>(order) + 1) {
             throw InvalidInput(
                 "a Python field must return one array for each of flux, gradient and curvature");

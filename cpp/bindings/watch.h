@@ -3,8 +3,7 @@
 
 #include <chrono>
 
-#include "bindings/bindings.h"
-#include "magshell/core/errors.h"
+#include "bindings/call_python.h"
 
 namespace magshell::bindings {
 
@@ -23,7 +22,7 @@ class Watch {
             PyErr_Clear();
             throw Interrupted();
         }
-        if (!progress_.is_none()) progress_(progress, residual);
+        if (!progress_.is_none()) call_python(progress_, progress, residual);
     }
 
   private:

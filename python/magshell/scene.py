@@ -33,7 +33,7 @@ class Scene:
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5)
     >>> ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField()).n_unknowns
-    158
+    160
     """
 
     def __init__(

@@ -26,7 +26,7 @@ class Shell:
 
     >>> import magshell as ms
     >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)
-    Shell(40 faces, thickness 0.001 m, young_modulus 1e+05 Pa, poisson_ratio 0.5, bending midedge)
+    Shell(40 faces, thickness 0.001 m, young_modulus 100000 Pa, poisson_ratio 0.5, bending midedge)
     """
 
     def __init__(
