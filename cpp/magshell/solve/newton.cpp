@@ -20,6 +20,11 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
     return scale > 0.0 ? length / scale : length > 0.0 ? 1.0 : 0.0;
 }
 
+// An iteration that will converge does so with few unstable directions, and from its sixth step on with steps that shrink.
+constexpr Index most_new_negative_pivots = 10;
+constexpr int settling_iterations = 6;
+constexpr double shrinking = 0.7;
+
 // Adds the time it lives to a sum.
 class Stopwatch {
   public:
@@ -108,35 +113,39 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
     VectorXd move = model_.reduction().prescribed_increment(q, controls.motion);
     bool extrapolated = false;
     double last_step = 0.0;
+    Index first_negative_pivots = 0;
+    const auto fail = [&](std::string reason) {
+        report.reason = std::move(reason);
+        return report;
+    };
     model_.evaluate(q, controls);
     for (;; ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);
         watch(report.residual);
-        if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent()) {
-            report.reason = "the iteration diverged";
-            return report;
-        }
+        if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent()) return fail("the iteration diverged");
         const bool in_place = move.isZero(0.0);
         if (in_place && report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent()) {
             report.converged = true;
             return report;
         }
-        if (report.iterations == max_iterations) {
-            report.reason = "no convergence in " + std::to_string(max_iterations) + " iterations";
-            return report;
-        }
+        if (report.iterations == max_iterations)
+            return fail("no convergence in " + std::to_string(max_iterations) + " iterations");
         Eigen::MatrixXd pull = move;
         const FactorReport factor = factorize(q, controls, options_.mixed && extrapolated, anchor, pull);
         report.negative_pivots = factor.negative_pivots;
-        if (!factor.succeeded) {
-            report.reason = factor.reason;
-            return report;
-        }
+        if (!factor.succeeded) return fail(factor.reason);
+        if (report.iterations == 0) first_negative_pivots = factor.negative_pivots;
+        report.lost = factor.negative_pivots > first_negative_pivots + most_new_negative_pivots;
+        if (options_.mixed && report.lost) return fail("the iteration lost its way");
         const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0));
         move.setZero();
+        const double length = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
+        if (options_.mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
+            length > 1e-3 * model_.extent())
+            return fail("the steps of the iteration do not get shorter");
         if (options_.mixed) model_.extrapolate(step);
         extrapolated = true;
-        last_step = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
+        last_step = length;
         q += step;
         model_.evaluate(q, controls);
     }

@@ -30,6 +30,7 @@ struct NewtonReport {
     int iterations = 0;
     double residual = 0.0;
     Index negative_pivots = 0;  // of the last matrix factorized
+    bool lost = false;          // far from any solution: a step half as long will hardly do
     std::string reason;         // why not converged
 };
 

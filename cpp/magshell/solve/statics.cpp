@@ -9,6 +9,7 @@ namespace magshell {
 namespace {
 
 constexpr int quick_iterations = 8;  // a load step that converged in so many is followed by one twice as long
+constexpr double forgetting = 1.2;   // of a step that failed, with every one that did not
 
 class Statics {
   public:
@@ -23,7 +24,7 @@ class Statics {
 
   private:
     bool load() {
-        double step = options_.first_step;
+        double step = options_.first_step, failed_step = 2.0;
         while (result_.progress < 1.0) {
             const double target = std::min(1.0, result_.progress + step);
             const Controls controls = interpolate(from_, to_, target);
@@ -31,11 +32,13 @@ class Statics {
             const NewtonReport report = newton_.solve(trial, controls);
             if (report.converged) {
                 accept(trial, controls, target, report.residual);
-                if (report.iterations <= quick_iterations) step *= 2.0;
+                if (report.iterations <= quick_iterations) step = std::min(2.0 * step, 0.75 * failed_step);
+                failed_step *= forgetting;
                 continue;
             }
             result_.reason = report.reason;
-            step = 0.5 * (target - result_.progress);
+            failed_step = target - result_.progress;
+            step = (report.lost ? 0.25 : 0.5) * failed_step;
             if (step < options_.smallest_step || !options_.start_at_rest) return descend(result_.state);
         }
         return check_stability();
