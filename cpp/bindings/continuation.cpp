@@ -8,7 +8,7 @@
 namespace magshell::bindings {
 namespace {
 
-PathResult follow(Model& model, const VectorXd& start, const Controls& from, const Controls& to,
+PathResult follow(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from, const Controls& to,
                   const PathOptions& options, const py::object& until, const py::object& progress) {
     const Watch watch(progress);
     Until ends;
@@ -19,7 +19,7 @@ PathResult follow(Model& model, const VectorXd& start, const Controls& from, con
         };
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
-    return follow_path(model, start, from, to, options, ends, [&](double at, double residual) { watch(at, residual); });
+    return follow_path(model, start, memory, from, to, options, ends, [&](double at, double residual) { watch(at, residual); });
 }
 
 }  // namespace
@@ -38,6 +38,7 @@ void register_continuation(py::module_& module) {
     py::class_<PathPoint>(module, "PathPoint")
         .def_readonly("state", &PathPoint::state)
         .def_readonly("parameter", &PathPoint::parameter)
+        .def_readonly("memory", &PathPoint::memory)
         .def_readonly("unstable_directions", &PathPoint::unstable_directions);
 
     py::enum_<CriticalKind>(module, "CriticalKind")
@@ -59,7 +60,7 @@ void register_continuation(py::module_& module) {
         .def_readonly("factorizations", &PathResult::factorizations)
         .def_readonly("failed_factorizations", &PathResult::failed_factorizations);
 
-    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("from"), py::arg("to"),
+    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from"), py::arg("to"),
                py::arg("options"), py::arg("until") = py::none(), py::arg("progress") = py::none());
 }
 

@@ -7,12 +7,12 @@
 namespace magshell::bindings {
 namespace {
 
-StaticsResult solve(Model& model, const VectorXd& start, const Controls& from, const Controls& to,
+StaticsResult solve(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from, const Controls& to,
                     const StaticsOptions& options, const py::object& progress) {
     const Watch watch(progress);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
-    return find_equilibrium(model, start, from, to, options,
+    return find_equilibrium(model, start, memory, from, to, options,
                             [&](double at, double residual) { watch(at, residual); });
 }
 
@@ -42,6 +42,7 @@ void register_statics(py::module_& module) {
     py::class_<StaticsResult>(module, "StaticsResult")
         .def_readonly("outcome", &StaticsResult::outcome)
         .def_readonly("state", &StaticsResult::state)
+        .def_readonly("memory", &StaticsResult::memory)
         .def_readonly("controls", &StaticsResult::controls)
         .def_readonly("progress", &StaticsResult::progress)
         .def_readonly("reason", &StaticsResult::reason)
@@ -58,7 +59,7 @@ void register_statics(py::module_& module) {
         .def_readonly("bytes", &StaticsResult::bytes)
         .def_readonly("factorization", &StaticsResult::factorization);
 
-    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("from"), py::arg("to"),
+    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from"), py::arg("to"),
                py::arg("options"), py::arg("progress") = py::none());
 }
 

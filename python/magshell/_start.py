@@ -13,21 +13,21 @@ from .scene import Scene
 
 
 def starting_point(scene: Scene, start, inputs: Inputs):
-    """State, controls at which it holds, and whether it is an equilibrium there."""
+    """State, the core's memory of it, controls at which it holds, and whether it is an equilibrium there."""
     model = scene._model
     if start is None:
-        return model.rest_state(), _core.Controls(), True
+        return model.rest_state(), [], _core.Controls(), True
     if isinstance(start, Equilibrium):
         if start.scene is not scene:
             raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
         same = np.array_equal(start._magnetization, inputs.magnetization)
-        return start._state, start._controls, same
+        return start._state, start._memory, start._controls, same
     positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
     n_v = scene.mesh.n_vertices
     if len(positions) != n_v:
         raise ValueError(f"start [m] must have shape (n_v, 3) = ({n_v}, 3), got {positions.shape}")
     _check_faces(scene.mesh, positions)
-    return model.state(positions, np.zeros(scene.mesh.n_edges)), inputs.controls, False
+    return model.state(positions, np.zeros(scene.mesh.n_edges)), [], inputs.controls, False
 
 
 def _check_faces(mesh, positions: np.ndarray) -> None:

@@ -42,6 +42,7 @@ class Equilibrium:
     memory: int
     factorization: str
     _state: np.ndarray = field(repr=False)
+    _memory: list = field(repr=False)
     _controls: Any = field(repr=False)
     _magnetization: Any = field(repr=False)
 

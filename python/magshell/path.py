@@ -56,7 +56,7 @@ class Path:
     failed_factorizations: int
     wall_time: float
     reason: str
-    _states: list = field(repr=False)
+    _points: list = field(repr=False)
     _inputs: Inputs = field(repr=False)
     _from: Any = field(repr=False)
     _to: Any = field(repr=False)
@@ -66,7 +66,8 @@ class Path:
         controls = self._from.towards(self._to, self.parameters[index])
         options = MixedNewton()._options()
         options.require_stable = False
-        return solve(self._inputs, self._states[index], controls, controls, options)
+        point = self._points[index]
+        return solve(self._inputs, point.state, point.memory, controls, controls, options)
 
     @property
     def stable(self) -> np.ndarray:
@@ -149,7 +150,7 @@ def follow(
         field_factor=field_factor,
         motion_factor=motion_factor,
     )
-    state, from_, at_rest = starting_point(scene, start, inputs)
+    state, memory, from_, at_rest = starting_point(scene, start, inputs)
     if not at_rest:
         raise ValueError("start must have the same remanent_magnetization as the path")
     options = _core.PathOptions()
@@ -161,7 +162,9 @@ def follow(
     began = time.perf_counter()
     bar_options = {"total": 1.0, "desc": "path", "delay": 2.0, "disable": not progress, "bar_format": _BAR}
     with inputs.in_core(), tqdm(**bar_options) as bar:
-        found = _core.follow_path(scene._model, state, from_, inputs.controls, options, until, _advance(bar))
+        found = _core.follow_path(
+            scene._model, state, memory, from_, inputs.controls, options, until, _advance(bar)
+        )
     path = _path(inputs, found, from_, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {len(path)} points of the path", path)
@@ -188,12 +191,12 @@ def _advance(bar):
 def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
     scene = inputs.scene
     model = scene._model
-    states = [point.state for point in found.points]
+    points = found.points
     return Path(
         scene=scene,
-        parameters=np.array([point.parameter for point in found.points]),
-        positions=np.array([model.positions(state) for state in states]).reshape(-1, scene.mesh.n_vertices, 3),
-        unstable_directions=np.array([point.unstable_directions for point in found.points], dtype=int),
+        parameters=np.array([point.parameter for point in points]),
+        positions=np.array([model.positions(point.state) for point in points]).reshape(-1, scene.mesh.n_vertices, 3),
+        unstable_directions=np.array([point.unstable_directions for point in points], dtype=int),
         critical=tuple(_critical(model, point) for point in found.critical),
         remanent_magnetization=inputs.given_magnetization,
         iterations=found.iterations,
@@ -201,7 +204,7 @@ def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
         failed_factorizations=found.failed_factorizations,
         wall_time=wall_time,
         reason=found.reason,
-        _states=states,
+        _points=points,
         _inputs=inputs,
         _from=from_,
         _to=inputs.controls,

@@ -71,20 +71,20 @@ def equilibrium(
         field_factor=field_factor,
         motion_factor=motion_factor,
     )
-    state, from_, at_rest = starting_point(scene, start, inputs)
+    state, memory, from_, at_rest = starting_point(scene, start, inputs)
     options = solver._options()
     options.require_stable = require_stable
     options.start_at_rest = at_rest
 
-    return solve(inputs, state, from_, inputs.controls, options, progress)
+    return solve(inputs, state, memory, from_, inputs.controls, options, progress)
 
 
-def solve(inputs: Inputs, state: np.ndarray, from_, to, options, progress=None) -> Equilibrium:
+def solve(inputs: Inputs, state: np.ndarray, memory: list, from_, to, options, progress=None) -> Equilibrium:
     """The core's search for an equilibrium at the controls `to`, from a state at `from_`."""
     scene = inputs.scene
     began = time.perf_counter()
     with inputs.in_core():
-        found = _core.find_equilibrium(scene._model, state, from_, to, options, progress)
+        found = _core.find_equilibrium(scene._model, state, memory, from_, to, options, progress)
         result = _result(scene, inputs, found, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
@@ -117,6 +117,7 @@ def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibriu
         memory=found.bytes,
         factorization=found.factorization,
         _state=found.state,
+        _memory=found.memory,
         _controls=found.controls,
         _magnetization=inputs.magnetization,
     )

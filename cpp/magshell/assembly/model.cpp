@@ -210,6 +210,17 @@ VectorXd Model::gradient_rate(const VectorXd& q, const Controls& rate) {
     return change.gradient;
 }
 
+Model::Memory Model::memory() const {
+    Memory memory;
+    for (const std::unique_ptr<Term>& term : terms_) memory.push_back(term->memory());
+    return memory;
+}
+
+void Model::set_memory(const Memory& memory) {
+    for (std::size_t k = 0; k < terms_.size(); ++k)
+        terms_[k]->set_memory(memory.empty() ? std::vector<double>(terms_[k]->memory().size(), 0.0) : memory[k]);
+}
+
 std::size_t Model::bytes() const {
     std::size_t total = matrix_.bytes() + reduction_.bytes() + schedule_.bytes() + faces_.bytes();
     for (const std::unique_ptr<Term>& term : terms_) total += term->bytes();

@@ -78,6 +78,11 @@ class Model {
     /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in them.
     VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
 
+    /// What the terms remember of how the state was reached. An empty memory is that of the rest state.
+    using Memory = std::vector<std::vector<double>>;
+    Memory memory() const;
+    void set_memory(const Memory& memory);
+
     std::size_t bytes() const;
     std::mutex& in_use() { return in_use_; }
 

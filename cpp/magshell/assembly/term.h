@@ -56,6 +56,11 @@ class Term {
     /// Adds the magnitude of forces that cancel inside the strains themselves, as for |a|^2 - |a~|^2 at rest.
     virtual void add_cancelling_forces(VectorXd& /*out*/) const {}
 
+    /// What the term must know of how its state was reached, such as full turns; a solve that rejects a state puts back
+    /// what it was.
+    virtual std::vector<double> memory() const { return {}; }
+    virtual void set_memory(const std::vector<double>&) {}
+
     virtual std::size_t bytes() const = 0;
 };
 

@@ -37,9 +37,10 @@ class Follower {
     }
 
     bool run(const VectorXd& start) {
-        PathPoint here{start, 0.0, 0};
+        PathPoint here{start, 0.0, {}, 0};
         const NewtonReport at_rest = newton_.solve(here.state, from_);
         if (!at_rest.converged) return fail("the start is not an equilibrium: " + at_rest.reason);
+        here.memory = model_.memory();
         Tangent tangent;
         if (!find_tangent(here, tangent)) return fail("the tangent does not exist at the start");
         const double moved = length(tangent.state);
@@ -104,6 +105,7 @@ class Follower {
     // From a point along its tangent; the model's last evaluated state must be that point. False: no convergence.
     bool correct(const PathPoint& base, const Tangent& along, double step, PathPoint& found, int& iterations) {
         VectorXd q = base.state;
+        model_.set_memory(base.memory);
         double parameter = base.parameter + step * along.parameter;
         VectorXd increment = step * along.state;
         for (iterations = 0;; ++iterations, newton_.count_iteration()) {
@@ -116,7 +118,7 @@ class Follower {
             const VectorXd gap = model_.reduction().prescribed_increment(q, at.motion);
             const bool in_place = gap.lpNorm<Eigen::Infinity>() <= 1e-14 * model_.extent();
             if (in_place && residual <= newton_.options().tolerance) {
-                found = {q, parameter, 0};
+                found = {q, parameter, model_.memory(), 0};
                 return true;
             }
             if (!std::isfinite(residual) || iterations == corrector_iterations) return false;
@@ -153,6 +155,7 @@ class Follower {
             if (turn < smallest_turn_cosine) continue;
             if (options_.locate_critical && next.unstable_directions != base.unstable_directions)
                 locate({0.0, base}, {step_, next}, tangent);
+            model_.set_memory(next.memory);
             model_.evaluate(next.state, controls(next.parameter));
             result_.points.push_back(std::move(next));
             tangent = std::move(there);
@@ -246,8 +249,9 @@ class Follower {
 
 }  // namespace
 
-PathResult follow_path(Model& model, const VectorXd& start, const Controls& from, const Controls& to,
-                       const PathOptions& options, const Until& until, const StaticsWatch& watch) {
+PathResult follow_path(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
+                       const Controls& to, const PathOptions& options, const Until& until, const StaticsWatch& watch) {
+    model.set_memory(memory);
     PathResult result;
     Newton newton(model, options.newton, [&](double residual) {
         if (watch) watch(result.points.empty() ? 0.0 : result.points.back().parameter, residual);

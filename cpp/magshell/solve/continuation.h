@@ -28,6 +28,7 @@ struct PathOptions {
 struct PathPoint {
     VectorXd state;
     double parameter = 0.0;
+    Model::Memory memory;
     Index unstable_directions = 0;
 };
 
@@ -52,7 +53,7 @@ struct PathResult {
 using Until = std::function<bool(const PathPoint&)>;
 
 /// From an equilibrium at `from`, following the controls towards `to`.
-PathResult follow_path(Model& model, const VectorXd& start, const Controls& from, const Controls& to,
+PathResult follow_path(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from, const Controls& to,
                        const PathOptions& options, const Until& until, const StaticsWatch& watch = {});
 
 }  // namespace magshell

@@ -73,8 +73,12 @@ class Relaxation {
 
     bool finish() {
         VectorXd trial = q_;
+        const Model::Memory memory = model_.memory();
         const NewtonReport report = newton_.solve(trial, controls_);
-        if (!report.converged || !lowers(model_.energy(trial, controls_))) return false;
+        if (!report.converged || !lowers(model_.energy(trial, controls_))) {
+            model_.set_memory(memory);
+            return false;
+        }
         report_.residual = report.residual;
         q_ = trial;
         return true;
@@ -83,11 +87,15 @@ class Relaxation {
     bool step() {
         const VectorXd anchor = q_;
         VectorXd trial = q_;
+        const Model::Memory memory = model_.memory();
         const NewtonReport report = newton_.solve(trial, controls_, {rate_, &anchor}, iterations_a_step);
-        if (!report.converged) return false;
         const VectorXd moved = trial - anchor;
-        const double energy = model_.energy(trial, controls_);
-        if (!lowers(energy + 0.5 * rate_ * moved.dot(model_.metric().cwiseProduct(moved)))) return false;
+        const double energy = report.converged ? model_.energy(trial, controls_) : 0.0;
+        const double pull = 0.5 * rate_ * moved.dot(model_.metric().cwiseProduct(moved));
+        if (!report.converged || !lowers(energy + pull)) {
+            model_.set_memory(memory);
+            return false;
+        }
         q_ = trial;
         energy_ = energy;
         last_move_ = moved.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();

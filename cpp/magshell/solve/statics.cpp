@@ -36,6 +36,7 @@ class Statics {
                 failed_step *= forgetting;
                 continue;
             }
+            newton_.model().set_memory(result_.memory);
             result_.reason = report.reason;
             failed_step = target - result_.progress;
             step = (report.lost ? 0.25 : 0.5) * failed_step;
@@ -46,6 +47,7 @@ class Statics {
 
     void accept(const VectorXd& state, const Controls& controls, double progress, double residual) {
         result_.state = state;
+        result_.memory = newton_.model().memory();
         result_.controls = controls;
         result_.progress = progress;
         result_.residual = residual;
@@ -66,6 +68,7 @@ class Statics {
         result_.relaxation_steps += report.steps;
         result_.saddles_left += report.saddles_left;
         if (!report.converged) {
+            newton_.model().set_memory(result_.memory);
             result_.reason = report.reason;
             return false;
         }
@@ -83,10 +86,12 @@ class Statics {
 
 }  // namespace
 
-StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Controls& from, const Controls& to,
-                               const StaticsOptions& options, const StaticsWatch& watch) {
+StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
+                               const Controls& to, const StaticsOptions& options, const StaticsWatch& watch) {
+    model.set_memory(memory);
     StaticsResult result;
     result.state = start;
+    result.memory = memory;
     result.controls = from;
     Newton newton(model, options.newton, [&](double residual) {
         if (watch) watch(result.progress, residual);
@@ -95,6 +100,7 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Contro
         Statics statics(newton, from, to, options, result);
         result.outcome = statics.run() ? Outcome::converged : Outcome::failed;
     } catch (const Interrupted&) {
+        model.set_memory(result.memory);
         result.outcome = Outcome::interrupted;
         result.reason = "interrupted";
     }
