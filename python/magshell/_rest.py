@@ -34,9 +34,13 @@ class RestStiffness:
         return self._factor.solve(forces)
 
     def response(self, inputs: Inputs) -> np.ndarray:
-        """u (n,) = dq/dc at rest: K u = -(g(c) - g(0)), exact in c where the controls enter the energy linearly."""
-        gradient = self._model.gradient(self.rest, inputs.controls) - self._model.gradient(self.rest, _core.Controls())
-        return self.solve(-self._model.reduce(gradient))
+        """du of all unknowns, held ones included: K du = -(g(c) - g(0)) - K dm, where dm moves what supports move."""
+        model, unloaded = self._model, _core.Controls()
+        moved = model.prescribed_rate(self.rest, 0.0) * inputs.controls.motion
+        forces = model.gradient(self.rest, unloaded) - model.gradient(self.rest, inputs.controls)
+        if moved.any():
+            forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved
+        return moved + model.expand(self.solve(model.reduce(forces)))
 
 
 def symmetric(size: int, starts: np.ndarray, rows: np.ndarray, values: np.ndarray) -> csc_array:

@@ -46,6 +46,7 @@ def linear_buckling(
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
+    motion_factor: float = 1.0,
     modes: int = 1,
 ) -> Buckling:
     """The smallest positive multiples of the controls at which a scene buckles, by linear pre-buckling theory.
@@ -81,6 +82,7 @@ def linear_buckling(
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,
+        motion_factor=motion_factor,
     )
     began = time.perf_counter()
     inputs.magnetize()
@@ -88,7 +90,7 @@ def linear_buckling(
     if modes >= model.free_size:
         raise ValueError(f"modes must be below the {model.free_size} unknowns of the scene, got {modes}")
     stiffness = RestStiffness(scene)
-    response = model.expand(stiffness.response(inputs))
+    response = stiffness.response(inputs)
     displacement = float(np.abs(model.positions(response)).max())
     change = _stiffness_change(scene, stiffness, response, displacement, inputs)
     factors, vectors = _lowest(stiffness, change, modes)

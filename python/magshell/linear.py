@@ -16,7 +16,7 @@ from .scene import Scene
 
 @dataclass(frozen=True, repr=False)
 class LinearResponse:
-    """What linear theory says of a scene: the deflection in proportion to the loads. Not an equilibrium.
+    """What linear theory says of a scene: the deflection in proportion to the controls. Not an equilibrium.
 
     displacements: (n_v, 3) m, from the rest shape; edge_rotations: (n_e,) rad, zero where an edge has none.
     factorizations: one.
@@ -49,11 +49,12 @@ def linear_response(
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
+    motion_factor: float = 1.0,
 ) -> LinearResponse:
     """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
 
     The stiffness is that of the unloaded sheet: loads and fields act as the forces they are at rest, without the
-    stiffness they add. Supports stay where they are at rest. Controls as in ms.equilibrium.
+    stiffness they add; supports that move do so at the rate they start with. Controls as in ms.equilibrium.
 
     Raises ValueError on bad input, and where the supports leave the sheet a motion without stiffness.
 
@@ -73,11 +74,12 @@ def linear_response(
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,
+        motion_factor=motion_factor,
     )
     began = time.perf_counter()
     inputs.magnetize()
     model = scene._model
-    change = model.expand(RestStiffness(scene).response(inputs))
+    change = RestStiffness(scene).response(inputs)
     return LinearResponse(
         scene=scene,
         displacements=like(model.positions(change), *inputs.given),

@@ -37,12 +37,14 @@ def radial_displacements(mesh: ms.TriangleMesh, displacements: np.ndarray) -> tu
 
 
 def large_deflection(cells: tuple[int, int] = (64, 16), bending: str = "midedge") -> Outcome:
-    """A4: at the full load of 400, in one solve from rest.
+    """A4: at the full load of 400, in one call from rest.
+
+    The first load step is short: all at once, the iteration can end at a saddle, with a wrinkle beside the pushed point.
 
     References: Sze, Liu, Lo, Finite Elem. Anal. Des. 40 (2004) 1551, Abaqus S4R: 4.067 outwards, 8.178 inwards.
     """
     mesh = quarter(cells)
-    state = ms.equilibrium(scene(mesh, bending, force=400.0))
+    state = ms.equilibrium(scene(mesh, bending, force=400.0), solver=ms.MixedNewton(first_load_step=0.05))
     pulled, pushed = radial_displacements(mesh, state.displacements)
     comparisons = [
         Comparison("U, pulled", pulled, 4.067, allowed=0.015),
@@ -51,19 +53,19 @@ def large_deflection(cells: tuple[int, int] = (64, 16), bending: str = "midedge"
     return outcome(f"{cells[0]}x{cells[1]}", mesh, comparisons, [state])
 
 
-def small_deflection(cells: tuple[int, int] = (64, 16), bending: str = "midedge") -> Outcome:
-    """B3: the radial displacement under forces of 2 to first order, with the hole of 18 degrees and without.
+def small_deflection(cells: tuple[int, int] = (128, 32), bending: str = "midedge") -> Outcome:
+    """B3: the radial displacement under forces of 2 to first order, with the hole and without.
 
-    References: 0.0924 without a hole; with it both 0.093 and MacNeal and Harder's 0.094 are in use, so the mean.
+    References: FinEtools (0.0924 without the hole, 0.093 with a slightly larger one), MacNeal and Harder (0.094).
     """
     meshes = quarter(cells), quarter(cells, hole=0.0)
     responses = [ms.linear_response(scene(mesh, bending, force=2.0)) for mesh in meshes]
-    found = [
+    hole, closed = (
         np.mean(radial_displacements(mesh, response.displacements))
         for mesh, response in zip(meshes, responses, strict=True)
-    ]
+    )
     comparisons = [
-        Comparison("u, hole", found[0], 0.0935, allowed=0.01),
-        Comparison("u, closed", found[1], 0.0924, allowed=0.01),
+        Comparison("u, hole", [hole, hole], [0.093, 0.094], at=("FinEtools", "MacNeal-Harder"), allowed=0.01),
+        Comparison("u, closed", closed, 0.0924, allowed=0.01),
     ]
     return outcome(f"{cells[0]}x{cells[1]}", meshes[0], comparisons, responses)
