@@ -8,13 +8,13 @@ from typing import Any
 
 from .buckling_loads import columns, plate
 from .cylinder_roof import snap_through
-from .end_moment import end_moment
-from .end_shear import end_shear
 from .hemisphere import large_deflection, small_deflection
 from .linear_cylinders import pinched_cylinder, scordelis_lo
 from .magnetic_strip import field_across, field_against, magnetic_end_shear
 from .outcome import Comparison, Outcome
 from .plates import circular_plate, square_plate
+from .rolled_strip import end_moment
+from .shear_strip import end_shear
 
 
 @dataclass(frozen=True)

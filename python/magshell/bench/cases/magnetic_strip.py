@@ -8,7 +8,7 @@ import numpy as np
 
 import magshell as ms
 
-from . import end_shear
+from . import shear_strip
 from .outcome import Comparison, Outcome, outcome, sweep, tip
 
 LENGTH, WIDTH, YOUNG_MODULUS, MAGNETIZATION = 0.1, 0.01, 1e6, 1e5
@@ -100,15 +100,15 @@ def magnetic_end_shear(cells: tuple[int, int] = (40, 4), bending: str = "midedge
     For a tangential uniform M and a uniform B the magnetic energy is the work of the dead traction h (M . nu) B on the
     boundary (divergence theorem), nu its outward normal: here the end load P = h w M B.
     """
-    mesh = end_shear.irregular_strip(cells, seed)
-    sheet = end_shear.shell(mesh, bending)
+    mesh = shear_strip.irregular_strip(cells, seed)
+    sheet = shear_strip.shell(mesh, bending)
     strip = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
-    flux_density = end_shear.FULL_LOAD / (end_shear.THICKNESS * end_shear.WIDTH * MAGNETIZATION)
+    flux_density = shear_strip.FULL_LOAD / (shear_strip.THICKNESS * shear_strip.WIDTH * MAGNETIZATION)
     magnetic = ms.equilibrium(
         strip, remanent_magnetization=(MAGNETIZATION, 0, 0), applied_flux_density=(0, 0, flux_density)
     )
-    loaded = ms.equilibrium(end_shear.scene(mesh, bending))
-    ends = [tip(mesh, state.displacements, x=end_shear.LENGTH) for state in (magnetic, loaded)]
+    loaded = ms.equilibrium(shear_strip.scene(mesh, bending))
+    ends = [tip(mesh, state.displacements, x=shear_strip.LENGTH) for state in (magnetic, loaded)]
     comparisons = [
         Comparison(f"{name}, field = force", ends[0][axis], ends[1][axis], allowed=0.001)
         for name, axis in (("W", 2), ("U", 0))
