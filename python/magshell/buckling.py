@@ -85,14 +85,14 @@ def linear_buckling(
         motion_factor=motion_factor,
     )
     began = time.perf_counter()
-    inputs.magnetize()
     model = scene._model
     if modes >= model.free_size:
         raise ValueError(f"modes must be below the {model.free_size} unknowns of the scene, got {modes}")
-    stiffness = RestStiffness(scene)
-    response = stiffness.response(inputs)
-    displacement = float(np.abs(model.positions(response)).max())
-    change = _stiffness_change(scene, stiffness, response, displacement, inputs)
+    with inputs.in_core():
+        stiffness = RestStiffness(scene)
+        response = stiffness.response(inputs)
+        displacement = float(np.abs(model.positions(response)).max())
+        change = _stiffness_change(scene, stiffness, response, displacement, inputs)
     factors, vectors = _lowest(stiffness, change, modes)
     reached = factors * displacement < scene.mesh.size
     if not reached.any():
@@ -138,7 +138,9 @@ def _lowest(stiffness: RestStiffness, change: csc_array, count: int) -> tuple[np
     try:
         inverses, vectors = eigsh(-change, k=count, M=stiffness.matrix, Minv=inverse, which="LA", v0=start)
     except ArpackNoConvergence as error:
-        raise NotConverged(f"the buckling modes did not converge: {error}. Ask for more or fewer modes.") from error
+        raise NotConverged(
+            f"the buckling modes did not converge: {error}. Ask for more or fewer modes."
+        ) from error
     positive = inverses > 0.0
     factors = 1.0 / inverses[positive]
     order = np.argsort(factors)

@@ -77,9 +77,9 @@ def linear_response(
         motion_factor=motion_factor,
     )
     began = time.perf_counter()
-    inputs.magnetize()
     model = scene._model
-    change = RestStiffness(scene).response(inputs)
+    with inputs.in_core():
+        change = RestStiffness(scene).response(inputs)
     return LinearResponse(
         scene=scene,
         displacements=like(model.positions(change), *inputs.given),

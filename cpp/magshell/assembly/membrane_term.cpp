@@ -78,15 +78,12 @@ void MembraneTerm::add_cancelling_forces(VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const Membrane::Element& element = elements_[f / Pack::width];
         const int lane = f % Pack::width;
-        double coordinate = 0.0;
-        for (const Index corner : sheet_.corners[f])
-            coordinate = std::max(coordinate, sheet_.rest[corner].lpNorm<Eigen::Infinity>());
         for (int i = 0; i < 3; ++i) {
             double stress = 0.0;
             for (int j = 0; j < 3; ++j) {
                 const double squared_length = element.rest_squared_length[j][lane];
                 stress += std::abs(element.stiffness(i, j)[lane]) *
-                          (squared_length + 0.25 * std::sqrt(squared_length) * coordinate);
+                          (squared_length + 0.25 * std::sqrt(squared_length) * sheet_.largest_coordinate(f));
             }
             const double force = 2.0 * stress * std::sqrt(element.rest_squared_length[i][lane]);
             for (const int k : {(i + 1) % 3, (i + 2) % 3})

@@ -25,9 +25,15 @@ SINGLE_SOLVES: dict[str, tuple[Callable[[], Outcome], int]] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = [case.name for case in CASES]
-    parser.add_argument("--only", nargs="+", choices=names, metavar="CASE", help=f"some of {', '.join(names)}")
-    parser.add_argument("--coarse", action="store_true", help="coarse meshes: quick, and outside the allowed errors")
-    parser.add_argument("--figure", type=writable_path, metavar="PATH", help="draw the convergence there (matplotlib)")
+    parser.add_argument(
+        "--only", nargs="+", choices=names, metavar="CASE", help=f"some of {', '.join(names)}"
+    )
+    parser.add_argument(
+        "--coarse", action="store_true", help="coarse meshes: quick, and outside the allowed errors"
+    )
+    parser.add_argument(
+        "--figure", type=writable_path, metavar="PATH", help="draw the convergence there (matplotlib)"
+    )
 
 
 def run(options: argparse.Namespace) -> dict:
@@ -40,7 +46,7 @@ def run(options: argparse.Namespace) -> dict:
         results["single solves"] = _single_solves()
         meshes = COARSE_MESHES if options.coarse else MESHES
         studies = {
-            (name, bending): converge(study, bending, meshes) for name, study in STUDIES.items() for bending in BENDINGS
+            (name, bending): converge(name, bending, meshes) for name in STUDIES for bending in BENDINGS
         }
         results["convergence"] = _print_orders(studies)
         if options.figure:
@@ -87,7 +93,9 @@ def _print_cases(cases: list[Case], outcomes: dict) -> None:
             within += comparison.passes
     headings = ["case", "quantity", "mesh", "reference", "midedge", "hinge", "allowed"]
     headings += ["time", "factorizations", "time (hinge)", "factorizations (hinge)"]
-    print_table("Errors, the largest of each row; time and factorizations of all solves of a case", headings, rows)
+    print_table(
+        "Errors, the largest of each row; time and factorizations of all solves of a case", headings, rows
+    )
     print(f"\n{within} of {compared} rows within the allowed error (midedge).")
     for name, each in outcomes.items():
         for bending in BENDINGS:
@@ -136,9 +144,18 @@ def _print_orders(studies: dict[tuple[str, str], Convergence]) -> list[dict]:
             }
         )
     cells = ", ".join(str(n) for n in next(iter(studies.values())).cells)
-    headings = ["study", "bending", f"mean error at {cells} cells", "order", "of single meshes", "at least"]
+    headings = [
+        "study",
+        "bending",
+        f"mean error / L at {cells} cells",
+        "order",
+        "of single meshes",
+        "at least",
+    ]
     count = len(next(iter(studies.values())).errors)
-    print_table(f"Order of convergence on irregular meshes, of the mean error of {count} of each", headings, rows)
+    print_table(
+        f"Order of convergence on irregular meshes, of the mean error of {count} of each", headings, rows
+    )
     return plain
 
 
@@ -160,7 +177,8 @@ def _cost(run: Outcome | str) -> tuple[str, str]:
 def _plain(outcomes: dict[str, Outcome | str]) -> dict:
     """For JSON."""
     return {
-        bending: {"failed": run} if isinstance(run, str) else _plain_outcome(run) for bending, run in outcomes.items()
+        bending: {"failed": run} if isinstance(run, str) else _plain_outcome(run)
+        for bending, run in outcomes.items()
     }
 
 

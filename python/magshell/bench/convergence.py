@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cases import Outcome
+from .cases import Outcome, shear_strip
 from .cases.magnetic_strip import field_across
-from .cases.shear_strip import end_shear
 
 REQUIRED_ORDER = 1.8
 MESHES = ((20, 2), (40, 4), (80, 8))
@@ -18,22 +17,26 @@ SEEDS = (0, 1, 2)
 
 
 def _full_shear(cells, bending: str, seed: int) -> Outcome:
-    return end_shear(cells, bending, seed=seed, loads=(1.0,))
+    return shear_strip.end_shear(cells, bending, seed=seed, loads=(1.0,))
 
 
 def _strongest_field(cells, bending: str, seed: int) -> Outcome:
     return field_across(cells, bending, seed=seed, betas=(20.0,))
 
 
-STUDIES: dict[str, Callable[..., Outcome]] = {"A1, full load": _full_shear, "C1-90, beta 20": _strongest_field}
+# What to run, and the length of the strip in the unit of what it compares.
+STUDIES: dict[str, tuple[Callable[..., Outcome], float]] = {
+    "A1, full load": (_full_shear, shear_strip.LENGTH),
+    "C1-90, beta 20": (_strongest_field, 1.0),
+}
 
 
 @dataclass(frozen=True)
 class Convergence:
     """Errors of one study on finer and finer meshes.
 
-    cells: those along the strip, (m,); n_faces (m,). errors: (seeds, m), the distance of the end from its reference, in the
-    study's unit. times: (seeds, m), s.
+    cells: those along the strip, (m,); n_faces (m,). errors: (seeds, m), the distance of the end from its reference over
+    the length of the strip. times: (seeds, m), s.
     """
 
     cells: np.ndarray
@@ -57,19 +60,22 @@ class Convergence:
         return np.array([_slope(self.cells, errors) for errors in self.errors])
 
 
-def converge(study: Callable[..., Outcome], bending: str, meshes=MESHES, seeds=SEEDS) -> Convergence:
-    runs = [[study(cells, bending, seed) for cells in meshes] for seed in seeds]
+def converge(study: str, bending: str, meshes=MESHES, seeds=SEEDS) -> Convergence:
+    run, length = STUDIES[study]
+    outcomes = [[run(cells, bending, seed) for cells in meshes] for seed in seeds]
     return Convergence(
         cells=np.array([cells[0] for cells in meshes]),
-        n_faces=np.array([run.n_faces for run in runs[0]]),
-        errors=np.array([[_distance(run) for run in row] for row in runs]),
-        times=np.array([[run.time for run in row] for row in runs]),
+        n_faces=np.array([each.n_faces for each in outcomes[0]]),
+        errors=np.array([[_distance(each) / length for each in row] for row in outcomes]),
+        times=np.array([[each.time for each in row] for row in outcomes]),
     )
 
 
 def _distance(run: Outcome) -> float:
     """From the computed end of the strip to the exact one; its two components are the comparisons."""
-    return float(np.linalg.norm([comparison.computed[-1] - comparison.reference[-1] for comparison in run.comparisons]))
+    return float(
+        np.linalg.norm([comparison.computed[-1] - comparison.reference[-1] for comparison in run.comparisons])
+    )
 
 
 def _slope(cells: np.ndarray, errors: np.ndarray) -> float:

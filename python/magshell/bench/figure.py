@@ -13,7 +13,7 @@ def draw_convergence(studies: dict[tuple[str, str], Convergence], path: Path) ->
         from matplotlib.figure import Figure
     except ImportError as error:
         raise ImportError('drawing needs matplotlib: pip install "magshell[plot]"') from error
-    figure = Figure(figsize=(9.0, 4.0), layout="constrained")
+    figure = Figure(figsize=(9.0, 4.5), layout="constrained")
     by_faces, by_time = figure.subplots(1, 2, sharey=True)
     colours = {name: f"C{k}" for k, name in enumerate(dict.fromkeys(name for name, _ in studies))}
     for (name, bending), study in studies.items():
@@ -21,9 +21,9 @@ def draw_convergence(studies: dict[tuple[str, str], Convergence], path: Path) ->
         label = f"{name}, {bending}, order {study.order:.2f}"
         by_faces.loglog(study.n_faces, study.mean_errors, label=label, **style)
         by_time.loglog(study.times.mean(axis=0), study.mean_errors, **style)
-    by_faces.set(xlabel="faces", ylabel="error of the end / unit of the case")
+    by_faces.set(xlabel="faces", ylabel="error of the end / length of the strip")
     by_time.set(xlabel="time of one equilibrium from rest / s")
-    by_faces.legend(fontsize="small")
+    figure.legend(fontsize="small", ncols=2, loc="outside upper center")
     for axes in (by_faces, by_time):
         axes.grid(True, which="both", alpha=0.3)
     figure.savefig(path, dpi=150)

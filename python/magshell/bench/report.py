@@ -17,7 +17,10 @@ from magshell import _core
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--json", type=writable_path, metavar="PATH", help="write the numbers there, with machine and versions"
+        "--json",
+        type=writable_path,
+        metavar="PATH",
+        help="write the numbers there, with machine and versions",
     )
     parser.add_argument("--threads", type=int, default=1, help="threads of magshell's loops (default 1)")
 

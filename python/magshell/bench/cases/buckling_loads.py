@@ -11,7 +11,12 @@ from .outcome import Comparison, Outcome, outcome
 LENGTH, WIDTH, THICKNESS, YOUNG_MODULUS, POISSON_RATIO = 1.0, 0.1, 0.001, 1e9, 0.3
 
 # P L^2 / (EI), Euler; clamped and pinned: the square of the smallest root of tan x = x.
-COLUMNS = {"cantilever": np.pi**2 / 4, "pinned": np.pi**2, "clamped-pinned": 20.19072855642663, "clamped": 4 * np.pi**2}
+COLUMNS = {
+    "cantilever": np.pi**2 / 4,
+    "pinned": np.pi**2,
+    "clamped-pinned": 20.19072855642663,
+    "clamped": 4 * np.pi**2,
+}
 PLATE_FACTOR = 4.0  # k of N = k pi^2 D / b^2 for a simply supported square, pushed along one axis
 
 
@@ -50,7 +55,11 @@ def plate(cells: tuple[int, int] = (32, 32), bending: str = "midedge") -> Outcom
     )
     unit = np.pi**2 * YOUNG_MODULUS * THICKNESS**3 / (12.0 * (1.0 - POISSON_RATIO**2)) / LENGTH**2
     rim = np.unique(mesh.edges[mesh.boundary_edges])
-    supports = [ms.Pin(rim, "z"), ms.Pin(mesh.vertices_at(x=0.0), "x"), ms.Pin(mesh.vertices_at(x=0.0, y=0.0), "y")]
+    supports = [
+        ms.Pin(rim, "z"),
+        ms.Pin(mesh.vertices_at(x=0.0), "x"),
+        ms.Pin(mesh.vertices_at(x=0.0, y=0.0), "y"),
+    ]
     load = ms.EdgeLoad(mesh.edges_at(x=LENGTH), (-unit, 0, 0))
     found = ms.linear_buckling(ms.Scene(sheet, supports=supports, loads=[load]))
     comparison = Comparison("k", found.factors[0], PLATE_FACTOR, allowed=0.01)

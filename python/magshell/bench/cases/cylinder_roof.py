@@ -52,7 +52,9 @@ LOADS_AT = {
     28.663: 0.9643,
     29.374: 1.0835,
 }
-BEYOND = 1.2  # the path is followed towards this multiple of the full load, until the last deflection is passed
+BEYOND = (
+    1.2  # the path is followed towards this multiple of the full load, until the last deflection is passed
+)
 
 
 def quarter(cells: tuple[int, int]) -> ms.TriangleMesh:
@@ -74,7 +76,11 @@ def scene(mesh: ms.TriangleMesh, bending: str) -> ms.Scene:
 def snap_through(
     cells: tuple[int, int] = (16, 16), bending: str = "midedge", *, largest_step: float = 0.002
 ) -> Outcome:
-    """The load at each listed deflection, by arc length through both limit points."""
+    """The load at each listed deflection, by arc length through both limit points.
+
+    Finer meshes converge to loads up to 2.6 % of the full one beside these (at the last deflection), because S4R shears under
+    the point force and a Kirchhoff-Love sheet does not: an extra deflection of 0.155 mm P / Pmax explains all but 0.45 %.
+    """
     mesh = quarter(cells)
     centre = mesh.nearest_vertex((0, 0, RADIUS))
     deflections, references = np.array(list(LOADS_AT.items())).T

@@ -94,7 +94,9 @@ def _against_elastica(cells, bending: str, seed: int, references: dict, directio
     return outcome(f"irregular {cells[0]}x{cells[1]}", mesh, comparisons, states)
 
 
-def magnetic_end_shear(cells: tuple[int, int] = (40, 4), bending: str = "midedge", *, seed: int = 0) -> Outcome:
+def magnetic_end_shear(
+    cells: tuple[int, int] = (40, 4), bending: str = "midedge", *, seed: int = 0
+) -> Outcome:
     """C4: the strip of A1, magnetised along x in a field along z, deflects as under a dead force at its end.
 
     For a tangential uniform M and a uniform B the magnetic energy is the work of the dead traction h (M . nu) B on the

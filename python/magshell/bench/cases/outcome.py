@@ -18,7 +18,9 @@ class Comparison:
     allowed: how large a relative error may be; None where the case only informs.
     """
 
-    def __init__(self, quantity: str, computed, reference, *, at=None, scale=None, allowed: float | None = None):
+    def __init__(
+        self, quantity: str, computed, reference, *, at=None, scale=None, allowed: float | None = None
+    ):
         self.quantity = quantity
         self.computed = np.atleast_1d(np.asarray(computed, dtype=np.float64))
         self.reference = np.atleast_1d(np.asarray(reference, dtype=np.float64))
@@ -67,7 +69,9 @@ class Outcome:
         return all(comparison.passes for comparison in self.comparisons)
 
 
-def outcome(mesh_name: str, mesh: ms.TriangleMesh, comparisons: Iterable[Comparison], results: Iterable) -> Outcome:
+def outcome(
+    mesh_name: str, mesh: ms.TriangleMesh, comparisons: Iterable[Comparison], results: Iterable
+) -> Outcome:
     """An Outcome from what the solves handed back: Equilibrium, LinearResponse, Buckling or Path objects."""
     results = list(results)
     return Outcome(

@@ -49,7 +49,13 @@ def circular_plate(rings: int = 48, bending: str = "midedge") -> Outcome:
 
 
 def _middle_deflections(
-    mesh: ms.TriangleMesh, rim: np.ndarray, symmetry: list, parts: int, bending: str, references: dict, name: str
+    mesh: ms.TriangleMesh,
+    rim: np.ndarray,
+    symmetry: list,
+    parts: int,
+    bending: str,
+    references: dict,
+    name: str,
 ) -> Outcome:
     """`mesh` is one of `parts` equal parts of the plate, its middle at the origin."""
     sheet = ms.Shell(
