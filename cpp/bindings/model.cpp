@@ -123,6 +123,11 @@ void register_model(py::module_& module) {
         .def("edge_rotations", &Model::edge_rotations)
         .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })
         .def("reduce", [](const Model& m, const VectorXd& full) { return m.reduction().vector(full); })
+        .def("prescribed_rate",
+             [](const Model& m, const VectorXd& q, double progress) {
+                 return m.reduction().prescribed_rate(q, progress);
+             },
+             "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")
         .def("energy", &Model::energy, py::call_guard<py::gil_scoped_release>())
         .def("energies", &energies)
         .def("gradient",

@@ -3,11 +3,13 @@
 from . import meshes
 from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
+from .buckling import Buckling, linear_buckling
 from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
 from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .field_adapters import CustomField, MagpylibField
 from .io import read_fields, read_mesh, write_mesh
+from .linear import LinearResponse, linear_response
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .mesh import TriangleMesh
 from .path import CriticalPoint, Path, follow
@@ -22,6 +24,7 @@ from .weld import Weld, weld
 __all__ = [
     "AppliedField",
     "AreaLoad",
+    "Buckling",
     "Clamp",
     "CriticalPoint",
     "CustomField",
@@ -30,6 +33,7 @@ __all__ = [
     "EdgeLoad",
     "Equilibrium",
     "Interrupted",
+    "LinearResponse",
     "MagpylibField",
     "MixedNewton",
     "Newton",
@@ -48,6 +52,8 @@ __all__ = [
     "__version__",
     "equilibrium",
     "follow",
+    "linear_buckling",
+    "linear_response",
     "meshes",
     "num_threads",
     "plot",

@@ -249,15 +249,18 @@ void BendingTerm::extrapolate(const double* p) {
     });
 }
 
-/// A fold angle is exact to about one unit of round-off of a radian.
+// A fold angle is exact to about one unit of round-off of a radian, and no better than the positions over the heights of
+// its faces.
 void BendingTerm::add_cancelling_forces(VectorXd& out) const {
-    for (Index f = 0; f < sheet_.n_faces(); ++f)
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const double angle = 1.0 + 0.25 * sheet_.largest_coordinate(f) / sheet_.smallest_height(f);
         for (int i = 0; i < 3; ++i) {
             const FaceSide& side = sheet_.sides[f][i];
             double moment = 0.0;
-            for (int j = 0; j < 3; ++j) moment += std::abs(stiffness_[f / Pack::width](i, j)[f % Pack::width]);
+            for (int j = 0; j < 3; ++j) moment += std::abs(stiffness_[f / Pack::width](i, j)[f % Pack::width]) * angle;
             if (side.rotation >= 0) out[3 * sheet_.n_nodes() + side.rotation] += moment;
         }
+    }
 }
 
 std::size_t BendingTerm::bytes() const {

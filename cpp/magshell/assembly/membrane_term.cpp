@@ -72,14 +72,19 @@ void MembraneTerm::extrapolate(const double* p) {
     });
 }
 
+// |a|^2 carries its own round-off, and that of the positions whose difference a is: far from the origin, or beside long
+// radii, the larger one.
 void MembraneTerm::add_cancelling_forces(VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const Membrane::Element& element = elements_[f / Pack::width];
         const int lane = f % Pack::width;
         for (int i = 0; i < 3; ++i) {
             double stress = 0.0;
-            for (int j = 0; j < 3; ++j)
-                stress += std::abs(element.stiffness(i, j)[lane]) * element.rest_squared_length[j][lane];
+            for (int j = 0; j < 3; ++j) {
+                const double squared_length = element.rest_squared_length[j][lane];
+                stress += std::abs(element.stiffness(i, j)[lane]) *
+                          (squared_length + 0.25 * std::sqrt(squared_length) * sheet_.largest_coordinate(f));
+            }
             const double force = 2.0 * stress * std::sqrt(element.rest_squared_length[i][lane]);
             for (const int k : {(i + 1) % 3, (i + 2) % 3})
                 out.segment<3>(3 * sheet_.corners[f][k]).array() += force;

@@ -1,5 +1,8 @@
 #include "magshell/assembly/sheet.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "magshell/strain/fold_angle.h"
 
 namespace magshell {
@@ -100,6 +103,18 @@ void Sheet::add_stencils() {
             if (side.fold >= 0) stencils[f].nodes[3 + i] = folds[side.fold].nodes[side.on_left ? 3 : 2];
             stencils[f].rotations[i] = side.rotation;
         }
+}
+
+double Sheet::largest_coordinate(Index face) const {
+    double largest = 0.0;
+    for (const Index corner : corners[face]) largest = std::max(largest, rest[corner].lpNorm<Eigen::Infinity>());
+    return largest;
+}
+
+double Sheet::smallest_height(Index face) const {
+    const Vec3 &a = rest[corners[face][0]], &b = rest[corners[face][1]], &c = rest[corners[face][2]];
+    const double longest = std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
+    return (b - a).cross(c - a).norm() / longest;
 }
 
 }  // namespace magshell

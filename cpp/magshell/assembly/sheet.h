@@ -52,6 +52,10 @@ class Sheet {
     Index n_rotations() const { return static_cast<Index>(edge_of_rotation.size()); }
     Index n_unknowns() const { return 3 * n_nodes() + n_rotations(); }
     Index direction_node(Index direction) const { return n_vertices() + direction; }
+    /// The largest coordinate at rest of the corners of a face [m]. A unit of its round-off is how exactly they are known.
+    double largest_coordinate(Index face) const;
+    /// The smallest height of a face at rest [m].
+    double smallest_height(Index face) const;
 
     Renumbering vertices, faces;            // caller's <-> ours
     std::vector<Vec3> rest;                 // per node: rest position of a vertex, rest value of a direction

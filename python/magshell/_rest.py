@@ -1,0 +1,52 @@
+"""A scene's stiffness at its rest shape, unloaded: what linear theory works with."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from . import _core
+from ._inputs import Inputs
+from .scene import Scene
+
+
+class RestStiffness:
+    """The Hessian K at the rest shape without controls, factorized once. Works on the free unknowns, (n,).
+
+    Raises ValueError where K is not positive definite: the scene is not held, or not stable at rest.
+    """
+
+    def __init__(self, scene: Scene):
+        self._model = scene._model
+        self.rest = self._model.rest_state()
+        size, starts, rows, values = self._model.hessian(self.rest, _core.Controls())
+        self._factor = _core.analyze(size, starts, rows)
+        report = self._factor.factorize(values)
+        if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
+            raise ValueError(
+                f"the stiffness at rest is not positive definite ({report.negative_pivots} negative and "
+                f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: hold the sheet by supports"
+            )
+        self.matrix = symmetric(size, starts, rows, values)
+
+    def solve(self, forces: np.ndarray) -> np.ndarray:
+        """u (n,) of K u = forces (n,)."""
+        return self._factor.solve(forces)
+
+    def response(self, inputs: Inputs) -> np.ndarray:
+        """du of all unknowns, held ones included: K du = -(g(c) - g(0)) - K dm, where dm moves what supports move."""
+        model, unloaded = self._model, _core.Controls()
+        moved = model.prescribed_rate(self.rest, 0.0) * inputs.controls.motion
+        forces = model.gradient(self.rest, unloaded) - model.gradient(self.rest, inputs.controls)
+        if moved.any():
+            forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved
+        return moved + model.expand(self.solve(model.reduce(forces)))
+
+
+def symmetric(size: int, starts: np.ndarray, rows: np.ndarray, values: np.ndarray) -> csc_array:
+    """Both triangles of a matrix (n, n) whose lower one is given by columns."""
+    lower = csc_array((values, rows, starts), shape=(size, size))
+    diagonal = lower.diagonal()
+    both = lower + lower.T
+    both.setdiag(diagonal)
+    return csc_array(both)

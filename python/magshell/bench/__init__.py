@@ -1,0 +1,1 @@
+"""How accurate and how fast magshell is: python -m magshell.bench PART."""

@@ -1,0 +1,46 @@
+"""python -m magshell.bench PART [options]: one module a part, with add_arguments(parser) and run(options) -> results."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+
+from .report import add_common_arguments, set_threads, write_json
+
+# Name: module, one line for the list.
+PARTS = {
+    "accuracy": ("magshell.bench.accuracy", "errors against references, and the order of convergence"),
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(_overview())
+        return 0
+    name, *rest = arguments
+    if name not in PARTS:
+        print(f"there is no part {name!r}\n{_overview()}", file=sys.stderr)
+        return 2
+    module, summary = PARTS[name]
+    part = importlib.import_module(module)
+    parser = argparse.ArgumentParser(prog=f"python -m magshell.bench {name}", description=summary)
+    add_common_arguments(parser)
+    part.add_arguments(parser)
+    options = parser.parse_args(rest)
+    set_threads(options.threads)
+    results = part.run(options)
+    if options.json:
+        write_json(options.json, name, results)
+    return 0
+
+
+def _overview() -> str:
+    lines = ["usage: python -m magshell.bench PART [options]", "", "parts:"]
+    lines += [f"  {name:<10} {summary}" for name, (_, summary) in PARTS.items()]
+    return "\n".join([*lines, "", "python -m magshell.bench PART --help lists a part's options"])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,204 @@
+"""python -m magshell.bench accuracy: every case against its reference, `midedge` and, on the same mesh, `hinge`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+
+import magshell as ms
+
+from .cases import CASES, Case, Comparison, Outcome
+from .cases.hemisphere import large_deflection
+from .cases.magnetic_strip import field_across
+from .cases.shear_strip import end_shear
+from .convergence import COARSE_MESHES, MESHES, REQUIRED_ORDER, STUDIES, Convergence, converge
+from .report import print_table, writable_path
+
+BENDINGS = ("midedge", "hinge")
+# One call from rest at full load, and how many factorizations it may take, failed ones counted.
+SINGLE_SOLVES: dict[str, tuple[Callable[[], Outcome], int]] = {
+    "A1, full load": (lambda: end_shear(loads=(1.0,)), 12),
+    "A4, full load": (large_deflection, 25),
+    "C1-90, beta 20": (lambda: field_across(betas=(20.0,)), 40),
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    names = [case.name for case in CASES]
+    parser.add_argument(
+        "--only", nargs="+", choices=names, metavar="CASE", help=f"some of {', '.join(names)}"
+    )
+    parser.add_argument(
+        "--coarse", action="store_true", help="coarse meshes: quick, and outside the allowed errors"
+    )
+    parser.add_argument(
+        "--figure", type=writable_path, metavar="PATH", help="draw the convergence there (matplotlib)"
+    )
+
+
+def run(options: argparse.Namespace) -> dict:
+    """Prints the tables, returns their numbers."""
+    cases = [case for case in CASES if options.only is None or case.name in options.only]
+    outcomes = {case.name: {b: _outcome(case, b, options.coarse) for b in BENDINGS} for case in cases}
+    _print_cases(cases, outcomes)
+    results: dict = {"cases": {name: _plain(each) for name, each in outcomes.items()}}
+    if options.only is None:
+        results["single solves"] = _single_solves()
+        meshes = COARSE_MESHES if options.coarse else MESHES
+        studies = {
+            (name, bending): converge(name, bending, meshes) for name in STUDIES for bending in BENDINGS
+        }
+        results["convergence"] = _print_orders(studies)
+        if options.figure:
+            from .figure import draw_convergence
+
+            draw_convergence(studies, options.figure)
+            print(f"\nThe figure is {options.figure}.")
+    return results
+
+
+def _outcome(case: Case, bending: str, coarse: bool) -> Outcome | str:
+    """Its outcome, or why there is none."""
+    try:
+        return case.run(case.coarse if coarse else case.mesh, bending)
+    except ms.NotConverged as error:
+        return str(error)
+
+
+def _print_cases(cases: list[Case], outcomes: dict) -> None:
+    rows, compared, within = [], 0, 0
+    for case in cases:
+        midedge, hinge = (outcomes[case.name][bending] for bending in BENDINGS)
+        if isinstance(midedge, str):
+            rows.append([case.name, case.title, "", "failed", "", "", "", *_cost(midedge), *_cost(hinge)])
+            compared += 1
+            continue
+        for k, comparison in enumerate(midedge.comparisons):
+            other = None if isinstance(hinge, str) else hinge.comparisons[k]
+            first = k == 0
+            rows.append(
+                [
+                    case.name if first else "",
+                    _what(comparison),
+                    midedge.mesh if first else "",
+                    f"{comparison.reference[comparison.worst]:.6g}",
+                    _percent(comparison.error) + ("" if comparison.passes else " MISSED"),
+                    "failed" if other is None else _percent(other.error),
+                    _percent(comparison.allowed),
+                    *(_cost(midedge) if first else ("", "")),
+                    *(_cost(hinge) if first else ("", "")),
+                ]
+            )
+            compared += 1
+            within += comparison.passes
+    headings = ["case", "quantity", "mesh", "reference", "midedge", "hinge", "allowed"]
+    headings += ["time", "factorizations", "time (hinge)", "factorizations (hinge)"]
+    print_table(
+        "Errors, the largest of each row; time and factorizations of all solves of a case", headings, rows
+    )
+    print(f"\n{within} of {compared} rows within the allowed error (midedge).")
+    for name, each in outcomes.items():
+        for bending in BENDINGS:
+            if isinstance(each[bending], str):
+                print(f"{name}, {bending}: {each[bending]}")
+
+
+def _single_solves() -> dict:
+    found = {name: solve() for name, (solve, _) in SINGLE_SOLVES.items()}
+    limits = {name: limit for name, (_, limit) in SINGLE_SOLVES.items()}
+    rows = [
+        [name, run.mesh, run.factorizations, run.failed_factorizations, limits[name], f"{run.time:.3f} s"]
+        for name, run in found.items()
+    ]
+    headings = ["one call from rest", "mesh", "factorizations", "of them failed", "allowed", "time"]
+    print_table("Factorizations (midedge)", headings, rows)
+    return {
+        name: {"factorizations": run.factorizations, "allowed": limits[name], "time": run.time}
+        for name, run in found.items()
+    }
+
+
+def _print_orders(studies: dict[tuple[str, str], Convergence]) -> list[dict]:
+    rows, plain = [], []
+    for (name, bending), study in studies.items():
+        required = REQUIRED_ORDER if bending == "midedge" else None
+        missed = required is not None and study.order < required
+        rows.append(
+            [
+                name,
+                bending,
+                ", ".join(f"{error:.2e}" for error in study.mean_errors),
+                f"{study.order:.2f}" + (" MISSED" if missed else ""),
+                f"{study.orders.min():.2f} to {study.orders.max():.2f}",
+                "" if required is None else f"{required}",
+            ]
+        )
+        plain.append(
+            {
+                "study": name,
+                "bending": bending,
+                "cells": study.cells.tolist(),
+                "faces": study.n_faces.tolist(),
+                "errors": study.errors.tolist(),
+                "order": study.order,
+            }
+        )
+    cells = ", ".join(str(n) for n in next(iter(studies.values())).cells)
+    headings = [
+        "study",
+        "bending",
+        f"mean error / L at {cells} cells",
+        "order",
+        "of single meshes",
+        "at least",
+    ]
+    count = len(next(iter(studies.values())).errors)
+    print_table(
+        f"Order of convergence on irregular meshes, of the mean error of {count} of each", headings, rows
+    )
+    return plain
+
+
+def _what(comparison: Comparison) -> str:
+    at = comparison.at[comparison.worst]
+    if len(comparison.at) == 1:
+        return f"{comparison.quantity}, {at}" if at else comparison.quantity
+    return f"{comparison.quantity}, worst of {len(comparison.at)}: {at}"
+
+
+def _percent(value: float | None) -> str:
+    return "" if value is None else f"{100.0 * value:.3f} %"
+
+
+def _cost(run: Outcome | str) -> tuple[str, str]:
+    return ("", "") if isinstance(run, str) else (f"{run.time:.3f} s", str(run.factorizations))
+
+
+def _plain(outcomes: dict[str, Outcome | str]) -> dict:
+    """For JSON."""
+    return {
+        bending: {"failed": run} if isinstance(run, str) else _plain_outcome(run)
+        for bending, run in outcomes.items()
+    }
+
+
+def _plain_outcome(run: Outcome) -> dict:
+    return {
+        "mesh": run.mesh,
+        "faces": run.n_faces,
+        "solves": run.solves,
+        "time": run.time,
+        "factorizations": run.factorizations,
+        "failed_factorizations": run.failed_factorizations,
+        "comparisons": [
+            {
+                "quantity": comparison.quantity,
+                "at": list(comparison.at),
+                "computed": comparison.computed.tolist(),
+                "reference": comparison.reference.tolist(),
+                "error": comparison.error,
+                "allowed": comparison.allowed,
+            }
+            for comparison in run.comparisons
+        ],
+    }

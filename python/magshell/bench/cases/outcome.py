@@ -1,0 +1,98 @@
+"""What a case hands back: computed numbers beside their references, and what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+import magshell as ms
+
+
+class Comparison:
+    """Computed numbers beside their references.
+
+    quantity: what they are. computed, reference: (k,). at: (k,) names of the entries, such as loads.
+    scale: what an error is relative to: a number, or (k,) one each; the references themselves by default.
+    allowed: how large a relative error may be; None where the case only informs.
+    """
+
+    def __init__(
+        self, quantity: str, computed, reference, *, at=None, scale=None, allowed: float | None = None
+    ):
+        self.quantity = quantity
+        self.computed = np.atleast_1d(np.asarray(computed, dtype=np.float64))
+        self.reference = np.atleast_1d(np.asarray(reference, dtype=np.float64))
+        self.at = tuple("" for _ in self.reference) if at is None else tuple(at)
+        self.scale = np.broadcast_to(np.abs(self.reference) if scale is None else scale, self.reference.shape)
+        self.allowed = allowed
+        if not self.computed.shape == self.reference.shape == (len(self.at),):
+            raise ValueError(
+                f"{quantity}: {self.computed.shape} numbers, {self.reference.shape} references, {len(self.at)} names"
+            )
+
+    @property
+    def errors(self) -> np.ndarray:
+        """(k,), relative."""
+        return np.abs(self.computed - self.reference) / self.scale
+
+    @property
+    def worst(self) -> int:
+        """The entry with the largest error; one that is not a number is the worst."""
+        return int(np.argmax(np.where(np.isnan(self.errors), np.inf, self.errors)))
+
+    @property
+    def error(self) -> float:
+        """The largest relative error."""
+        return float(self.errors[self.worst])
+
+    @property
+    def passes(self) -> bool:
+        return self.allowed is None or self.error <= self.allowed
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One run of a case: mesh, comparisons, and the cost of all its solves together."""
+
+    mesh: str
+    comparisons: tuple[Comparison, ...]
+    n_faces: int
+    solves: int
+    time: float
+    factorizations: int
+    failed_factorizations: int
+
+    @property
+    def passes(self) -> bool:
+        return all(comparison.passes for comparison in self.comparisons)
+
+
+def outcome(
+    mesh_name: str, mesh: ms.TriangleMesh, comparisons: Iterable[Comparison], results: Iterable
+) -> Outcome:
+    """An Outcome from what the solves handed back: Equilibrium, LinearResponse, Buckling or Path objects."""
+    results = list(results)
+    return Outcome(
+        mesh=mesh_name,
+        comparisons=tuple(comparisons),
+        n_faces=mesh.n_faces,
+        solves=len(results),
+        time=sum(result.wall_time for result in results),
+        factorizations=sum(result.factorizations for result in results),
+        failed_factorizations=sum(getattr(result, "failed_factorizations", 0) for result in results),
+    )
+
+
+def sweep(scene: ms.Scene, controls: Iterable[dict], **common) -> list[ms.Equilibrium]:
+    """Equilibria at one set of controls after the other, each from the one before and the first from rest."""
+    found: list[ms.Equilibrium] = []
+    for each in controls:
+        found.append(ms.equilibrium(scene, start=found[-1] if found else None, **common, **each))
+    return found
+
+
+def tip(mesh: ms.TriangleMesh, displacements: np.ndarray, **at: float) -> np.ndarray:
+    """The mean displacement (3,) m of the vertices at the given coordinates."""
+    return displacements[mesh.vertices_at(**at)].mean(axis=0)

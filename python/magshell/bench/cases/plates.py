@@ -1,0 +1,73 @@
+"""B5: square and circular plates, simply supported and clamped, under a pressure and a central force, to first order."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import magshell as ms
+
+from .outcome import Comparison, Outcome, outcome
+
+POISSON_RATIO = 0.3
+THICKNESS = 0.01
+YOUNG_MODULUS = 12.0 * (1.0 - POISSON_RATIO**2) / THICKNESS**3  # a plate stiffness D of 1
+
+# Deflection of the middle over q a^4 / D and P a^2 / D. Square: side a, Navier's series and an extrapolated Ritz solution
+# (clamped); they agree with Taylor and Govindjee 2004. Circular: radius a, closed forms.
+SQUARE = {
+    ("supported", "pressure"): 0.004062353,
+    ("supported", "force"): 0.011600840,
+    ("clamped", "pressure"): 0.00126532,
+    ("clamped", "force"): 0.0056120,
+}
+CIRCULAR = {
+    ("supported", "pressure"): (5 + POISSON_RATIO) / (1 + POISSON_RATIO) / 64,
+    ("supported", "force"): (3 + POISSON_RATIO) / (1 + POISSON_RATIO) / (16 * np.pi),
+    ("clamped", "pressure"): 1 / 64,
+    ("clamped", "force"): 1 / (16 * np.pi),
+}
+
+
+def square_plate(cells: tuple[int, int] = (32, 32), bending: str = "midedge") -> Outcome:
+    """The four deflections of a unit square, on a quarter of it; cells as those of the whole."""
+    if cells[0] % 2 or cells[1] % 2:
+        raise ValueError(f"a quarter needs even numbers of cells, got {cells}")
+    mesh = ms.meshes.rectangle(0.5, 0.5, (cells[0] // 2, cells[1] // 2))
+    rim = mesh.edges_where(lambda midpoints: midpoints[:, :2].max(axis=1) > 0.5 - 1e-9)
+    symmetry = [ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]
+    return _middle_deflections(mesh, rim, symmetry, 4, bending, SQUARE, f"{cells[0]}x{cells[1]}")
+
+
+def circular_plate(rings: int = 48, bending: str = "midedge") -> Outcome:
+    """The four deflections of a disk of radius 1.
+
+    Its rim is a polygon, simply supported at its vertices. The lowest-order Hellan-Herrmann-Johnson element does not fall
+    for Babuska's paradox there (Arnold and Walker 2020).
+    """
+    mesh = ms.meshes.disk(1.0, rings)
+    return _middle_deflections(mesh, mesh.boundary_edges, [], 1, bending, CIRCULAR, f"{rings} rings")
+
+
+def _middle_deflections(
+    mesh: ms.TriangleMesh,
+    rim: np.ndarray,
+    symmetry: list,
+    parts: int,
+    bending: str,
+    references: dict,
+    name: str,
+) -> Outcome:
+    """`mesh` is one of `parts` equal parts of the plate, its middle at the origin."""
+    sheet = ms.Shell(
+        mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
+    )
+    middle = mesh.nearest_vertex((0, 0, 0))
+    held = {"supported": ms.Pin(np.unique(mesh.edges[rim])), "clamped": ms.Clamp(rim)}
+    loads = {"pressure": ms.AreaLoad((0, 0, 1.0)), "force": ms.PointLoad(middle, (0, 0, 1.0 / parts))}
+    comparisons, responses = [], []
+    for (support, load), reference in references.items():
+        scene = ms.Scene(sheet, supports=[held[support], *symmetry], loads=[loads[load]])
+        responses.append(ms.linear_response(scene))
+        deflection = responses[-1].displacements[middle, 2]
+        comparisons.append(Comparison(f"{support}, {load}", deflection, reference, allowed=0.005))
+    return outcome(name, mesh, comparisons, responses)

@@ -1,0 +1,82 @@
+"""How fast errors fall with the mesh size: the order of convergence on irregular meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .cases import Outcome, shear_strip
+from .cases.magnetic_strip import field_across
+
+REQUIRED_ORDER = 1.8
+MESHES = ((20, 2), (40, 4), (80, 8))
+COARSE_MESHES = ((10, 1), (20, 2), (40, 4))
+SEEDS = (0, 1, 2)
+
+
+def _full_shear(cells, bending: str, seed: int) -> Outcome:
+    return shear_strip.end_shear(cells, bending, seed=seed, loads=(1.0,))
+
+
+def _strongest_field(cells, bending: str, seed: int) -> Outcome:
+    return field_across(cells, bending, seed=seed, betas=(20.0,))
+
+
+# What to run, and the length of the strip in the unit of what it compares.
+STUDIES: dict[str, tuple[Callable[..., Outcome], float]] = {
+    "A1, full load": (_full_shear, shear_strip.LENGTH),
+    "C1-90, beta 20": (_strongest_field, 1.0),
+}
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """Errors of one study on finer and finer meshes.
+
+    cells: those along the strip, (m,); n_faces (m,). errors: (seeds, m), the distance of the end from its reference over
+    the length of the strip. times: (seeds, m), s.
+    """
+
+    cells: np.ndarray
+    n_faces: np.ndarray
+    errors: np.ndarray
+    times: np.ndarray
+
+    @property
+    def mean_errors(self) -> np.ndarray:
+        """(m,): over the seeds, because one mesh's error depends on how its vertices fell."""
+        return self.errors.mean(axis=0)
+
+    @property
+    def order(self) -> float:
+        """Of the mean errors, by least squares in the logarithms."""
+        return _slope(self.cells, self.mean_errors)
+
+    @property
+    def orders(self) -> np.ndarray:
+        """(seeds,): of each seed alone."""
+        return np.array([_slope(self.cells, errors) for errors in self.errors])
+
+
+def converge(study: str, bending: str, meshes=MESHES, seeds=SEEDS) -> Convergence:
+    run, length = STUDIES[study]
+    outcomes = [[run(cells, bending, seed) for cells in meshes] for seed in seeds]
+    return Convergence(
+        cells=np.array([cells[0] for cells in meshes]),
+        n_faces=np.array([each.n_faces for each in outcomes[0]]),
+        errors=np.array([[_distance(each) / length for each in row] for row in outcomes]),
+        times=np.array([[each.time for each in row] for row in outcomes]),
+    )
+
+
+def _distance(run: Outcome) -> float:
+    """From the computed end of the strip to the exact one; its two components are the comparisons."""
+    return float(
+        np.linalg.norm([comparison.computed[-1] - comparison.reference[-1] for comparison in run.comparisons])
+    )
+
+
+def _slope(cells: np.ndarray, errors: np.ndarray) -> float:
+    return float(-np.polyfit(np.log(cells), np.log(errors), 1)[0])

@@ -1,0 +1,93 @@
+"""What all parts of the bench share: their common options, tables, and results as JSON."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy
+import scipy
+
+import magshell as ms
+from magshell import _core
+
+
+def add_common_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--json",
+        type=writable_path,
+        metavar="PATH",
+        help="write the numbers there, with machine and versions",
+    )
+    parser.add_argument("--threads", type=int, default=1, help="threads of magshell's loops (default 1)")
+
+
+def set_threads(count: int) -> None:
+    try:
+        ms.set_num_threads(count)
+    except ValueError as error:
+        raise SystemExit(f"--threads: {error}") from error
+
+
+def writable_path(text: str) -> Path:
+    """A path that can be written, its folder made if need be: refused before hours of work, not after."""
+    path = Path(text)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("a"):
+            pass
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"cannot write {path}: {error.strerror}") from error
+    return path
+
+
+def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Columns as wide as they need; the first two to the left, the others to the right."""
+    rows = [[str(cell) for cell in row] for row in rows]
+    widths = [max(len(row[c]) for row in [list(headings), *rows]) for c in range(len(headings))]
+
+    def line(cells: Sequence[str]) -> str:
+        padded = [
+            cell.ljust(width) if c < 2 else cell.rjust(width)
+            for c, (cell, width) in enumerate(zip(cells, widths, strict=True))
+        ]
+        return "  ".join(padded).rstrip()
+
+    print(f"\n{title}\n")
+    print(line(headings))
+    print("  ".join("-" * width for width in widths))
+    for row in rows:
+        print(line(row))
+
+
+def write_json(path: Path, part: str, results: dict) -> None:
+    content = {"part": part, "setting": setting(), "results": results}
+    path.write_text(json.dumps(content, indent=2, allow_nan=True) + "\n")
+
+
+def setting() -> dict[str, str | int]:
+    """On what the numbers were made: machine, versions, threads."""
+    return {
+        "machine": platform.machine(),
+        "processor": _processor(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "scipy": scipy.__version__,
+        "magshell": ms.__version__,
+        "threads": ms.num_threads(),
+        **dict(_core.build_info()),
+    }
+
+
+def _processor() -> str:
+    """The processor's name, where the system tells it (Linux does in /proc/cpuinfo)."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown"

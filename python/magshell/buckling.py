@@ -1,0 +1,154 @@
+"""Buckling loads from the Hessian: ms.linear_buckling."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+
+from . import _core
+from ._inputs import Inputs
+from ._rest import RestStiffness, symmetric
+from .errors import NotConverged
+from .scene import Scene
+
+_PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured, over the mean edge length
+
+
+@dataclass(frozen=True, repr=False)
+class Buckling:
+    """The lowest buckling modes of a scene.
+
+    factors: (k,), ascending: what to multiply the controls by so that the sheet buckles in mode k.
+    modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
+    edge_rotations: (k, n_e), rad, that go with them.
+    """
+
+    scene: Scene
+    factors: np.ndarray
+    modes: np.ndarray = field(repr=False)
+    edge_rotations: np.ndarray = field(repr=False)
+    factorizations: int
+    wall_time: float
+
+    def __repr__(self) -> str:
+        return f"Buckling: at {', '.join(f'{factor:.6g}' for factor in self.factors)} times the controls, {self.wall_time:.3g} s"
+
+
+def linear_buckling(
+    scene: Scene,
+    *,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    motion_factor: float = 1.0,
+    modes: int = 1,
+) -> Buckling:
+    """The smallest positive multiples of the controls at which a scene buckles, by linear pre-buckling theory.
+
+    With K(q, c) the Hessian, c the controls and u the linear response to them,
+
+        (K + lambda dK) v = 0,     dK = d/dt K(rest + t u, t c) at t = 0, by a central difference     [Pa m]
+
+    so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact in the
+    limit of small displacements before buckling: columns, plates loaded in their plane, complete cylinders and spheres. A
+    shallow arch that softens on its way needs ms.follow. Controls as in ms.equilibrium; a field's own stiffness counts.
+
+    modes: how many to find. Fewer come back where the others lie further than the linear theory reaches (a displacement
+        before buckling larger than the sheet).
+
+    Raises ValueError on bad input, where the supports leave the sheet a motion without stiffness, where the controls
+    do nothing, and where the sheet does not buckle under them (a column that is pulled).
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (-1.0, 0, 0))
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+    >>> round(float(ms.linear_buckling(scene).factors[0]), 3)  # pi^2 E h^3 / (48 L^2) = 0.0206 N/m
+    0.021
+    """
+    if isinstance(modes, bool) or not isinstance(modes, (int, np.integer)) or modes < 1:
+        raise ValueError(f"modes must be an integer of at least 1, got {modes!r}")
+    inputs = Inputs(
+        scene,
+        remanent_magnetization,
+        applied_flux_density,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    began = time.perf_counter()
+    model = scene._model
+    if modes >= model.free_size:
+        raise ValueError(f"modes must be below the {model.free_size} unknowns of the scene, got {modes}")
+    with inputs.in_core():
+        stiffness = RestStiffness(scene)
+        response = stiffness.response(inputs)
+        displacement = float(np.abs(model.positions(response)).max())
+        change = _stiffness_change(scene, stiffness, response, displacement, inputs)
+    factors, vectors = _lowest(stiffness, change, modes)
+    reached = factors * displacement < scene.mesh.size
+    if not reached.any():
+        raise ValueError(
+            "the sheet does not buckle under these controls, as far as linear theory reaches. Under reversed ones it may"
+        )
+    shapes = [_normalized(model, vector) for vector in vectors.T[reached]]
+    return Buckling(
+        scene=scene,
+        factors=factors[reached],
+        modes=np.array([model.positions(shape) for shape in shapes]),
+        edge_rotations=np.array([model.edge_rotations(shape) for shape in shapes]),
+        factorizations=1,
+        wall_time=time.perf_counter() - began,
+    )
+
+
+def _stiffness_change(
+    scene: Scene, stiffness: RestStiffness, response: np.ndarray, displacement: float, inputs: Inputs
+) -> csc_array:
+    """dK (n, n) for the controls as they are."""
+    # Where nothing moves before buckling, K is linear in the controls and any step is exact.
+    step = _PRE_LOAD * float(scene.mesh.edge_lengths.mean()) / displacement if displacement > 0.0 else 1.0
+    unloaded = _core.Controls()
+
+    def values(t: float) -> np.ndarray:
+        controls = unloaded.towards(inputs.controls, t)
+        return scene._model.hessian(stiffness.rest + t * response, controls)[3]
+
+    size, starts, rows, _ = scene._model.hessian(stiffness.rest, unloaded)
+    change = (values(step) - values(-step)) / (2.0 * step)
+    if not change.any():
+        raise ValueError("the controls neither load the sheet nor change its stiffness: nothing buckles it")
+    return symmetric(size, starts, rows, change)
+
+
+def _lowest(stiffness: RestStiffness, change: csc_array, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Positive factors (k,), ascending, and their modes (n, k), k <= count."""
+    # -dK v = (1/lambda) K v, with K positive definite: the smallest positive lambda are the largest eigenvalues.
+    size = change.shape[0]
+    inverse = LinearOperator((size, size), matvec=stiffness.solve, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(size)  # one that no symmetry is orthogonal to
+    try:
+        inverses, vectors = eigsh(-change, k=count, M=stiffness.matrix, Minv=inverse, which="LA", v0=start)
+    except ArpackNoConvergence as error:
+        raise NotConverged(
+            f"the buckling modes did not converge: {error}. Ask for more or fewer modes."
+        ) from error
+    positive = inverses > 0.0
+    factors = 1.0 / inverses[positive]
+    order = np.argsort(factors)
+    return factors[order], vectors[:, positive][:, order]
+
+
+def _normalized(model, vector: np.ndarray) -> np.ndarray:
+    """All unknowns of a mode, its largest component of a displacement 1."""
+    shape = model.expand(vector)
+    displacements = model.positions(shape)
+    return shape / displacements.ravel()[np.argmax(np.abs(displacements))]

@@ -1,0 +1,107 @@
+"""Accuracy against exact solutions and published references: the rows of `python -m magshell.bench accuracy`.
+
+The cases, their references with sources, and the allowed errors are in magshell.bench.cases.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from magshell.bench.accuracy import SINGLE_SOLVES
+from magshell.bench.cases import CASES, Comparison
+from magshell.bench.cases.hemisphere import large_deflection
+from magshell.bench.cases.plates import SQUARE, square_plate
+from magshell.bench.convergence import REQUIRED_ORDER, STUDIES, converge
+
+# On 32x32 cells these closed forms are out of the element's reach, and on 128x128 ("B5 finer") they are not: it is Morley's
+# element (tests/test_morley.py), whose errors these are.
+BEYOND_MORLEY = {("B5", "supported, force"), ("B5", "clamped, pressure"), ("B5", "clamped, force")}
+
+# What the project set out to reach: relative errors, of each case's comparisons in turn.
+PLATE = {", ".join(key): 0.005 for key in SQUARE}
+BOUNDS = {
+    "A1": {"W": 0.002, "U": 0.003},
+    "A2": {"U / L": 0.005, "W / L": 0.005},
+    "A4": {"U, pulled": 0.015, "V, pushed": 0.015},
+    "A7a": {"P / Pmax": 0.01},
+    "B1": {"w, free edge": 0.01},
+    "B2": {"w, force": 0.01},
+    "B3": {"u, hole": 0.01, "u, closed": 0.01},
+    "B5": PLATE,
+    "B5 finer": PLATE,
+    "B5 disk": PLATE,
+    "B7": {"P L2 / EI": 0.01},
+    "B7 plate": {"k": 0.01},
+    "C1-90": {"x / L": 0.001, "y / L": 0.001},
+    "C1-180": {"x / L": 0.001, "y / L": 0.001},
+    "C4": {"W, field = force": 0.001, "U, field = force": 0.001},
+}
+
+
+@cache
+def outcome(name: str, bending: str = "midedge"):
+    case = next(case for case in CASES if case.name == name)
+    return case.run(case.mesh, bending)
+
+
+def rows():
+    reason = "Morley's element on this mesh"
+    out_of_reach = pytest.mark.xfail(reason=reason, raises=AssertionError, strict=True)
+    for name, bounds in BOUNDS.items():
+        for k, (quantity, bound) in enumerate(bounds.items()):
+            beyond = (name, quantity) in BEYOND_MORLEY
+            marks = (
+                [pytest.mark.xfail(reason="beyond Morley's element on this mesh", strict=True)]
+                if beyond
+                else []
+            )
+            yield pytest.param(name, k, bound, marks=marks, id=f"{name}: {quantity}")
+
+
+@pytest.mark.parametrize(("name", "k", "bound"), list(rows()))
+def test_error(name: str, k: int, bound: float) -> None:
+    comparison = outcome(name).comparisons[k]
+    worst = comparison.worst
+    assert comparison.error <= bound, (
+        f"{comparison.at[worst]}: {comparison.computed[worst]:.6g}, not {comparison.reference[worst]:.6g}"
+    )
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_the_table_allows_what_the_tests_allow(case) -> None:
+    comparisons = outcome(case.name).comparisons
+    assert {comparison.quantity: comparison.allowed for comparison in comparisons} == BOUNDS[case.name]
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_order_of_convergence(study: str) -> None:
+    found = converge(study, "midedge")
+    assert found.order >= REQUIRED_ORDER
+    assert found.mean_errors[-1] < 1e-4 * found.cells[-1]  # small, not only falling
+
+
+@pytest.mark.parametrize("name", SINGLE_SOLVES)
+def test_factorizations_of_one_call_from_rest(name: str) -> None:
+    solve, allowed = SINGLE_SOLVES[name]
+    assert solve().factorizations <= allowed
+
+
+@pytest.mark.parametrize("name", ["A1", "B7", "C1-90"])
+def test_hinge_is_worse_on_the_same_mesh(name: str) -> None:
+    for ours, theirs in zip(outcome(name).comparisons, outcome(name, "hinge").comparisons, strict=True):
+        assert theirs.error > 10 * ours.error
+
+
+def test_a_comparison_takes_its_worst_entry() -> None:
+    comparison = Comparison("w", [1.0, 2.2, 3.0], [1.0, 2.0, 4.0], at=("a", "b", "c"), allowed=0.2)
+    assert comparison.at[comparison.worst] == "c" and comparison.error == 0.25 and not comparison.passes
+    lost = Comparison("w", [np.nan, 9.0], [1.0, 1.0], allowed=10.0)
+    assert lost.worst == 0 and not lost.passes
+
+
+def test_a_part_of_a_mesh_needs_cells_that_divide() -> None:
+    with pytest.raises(ValueError, match="multiple of 4"):
+        large_deflection((30, 8))
+    with pytest.raises(ValueError, match="even numbers"):
+        square_plate((7, 8))
