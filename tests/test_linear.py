@@ -30,21 +30,24 @@ def magnetic() -> ms.Scene:
 def test_response_is_the_limit_of_small_equilibria(bending: str) -> None:
     mesh, shell = strip(bending=bending, mass_density=1e3)
     support = ms.Clamp(mesh.edges_at(x=0.0), displacement=(0, 0, 0.01), rotation=(0, 0.2, 0))
-    load = ms.EdgeLoad(mesh.edges_at(x=LENGTH), (0.1, 0, 0.01))
-    scene = ms.Scene(shell, supports=[support], loads=[load], gravity=(0, 0, -9.81), field=ms.UniformField())
-    field = {"remanent_magnetization": (4e4, 0, 0), "applied_flux_density": np.array([0, 1e-4, 1e-3])}
+    load = ms.EdgeLoad(mesh.edges_at(x=LENGTH), (0.01, 0, 1e-4))
+    scene = ms.Scene(shell, supports=[support], loads=[load], gravity=(0, 0, -0.1), field=ms.UniformField())
+    field = {"remanent_magnetization": (4e4, 0, 0), "applied_flux_density": np.array([0, 1e-6, 1e-5])}
     response = ms.linear_response(scene, **field)
-    small = 1e-4
-    at = dict.fromkeys(("load_factor", "gravity_factor", "motion_factor"), small)
-    field["applied_flux_density"] = small * field["applied_flux_density"]
-    state = ms.equilibrium(scene, **field, **at)
-    scale = np.abs(response.displacements).max()
-    np.testing.assert_allclose(state.displacements / small, response.displacements, atol=1e-3 * scale)
-    np.testing.assert_allclose(
-        state.edge_rotations / small,
-        response.edge_rotations,
-        atol=1e-2 * np.abs(response.edge_rotations).max() + 1e-12,
-    )
+    small = 1e-3
+
+    def state(t: float) -> ms.Equilibrium:
+        factors = dict.fromkeys(("load_factor", "gravity_factor", "motion_factor"), t)
+        return ms.equilibrium(
+            scene, **{**field, "applied_flux_density": t * field["applied_flux_density"]}, **factors
+        )
+
+    up, down = state(small), state(-small)
+    for found, expected in (
+        (up.positions - down.positions, response.displacements),
+        (up.edge_rotations - down.edge_rotations, response.edge_rotations),
+    ):
+        np.testing.assert_allclose(found / (2 * small), expected, atol=1e-4 * np.abs(expected).max() + 1e-9)
     assert response.factorizations == 1 and "largest displacement" in repr(response)
 
 
@@ -71,7 +74,7 @@ def test_response_of_tensors_is_a_tensor() -> None:
 
 def test_buckling_load_and_mode() -> None:
     found = ms.linear_buckling(pushed(EULER), modes=2)
-    np.testing.assert_allclose(found.factors, [1.0, 9.0], rtol=0.01)
+    np.testing.assert_allclose(found.factors, [1.0, 9.0], rtol=0.02)
     mesh = found.scene.mesh
     x = mesh.rest_positions[:, 0]
     np.testing.assert_allclose(found.modes[0][:, 2], 1 - np.cos(np.pi * x / (2 * LENGTH)), atol=0.01)
@@ -98,8 +101,8 @@ def test_buckling_by_motion() -> None:
 
 @pytest.mark.parametrize("direction", [(-1, 0, 0), (0, 0, -1)])
 def test_buckling_in_a_field(direction) -> None:
-    # Magnetised along it, against the field: M B h L^2 = (pi^2 / 4) D, the field pushing the end and turning all of it.
-    # Magnetised across, the strip is turned by the field everywhere, and not pushed: the same energy in small rotations.
+    # Magnetised along it, against the field: M B h L^2 = (pi^2 / 4) D. Magnetised across, no force acts before it buckles,
+    # but the energy of a small rotation is the same.
     magnetization = 1e5 * -np.array(direction)
     stiffness = YOUNG_MODULUS * THICKNESS**3 / 12
     flux_density = np.pi**2 / 4 * stiffness / (1e5 * THICKNESS * LENGTH**2)

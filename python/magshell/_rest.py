@@ -19,22 +19,35 @@ class RestStiffness:
     def __init__(self, scene: Scene):
         self._model = scene._model
         self.rest = self._model.rest_state()
-        size, starts, rows, values = self._model.hessian(self.rest, _core.Controls())
-        self._factor = _core.analyze(size, starts, rows)
-        report = self._factor.factorize(values)
+        *self._pattern, self._values = self._model.hessian(self.rest, _core.Controls())
+        self._factor = _core.analyze(*self._pattern)
+        report = self._factor.factorize(self._values)
         if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
             raise ValueError(
                 f"the stiffness at rest is not positive definite ({report.negative_pivots} negative and "
-                f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: hold the sheet by supports"
+                f"{report.perturbed_pivots} zero pivots of {self._pattern[0]}), and linear theory needs that: "
+                "hold the sheet by supports"
             )
-        self.matrix = symmetric(size, starts, rows, values)
+
+    @property
+    def matrix(self) -> csc_array:
+        """K, (n, n)."""
+        return self.with_values(self._values)
+
+    def with_values(self, values: np.ndarray) -> csc_array:
+        """The symmetric matrix (n, n) whose lower triangle has K's pattern and these values."""
+        return symmetric(*self._pattern, values)
+
+    def negative_directions(self, change: np.ndarray) -> int:
+        """How many directions K plus a change of its values has that lower the energy, by another factorization."""
+        return _core.analyze(*self._pattern).factorize(self._values + change).negative_pivots
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """u (n,) of K u = forces (n,)."""
         return self._factor.solve(forces)
 
     def response(self, inputs: Inputs) -> np.ndarray:
-        """du of all unknowns, held ones included: K du = -(g(c) - g(0)) - K dm, where dm moves what supports move."""
+        """du of all unknowns, held ones included: K du = -(g(c) - g(0)) - K dm, with dm what supports move."""
         model, unloaded = self._model, _core.Controls()
         moved = model.prescribed_rate(self.rest, 0.0) * inputs.controls.motion
         forces = model.gradient(self.rest, unloaded) - model.gradient(self.rest, inputs.controls)

@@ -6,16 +6,16 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import csc_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from . import _core
 from ._inputs import Inputs
-from ._rest import RestStiffness, symmetric
+from ._rest import RestStiffness
 from .errors import NotConverged
 from .scene import Scene
 
 _PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured, over the mean edge length
+_LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,11 +56,11 @@ def linear_buckling(
         (K + lambda dK) v = 0,     dK = d/dt K(rest + t u, t c) at t = 0, by a central difference     [Pa m]
 
     so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact in the
-    limit of small displacements before buckling: columns, plates loaded in their plane, complete cylinders and spheres. A
-    shallow arch that softens on its way needs ms.follow. Controls as in ms.equilibrium; a field's own stiffness counts.
+    limit of small displacements before buckling: columns, plates loaded in their plane, closed shells. A shallow arch
+    that softens on its way needs ms.follow. Controls as in ms.equilibrium; a field's own stiffness counts.
 
-    modes: how many to find. Fewer come back where the others lie further than the linear theory reaches (a displacement
-        before buckling larger than the sheet).
+    modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: a displacement
+        before buckling of a tenth of the sheet's size, or a thousand times the first factor of either sign.
 
     Raises ValueError on bad input, where the supports leave the sheet a motion without stiffness, where the controls
     do nothing, and where the sheet does not buckle under them (a column that is pulled).
@@ -93,27 +93,24 @@ def linear_buckling(
         response = stiffness.response(inputs)
         displacement = float(np.abs(model.positions(response)).max())
         change = _stiffness_change(scene, stiffness, response, displacement, inputs)
-    factors, vectors = _lowest(stiffness, change, modes)
-    reached = factors * displacement < scene.mesh.size
-    if not reached.any():
-        raise ValueError(
-            "the sheet does not buckle under these controls, as far as linear theory reaches. Under reversed ones it may"
-        )
-    shapes = [_normalized(model, vector) for vector in vectors.T[reached]]
+    factors, vectors = _lowest(
+        stiffness, change, modes, _LARGEST_DISPLACEMENT * scene.mesh.size, displacement
+    )
+    shapes = [_normalized(model, vector) for vector in vectors.T]
     return Buckling(
         scene=scene,
-        factors=factors[reached],
+        factors=factors,
         modes=np.array([model.positions(shape) for shape in shapes]),
         edge_rotations=np.array([model.edge_rotations(shape) for shape in shapes]),
-        factorizations=1,
+        factorizations=2,
         wall_time=time.perf_counter() - began,
     )
 
 
 def _stiffness_change(
     scene: Scene, stiffness: RestStiffness, response: np.ndarray, displacement: float, inputs: Inputs
-) -> csc_array:
-    """dK (n, n) for the controls as they are."""
+) -> np.ndarray:
+    """The values of dK, in the pattern of K, for the controls as they are."""
     # Where nothing moves before buckling, K is linear in the controls and any step is exact.
     step = _PRE_LOAD * float(scene.mesh.edge_lengths.mean()) / displacement if displacement > 0.0 else 1.0
     unloaded = _core.Controls()
@@ -122,29 +119,38 @@ def _stiffness_change(
         controls = unloaded.towards(inputs.controls, t)
         return scene._model.hessian(stiffness.rest + t * response, controls)[3]
 
-    size, starts, rows, _ = scene._model.hessian(stiffness.rest, unloaded)
     change = (values(step) - values(-step)) / (2.0 * step)
     if not change.any():
         raise ValueError("the controls neither load the sheet nor change its stiffness: nothing buckles it")
-    return symmetric(size, starts, rows, change)
+    return change
 
 
-def _lowest(stiffness: RestStiffness, change: csc_array, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Positive factors (k,), ascending, and their modes (n, k), k <= count."""
+def _lowest(
+    stiffness: RestStiffness, change: np.ndarray, count: int, reach: float, displacement: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positive factors (k,), ascending, and their modes (n, k), k <= count; none whose pre-buckling displacement
+    exceeds `reach`."""
     # -dK v = (1/lambda) K v, with K positive definite: the smallest positive lambda are the largest eigenvalues.
-    size = change.shape[0]
+    negative_change = -stiffness.with_values(change)
+    size = negative_change.shape[0]
     inverse = LinearOperator((size, size), matvec=stiffness.solve, dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(size)  # one that no symmetry is orthogonal to
+    pencil = {"A": negative_change, "M": stiffness.matrix, "Minv": inverse, "v0": start}
     try:
-        inverses, vectors = eigsh(-change, k=count, M=stiffness.matrix, Minv=inverse, which="LA", v0=start)
+        extreme = abs(eigsh(k=1, which="LM", return_eigenvectors=False, **pencil)[0])
+        # By Sylvester's law, K + lambda dK has as many negative directions as there are factors between 0 and lambda.
+        # Looked for no further than theory reaches: beyond are strains of order one, closely spaced and meaningless.
+        largest = min(1e3 / extreme, reach / displacement if displacement > 0.0 else np.inf)
+        available = stiffness.negative_directions(largest * change)
+        if available == 0:
+            raise ValueError(
+                "the sheet does not buckle under these controls, as far as linear theory reaches. Under reversed ones it may"
+            )
+        inverses, vectors = eigsh(k=min(count, available), which="LA", **pencil)
     except ArpackNoConvergence as error:
-        raise NotConverged(
-            f"the buckling modes did not converge: {error}. Ask for more or fewer modes."
-        ) from error
-    positive = inverses > 0.0
-    factors = 1.0 / inverses[positive]
-    order = np.argsort(factors)
-    return factors[order], vectors[:, positive][:, order]
+        raise NotConverged(f"the buckling modes did not converge: {error}. Ask for fewer modes.") from error
+    order = np.argsort(-inverses)
+    return 1.0 / inverses[order], vectors[:, order]
 
 
 def _normalized(model, vector: np.ndarray) -> np.ndarray:
