@@ -1,4 +1,4 @@
-"""python -m magshell.bench: the dispatcher, a quick accuracy run, results as JSON, and what it says when it cannot."""
+"""python -m magshell.bench: parts, a quick accuracy run, results as JSON, and what it refuses."""
 
 import json
 import subprocess

@@ -101,8 +101,8 @@ def test_buckling_by_motion() -> None:
 
 @pytest.mark.parametrize("direction", [(-1, 0, 0), (0, 0, -1)])
 def test_buckling_in_a_field(direction) -> None:
-    # Magnetised along it, against the field: M B h L^2 = (pi^2 / 4) D. Magnetised across, no force acts before it buckles,
-    # but the energy of a small rotation is the same.
+    # Magnetised along it, against the field: M B h L^2 = (pi^2 / 4) D. Magnetised across, no force acts
+    # before it buckles, but the energy of a small rotation is the same.
     magnetization = 1e5 * -np.array(direction)
     stiffness = YOUNG_MODULUS * THICKNESS**3 / 12
     flux_density = np.pi**2 / 4 * stiffness / (1e5 * THICKNESS * LENGTH**2)

@@ -14,8 +14,8 @@ from magshell.bench.cases.hemisphere import large_deflection
 from magshell.bench.cases.plates import SQUARE, square_plate
 from magshell.bench.convergence import REQUIRED_ORDER, STUDIES, converge
 
-# On 32x32 cells these closed forms are out of the element's reach, and on 128x128 ("B5 finer") they are not: it is Morley's
-# element (tests/test_morley.py), whose errors these are.
+# On 32x32 cells these closed forms are out of the element's reach, and on 128x128 ("B5 finer") they are not:
+# it is Morley's element (tests/test_morley.py), whose errors these are.
 BEYOND_MORLEY = {("B5", "supported, force"), ("B5", "clamped, pressure"), ("B5", "clamped, force")}
 
 # What the project set out to reach: relative errors, of each case's comparisons in turn.
@@ -46,16 +46,12 @@ def outcome(name: str, bending: str = "midedge"):
 
 
 def rows():
-    reason = "Morley's element on this mesh"
+    reason = "beyond Morley's element on this mesh"
     out_of_reach = pytest.mark.xfail(reason=reason, raises=AssertionError, strict=True)
     for name, bounds in BOUNDS.items():
         for k, (quantity, bound) in enumerate(bounds.items()):
             beyond = (name, quantity) in BEYOND_MORLEY
-            marks = (
-                [pytest.mark.xfail(reason="beyond Morley's element on this mesh", strict=True)]
-                if beyond
-                else []
-            )
+            marks = [out_of_reach] if beyond else []
             yield pytest.param(name, k, bound, marks=marks, id=f"{name}: {quantity}")
 
 

@@ -25,8 +25,8 @@ class RestStiffness:
         if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
             raise ValueError(
                 f"the stiffness at rest is not positive definite ({report.negative_pivots} negative and "
-                f"{report.perturbed_pivots} zero pivots of {self._pattern[0]}), and linear theory needs that: "
-                "hold the sheet by supports"
+                f"{report.perturbed_pivots} zero pivots of {self._pattern[0]}), "
+                "and linear theory needs that: hold the sheet by supports"
             )
 
     @property
@@ -39,7 +39,7 @@ class RestStiffness:
         return symmetric(*self._pattern, values)
 
     def negative_directions(self, change: np.ndarray) -> int:
-        """How many directions K plus a change of its values has that lower the energy, by another factorization."""
+        """How many negative eigenvalues K plus a change of its values has, by another factorization."""
         return _core.analyze(*self._pattern).factorize(self._values + change).negative_pivots
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
@@ -47,7 +47,7 @@ class RestStiffness:
         return self._factor.solve(forces)
 
     def response(self, inputs: Inputs) -> np.ndarray:
-        """du of all unknowns, held ones included: K du = -(g(c) - g(0)) - K dm, with dm what supports move."""
+        """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports move."""
         model, unloaded = self._model, _core.Controls()
         moved = model.prescribed_rate(self.rest, 0.0) * inputs.controls.motion
         forces = model.gradient(self.rest, unloaded) - model.gradient(self.rest, inputs.controls)

@@ -35,7 +35,8 @@ class Buckling:
     wall_time: float
 
     def __repr__(self) -> str:
-        return f"Buckling: at {', '.join(f'{factor:.6g}' for factor in self.factors)} times the controls, {self.wall_time:.3g} s"
+        factors = ", ".join(f"{factor:.6g}" for factor in self.factors)
+        return f"Buckling: at {factors} times the controls; {self.wall_time:.3g} s"
 
 
 def linear_buckling(
@@ -49,21 +50,22 @@ def linear_buckling(
     motion_factor: float = 1.0,
     modes: int = 1,
 ) -> Buckling:
-    """The smallest positive multiples of the controls at which a scene buckles, by linear pre-buckling theory.
+    """The smallest positive multiples of the controls at which a scene buckles, by linear theory.
 
     With K(q, c) the Hessian, c the controls and u the linear response to them,
 
         (K + lambda dK) v = 0,     dK = d/dt K(rest + t u, t c) at t = 0, by a central difference     [Pa m]
 
-    so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact in the
-    limit of small displacements before buckling: columns, plates loaded in their plane, closed shells. A shallow arch
-    that softens on its way needs ms.follow. Controls as in ms.equilibrium; a field's own stiffness counts.
+    so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact
+    in the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells.
+    A shallow arch that softens on its way needs ms.follow. Controls as in ms.equilibrium; a field's own
+    stiffness counts.
 
-    modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: a displacement
-        before buckling of a tenth of the sheet's size, or a thousand times the first factor of either sign.
+    modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
+        the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
-    Raises ValueError on bad input, where the supports leave the sheet a motion without stiffness, where the controls
-    do nothing, and where the sheet does not buckle under them (a column that is pulled).
+    Raises ValueError on bad input, where the supports leave the sheet a motion without stiffness, where the
+    controls do nothing, and where the sheet does not buckle under them (a column that is pulled).
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
@@ -128,9 +130,9 @@ def _stiffness_change(
 def _lowest(
     stiffness: RestStiffness, change: np.ndarray, count: int, reach: float, displacement: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positive factors (k,), ascending, and their modes (n, k), k <= count; none whose pre-buckling displacement
-    exceeds `reach`."""
-    # -dK v = (1/lambda) K v, with K positive definite: the smallest positive lambda are the largest eigenvalues.
+    """Positive factors (k,), ascending, and their modes (n, k), k <= count. It moves by `reach` at most."""
+    # -dK v = (1/lambda) K v, with K positive definite: the smallest positive lambda are the largest
+    # eigenvalues.
     negative_change = -stiffness.with_values(change)
     size = negative_change.shape[0]
     inverse = LinearOperator((size, size), matvec=stiffness.solve, dtype=np.float64)
@@ -138,13 +140,15 @@ def _lowest(
     pencil = {"A": negative_change, "M": stiffness.matrix, "Minv": inverse, "v0": start}
     try:
         extreme = abs(eigsh(k=1, which="LM", return_eigenvectors=False, **pencil)[0])
-        # By Sylvester's law, K + lambda dK has as many negative directions as there are factors between 0 and lambda.
-        # Looked for no further than theory reaches: beyond are strains of order one, closely spaced and meaningless.
+        # By Sylvester's law, K + lambda dK has as many negative directions as there are factors between 0 and
+        # lambda. Looked for no further than theory reaches: beyond are strains of order one, closely spaced
+        # and meaningless.
         largest = min(1e3 / extreme, reach / displacement if displacement > 0.0 else np.inf)
         available = stiffness.negative_directions(largest * change)
         if available == 0:
             raise ValueError(
-                "the sheet does not buckle under these controls, as far as linear theory reaches. Under reversed ones it may"
+                "the sheet does not buckle under these controls, as far as linear theory reaches; "
+                "under reversed ones it may"
             )
         inverses, vectors = eigsh(k=min(count, available), which="LA", **pencil)
     except ArpackNoConvergence as error:

@@ -1,4 +1,7 @@
-"""python -m magshell.bench PART [options]: one module a part, with add_arguments(parser) and run(options) -> results."""
+"""python -m magshell.bench PART [options].
+
+A part is a module with add_arguments(parser) and run(options) -> results for JSON.
+"""
 
 from __future__ import annotations
 

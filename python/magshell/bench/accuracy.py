@@ -1,4 +1,4 @@
-"""python -m magshell.bench accuracy: every case against its reference, `midedge` and, on the same mesh, `hinge`."""
+"""python -m magshell.bench accuracy: cases against references, `midedge` and on the same mesh `hinge`."""
 
 from __future__ import annotations
 

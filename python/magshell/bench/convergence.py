@@ -35,8 +35,8 @@ STUDIES: dict[str, tuple[Callable[..., Outcome], float]] = {
 class Convergence:
     """Errors of one study on finer and finer meshes.
 
-    cells: those along the strip, (m,); n_faces (m,). errors: (seeds, m), the distance of the end from its reference over
-    the length of the strip. times: (seeds, m), s.
+    cells: those along the strip, (m,); n_faces (m,). errors: (seeds, m), the distance of the end from its
+    reference over the length of the strip. times: (seeds, m), s.
     """
 
     cells: np.ndarray

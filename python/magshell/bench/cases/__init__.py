@@ -19,7 +19,7 @@ from .shear_strip import end_shear
 
 @dataclass(frozen=True)
 class Case:
-    """A row of the table. run(mesh, bending) -> Outcome; mesh: what the table is about; coarse: for a quick look."""
+    """A row of the table. run(mesh, bending) -> Outcome; mesh: the table's; coarse: one for a quick look."""
 
     name: str
     title: str

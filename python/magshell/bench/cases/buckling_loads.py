@@ -21,7 +21,7 @@ PLATE_FACTOR = 4.0  # k of N = k pi^2 D / b^2 for a simply supported square, pus
 
 
 def column(mesh: ms.TriangleMesh, ends: str, bending: str) -> ms.Scene:
-    """A strip along x, pushed at its far end: by its Euler load, or by a motion that makes it where the end is clamped."""
+    """A strip along x, pushed at its far end by its Euler load; a clamped end is moved until it bears it."""
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=0.0, bending=bending
     )

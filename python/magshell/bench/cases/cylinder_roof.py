@@ -1,4 +1,4 @@
-"""A7a: a shallow cylindrical roof, hinged along its straight edges, snaps through under a force at its centre."""
+"""A7a: a shallow cylindrical roof, hinged along its straight edges, snaps through under a central force."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ RADIUS, LENGTH, HALF_ANGLE, THICKNESS = 2540.0, 508.0, 0.1, 12.7  # mm
 YOUNG_MODULUS, POISSON_RATIO = 3102.75, 0.3  # N/mm2
 FULL_LOAD = 3000.0  # N
 
-# P / FULL_LOAD at the central deflection [mm]: Sze, Liu, Lo, Finite Elem. Anal. Des. 40 (2004) 1551, Abaqus S4R.
+# P / FULL_LOAD at the central deflection [mm], by Abaqus S4R: Sze, Liu, Lo, Finite Elem. Anal. Des. 40
+# (2004) 1551.
 LOADS_AT = {
     0.693: 0.0877,
     1.638: 0.1980,
@@ -52,9 +53,7 @@ LOADS_AT = {
     28.663: 0.9643,
     29.374: 1.0835,
 }
-BEYOND = (
-    1.2  # the path is followed towards this multiple of the full load, until the last deflection is passed
-)
+BEYOND = 1.2  # times the full load: towards there the path is followed, past the last deflection
 
 
 def quarter(cells: tuple[int, int]) -> ms.TriangleMesh:
@@ -78,8 +77,9 @@ def snap_through(
 ) -> Outcome:
     """The load at each listed deflection, by arc length through both limit points.
 
-    Finer meshes converge to loads up to 2.6 % of the full one beside these (at the last deflection), because S4R shears under
-    the point force and a Kirchhoff-Love sheet does not: an extra deflection of 0.155 mm P / Pmax explains all but 0.45 %.
+    Finer meshes converge to loads up to 2.6 % of the full one beside these (at the last deflection), because
+    S4R shears under the point force and a Kirchhoff-Love sheet does not: an extra deflection of 0.155 mm P /
+    Pmax explains all but 0.45 %.
     """
     mesh = quarter(cells)
     centre = mesh.nearest_vertex((0, 0, RADIUS))

@@ -1,4 +1,4 @@
-"""A4 and B3: a hemisphere, with and without a hole at its pole, pulled and pushed radially at four points of its rim."""
+"""A4 and B3: a hemisphere with or without a hole at its pole, pulled and pushed at four points of its rim."""
 
 from __future__ import annotations
 
@@ -39,9 +39,11 @@ def radial_displacements(mesh: ms.TriangleMesh, displacements: np.ndarray) -> tu
 def large_deflection(cells: tuple[int, int] = (64, 16), bending: str = "midedge") -> Outcome:
     """A4: at the full load of 400, in one call from rest.
 
-    The first load step is short: all at once, the iteration can end at a saddle, with a wrinkle beside the pushed point.
+    The first load step is short: all at once, the iteration can end at a saddle, with a wrinkle beside the
+    pushed point.
 
-    References: Sze, Liu, Lo, Finite Elem. Anal. Des. 40 (2004) 1551, Abaqus S4R: 4.067 outwards, 8.178 inwards.
+    References: Sze, Liu, Lo, Finite Elem. Anal. Des. 40 (2004) 1551, Abaqus S4R: 4.067 outwards, 8.178
+    inwards.
     """
     mesh = quarter(cells)
     state = ms.equilibrium(scene(mesh, bending, force=400.0), solver=ms.MixedNewton(first_load_step=0.05))
@@ -56,7 +58,8 @@ def large_deflection(cells: tuple[int, int] = (64, 16), bending: str = "midedge"
 def small_deflection(cells: tuple[int, int] = (128, 32), bending: str = "midedge") -> Outcome:
     """B3: the radial displacement under forces of 2 to first order, with the hole and without.
 
-    References: FinEtools (0.0924 without the hole, 0.093 with a slightly larger one), MacNeal and Harder (0.094).
+    References: FinEtools (0.0924 without the hole, 0.093 with a slightly larger one), MacNeal and Harder
+    (0.094).
     """
     meshes = quarter(cells), quarter(cells, hole=0.0)
     responses = [ms.linear_response(scene(mesh, bending, force=2.0)) for mesh in meshes]

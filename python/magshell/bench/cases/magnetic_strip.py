@@ -14,8 +14,11 @@ from .outcome import Comparison, Outcome, outcome, sweep, tip
 LENGTH, WIDTH, YOUNG_MODULUS, MAGNETIZATION = 0.1, 0.01, 1e6, 1e5
 THICKNESS = LENGTH / 400  # thin, because the elastica does not stretch: 1e-5 of its length here
 
-# beta = M B A L^2 / (EI): end (x, y) / L of the hard-magnetic elastica EI theta'' + M A B sin(phi - theta) = 0 with
-# theta(0) = theta'(L) = 0, phi the angle of the field; by elliptic integrals and by shooting, which agree to 5e-14.
+# beta = M B A L^2 / (EI): end (x, y) / L of the hard-magnetic elastica
+#
+#   EI theta'' + M A B sin(phi - theta) = 0,   theta(0) = theta'(L) = 0,   phi the angle of the field
+#
+# by elliptic integrals and by shooting, which agree to 5e-14.
 ACROSS = {  # phi = 90 degrees
     0.5: (0.9840810375291625, 0.1621435756583696),
     1.0: (0.9435667637166231, 0.30172077379981355),
@@ -77,7 +80,7 @@ def field_against(
     seed: int = 0,
     betas: Sequence[float] = tuple(AGAINST),
 ) -> Outcome:
-    """C1-180: the same past the critical field, where the straight strip is a saddle that the solver has to leave."""
+    """C1-180: the same past the critical field, where the straight strip is a saddle that has to be left."""
     return _against_elastica(cells, bending, seed, {beta: AGAINST[beta] for beta in betas}, (-1.0, 0.0, 0.0))
 
 
@@ -99,8 +102,8 @@ def magnetic_end_shear(
 ) -> Outcome:
     """C4: the strip of A1, magnetised along x in a field along z, deflects as under a dead force at its end.
 
-    For a tangential uniform M and a uniform B the magnetic energy is the work of the dead traction h (M . nu) B on the
-    boundary (divergence theorem), nu its outward normal: here the end load P = h w M B.
+    For a tangential uniform M and a uniform B the magnetic energy is the work of the dead traction h (M . nu)
+    B on the boundary (divergence theorem), nu its outward normal: here the end load P = h w M B.
     """
     mesh = shear_strip.irregular_strip(cells, seed)
     sheet = shear_strip.shell(mesh, bending)

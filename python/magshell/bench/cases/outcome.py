@@ -29,7 +29,8 @@ class Comparison:
         self.allowed = allowed
         if not self.computed.shape == self.reference.shape == (len(self.at),):
             raise ValueError(
-                f"{quantity}: {self.computed.shape} numbers, {self.reference.shape} references, {len(self.at)} names"
+                f"{quantity}: {self.computed.shape} numbers, {self.reference.shape} references, "
+                f"{len(self.at)} names"
             )
 
     @property

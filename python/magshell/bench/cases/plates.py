@@ -1,4 +1,4 @@
-"""B5: square and circular plates, simply supported and clamped, under a pressure and a central force, to first order."""
+"""B5, to first order: square and circular plates, supported and clamped, under a pressure and a force."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ POISSON_RATIO = 0.3
 THICKNESS = 0.01
 YOUNG_MODULUS = 12.0 * (1.0 - POISSON_RATIO**2) / THICKNESS**3  # a plate stiffness D of 1
 
-# Deflection of the middle over q a^4 / D and P a^2 / D. Square: side a, Navier's series and an extrapolated Ritz solution
-# (clamped); they agree with Taylor and Govindjee 2004. Circular: radius a, closed forms.
+# Deflection of the middle over q a^4 / D and P a^2 / D. Square: side a, Navier's series and an extrapolated
+# Ritz solution (clamped); they agree with Taylor and Govindjee 2004. Circular: radius a, closed forms.
 SQUARE = {
     ("supported", "pressure"): 0.004062353,
     ("supported", "force"): 0.011600840,
@@ -41,8 +41,8 @@ def square_plate(cells: tuple[int, int] = (32, 32), bending: str = "midedge") ->
 def circular_plate(rings: int = 48, bending: str = "midedge") -> Outcome:
     """The four deflections of a disk of radius 1.
 
-    Its rim is a polygon, simply supported at its vertices. The lowest-order Hellan-Herrmann-Johnson element does not fall
-    for Babuska's paradox there (Arnold and Walker 2020).
+    Its rim is a polygon, simply supported at its vertices. The lowest-order Hellan-Herrmann-Johnson element
+    does not fall for Babuska's paradox there (Arnold and Walker 2020).
     """
     mesh = ms.meshes.disk(1.0, rings)
     return _middle_deflections(mesh, mesh.boundary_edges, [], 1, bending, CIRCULAR, f"{rings} rings")

@@ -34,7 +34,8 @@ def end_moment(
 ) -> Outcome:
     """Deflection and shortening of the end against the exact arc, at every load."""
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells)
-    # Beyond 0.928 Mmax the plane arc bends sideways (on finer meshes too); the closed form is that of the plane one.
+    # Beyond 0.928 Mmax the plane arc bends sideways (on finer meshes too); the closed form is that of the
+    # plane one.
     states = sweep(scene(mesh, bending), [{"load_factor": load} for load in loads], require_stable=False)
     tips = np.array([tip(mesh, state.displacements, x=LENGTH) for state in states])
     references = np.array([exact(load) for load in loads])

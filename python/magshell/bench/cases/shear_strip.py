@@ -11,9 +11,9 @@ from .outcome import Comparison, Outcome, outcome, sweep, tip
 LENGTH, WIDTH, THICKNESS, YOUNG_MODULUS = 10.0, 1.0, 0.1, 1.2e6
 FULL_LOAD = 4.0  # 4 EI / L^2, on the whole end
 
-# P / FULL_LOAD: shortening U and deflection W of the end of an inextensible elastica under a dead end force, by elliptic
-# integrals and by shooting, which agree. The case is that of Sze, Liu, Lo, Finite Elem. Anal. Des. 40 (2004) 1551,
-# whose Abaqus S4R numbers lie within 0.0035 of these.
+# P / FULL_LOAD: shortening U and deflection W of the end of an inextensible elastica under a dead end force,
+# by elliptic integrals and by shooting, which agree. The case is that of Sze, Liu, Lo, Finite Elem. Anal.
+# Des. 40 (2004) 1551, whose Abaqus S4R numbers lie within 0.0035 of these.
 ELASTICA = {
     0.05: (0.026465, 0.663645),
     0.10: (0.103539, 1.309752),

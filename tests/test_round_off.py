@@ -1,0 +1,29 @@
+"""Small loads on sheets of long radii: the residual stops at the positions' round-off, and so must a solve."""
+
+import numpy as np
+import pytest
+
+import magshell as ms
+from magshell.bench.cases import cylinder_roof
+
+
+@pytest.mark.parametrize("load_factor", [1e-4, 1e-3, 1e-2])
+def test_small_load_on_a_shallow_roof(load_factor: float) -> None:
+    # 2540 mm from its axis, cells of 16 mm.
+    scene = cylinder_roof.scene(cylinder_roof.quarter((16, 16)), "midedge")
+    state = ms.equilibrium(scene, load_factor=load_factor)
+    response = ms.linear_response(scene, load_factor=load_factor).displacements
+    assert state.iterations <= 5
+    np.testing.assert_allclose(state.displacements, response, atol=0.02 * np.abs(response).max())
+
+
+def test_fine_roof_takes_small_steps() -> None:
+    mesh = cylinder_roof.quarter((32, 32))
+    centre = mesh.nearest_vertex((0, 0, cylinder_roof.RADIUS))
+    path = ms.follow(
+        cylinder_roof.scene(mesh, "midedge"),
+        until=lambda _, positions: positions[centre, 2] < cylinder_roof.RADIUS - 2.0,
+        first_step=0.005,
+        progress=False,
+    )
+    assert path.unstable_directions[-1] == 0 and len(path) > 2
