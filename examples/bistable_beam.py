@@ -21,10 +21,10 @@ time:
 - Without Poisson's effect, and scaled to small slopes and strains, the shell is the beam, to 0.05 %. At
   its true slopes of 0.1 it stands 0.2 % lower and snaps 0.6 % earlier.
 - The rest, 3 to 4 % in height and field, is Poisson's effect in a sheet of some width: a strip a quarter
-  as wide has a fifth of the loss in height, and none in field. Clamps that let the sheet neither bend
-  sideways nor widen stiffen it more in bending than in compression: straight, it buckles only when
-  shortened by 7 % more. Beam theory with a bending stiffness larger by these 7 % has less of the
-  shortening left to bend with, and gives a *lower* field, 5.50 mT, with half of the loss in height.
+  as wide has a sixth of the loss in height, and none to speak of in field. Clamps that let the sheet
+  neither bend sideways nor widen stiffen it more in bending than in compression: straight, it buckles
+  only when shortened by 7 % more. Beam theory with a bending stiffness larger by these 7 % has less of
+  the shortening left to bend with, and gives a *lower* field, 5.50 mT, with half of the loss in height.
 
 Run it: prints a summary and writes pictures into out/.
 """
