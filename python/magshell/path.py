@@ -70,6 +70,11 @@ class Path:
         return solve(self._inputs, point.state, point.memory, controls, controls, options)
 
     @property
+    def applied_flux_densities(self) -> np.ndarray:
+        """The uniform field at each point, (n, 3), T."""
+        return np.array([self._from.towards(self._to, t).flux_density for t in self.parameters]).reshape(-1, 3)
+
+    @property
     def stable(self) -> np.ndarray:
         """(n,), bool."""
         return self.unstable_directions == 0

@@ -145,7 +145,8 @@ class Follower {
             PathPoint next;
             Tangent there;
             int iterations = 0;
-            if (!correct(base, tangent, step_, next, iterations) || !find_tangent(next, there)) continue;
+            if (!correct(base, tangent, step_, next, iterations) || !end_in_range(next) || !find_tangent(next, there))
+                continue;
             normalize(there);
             double turn = cosine(tangent, there);
             if (turn < 0.0) {
@@ -162,6 +163,16 @@ class Follower {
             step_ *= std::clamp(std::sqrt(double(wanted_iterations) / std::max(iterations, 1)), 0.5, 2.0);
             return true;
         }
+    }
+
+    // A point past the end of the range is exchanged for the one at its end.
+    bool end_in_range(PathPoint& point) {
+        const double end = std::clamp(point.parameter, options_.lowest_parameter, options_.highest_parameter);
+        if (end == point.parameter) return true;
+        if (!newton_.solve(point.state, controls(end)).converged) return false;
+        point.parameter = end;
+        point.memory = model_.memory();
+        return true;
     }
 
     // The eigenvalue next to zero at the point just factorized, positive on the side of `count` unstable directions.
