@@ -1,4 +1,4 @@
-"""Small loads on sheets of long radii: the residual stops at the positions' round-off, and so must a solve."""
+"""Small loads on sheets of long radii: the residual ends at the positions' round-off, so a solve must."""
 
 import numpy as np
 import pytest
