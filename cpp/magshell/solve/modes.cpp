@@ -70,10 +70,23 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     return modes;
 }
 
-Mode most_unstable_mode(Newton& newton, Index negative_pivots) {
-    // Stable modes may lie nearer to zero than the most unstable one: look at a few more.
+Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& controls, Index negative_pivots) {
     constexpr Index most = 12, spare = 6;
-    return modes_near_zero(newton, static_cast<int>(std::min(negative_pivots, most) + spare)).front();
+    const int count = static_cast<int>(std::min(negative_pivots, most) + spare);
+    std::vector<Mode> modes = modes_near_zero(newton, count);
+    if (modes.front().eigenvalue < 0.0 || negative_pivots == 0) return modes.front();
+
+    // Many stable modes lie nearer to zero. Shift until all are stable; the most unstable one is then the nearest.
+    double shift = std::max(std::abs(modes.front().eigenvalue), std::abs(modes.back().eigenvalue));
+    Eigen::MatrixXd no_moves(q.size(), 0);
+    for (FactorReport factor; !factor.succeeded || factor.negative_pivots > 0;) {
+        shift *= 4.0;
+        if (!std::isfinite(shift)) return modes.front();
+        factor = newton.factorize(q, controls, false, {shift, &q}, no_moves);
+    }
+    Mode mode = modes_near_zero(newton, 1).front();
+    mode.eigenvalue -= shift;
+    return mode;
 }
 
 }  // namespace magshell

@@ -14,7 +14,8 @@ struct Mode {
 /// factorization of `newton`, which must be that of the Hessian itself.
 std::vector<Mode> modes_near_zero(Newton& newton, int count);
 
-/// The mode with the most negative eigenvalue, at a point whose factorization has so many negative pivots.
-Mode most_unstable_mode(Newton& newton, Index negative_pivots);
+/// The mode with the most negative eigenvalue at q, which the model was last evaluated at and whose factorization has so
+/// many negative pivots; without any, the lowest of all. May leave the factorization of a shifted Hessian behind.
+Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& controls, Index negative_pivots);
 
 }  // namespace magshell

@@ -13,7 +13,7 @@ constexpr int iterations_a_step = 10, quick_iterations = 6;
 constexpr double above_instability = 1.3;  // the rate, over the most negative eigenvalue's size
 constexpr double rate_growth = 2.0, rate_decay = 4.0;
 constexpr double settled = 1e-4;  // of the extent: a step that moves less has come to rest, or to a saddle
-constexpr double smallest_step = 1e-12;  // of a rate, over the first one, before giving up
+constexpr double smallest_step = 1e-9;  // of a rate, over the first one, before giving up
 
 class Relaxation {
   public:
@@ -49,8 +49,9 @@ class Relaxation {
         const bool convex = factor.negative_pivots == 0;
         if (!convex || rate_ == 0.0) {
             const bool at_rest = newton_.relative_residual(q_, {}) <= newton_.options().tolerance;
-            const Mode mode = most_unstable_mode(newton_, factor.negative_pivots);
-            rate_ = above_instability * std::abs(mode.eigenvalue);
+            const Mode mode = most_unstable_mode(newton_, q_, controls_, factor.negative_pivots);
+            // Not far below a rate that was needed a moment ago.
+            rate_ = std::max(above_instability * std::abs(mode.eigenvalue), rate_);
             if (first_rate_ == 0.0) first_rate_ = rate_;
             if (mode.eigenvalue < 0.0 && (at_rest || last_move_ < settled * model_.extent())) leave_saddle(mode);
         }
@@ -103,7 +104,7 @@ class Relaxation {
         return true;
     }
 
-    bool lowers(double energy) const { return energy <= energy_ + 1e-9 * std::abs(energy_); }
+    bool lowers(double energy) const { return energy <= energy_ + 1e-12 * std::abs(energy_); }
 
     Newton& newton_;
     Model& model_;
