@@ -124,6 +124,11 @@ def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibriu
 
 
 def _failure(found, at_rest: bool) -> str:
+    if found.progress >= 1.0:
+        return (
+            f"no stable equilibrium was found at the new controls, in {found.iterations} iterations: {found.reason}. "
+            "The unstable one is in `error.last_good`; require_stable=False accepts it."
+        )
     advice = (
         "Load it in smaller steps (first_load_step of the solver), or start from a nearby equilibrium."
         if at_rest
