@@ -59,7 +59,7 @@ void register_statics(py::module_& module) {
         .def_readonly("bytes", &StaticsResult::bytes)
         .def_readonly("factorization", &StaticsResult::factorization);
 
-    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from"), py::arg("to"),
+    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from_"), py::arg("to"),
                py::arg("options"), py::arg("progress") = py::none());
 }
 
