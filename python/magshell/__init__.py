@@ -1,6 +1,6 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
-from . import meshes
+from . import meshes, optim
 from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
@@ -56,6 +56,7 @@ __all__ = [
     "linear_response",
     "meshes",
     "num_threads",
+    "optim",
     "plot",
     "read_fields",
     "read_mesh",
