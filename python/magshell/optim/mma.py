@@ -12,7 +12,7 @@ from .base import BoxOptimizer, Restoring, require_range
 from .box import Box
 from .sample import Sample
 
-_CONVEXITY = 1e-5  # of the steepest slope so far: damps steps once the gradient has all but vanished
+_CONVEXITY = 1e-6  # of the steepest slope so far: damps steps once the gradient has all but vanished
 
 
 class MMA(BoxOptimizer):
