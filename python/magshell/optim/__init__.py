@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from .._tensors import require_torch
+
 _HOMES = {"GCMMA": ".gcmma", "LBFGS": ".lbfgs", "MMA": ".mma"}
 
 __all__ = ["GCMMA", "LBFGS", "MMA"]
@@ -15,10 +17,7 @@ __all__ = ["GCMMA", "LBFGS", "MMA"]
 def __getattr__(name: str):
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    try:
-        import torch  # noqa: F401
-    except ImportError as error:
-        raise ImportError('the optimizers need torch: pip install "magshell[torch]"') from error
+    require_torch(f"optim.{name}")
     return getattr(import_module(_HOMES[name], __name__), name)
 
 
