@@ -1,11 +1,12 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
-from . import meshes
+from . import meshes, objectives, optim, parametrize
 from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
+from .design import Minimum, minimize
 from .equilibrium import Equilibrium
-from .errors import Interrupted, NotConverged
+from .errors import Interrupted, NotConverged, ObjectiveFailed
 from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .field_adapters import CustomField, MagpylibField
 from .io import read_fields, read_mesh, write_mesh
@@ -35,9 +36,11 @@ __all__ = [
     "Interrupted",
     "LinearResponse",
     "MagpylibField",
+    "Minimum",
     "MixedNewton",
     "Newton",
     "NotConverged",
+    "ObjectiveFailed",
     "Path",
     "Picture",
     "Pin",
@@ -55,7 +58,11 @@ __all__ = [
     "linear_buckling",
     "linear_response",
     "meshes",
+    "minimize",
     "num_threads",
+    "objectives",
+    "optim",
+    "parametrize",
     "plot",
     "read_fields",
     "read_mesh",

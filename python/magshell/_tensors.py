@@ -7,6 +7,15 @@ import sys
 import numpy as np
 
 
+def require_torch(what: str):
+    """The torch module, or an ImportError that says how to get it."""
+    try:
+        import torch
+    except ImportError as error:
+        raise ImportError(f'{what} needs torch: pip install "magshell[torch]"') from error
+    return torch
+
+
 def is_tensor(value) -> bool:
     torch = sys.modules.get("torch")
     return torch is not None and isinstance(value, torch.Tensor)

@@ -17,3 +17,11 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, message: str, last_good=None):
         super().__init__(message)
         self.last_good = last_good
+
+
+class ObjectiveFailed(RuntimeError):
+    """An optimization met an error, its cause, on the way. `last_good` holds the best design until then, as a result of the same kind."""
+
+    def __init__(self, message: str, last_good=None):
+        super().__init__(message)
+        self.last_good = last_good

@@ -1,0 +1,146 @@
+"""Objectives, penalties and constraints of designs: small functions of torch tensors, differentiable in each.
+
+Each returns a scalar that a sum of others can hold; `cap` returns constraints g <= 0. Lengths in m, magnetizations in A/m.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._tensors import require_torch
+
+
+def shape_matching(positions, target, vertices=None, weights=None):
+    """Sum of squared distances between vertices and their targets [m2].
+
+    positions: (n_v, 3). target: (n_v, 3), or (k, 3) when k vertices are chosen. vertices: (k,) indices, by default all.
+    weights: (k,), one a distance, for example vertex areas; by default 1.
+    """
+    chosen = positions if vertices is None else positions[_indices(vertices)]
+    squares = ((chosen - _like(target, chosen, "target", chosen.shape)) ** 2).sum(-1)
+    if weights is None:
+        return squares.sum()
+    return (_like(weights, squares, "weights", squares.shape) * squares).sum()
+
+
+def height_map(positions, rest_positions, image, extent, weights=None):
+    """Sum of squared differences between the vertices' heights z and an image [m2].
+
+    The image is sampled bilinearly where the vertices rest. positions, rest_positions: (n_v, 3). image: (rows, columns) heights [m], row 0 at the largest y as
+    pictures are drawn. extent: (x_min, x_max, y_min, y_max) [m] of the centres of its outermost pixels; beyond, the nearest pixel counts.
+    weights: (n_v,), by default 1.
+    """
+    heights = bilinear(image, rest_positions, extent)
+    squares = (positions[:, 2] - heights.to(positions)) ** 2
+    return squares.sum() if weights is None else (_like(weights, squares, "weights", squares.shape) * squares).sum()
+
+
+def bilinear(image, points, extent):
+    """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in `height_map`."""
+    torch = require_torch("objectives.bilinear")
+    image = torch.as_tensor(image, dtype=torch.float64)
+    if image.ndim != 2 or min(image.shape) < 2:
+        raise ValueError(f"image must have at least 2 rows and 2 columns, got shape {tuple(image.shape)}")
+    x_min, x_max, y_min, y_max = extent
+    if not (x_min < x_max and y_min < y_max):
+        raise ValueError(f"extent must be (x_min, x_max, y_min, y_max) with positive sizes, got {tuple(extent)}")
+    points = torch.as_tensor(points, dtype=torch.float64)
+    rows, columns = image.shape
+    column = ((points[:, 0] - x_min) / (x_max - x_min) * (columns - 1)).clamp(0, columns - 1)
+    row = ((y_max - points[:, 1]) / (y_max - y_min) * (rows - 1)).clamp(0, rows - 1)
+    left, top = column.detach().long().clamp(max=columns - 2), row.detach().long().clamp(max=rows - 2)
+    right_share, down_share = column - left, row - top
+    above = image[top, left] * (1 - right_share) + image[top, left + 1] * right_share
+    below = image[top + 1, left] * (1 - right_share) + image[top + 1, left + 1] * right_share
+    return above * (1 - down_share) + below * down_share
+
+
+def extension(positions, vertices, direction):
+    """Minus the mean reach of the chosen vertices along a direction [m]: minimize it to pull them as far as they go.
+
+    positions: (n_v, 3). vertices: an index, or (k,). direction: (3,), of any length but zero.
+    """
+    torch = require_torch("objectives.extension")
+    direction = _like(direction, positions, "direction", (3,))
+    length = torch.linalg.vector_norm(direction)
+    if not float(length.detach()) > 0:
+        raise ValueError("direction must not be zero")
+    return -(positions[_indices(vertices)].reshape(-1, 3) @ (direction / length)).mean()
+
+
+def magnitude(values, areas=None):
+    """Sum of squares, weighted by areas [m2] where given: of magnetizations (n_f, 3), or of any (n, ...)."""
+    squares = (values**2).reshape(len(values), -1).sum(-1)
+    return squares.sum() if areas is None else (_like(areas, squares, "areas", squares.shape) * squares).sum()
+
+
+def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
+    """Sum over interior edges of edge length times the jump of the values across, smooth at zero: sqrt(jump^2 + eps^2) - eps.
+
+    values: (n_f,) or (n_f, k). edge_faces: (n_e, 2), with -1 where an edge has no second face, as in `TriangleMesh`. edge_lengths: (n_e,) [m], by default 1.
+    smoothing eps > 0: in units of the values; jumps far below it count by their squares.
+    """
+    if not smoothing > 0:
+        raise ValueError(f"smoothing must be positive, got {smoothing}")
+    edge_faces = _indices(edge_faces)
+    interior = (edge_faces >= 0).all(-1)
+    first, second = edge_faces[interior].T
+    jumps = ((values[first] - values[second]) ** 2).reshape(len(first), -1).sum(-1)
+    rounded = (jumps + smoothing**2) ** 0.5 - smoothing
+    if edge_lengths is None:
+        return rounded.sum()
+    return (_like(edge_lengths, rounded, "edge_lengths", interior.shape)[interior] * rounded).sum()
+
+
+def cap(remanent_magnetization, limit, sharpness=None):
+    """Constraints g <= 0 that keep |M_r| at or below a limit: (|M_r| / limit)^2 - 1.
+
+    remanent_magnetization: (n_f, 3) A/m. limit: A/m. One constraint a face, (n_f,); with a sharpness p > 1, a single one, (1,), from the
+    p-norm over all faces: for optimizers it costs one gradient instead of n_f, and it is never looser than the limit.
+    """
+    if not float(limit) > 0:
+        raise ValueError(f"limit [A/m] must be positive, got {limit}")
+    squares = ((remanent_magnetization / limit) ** 2).sum(-1)
+    if sharpness is None:
+        return squares - 1
+    if not sharpness > 1:
+        raise ValueError(f"sharpness must exceed 1, got {sharpness}")
+    largest = squares.detach().max().clamp(min=1e-30)  # taken out, so that the powers neither overflow nor vanish
+    return (largest * ((squares / largest) ** sharpness).sum() ** (1 / sharpness) - 1)[None]
+
+
+def printable(remanent_magnetization, directions, sharpness=None):
+    """Sum of squared distances of magnetizations from their nearest printable ray [A2/m2].
+
+    remanent_magnetization: (n_f, 3) A/m. directions: (k, 3), of any length but zero; no magnetization at all can be printed too. The distance
+    is to the ray that starts at zero. sharpness: replaces the minimum over the rays by a smooth one, in 1 / (A2/m2).
+    """
+    torch = require_torch("objectives.printable")
+    rays = torch.as_tensor(directions).to(remanent_magnetization)
+    if rays.ndim != 2 or rays.shape[1] != 3 or len(rays) == 0:
+        raise ValueError(f"directions must have shape (k, 3), got {tuple(rays.shape)}")
+    lengths = torch.linalg.vector_norm(rays, dim=1, keepdim=True)
+    if not (lengths > 0).all():
+        raise ValueError("directions must not be zero")
+    along = (remanent_magnetization @ (rays / lengths).T).clamp(min=0)
+    squares = (remanent_magnetization**2).sum(-1, keepdim=True) - along**2
+    if sharpness is None:
+        return squares.min(dim=1).values.sum()
+    return -(torch.logsumexp(-sharpness * squares, dim=1) / sharpness).sum()
+
+
+def _indices(values):
+    torch = require_torch("an objective")
+    indices = torch.as_tensor(values if hasattr(values, "dtype") else np.asarray(values))
+    if indices.is_floating_point() or indices.dtype == torch.bool:
+        raise ValueError(f"indices must be integers, got {indices.dtype}")
+    return indices.long()
+
+
+def _like(values, reference, name: str, shape):
+    """A tensor of the reference's dtype, of the shape it must have."""
+    torch = require_torch("an objective")
+    tensor = torch.as_tensor(values).to(reference)
+    if tuple(tensor.shape) != tuple(shape):
+        raise ValueError(f"{name} must have shape {tuple(shape)}, got {tuple(tensor.shape)}")
+    return tensor

@@ -1,0 +1,144 @@
+"""The convex separable subproblem of MMA, by a primal-dual interior point method.
+
+    minimize    sum_j p_0j / (s_j - t_j) + q_0j / (s_j + t_j)  +  sum_i c y_i + y_i^2 / 2
+    such that   sum_j p_ij / (s_j - t_j) + q_ij / (s_j + t_j) - y_i <= b_i
+                lower_j <= t_j <= upper_j,  y_i >= 0
+
+K. Svanberg, MMA and GCMMA - two methods for nonlinear optimization (2007), sections 4 and 5, without the variable z, which only
+min-max problems need, and with asymptotes at -s and s, where MMA's own rules keep them. The unknowns t are steps in
+units of the variables' sizes and the functions are scaled to unit slopes, so that the tolerances below mean the same
+in every problem.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_BARRIER_END = 1e-10
+_NEWTON_LIMIT = 100  # a barrier value takes 3 to 10
+
+
+@dataclass(frozen=True)
+class Subproblem:
+    """p, q: (1 + m, n) >= 0, the objective's row first. limits b: (m,). asymptote s, lower, upper: (n,). penalty c."""
+
+    p: np.ndarray
+    q: np.ndarray
+    limits: np.ndarray
+    asymptote: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    penalty: float
+
+    def solve(self) -> np.ndarray:
+        """The minimizer t, (n,)."""
+        return self._unconstrained() if len(self.limits) == 0 else self._interior_point()
+
+    def _unconstrained(self) -> np.ndarray:
+        """p / (s - t)^2 = q / (s + t)^2 for each variable on its own, cut to its interval."""
+        root_p, root_q = np.sqrt(self.p[0]), np.sqrt(self.q[0])
+        return np.clip(self.asymptote * (root_q - root_p) / (root_q + root_p), self.lower, self.upper)
+
+    def _interior_point(self) -> np.ndarray:
+        point = _Point.start(self)
+        barrier = 1.0
+        while barrier > _BARRIER_END:
+            for _ in range(_NEWTON_LIMIT):
+                residual = point.residual(self, barrier)
+                if np.abs(residual).max() < 0.9 * barrier:
+                    break
+                moved = point.newton(self, barrier, np.linalg.norm(residual))
+                if moved is None:  # at the floor of rounding
+                    break
+                point = moved
+            barrier *= 0.1
+        return point.t
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Primal t, y, slack s of the constraints, and multipliers: constraints, lower and upper bounds of t, bound of y."""
+
+    t: np.ndarray
+    y: np.ndarray
+    slack: np.ndarray
+    multiplier: np.ndarray
+    at_lower: np.ndarray
+    at_upper: np.ndarray
+    at_zero: np.ndarray
+
+    @staticmethod
+    def start(sub: Subproblem) -> _Point:
+        m = len(sub.limits)
+        t = 0.5 * (sub.lower + sub.upper)
+        at_bound = np.maximum(1.0, 2.0 / (sub.upper - sub.lower))
+        ones = np.ones(m)
+        return _Point(t, ones, ones, ones, at_bound, at_bound, np.full(m, max(1.0, 0.5 * sub.penalty)))
+
+    def parts(self) -> tuple[np.ndarray, ...]:
+        return self.t, self.y, self.slack, self.multiplier, self.at_lower, self.at_upper, self.at_zero
+
+    def slopes(self, sub: Subproblem) -> np.ndarray:
+        """(1 + m, n) derivatives of objective and constraints."""
+        return sub.p / (sub.asymptote - self.t) ** 2 - sub.q / (sub.asymptote + self.t) ** 2
+
+    def excess(self, sub: Subproblem) -> np.ndarray:
+        """(m,) constraints less y and b."""
+        values = sub.p[1:] @ (1 / (sub.asymptote - self.t)) + sub.q[1:] @ (1 / (sub.asymptote + self.t))
+        return values - self.y - sub.limits
+
+    def residual(self, sub: Subproblem, barrier: float) -> np.ndarray:
+        slopes = self.slopes(sub)
+        return np.concatenate(
+            [
+                slopes[0] + self.multiplier @ slopes[1:] - self.at_lower + self.at_upper,
+                sub.penalty + self.y - self.multiplier - self.at_zero,
+                self.excess(sub) + self.slack,
+                self.at_lower * (self.t - sub.lower) - barrier,
+                self.at_upper * (sub.upper - self.t) - barrier,
+                self.at_zero * self.y - barrier,
+                self.multiplier * self.slack - barrier,
+            ]
+        )
+
+    def newton(self, sub: Subproblem, barrier: float, norm: float) -> _Point | None:
+        """One damped Newton step; None if no step makes the residual smaller."""
+        direction = self._direction(sub, barrier)
+        rates = [-step / value for step, value in zip(direction[1:], self.parts()[1:], strict=True)]
+        rates += [-direction[0] / (self.t - sub.lower), direction[0] / (sub.upper - self.t)]
+        length = 1.0 / max(1.0, *(1.01 * rate.max() for rate in rates))
+        for _ in range(50):
+            moved = _Point(*(value + length * step for value, step in zip(self.parts(), direction, strict=True)))
+            inside = (moved.t > sub.lower).all() and (moved.t < sub.upper).all()
+            if inside and np.linalg.norm(moved.residual(sub, barrier)) < norm:
+                return moved
+            length *= 0.5
+        return None
+
+    def _direction(self, sub: Subproblem, barrier: float) -> tuple[np.ndarray, ...]:
+        """Newton's step: everything but the m multipliers eliminated."""
+        above, below = self.t - sub.lower, sub.upper - self.t
+        slopes = self.slopes(sub)
+        jacobian = slopes[1:]
+        weights = np.concatenate([[1.0], self.multiplier])
+        curvature = 2 * (weights @ sub.p) / (sub.asymptote - self.t) ** 3
+        curvature += 2 * (weights @ sub.q) / (sub.asymptote + self.t) ** 3
+        diagonal_t = curvature + self.at_lower / above + self.at_upper / below
+        diagonal_y = 1.0 + self.at_zero / self.y
+        force_t = slopes[0] + self.multiplier @ jacobian - barrier / above + barrier / below
+        force_y = sub.penalty + self.y - self.multiplier - barrier / self.y
+        force_multiplier = self.excess(sub) + barrier / self.multiplier
+
+        matrix = (jacobian / diagonal_t) @ jacobian.T
+        matrix += np.diag(1 / diagonal_y + self.slack / self.multiplier)
+        right = force_multiplier - jacobian @ (force_t / diagonal_t) + force_y / diagonal_y
+        multiplier = np.linalg.solve(matrix, right)
+        t = -(force_t + multiplier @ jacobian) / diagonal_t
+        y = (multiplier - force_y) / diagonal_y
+        slack = barrier / self.multiplier - self.slack - self.slack / self.multiplier * multiplier
+        at_lower = barrier / above - self.at_lower - self.at_lower / above * t
+        at_upper = barrier / below - self.at_upper + self.at_upper / below * t
+        at_zero = barrier / self.y - self.at_zero - self.at_zero / self.y * y
+        return t, y, slack, multiplier, at_lower, at_upper, at_zero

@@ -1,0 +1,65 @@
+"""From the few numbers that are optimized to the values of every face: small functions of torch tensors."""
+
+from __future__ import annotations
+
+import math
+
+from ._tensors import require_torch
+
+
+def from_regions(values, regions):
+    """Values a face, (n_f, ...), equal within a region. values: (n_regions, ...). regions: (n_f,) the region of each face, from 0."""
+    torch = require_torch("parametrize.from_regions")
+    regions = torch.as_tensor(regions)
+    if regions.ndim != 1 or regions.is_floating_point() or regions.dtype == torch.bool:
+        raise ValueError(f"regions must be integers of shape (n_f,), got {regions.dtype} {tuple(regions.shape)}")
+    if len(regions) and not 0 <= int(regions.min()) <= int(regions.max()) < len(values):
+        raise ValueError(f"regions must lie in 0 ... {len(values) - 1}, got {int(regions.min())} ... {int(regions.max())}")
+    return values[regions.long()]
+
+
+def along(amplitude, directions):
+    """Magnetizations (n_f, 3) of free amplitude in fixed directions. amplitude: (n_f,) A/m. directions: (3,) or (n_f, 3), of any length but zero."""
+    torch = require_torch("parametrize.along")
+    directions = torch.as_tensor(directions).to(amplitude)
+    if directions.shape[-1:] != (3,) or directions.ndim > 2 or (directions.ndim == 2 and len(directions) != len(amplitude)):
+        raise ValueError(f"directions must have shape (3,) or ({len(amplitude)}, 3), got {tuple(directions.shape)}")
+    lengths = torch.linalg.vector_norm(directions, dim=-1, keepdim=True)
+    if not (lengths > 0).all():
+        raise ValueError("directions must not be zero")
+    return amplitude[:, None] * (directions / lengths)
+
+
+def log_scaled(shares, lower, upper):
+    """Values between lower and upper, evenly spread in their logarithm: lower (upper / lower)^share, for shares in [0, 1].
+
+    Moduli over decades: young_modulus = log_scaled(s, 1e4, 1e8), with the bounds 0 and 1 of s left to the optimizer.
+    """
+    if not 0 < lower < upper < math.inf:
+        raise ValueError(f"bounds must be positive and in order, got {lower} and {upper}")
+    return lower * (shares * math.log(upper / lower)).exp()
+
+
+def log_shares(values, lower, upper):
+    """The shares of `log_scaled` that give these values."""
+    if not 0 < lower < upper < math.inf:
+        raise ValueError(f"bounds must be positive and in order, got {lower} and {upper}")
+    return (values / lower).log() / math.log(upper / lower)
+
+
+def capped(vectors, limit):
+    """Magnetizations (n_f, 3) below a limit [A/m], smoothly from any (n_f, 3): v / sqrt(1 + |v|^2 / limit^2)."""
+    if not float(limit) > 0:
+        raise ValueError(f"limit [A/m] must be positive, got {limit}")
+    return vectors / (1 + ((vectors / limit) ** 2).sum(-1, keepdim=True)) ** 0.5
+
+
+def project_to_cap(vectors, limit):
+    """The nearest magnetizations (n_f, 3) that do not exceed a limit [A/m]: longer ones are cut to it."""
+    torch = require_torch("parametrize.project_to_cap")
+    if not float(limit) > 0:
+        raise ValueError(f"limit [A/m] must be positive, got {limit}")
+    squares = (vectors**2).sum(-1, keepdim=True)
+    # The root only where it is needed: its derivative at zero would make NaN of a zero vector's gradient.
+    longer = squares > limit**2
+    return vectors * torch.where(longer, limit / torch.where(longer, squares, torch.ones_like(squares)) ** 0.5, 1.0)
