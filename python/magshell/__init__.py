@@ -5,7 +5,7 @@ from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
 from .equilibrium import Equilibrium
-from .errors import Interrupted, NotConverged
+from .errors import Interrupted, NoGradient, NotConverged
 from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .field_adapters import CustomField, MagpylibField
 from .io import read_fields, read_mesh, write_mesh
@@ -37,6 +37,7 @@ __all__ = [
     "MagpylibField",
     "MixedNewton",
     "Newton",
+    "NoGradient",
     "NotConverged",
     "Path",
     "Picture",

@@ -17,3 +17,7 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, message: str, last_good=None):
         super().__init__(message)
         self.last_good = last_good
+
+
+class NoGradient(RuntimeError):
+    """A gradient was asked for at a state that has none: not converged, or not stable."""
