@@ -14,7 +14,7 @@ BENDINGS = ("midedge", "hinge")
 MESH = ms.meshes.rectangle(0.1, 0.06, cells=(3, 2), irregular=0.2, seed=3)
 N_F, N_E, N_V = MESH.n_faces, MESH.n_edges, MESH.n_vertices
 FREE = MESH.vertices_at(x=0.1)
-EXACT = ms.MixedNewton(tolerance=1e-13)
+EXACT = ms.MixedNewton(tolerance=1e-12)
 RNG = np.random.default_rng(7)
 MAGNETIZATION = np.array((3e4, 1e4, 2e4)) * RNG.uniform(0.7, 1.3, (N_F, 3))
 YOUNG = RNG.uniform(0.8e6, 1.2e6, N_F)
@@ -147,7 +147,7 @@ def test_gravity_and_vertex_loads():
     def loaded(value, start=None):
         return ms.equilibrium(scene, **DEFAULTS, vertex_loads=value, start=start, solver=EXACT)
 
-    check(falls, (1.0, -2.0, 5.0))
+    check(falls, (1.0, -2.0, -5.0))
     check(loaded, RNG.uniform(-2e-3, 2e-3, (N_V, 3)))
 
 
