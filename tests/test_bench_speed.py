@@ -28,7 +28,19 @@ def test_statics(tmp_path, capsys) -> None:
     assert "supernodal" in results["backends"]
 
 
-@pytest.mark.parametrize("arguments", [["kernels", "--faces", "1"], ["statics", "--rounds", "0"]])
+def test_gradients(tmp_path, capsys) -> None:
+    pytest.importorskip("torch")
+    path = tmp_path / "gradients.json"
+    assert main(["gradients", "--faces", "32", "--rounds", "1", "--json", str(path)]) == 0
+    assert "The gradient by all inputs at once" in capsys.readouterr().out
+    results = json.loads(path.read_text())["results"]
+    assert results.keys() == {"midedge", "hinge"}
+    assert all(cost["share"] == cost["gradient"] / cost["equilibrium"] for cost in results.values())
+
+
+@pytest.mark.parametrize(
+    "arguments", [["kernels", "--faces", "1"], ["statics", "--rounds", "0"], ["gradients", "--faces", "0"]]
+)
 def test_sizes_that_make_no_sense(arguments) -> None:
     with pytest.raises(SystemExit, match="must be at least"):
         main(arguments)
