@@ -21,15 +21,16 @@ class Statics {
 
     bool run() {
         if (!load()) return false;
-        return result_.stable || !options_.require_stable || descend();
+        return result_.stable || !options_.require_stable || descend(1.0);
     }
 
   private:
     bool load() {
         double step = options_.first_step, failed_step = 2.0;
         const double turn = std::abs(to_.motion - from_.motion) * newton_.model().reduction().largest_turn();
+        const double longest_step = turn > longest_turn ? longest_turn / turn : 1.0;
         while (result_.progress < 1.0) {
-            if (step * turn > longest_turn) step = longest_turn / turn;
+            step = std::min(step, longest_step);
             const double target = std::min(1.0, result_.progress + step);
             const Controls controls = interpolate(from_, to_, target);
             VectorXd trial = result_.state;
@@ -44,7 +45,10 @@ class Statics {
             result_.reason = report.reason;
             failed_step = target - result_.progress;
             step = (report.lost ? 0.25 : 0.5) * failed_step;
-            if (step < options_.smallest_step || !options_.start_at_rest) return descend();
+            if (step >= options_.smallest_step * longest_step && options_.start_at_rest) continue;
+            // What a support turns must be gone through; everything else may be relaxed at its end at once.
+            if (!descend(longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0)) return false;
+            step = longest_step;
         }
         return check_stability();
     }
@@ -60,19 +64,20 @@ class Statics {
 
     // The factorization at the solution itself, with its own stresses, decides.
     bool check_stability() {
-        const FactorReport factor = newton_.factorize_at(result_.state, to_);
+        const FactorReport factor = newton_.factorize_at(result_.state, result_.controls);
         result_.unstable_directions = factor.negative_pivots;
         result_.stable = factor.succeeded && factor.negative_pivots == 0 && factor.perturbed_pivots == 0;
         if (!factor.succeeded) result_.reason = factor.reason;
         return factor.succeeded;
     }
 
-    // Newton, which finishes a relaxation, may still have been drawn to a saddle: then once more from there.
-    bool descend() {
+    // Relaxes at the controls of `target`. Newton, which finishes a relaxation, may still have been drawn to a saddle: then once more from there.
+    bool descend(double target) {
         constexpr int attempts = 5;
         for (int k = 0; k < attempts; ++k) {
             VectorXd trial = result_.state;
-            const RelaxationReport report = relax(newton_, trial, to_, options_.max_relaxation_steps);
+            const Controls controls = interpolate(from_, to_, target);
+            const RelaxationReport report = relax(newton_, trial, controls, options_.max_relaxation_steps);
             result_.relaxation_steps += report.steps;
             result_.saddles_left += report.saddles_left;
             if (!report.converged) {
@@ -80,7 +85,7 @@ class Statics {
                 result_.reason = report.reason;
                 return false;
             }
-            accept(trial, to_, 1.0, report.residual);
+            accept(trial, controls, target, report.residual);
             if (!check_stability() || result_.stable) return result_.stable;
             if (result_.unstable_directions == 0) {
                 result_.reason = "the equilibrium is neutral: its Hessian is singular";
