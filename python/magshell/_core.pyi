@@ -35,6 +35,7 @@ __all__: list[str] = [
     "find_equilibrium",
     "follow_path",
     "num_threads",
+    "pull_back",
     "sample_fields",
     "set_num_threads",
     "vacuum_permeability",
@@ -166,7 +167,7 @@ class Controls:
     def motion(self) -> float: ...
 
 class Model:
-    def __init__(self, mesh: TriangleMesh, **kwargs) -> None: ...
+    def __init__(self, mesh: TriangleMesh, values: dict, **kwargs) -> None: ...
     def assemble(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
     ) -> None:
@@ -198,9 +199,7 @@ class Model:
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     def prescribed_rate(
-        self,
-        arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        arg1: typing.SupportsFloat | typing.SupportsIndex,
+        self, arg0: typing.SupportsFloat | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.
@@ -210,6 +209,7 @@ class Model:
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def rest_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def set_magnetization(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
+    def set_values(self, arg0: dict) -> None: ...
     def state(
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -232,6 +232,7 @@ class NewtonOptions:
     ) -> None: ...
 
 class StaticsOptions:
+    keep_factor: bool
     newton: NewtonOptions
     require_stable: bool
     start_at_rest: bool
@@ -450,6 +451,16 @@ def follow_path(
     progress: typing.Any = None,
 ) -> PathResult: ...
 def num_threads() -> int: ...
+def pull_back(
+    model: Model,
+    equilibrium: StaticsResult,
+    by_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> dict:
+    """
+    The gradients by everything a solve takes, of a function of positions (n_v, 3) and edge rotations (n_e,) with these gradients. The model must hold the values of that solve.
+    """
+
 def sample_fields(
     fields: collections.abc.Sequence[AppliedField],
     scales: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
