@@ -83,7 +83,7 @@ VALUES = {
     "dipole positions": (DIPOLES, "positions", DIPOLES.positions),
     "dipole moments": (DIPOLES, "moments", DIPOLES.moments),
     "grid": (GRID, "flux_density", GRID.flux_density(np.zeros((5, 4, 3, 3)) + 0.01)),
-    "plane grid": (PLANE_GRID, "flux_density", RNG.uniform(-1e-3, 1e-3, (6, 1, 2, 3))),
+    "plane grid": (PLANE_GRID, "flux_density", RNG.uniform((0, 0, 9e-3), (1e-3, 1e-3, 12e-3), (6, 1, 2, 3))),
 }
 DEFAULTS = {"remanent_magnetization": MAGNETIZATION, "applied_flux_density": (1e-3, -2e-3, 3e-3)}
 

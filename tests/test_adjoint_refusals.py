@@ -43,7 +43,8 @@ def test_a_state_on_the_way_has_no_gradient():
 
 
 def with_values(owner, name, value, **changes):
-    return lambda: solve(scene(**changes), values={owner: {name: value}})
+    magnetic = {"remanent_magnetization": (1, 0, 0)} if "field" in changes else {}
+    return lambda: solve(scene(**changes), values={owner: {name: value}}, **magnetic)
 
 
 test_values_are_refused = refused(
