@@ -3,12 +3,10 @@ The C++ core of magshell; use the functions of the package, not this module.
 """
 
 from __future__ import annotations
-
 import collections.abc
-import typing
-
 import numpy
 import numpy.typing
+import typing
 
 __all__: list[str] = [
     "AppliedField",
@@ -35,6 +33,7 @@ __all__: list[str] = [
     "find_equilibrium",
     "follow_path",
     "num_threads",
+    "pull_back",
     "sample_fields",
     "set_num_threads",
     "vacuum_permeability",
@@ -166,7 +165,7 @@ class Controls:
     def motion(self) -> float: ...
 
 class Model:
-    def __init__(self, mesh: TriangleMesh, **kwargs) -> None: ...
+    def __init__(self, mesh: TriangleMesh, values: dict, **kwargs) -> None: ...
     def assemble(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
     ) -> None:
@@ -198,9 +197,7 @@ class Model:
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     def prescribed_rate(
-        self,
-        arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        arg1: typing.SupportsFloat | typing.SupportsIndex,
+        self, arg0: typing.SupportsFloat | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.
@@ -210,6 +207,7 @@ class Model:
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def rest_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def set_magnetization(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
+    def set_values(self, arg0: dict) -> None: ...
     def state(
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -232,6 +230,7 @@ class NewtonOptions:
     ) -> None: ...
 
 class StaticsOptions:
+    keep_factor: bool
     newton: NewtonOptions
     require_stable: bool
     start_at_rest: bool
@@ -450,6 +449,16 @@ def follow_path(
     progress: typing.Any = None,
 ) -> PathResult: ...
 def num_threads() -> int: ...
+def pull_back(
+    model: Model,
+    equilibrium: StaticsResult,
+    by_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> dict:
+    """
+    The gradients by everything a solve takes, of a function of positions (n_v, 3) and edge rotations (n_e,) with these gradients. The model must hold the values of that solve.
+    """
+
 def sample_fields(
     fields: collections.abc.Sequence[AppliedField],
     scales: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
@@ -463,5 +472,5 @@ def sample_fields(
 
 def set_num_threads(count: typing.SupportsInt | typing.SupportsIndex) -> None: ...
 
-__version__: str = "0+dev"
+__version__: str = "0.1.0"
 vacuum_permeability: float = 1.25663706127e-06
