@@ -18,7 +18,7 @@ class Adjoint:
     def gradients(
         self, by_positions: np.ndarray, by_edge_rotations: np.ndarray, wanted
     ) -> list[np.ndarray | None]:
-        """By each leaf of the inputs that is wanted, shaped like it. Raises NoGradient where there is none."""
+        """By each wanted leaf of the inputs, shaped like it. Raises NoGradient where there is none."""
         self._refuse()
         inputs, model = self._inputs, self._inputs.scene._model
         with inputs.in_core():
@@ -42,7 +42,7 @@ class Adjoint:
             )
         if not found.stable:
             raise NoGradient(
-                f"no gradient here: the equilibrium is not stable ({found.unstable_directions} directions lower "
-                "its energy, or its Hessian is singular), and a sheet would not stay in it. "
-                "Solve with require_stable=True."
+                "no gradient here: the equilibrium is not stable "
+                f"({found.unstable_directions} directions lower its energy, or its Hessian is singular), "
+                "and a sheet would not stay in it. Solve with require_stable=True."
             )

@@ -3,10 +3,12 @@ The C++ core of magshell; use the functions of the package, not this module.
 """
 
 from __future__ import annotations
+
 import collections.abc
+import typing
+
 import numpy
 import numpy.typing
-import typing
 
 __all__: list[str] = [
     "AppliedField",
@@ -472,5 +474,5 @@ def sample_fields(
 
 def set_num_threads(count: typing.SupportsInt | typing.SupportsIndex) -> None: ...
 
-__version__: str = "0.1.0"
+__version__: str = "0+dev"
 vacuum_permeability: float = 1.25663706127e-06
