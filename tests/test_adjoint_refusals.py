@@ -38,12 +38,13 @@ def test_a_state_on_the_way_has_no_gradient():
     hasty = ms.MixedNewton(max_iterations=1, smallest_load_step=0.5, max_relaxation_steps=1)
     with pytest.raises(ms.NotConverged) as caught:
         solve(scene(loads=[TIP]), young_modulus=young(), load_factor=1e3, solver=hasty)
-    with pytest.raises(ms.NoGradient, match="did not converge, it got .* of the way"):
+    with pytest.raises(ms.NoGradient, match=r"did not converge, it got .* of the way"):
         caught.value.last_good.positions.sum().backward()
 
 
 def with_values(owner, name, value, **changes):
-    return lambda: solve(scene(**changes), values={owner: {name: value}})
+    magnetic = {"remanent_magnetization": (1, 0, 0)} if "field" in changes else {}
+    return lambda: solve(scene(**changes), values={owner: {name: value}}, **magnetic)
 
 
 test_values_are_refused = refused(
@@ -51,24 +52,62 @@ test_values_are_refused = refused(
         ("no dict", lambda: solve(values=3), "values must be a dict .* got int"),
         ("no dict inside", lambda: solve(scene(loads=[LOAD]), values={LOAD: 1}), "must be a dict .* got int"),
         ("another object", with_values(LOAD, "force", (0, 0, 1)), "not the scene, nor an object of it"),
-        ("no such name", with_values(LOAD, "vertices", [1], loads=[LOAD]), "PointLoad has no value 'vertices' .* it has force"),
-        ("function", with_values(CUSTOM, "function", 1, field=CUSTOM), "CustomField has no value 'function' .* none"),
-        ("load's shape", with_values(LOAD, "force", (0, 1), loads=[LOAD]), r"force \[N\] must have shape \(3,\) or"),
-        ("couple's shape", with_values(COUPLE, "couple_per_length", (0, 1, 0), loads=[COUPLE]), "must keep its shape"),
-        ("more dipoles", with_values(DIPOLES, "positions", np.ones((2, 3)), field=DIPOLES), r"moments .* must have shape \(2, 3\)"),
-        ("another grid", with_values(GRID, "flux_density", np.ones((3, 2, 2, 3)), field=GRID), r"\(2, 2, 2, 3\)"),
-        ("a support that stays", with_values(STILL, "displacement", (0, 0, 1), supports=[STILL]), "give it a displacement in the scene"),
+        (
+            "no such name",
+            with_values(LOAD, "vertices", [1], loads=[LOAD]),
+            "PointLoad has no value 'vertices' .* it has force",
+        ),
+        (
+            "function",
+            with_values(CUSTOM, "function", 1, field=CUSTOM),
+            "CustomField has no value 'function' .* none",
+        ),
+        (
+            "load's shape",
+            with_values(LOAD, "force", (0, 1), loads=[LOAD]),
+            r"force \[N\] must have shape \(3,\) or",
+        ),
+        (
+            "couple's shape",
+            with_values(COUPLE, "couple_per_length", (0, 1, 0), loads=[COUPLE]),
+            "must keep its shape",
+        ),
+        (
+            "more dipoles",
+            with_values(DIPOLES, "positions", np.ones((2, 3)), field=DIPOLES),
+            r"moments .* must have shape \(2, 3\)",
+        ),
+        (
+            "another grid",
+            with_values(GRID, "flux_density", np.ones((3, 2, 2, 3)), field=GRID),
+            r"\(2, 2, 2, 3\)",
+        ),
+        (
+            "a support that stays",
+            with_values(STILL, "displacement", (0, 0, 1), supports=[STILL]),
+            "give it a displacement in the scene",
+        ),
         ("no gravity", lambda: solve(mass_density=1e3), "the scene has no gravity"),
         ("no loads", lambda: solve(vertex_loads=np.zeros((N_V, 3))), "the scene has no loads"),
-        ("loads' shape", lambda: solve(scene(loads=[LOAD]), vertex_loads=np.zeros(3)), rf"vertex_loads \[N\] must have shape \({N_V}, 3\)"),
+        (
+            "loads' shape",
+            lambda: solve(scene(loads=[LOAD]), vertex_loads=np.zeros(3)),
+            rf"vertex_loads \[N\] must have shape \({N_V}, 3\)",
+        ),
         (
             "loads twice",
-            lambda: solve(scene(loads=[LOAD]), vertex_loads=np.zeros((N_V, 3)), values={LOAD: {"force": (0, 0, 1)}}),
+            lambda: solve(
+                scene(loads=[LOAD]), vertex_loads=np.zeros((N_V, 3)), values={LOAD: {"force": (0, 0, 1)}}
+            ),
             "vertex_loads stands for all loads",
         ),
         ("modulus", lambda: solve(young_modulus=-1.0), r"young_modulus \[Pa\] must be positive"),
         ("ratio", lambda: solve(poisson_ratio=0.6), r"poisson_ratio \[1\] must be in"),
-        ("scale's shape", lambda: solve(curvature_scale=np.ones(3)), r"curvature_scale \[1\] must be a number or"),
+        (
+            "scale's shape",
+            lambda: solve(curvature_scale=np.ones(3)),
+            r"curvature_scale \[1\] must be a number or",
+        ),
     ]
 )
 

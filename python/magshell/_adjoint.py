@@ -1,4 +1,4 @@
-"""The way back from an equilibrium to what it was asked for with: arrays only, autograd.py has the tensors."""
+"""The way back from an equilibrium to its inputs: arrays only, autograd.py has the tensors."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ class Adjoint:
     def __init__(self, inputs: Inputs, found):
         self._inputs, self._found = inputs, found
 
-    def gradients(self, by_positions: np.ndarray, by_edge_rotations: np.ndarray, wanted) -> list[np.ndarray | None]:
-        """By each of the inputs' leaves that is wanted, shaped like it. Raises NoGradient where there is none."""
+    def gradients(
+        self, by_positions: np.ndarray, by_edge_rotations: np.ndarray, wanted
+    ) -> list[np.ndarray | None]:
+        """By each wanted leaf of the inputs, shaped like it. Raises NoGradient where there is none."""
         self._refuse()
         inputs, model = self._inputs, self._inputs.scene._model
         with inputs.in_core():
@@ -35,10 +37,12 @@ class Adjoint:
         found = self._found
         if found.progress < 1.0 or found.outcome != _core.Outcome.converged:
             raise NoGradient(
-                f"no gradient here: the solve did not converge, it got {found.progress:.3g} of the way ({found.reason})"
+                "no gradient here: the solve did not converge, "
+                f"it got {found.progress:.3g} of the way ({found.reason})"
             )
         if not found.stable:
             raise NoGradient(
-                f"no gradient here: the equilibrium is not stable ({found.unstable_directions} directions lower its "
-                "energy, or its Hessian is singular), and a sheet would not stay in it. Solve with require_stable=True."
+                "no gradient here: the equilibrium is not stable "
+                f"({found.unstable_directions} directions lower its energy, or its Hessian is singular), "
+                "and a sheet would not stay in it. Solve with require_stable=True."
             )

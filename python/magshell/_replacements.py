@@ -9,10 +9,12 @@ SHELL_NAMES = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "c
 
 
 def requested(scene, vertex_loads, values, **shell) -> dict[object, dict[str, object]]:
-    """{object of the scene: {name: what was given}} from a solve's arguments. Raises ValueError on what has no place."""
+    """{object of the scene: {name: value}} from a solve's arguments. Raises ValueError on what has no place."""
     asked: dict[object, dict[str, object]] = {}
     if values is not None and not isinstance(values, dict):
-        raise ValueError(f"values must be a dict {{object of the scene: {{name: value}}}}, got {type(values).__name__}")
+        raise ValueError(
+            f"values must be a dict {{object of the scene: {{name: value}}}}, got {type(values).__name__}"
+        )
     for owner, named in (values or {}).items():
         _check(scene, owner, named)
         asked[owner] = dict(named)
@@ -48,16 +50,22 @@ def _check(scene, owner, named) -> None:
     for name in named:
         if name not in names:
             what = f"it has {', '.join(names)}" if names else "it has none that can be"
-            raise ValueError(f"{type(owner).__name__} has no value {name!r} to be replaced in a solve: {what}")
+            raise ValueError(
+                f"{type(owner).__name__} has no value {name!r} to be replaced in a solve: {what}"
+            )
 
 
 def _check_against_scene(scene, asked: dict) -> None:
     heavy = bool(scene.gravity.any())
     if not heavy and ("gravity" in asked.get(scene, {}) or "mass_density" in asked.get(scene.shell, {})):
-        raise ValueError("gravity or mass_density was given, but the scene has no gravity: Scene(..., gravity=...)")
+        raise ValueError(
+            "gravity or mass_density was given, but the scene has no gravity: Scene(..., gravity=...)"
+        )
     if "vertex_loads" in asked.get(scene, {}):
         forces = [load for load in scene.loads if not isinstance(load, EdgeCouple)]
         if not forces:
-            raise ValueError("vertex_loads was given, but the scene has no loads: Scene(..., loads=...), zero will do")
+            raise ValueError(
+                "vertex_loads was given, but the scene has no loads: Scene(..., loads=...), zero will do"
+            )
         if any(load in asked for load in forces):
             raise ValueError("vertex_loads stands for all loads: leave them out of values")

@@ -1,4 +1,4 @@
-"""The numbers of a scene, some of them replaced for one solve, as the core takes them; and gradients on the way back."""
+"""The numbers of a scene as the core takes them, some replaced for one solve; gradients on the way back."""
 
 from __future__ import annotations
 
@@ -15,9 +15,13 @@ class Values:
     The scene itself has the names "gravity" and "vertex_loads". Raises ValueError where a value does not fit.
     """
 
-    def __init__(self, scene, constraints: _constraints.Constraints, replaced: dict[object, dict] | None = None):
+    def __init__(
+        self, scene, constraints: _constraints.Constraints, replaced: dict[object, dict] | None = None
+    ):
         self._scene = scene
-        self._now = {item: item.replaced(**values) for item, values in (replaced or {}).items() if item is not scene}
+        self._now = {
+            item: item.replaced(**values) for item, values in (replaced or {}).items() if item is not scene
+        }
         self.shell = self._current(scene.shell)
         self._constraints = constraints
         if any(support in self._now for support in scene.supports):
@@ -46,7 +50,7 @@ class Values:
         return all(np.array_equal(mine[name], others[name]) for name in mine)
 
     def gradients(self, owner, gradient: dict) -> dict[str, np.ndarray]:
-        """By the values of one object of the scene, from the core's gradients; as many rows as the object has."""
+        """By the values of one object of the scene, from the core's gradients; a row for each of its parts."""
         scene, mesh = self._scene, self._scene.mesh
         by_weights = gradient.get("vertex_weights")
         if owner is scene:
@@ -75,7 +79,10 @@ class Values:
         supports = [self._current(support) for support in scene.supports]
         moved = _constraints.gather(scene.mesh, supports, scene._couple_directions)
         if not np.array_equal(moved.held_nodes, constraints.held_nodes):
-            raise ValueError("a support that stays cannot be moved by a solve: give it a displacement in the scene, zero will do")
+            raise ValueError(
+                "a support that stays cannot be moved by a solve: "
+                "give it a displacement in the scene, zero will do"
+            )
         return moved
 
     def _motion_gradients(self, support, by_motions: np.ndarray) -> dict[str, np.ndarray]:

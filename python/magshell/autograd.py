@@ -23,9 +23,15 @@ class AtRest(torch.autograd.Function):
     def backward(ctx, by_positions, by_edge_rotations):
         arrays = [each.detach().cpu().numpy() for each in (by_positions, by_edge_rotations)]
         gradients = ctx.adjoint.gradients(*arrays, ctx.needs_input_grad[4:])
-        return None, None, None, None, *(
-            None if values is None else torch.from_numpy(np.array(values)).to(dtype=dtype, device=device)
-            for values, (dtype, device) in zip(gradients, ctx.leaves, strict=True)
+        return (
+            None,
+            None,
+            None,
+            None,
+            *(
+                None if values is None else torch.from_numpy(np.array(values)).to(dtype=dtype, device=device)
+                for values, (dtype, device) in zip(gradients, ctx.leaves, strict=True)
+            ),
         )
 
 
