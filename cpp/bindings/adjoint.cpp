@@ -1,7 +1,7 @@
-// Adjoints to Python: a gradient by positions and edge rotations in, gradients by everything a solve takes out.
-#include "magshell/adjoint/static.h"
-
+// Adjoints to Python: a gradient by positions and edge rotations in, gradients by everything a solve takes
+// out.
 #include "bindings/arrays.h"
+#include "magshell/adjoint/static.h"
 
 namespace magshell::bindings {
 namespace {
@@ -53,10 +53,11 @@ py::dict pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, con
 }  // namespace
 
 void register_adjoint(py::module_& module) {
-    module.def("pull_back", &pull_back_to_inputs, py::arg("model"), py::arg("equilibrium"), py::arg("by_positions"),
-               py::arg("by_edge_rotations"),
-               "The gradients by everything a solve takes, of a function of positions (n_v, 3) and edge rotations "
-               "(n_e,) with these gradients. The model must hold the values of that solve.");
+    module.def(
+        "pull_back", &pull_back_to_inputs, py::arg("model"), py::arg("equilibrium"), py::arg("by_positions"),
+        py::arg("by_edge_rotations"),
+        "The gradients by everything a solve takes, of a function of positions (n_v, 3) and edge rotations "
+        "(n_e,) with these gradients. The model must hold the values of that solve.");
 }
 
 }  // namespace magshell::bindings

@@ -13,6 +13,8 @@ inline Rows3 to_rows3(const Array& array) {
     return Eigen::Map<const Rows3>(array.data(), array.shape(0), 3);
 }
 
-inline VectorXd to_vector(const Array& array) { return Eigen::Map<const VectorXd>(array.data(), array.size()); }
+inline VectorXd to_vector(const Array& array) {
+    return Eigen::Map<const VectorXd>(array.data(), array.size());
+}
 
 }  // namespace magshell::bindings

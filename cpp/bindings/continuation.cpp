@@ -8,8 +8,9 @@
 namespace magshell::bindings {
 namespace {
 
-PathResult follow(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from, const Controls& to,
-                  const PathOptions& options, const py::object& until, const py::object& progress) {
+PathResult follow(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
+                  const Controls& to, const PathOptions& options, const py::object& until,
+                  const py::object& progress) {
     const Watch watch(progress);
     Until ends;
     if (!until.is_none())
@@ -19,7 +20,8 @@ PathResult follow(Model& model, const VectorXd& start, const Model::Memory& memo
         };
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
-    return follow_path(model, start, memory, from, to, options, ends, [&](double at, double residual) { watch(at, residual); });
+    return follow_path(model, start, memory, from, to, options, ends,
+                       [&](double at, double residual) { watch(at, residual); });
 }
 
 }  // namespace
@@ -60,8 +62,9 @@ void register_continuation(py::module_& module) {
         .def_readonly("factorizations", &PathResult::factorizations)
         .def_readonly("failed_factorizations", &PathResult::failed_factorizations);
 
-    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from_"), py::arg("to"),
-               py::arg("options"), py::arg("until") = py::none(), py::arg("progress") = py::none());
+    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("memory"),
+               py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("until") = py::none(),
+               py::arg("progress") = py::none());
 }
 
 }  // namespace magshell::bindings

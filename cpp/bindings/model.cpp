@@ -1,8 +1,8 @@
 // The model of a scene to Python: checked arrays in, numbers out. Scene in the package builds it.
 #include "magshell/assembly/model.h"
 
-#include "bindings/bindings.h"
 #include "bindings/arrays.h"
+#include "bindings/bindings.h"
 #include "magshell/core/errors.h"
 
 namespace magshell::bindings {
@@ -35,7 +35,8 @@ std::vector<Motion> motions_of(const Array& rows) {
 SceneValues values_of(const py::dict& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     SceneValues values;
-    const Array thickness = array("thickness"), young = array("young_modulus"), poisson = array("poisson_ratio");
+    const Array thickness = array("thickness"), young = array("young_modulus"),
+                poisson = array("poisson_ratio");
     for (py::ssize_t f = 0; f < thickness.size(); ++f)
         values.materials.push_back({thickness.at(f), young.at(f), poisson.at(f)});
     values.curvature_scale = to_vector(array("curvature_scale"));
@@ -86,8 +87,10 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
         const std::lock_guard lock(model.in_use());
         model.evaluate(q, controls);
         model.assemble(q, controls, false);
-        if (reduced) model.reduction().matrix(model.matrix(), values);
-        else values = model.matrix().values();
+        if (reduced)
+            model.reduction().matrix(model.matrix(), values);
+        else
+            values = model.matrix().values();
     }
     const SparsePattern& pattern = model.reduction().pattern();
     const auto& starts = reduced ? pattern.column_starts : model.matrix().column_starts();
@@ -125,7 +128,8 @@ void register_model(py::module_& module) {
         .def("set_magnetization",
              [](Model& model, const Array& magnetization) {
                  const Rows3 rows = to_rows3(magnetization);
-                 const py::gil_scoped_release unlocked;  // a solve that holds the lock may be waiting for the GIL
+                 const py::gil_scoped_release
+                     unlocked;  // a solve that holds the lock may be waiting for the GIL
                  const std::lock_guard lock(model.in_use());
                  model.set_magnetization(rows);
              })
@@ -133,31 +137,35 @@ void register_model(py::module_& module) {
         .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
         .def_property_readonly("bytes", &Model::bytes)
         .def("rest_state", &Model::rest_state)
-        .def("state", [](const Model& m, const Array& x, const Array& r) { return m.state(to_rows3(x), to_vector(r)); })
+        .def("state", [](const Model& m, const Array& x,
+                         const Array& r) { return m.state(to_rows3(x), to_vector(r)); })
         .def("positions", &Model::positions)
         .def("edge_rotations", &Model::edge_rotations)
         .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })
         .def("reduce", [](const Model& m, const VectorXd& full) { return m.reduction().vector(full); })
-        .def("prescribed_rate",
-             [](const Model& m, double progress) { return m.reduction().prescribed_rate(progress); },
-             "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")
+        .def(
+            "prescribed_rate",
+            [](const Model& m, double progress) { return m.reduction().prescribed_rate(progress); },
+            "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")
         .def("energy", &Model::energy, py::call_guard<py::gil_scoped_release>())
         .def("energies", &energies)
-        .def("gradient",
-             [](Model& model, const VectorXd& q, const Controls& controls) {
-                 const std::lock_guard lock(model.in_use());
-                 model.evaluate(q, controls);
-                 return model.residual().gradient;
-             },
-             py::call_guard<py::gil_scoped_release>())
-        .def("assemble",
-             [](Model& model, const VectorXd& q, const Controls& controls) {
-                 const std::lock_guard lock(model.in_use());
-                 model.evaluate(q, controls);
-                 model.assemble(q, controls, false);
-             },
-             "Gradient and Hessian, left in the core: what `python -m magshell.bench kernels` times.",
-             py::call_guard<py::gil_scoped_release>())
+        .def(
+            "gradient",
+            [](Model& model, const VectorXd& q, const Controls& controls) {
+                const std::lock_guard lock(model.in_use());
+                model.evaluate(q, controls);
+                return model.residual().gradient;
+            },
+            py::call_guard<py::gil_scoped_release>())
+        .def(
+            "assemble",
+            [](Model& model, const VectorXd& q, const Controls& controls) {
+                const std::lock_guard lock(model.in_use());
+                model.evaluate(q, controls);
+                model.assemble(q, controls, false);
+            },
+            "Gradient and Hessian, left in the core: what `python -m magshell.bench kernels` times.",
+            py::call_guard<py::gil_scoped_release>())
         .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true);
 }
 

@@ -7,8 +7,8 @@
 namespace magshell::bindings {
 namespace {
 
-StaticsResult solve(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from, const Controls& to,
-                    const StaticsOptions& options, const py::object& progress) {
+StaticsResult solve(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
+                    const Controls& to, const StaticsOptions& options, const py::object& progress) {
     const Watch watch(progress);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
@@ -23,7 +23,8 @@ void register_statics(py::module_& module) {
         .def(py::init([](bool mixed, double tolerance, int max_iterations) {
                  return NewtonOptions{mixed, tolerance, max_iterations};
              }),
-             py::kw_only(), py::arg("mixed") = true, py::arg("tolerance") = 1e-10, py::arg("max_iterations") = 20);
+             py::kw_only(), py::arg("mixed") = true, py::arg("tolerance") = 1e-10,
+             py::arg("max_iterations") = 20);
 
     py::class_<StaticsOptions>(module, "StaticsOptions")
         .def(py::init<>())
@@ -60,8 +61,8 @@ void register_statics(py::module_& module) {
         .def_readonly("bytes", &StaticsResult::bytes)
         .def_readonly("factorization", &StaticsResult::factorization);
 
-    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from_"), py::arg("to"),
-               py::arg("options"), py::arg("progress") = py::none());
+    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("memory"),
+               py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("progress") = py::none());
 }
 
 }  // namespace magshell::bindings

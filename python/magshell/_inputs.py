@@ -51,11 +51,19 @@ class Inputs:
         self.leaves: list[Leaf] = []
         self.given_magnetization, self.given_flux_density = remanent_magnetization, applied_flux_density
         self._differentiable = differentiable
-        self.magnetization = self._magnetization(self._numbers("remanent_magnetization", remanent_magnetization))
+        self.magnetization = self._magnetization(
+            self._numbers("remanent_magnetization", remanent_magnetization)
+        )
         flux_density = self._flux_density(self._numbers("applied_flux_density", applied_flux_density))
-        names = {"load_factor": "load", "gravity_factor": "gravity", "field_factor": "field", "motion_factor": "motion"}
+        names = {
+            "load_factor": "load",
+            "gravity_factor": "gravity",
+            "field_factor": "field",
+            "motion_factor": "motion",
+        }
         numbers = {
-            names[key]: float(quantity(key, "1", self._numbers(key, value), ())) for key, value in factors.items()
+            names[key]: float(quantity(key, "1", self._numbers(key, value), ()))
+            for key, value in factors.items()
         }
         self.controls = _core.Controls(flux_density=flux_density, **numbers)
         self.values = self._values(replaced) if replaced else scene._values
@@ -78,7 +86,10 @@ class Inputs:
     def _values(self, replaced: dict[object, dict]) -> Values:
         scene = self.scene
         arrays = {
-            owner: {name: checked(scene, owner, name, self._numbers(name, value, owner)) for name, value in named.items()}
+            owner: {
+                name: checked(scene, owner, name, self._numbers(name, value, owner))
+                for name, value in named.items()
+            }
             for owner, named in replaced.items()
         }
         return Values(scene, scene._constraints, arrays)
@@ -86,7 +97,9 @@ class Inputs:
     def _magnetization(self, given) -> np.ndarray | None:
         if not self.scene.fields:
             if given is not None:
-                raise ValueError("remanent_magnetization was given, but the scene has no field: Scene(..., field=...)")
+                raise ValueError(
+                    "remanent_magnetization was given, but the scene has no field: Scene(..., field=...)"
+                )
             return None
         if given is None:
             raise ValueError("the scene has a field, so remanent_magnetization [A/m] is needed")

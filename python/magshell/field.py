@@ -170,7 +170,9 @@ class SampledField(AppliedField):
 
     def replaced(self, *, flux_density) -> SampledField:
         """Other values on the same grid."""
-        return SampledField(self.origin, self.spacing, quantity("flux_density", "T", flux_density, (*self.counts, 3)))
+        return SampledField(
+            self.origin, self.spacing, quantity("flux_density", "T", flux_density, (*self.counts, 3))
+        )
 
     def gradients(self, by_parameters: np.ndarray) -> dict[str, np.ndarray]:
         return {"flux_density": by_parameters.reshape(*self.counts, 3)}

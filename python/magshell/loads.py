@@ -47,7 +47,9 @@ class EdgeLoad:
     def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
         """(n_v, 3), N."""
         ends, weights = self._shares(mesh)
-        return _spread(mesh, ends, _rows("force_per_length [N/m]", self.force_per_length, len(ends)) * weights)
+        return _spread(
+            mesh, ends, _rows("force_per_length [N/m]", self.force_per_length, len(ends)) * weights
+        )
 
     def gradients(self, mesh: TriangleMesh, by_vertex_forces: np.ndarray) -> dict[str, np.ndarray]:
         """By the force per length, one an edge."""
@@ -73,7 +75,9 @@ class AreaLoad:
     def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
         """(n_v, 3), N."""
         corners, weights = self._shares(mesh)
-        return _spread(mesh, corners, _rows("force_per_area [N/m2]", self.force_per_area, len(corners)) * weights)
+        return _spread(
+            mesh, corners, _rows("force_per_area [N/m2]", self.force_per_area, len(corners)) * weights
+        )
 
     def gradients(self, mesh: TriangleMesh, by_vertex_forces: np.ndarray) -> dict[str, np.ndarray]:
         """By the force per area, one a face."""
@@ -83,7 +87,11 @@ class AreaLoad:
         return AreaLoad(force_per_area, self.faces)
 
     def _shares(self, mesh: TriangleMesh):
-        faces = np.arange(mesh.n_faces) if self.faces is None else indices("AreaLoad faces", self.faces, mesh.n_faces)
+        faces = (
+            np.arange(mesh.n_faces)
+            if self.faces is None
+            else indices("AreaLoad faces", self.faces, mesh.n_faces)
+        )
         return mesh.faces[faces], (mesh.face_areas[faces] / 3.0)[:, None]
 
 

@@ -38,7 +38,14 @@ class Scene:
     """
 
     def __init__(
-        self, shell: Shell, *, supports=(), loads=(), field=None, gravity=None, allow_rigid_motions: bool = False
+        self,
+        shell: Shell,
+        *,
+        supports=(),
+        loads=(),
+        field=None,
+        gravity=None,
+        allow_rigid_motions: bool = False,
     ):
         if not isinstance(shell, Shell):
             raise ValueError(f"shell must be a Shell, got {type(shell).__name__}")
@@ -52,7 +59,9 @@ class Scene:
         if not isinstance(allow_rigid_motions, bool):
             raise ValueError(f"allow_rigid_motions must be True or False, got {allow_rigid_motions!r}")
         if sum(isinstance(f, UniformField) for f in self.fields) > 1:
-            raise ValueError("field holds several UniformFields: one is enough, its value comes when the scene is solved")
+            raise ValueError(
+                "field holds several UniformFields: one is enough, its value comes when the scene is solved"
+            )
         self._build(allow_rigid_motions)
 
     def _build(self, allow_rigid_motions: bool) -> None:
@@ -82,7 +91,9 @@ class Scene:
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
             held_frames=constraints.held_frames,
-            couple_edges=np.stack([edges, n_directions - n_couples + np.arange(n_couples)], axis=1).astype(np.int32),
+            couple_edges=np.stack([edges, n_directions - n_couples + np.arange(n_couples)], axis=1).astype(
+                np.int32
+            ),
             magnetic=bool(self.fields),
         )
 

@@ -5,7 +5,8 @@
 namespace magshell {
 
 SceneGradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state) {
-    if (!equilibrium.factor) throw InvalidInput("the equilibrium was found without keeping its factorization");
+    if (!equilibrium.factor)
+        throw InvalidInput("the equilibrium was found without keeping its factorization");
     const VectorXd& q = equilibrium.state;
     const Controls& controls = equilibrium.controls;
     const Reduction& reduction = model.reduction();

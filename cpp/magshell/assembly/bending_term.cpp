@@ -18,7 +18,8 @@ BendingTerm::BendingTerm(const Sheet& sheet, const Schedule& schedule, const Sys
         for (int i = 0; i < 3; ++i) {
             const Index r = s.rotations[i];
             for (int k = 0; k < 6; ++k)
-                slots.rotation_nodes[6 * i + k] = r < 0 || s.nodes[k] < 0 ? -1 : matrix.rotation_slot(r, s.nodes[k]);
+                slots.rotation_nodes[6 * i + k] =
+                    r < 0 || s.nodes[k] < 0 ? -1 : matrix.rotation_slot(r, s.nodes[k]);
             for (int j = 0; j <= i; ++j)
                 slots.rotations[lower_index(i, j)] =
                     r < 0 || s.rotations[j] < 0 ? -1 : matrix.rotations_slot(r, s.rotations[j]);
@@ -60,7 +61,8 @@ Fold BendingTerm::folds_at(Index first, Index last, const double* q) const {
     return Fold(x[0], x[1], x[2], x[3], right_is_point);
 }
 
-// theta - theta~ in (-pi, pi]: a sheet rolled into a closed surface may have its rest angle on the other side of pi.
+// theta - theta~ in (-pi, pi]: a sheet rolled into a closed surface may have its rest angle on the other side
+// of pi.
 double BendingTerm::turn_from(double angle, Index fold) const {
     return std::remainder(angle - sheet_.folds[fold].rest_angle, 2.0 * std::numbers::pi);
 }
@@ -87,7 +89,7 @@ void BendingTerm::store_folds(const double* q) {
 }
 
 /// delta of a pack of faces from a number a fold and the rotations in q; linear, so it serves rates as well.
-void BendingTerm::strain(Index pack, const double* q, const double FoldState::*turn, Pack delta[3]) const {
+void BendingTerm::strain(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const {
     const double* rotation = q + 3 * sheet_.n_nodes();
     for (int lane = 0; lane < Pack::width; ++lane) {
         const std::array<FaceSide, 3>& sides = sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
@@ -151,7 +153,8 @@ double BendingTerm::moment(const FoldStencil& fold, const std::vector<Stress>& s
 }
 
 void BendingTerm::add_forces(Residual& out) const {
-    // Faces that share a rotation share an edge and so a node: parts of one colour meet at no rotation either.
+    // Faces that share a rotation share an edge and so a node: parts of one colour meet at no rotation
+    // either.
     schedule_.scatter([&](const Part& part) {
         for (Index h = part.first_fold; h < part.last_fold; ++h) {
             const double m = moment(sheet_.folds[h], stress_);
@@ -218,8 +221,8 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
                                          rows[i][k], lane);
             for (int j = 0; j <= i; ++j)
                 if (stencil.rotations[j] >= 0)
-                    out.add(slots.rotations[lower_index(i, j)], face.sign[i][lane] * face.sign[j][lane] *
-                                                                    stiffness_[pack](i, j)[lane]);
+                    out.add(slots.rotations[lower_index(i, j)],
+                            face.sign[i][lane] * face.sign[j][lane] * stiffness_[pack](i, j)[lane]);
         }
     }
 }
@@ -267,18 +270,22 @@ void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Sc
             strain(pack, q, &FoldState::turn, delta);
             strain(pack, lambda, &FoldState::rate, rate);
             stiffness_[pack].times(rate, stress_rate);
-            for (Index f = pack * Pack::width; f < std::min((pack + 1) * Pack::width, sheet_.n_faces()); ++f) {
+            for (Index f = pack * Pack::width; f < std::min((pack + 1) * Pack::width, sheet_.n_faces());
+                 ++f) {
                 const int lane = f % Pack::width;
                 const SheetMaterial& m = materials_[f];
                 const Vec3 d = lane_of(delta, lane), along = lane_of(rate, lane), scale = curvature_scales(f);
                 const Vec3 stress = lane_of(stress_[pack].at, lane);
-                const Mat3 by_poisson_ratio = RestFace(sheet_.rest_corners(f).data()).bending_by_poisson_ratio(m);
+                const Mat3 by_poisson_ratio =
+                    RestFace(sheet_.rest_corners(f).data()).bending_by_poisson_ratio(m);
                 const double work = along.dot(stress);
                 const Index user = sheet_.faces.user[f];
                 out.young_modulus[user] += work / m.young_modulus;
                 out.thickness[user] += 3.0 * work / m.thickness;
-                out.poisson_ratio[user] += along.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d));
-                by_scale[f] = (along.cwiseProduct(stress) + d.cwiseProduct(lane_of(stress_rate, lane))).cwiseQuotient(scale);
+                out.poisson_ratio[user] +=
+                    along.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d));
+                by_scale[f] = (along.cwiseProduct(stress) + d.cwiseProduct(lane_of(stress_rate, lane)))
+                                  .cwiseQuotient(scale);
             }
         }
     });
@@ -286,23 +293,24 @@ void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Sc
         for (int i = 0; i < 3; ++i) out.curvature_scale[sheet_.edges[f][i]] += by_scale[f][i];
 }
 
-// A fold angle is exact to about one unit of round-off of a radian, and no better than the positions over the heights of
-// its faces.
+// A fold angle is exact to about one unit of round-off of a radian, and no better than the positions over the
+// heights of its faces.
 void BendingTerm::add_cancelling_forces(VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const double angle = 1.0 + 0.25 * sheet_.largest_coordinate(f) / sheet_.smallest_height(f);
         for (int i = 0; i < 3; ++i) {
             const FaceSide& side = sheet_.sides[f][i];
             double moment = 0.0;
-            for (int j = 0; j < 3; ++j) moment += std::abs(stiffness_[f / Pack::width](i, j)[f % Pack::width]) * angle;
+            for (int j = 0; j < 3; ++j)
+                moment += std::abs(stiffness_[f / Pack::width](i, j)[f % Pack::width]) * angle;
             if (side.rotation >= 0) out[3 * sheet_.n_nodes() + side.rotation] += moment;
         }
     }
 }
 
 std::size_t BendingTerm::bytes() const {
-    return bytes_of(face_slots_) + bytes_of(fold_slots_) + bytes_of(materials_) + bytes_of(stiffness_) + bytes_of(stress_) +
-           bytes_of(extrapolated_) + bytes_of(folds_);
+    return bytes_of(face_slots_) + bytes_of(fold_slots_) + bytes_of(materials_) + bytes_of(stiffness_) +
+           bytes_of(stress_) + bytes_of(extrapolated_) + bytes_of(folds_);
 }
 
 }  // namespace magshell

@@ -1,7 +1,8 @@
-// The bending energy of a whole sheet, `hinge` and `midedge` alike: energy/bending.h over strain/fold_angle.h.
+// The bending energy of a whole sheet, `hinge` and `midedge` alike: energy/bending.h over
+// strain/fold_angle.h.
 //
-// Fold angles and their gradients are found once an edge; faces combine three of them. The Hessian is the faces'
-// J^T C J, plus each fold's curvature times the moment of the faces beside it.
+// Fold angles and their gradients are found once an edge; faces combine three of them. The Hessian is the
+// faces' J^T C J, plus each fold's curvature times the moment of the faces beside it.
 #pragma once
 
 #include "magshell/assembly/lanes.h"
@@ -49,7 +50,7 @@ class BendingTerm final : public Term {
     Index face_packs() const { return packs_for(sheet_.n_faces()); }
     Fold folds_at(Index first, Index last, const double* q) const;
     double turn_from(double angle, Index fold) const;
-    void strain(Index pack, const double* q, const double FoldState::*turn, Pack delta[3]) const;
+    void strain(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const;
     double moment(const FoldStencil& fold, const std::vector<Stress>& stress) const;
     void store_folds(const double* q);
     void store_rates(const double* p);

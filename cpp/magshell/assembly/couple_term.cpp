@@ -50,7 +50,8 @@ void CoupleTerm::evaluate(const double* q, const Controls& controls, Residual& o
         Pack3 g[4];
         fold_at(couple, q).gradient(g);
         for (int node = 0; node < 4; ++node) scatter_node(out, couple.nodes[node], Pack(pull) * g[node], 0);
-        if (couple.rotation >= 0) out.add(3 * sheet_.n_nodes() + couple.rotation, -pull * couple.rotation_sign);
+        if (couple.rotation >= 0)
+            out.add(3 * sheet_.n_nodes() + couple.rotation, -pull * couple.rotation_sign);
     }
 }
 
@@ -66,7 +67,8 @@ void CoupleTerm::vjp(const double* q, const Controls& controls, const double* la
         double turn_rate = 0.0;
         for (int node = 0; node < 4; ++node)
             turn_rate += lane_of(g[node], 0).dot(Eigen::Map<const Vec3>(lambda + 3 * couple.nodes[node]));
-        if (couple.rotation >= 0) turn_rate -= couple.rotation_sign * lambda[3 * sheet_.n_nodes() + couple.rotation];
+        if (couple.rotation >= 0)
+            turn_rate -= couple.rotation_sign * lambda[3 * sheet_.n_nodes() + couple.rotation];
         out.couples[k] = -controls.load * turn_rate;
         out.controls.load -= couple.couple * turn_rate;
     }

@@ -2,8 +2,8 @@
 //
 //   E = - factor C psi,   psi = theta_d - theta~_d - s phi                          [J]
 //
-// theta_d is the angle of the edge's face to a fixed direction, and the director stands off that face by s phi. The couple
-// follows the edge: its axis is always the edge itself, the sheet to the left.
+// theta_d is the angle of the edge's face to a fixed direction, and the director stands off that face by s
+// phi. The couple follows the edge: its axis is always the edge itself, the sheet to the left.
 #pragma once
 
 #include "magshell/assembly/lanes.h"
@@ -16,7 +16,7 @@ class CoupleTerm final : public Term {
     struct Couple {
         std::array<Index, 4> nodes;  // edge from, to, the face's third corner, the direction
         double rest_angle;
-        Index rotation;       // -1 without directors
+        Index rotation;  // -1 without directors
         double rotation_sign;
         double couple = 0.0;  // [N m]
     };
@@ -42,7 +42,8 @@ class CoupleTerm final : public Term {
     const Sheet& sheet_;
     std::vector<Couple> couples_;
     std::vector<PairSlots<4>> slots_;
-    std::vector<double> last_turn_;  // full circles count: an angle is taken as the one nearest to the last evaluated
+    std::vector<double>
+        last_turn_;  // full circles count: an angle is taken as the one nearest to the last evaluated
 };
 
 }  // namespace magshell

@@ -10,12 +10,19 @@
 
 namespace magshell {
 
-constexpr Index packs_for(Index elements) { return (elements + Pack::width - 1) / Pack::width; }
+constexpr Index packs_for(Index elements) {
+    return (elements + Pack::width - 1) / Pack::width;
+}
 
 /// The element of a lane; lanes past the end repeat the last element and are never scattered.
 inline Index element_of(Index pack, int lane, Index elements) {
     const Index element = pack * Pack::width + lane;
     return element < elements ? element : elements - 1;
+}
+
+/// The same vector in every lane.
+inline Pack3 broadcast(const Vec3& v) {
+    return {Pack(v.x()), Pack(v.y()), Pack(v.z())};
 }
 
 inline void set_lane(Pack3& pack, int lane, const double* from) {
@@ -24,16 +31,22 @@ inline void set_lane(Pack3& pack, int lane, const double* from) {
     pack.z.set(lane, from[2]);
 }
 
-inline void set_lane(Pack3& pack, int lane, const Vec3& from) { set_lane(pack, lane, from.data()); }
+inline void set_lane(Pack3& pack, int lane, const Vec3& from) {
+    set_lane(pack, lane, from.data());
+}
 
 inline void set_lane(Symmetric3& pack, int lane, const Mat3& from) {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j <= i; ++j) pack.at[lower_index(i, j)].set(lane, from(i, j));
 }
 
-inline Vec3 lane_of(const Pack v[3], int lane) { return {v[0][lane], v[1][lane], v[2][lane]}; }
+inline Vec3 lane_of(const Pack v[3], int lane) {
+    return {v[0][lane], v[1][lane], v[2][lane]};
+}
 
-inline Vec3 lane_of(const Pack3& v, int lane) { return {v.x[lane], v.y[lane], v.z[lane]}; }
+inline Vec3 lane_of(const Pack3& v, int lane) {
+    return {v.x[lane], v.y[lane], v.z[lane]};
+}
 
 /// The nodes of an element, as three-vectors of packs.
 template <int N>
@@ -50,7 +63,7 @@ inline void scatter_node(Residual& out, Index node, const Pack3& force, int lane
 
 /// Where the blocks of N nodes go: one slot a pair, at lower_index(row - 1, column).
 template <int N>
-using PairSlots = std::array<SystemMatrix::Slot, N * (N - 1) / 2>;
+using PairSlots = std::array<SystemMatrix::Slot, N*(N - 1) / 2>;
 
 template <int N, class Nodes>
 PairSlots<N> pair_slots(const SystemMatrix& matrix, const Nodes& nodes) {
@@ -64,8 +77,8 @@ PairSlots<N> pair_slots(const SystemMatrix& matrix, const Nodes& nodes) {
 
 /// Adds the lower blocks (row, column) at lower_index(row, column) of one lane; absent nodes are passed over.
 template <int N, class Nodes>
-inline void scatter_blocks(SystemMatrix& matrix, const Nodes& nodes, const PairSlots<N>& slots, const Pack33* blocks,
-                           int lane) {
+inline void scatter_blocks(SystemMatrix& matrix, const Nodes& nodes, const PairSlots<N>& slots,
+                           const Pack33* blocks, int lane) {
     Index length[N];
     for (int i = 0; i < N; ++i) length[i] = nodes[i] < 0 ? 0 : matrix.column_length(nodes[i]);
     for (int i = 0; i < N; ++i) {

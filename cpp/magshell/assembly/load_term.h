@@ -9,8 +9,10 @@ namespace magshell {
 
 class LoadTerm final : public Term {
   public:
-    /// forces [N], three a node; `factor` is the control that scales them, `by_forces` where their gradient goes.
-    LoadTerm(std::string_view name, VectorXd forces, double Controls::*factor, VectorXd SceneGradient::*by_forces)
+    /// forces [N], three a node; `factor` is the control that scales them, `by_forces` where their gradient
+    /// goes.
+    LoadTerm(std::string_view name, VectorXd forces, double Controls::* factor,
+             VectorXd SceneGradient::* by_forces)
         : name_(name), forces_(std::move(forces)), factor_(factor), by_forces_(by_forces) {}
 
     void set_forces(VectorXd forces) { forces_ = std::move(forces); }
@@ -36,8 +38,8 @@ class LoadTerm final : public Term {
   private:
     std::string_view name_;
     VectorXd forces_;
-    double Controls::*factor_;
-    VectorXd SceneGradient::*by_forces_;
+    double Controls::* factor_;
+    VectorXd SceneGradient::* by_forces_;
 };
 
 }  // namespace magshell

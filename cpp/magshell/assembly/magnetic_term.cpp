@@ -5,8 +5,6 @@
 namespace magshell {
 namespace {
 
-Pack3 broadcast(const Vec3& v) { return {Pack(v.x()), Pack(v.y()), Pack(v.z())}; }
-
 // (a~_1, a~_2, n~)
 Mat3 rest_frame(const Sheet& sheet, Index face) {
     const std::array<Vec3, 3> x = sheet.rest_corners(face);
@@ -31,7 +29,8 @@ void MagneticTerm::set_magnetization(const std::vector<Vec3>& remanent_magnetiza
             const Mat3 frame = rest_frame(sheet_, f);
             const Vec3 across = frame.col(0).cross(frame.col(1)), m = remanent_magnetization[f];
             Vec3 coordinates = frame.inverse() * m;
-            // What the inverse leaves of a tangential magnetization along the normal is round-off, not magnetization.
+            // What the inverse leaves of a tangential magnetization along the normal is round-off, not
+            // magnetization.
             if (std::abs(coordinates[2]) <= 1e-14 * m.norm()) coordinates[2] = 0.0;
             if (coordinates[2] != 0.0) normal_magnetization_ = true;
             elements_[pack].volume.set(lane, 0.5 * across.norm() * thickness[f]);
@@ -41,7 +40,8 @@ void MagneticTerm::set_magnetization(const std::vector<Vec3>& remanent_magnetiza
         }
 }
 
-void MagneticTerm::place(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const {
+void MagneticTerm::place(const double* q, std::vector<Vec3>& points,
+                         std::vector<Vec3>& magnetizations) const {
     points.resize(sheet_.n_faces());
     magnetizations.resize(sheet_.n_faces());
     loop_.each_pack([&](Index pack) {
@@ -56,7 +56,8 @@ void MagneticTerm::place(const double* q, std::vector<Vec3>& points, std::vector
     });
 }
 
-std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Controls& controls, int order) const {
+std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Controls& controls,
+                                                  int order) const {
     const Index n = sheet_.n_faces();
     std::vector<Vec3> points, moments;
     place(q, points, moments);
@@ -81,7 +82,8 @@ std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Control
 
 double MagneticTerm::energy(const double* q, const Controls& controls) const {
     const bool varies = sampled(controls);
-    const std::vector<Magnetic::Field> fields = varies ? sample(q, controls, 0) : std::vector<Magnetic::Field>();
+    const std::vector<Magnetic::Field> fields =
+        varies ? sample(q, controls, 0) : std::vector<Magnetic::Field>();
     const Pack3 uniform = broadcast(controls.flux_density);
     return loop_.sum([&](Index pack) {
         Pack3 x[3];
@@ -92,7 +94,8 @@ double MagneticTerm::energy(const double* q, const Controls& controls) const {
 
 void MagneticTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
     const bool varies = sampled(controls);
-    const std::vector<Magnetic::Field> fields = varies ? sample(q, controls, 1) : std::vector<Magnetic::Field>();
+    const std::vector<Magnetic::Field> fields =
+        varies ? sample(q, controls, 1) : std::vector<Magnetic::Field>();
     const Pack3 uniform = broadcast(controls.flux_density);
     loop_.scatter_packs([&](Index pack) {
         Pack3 x[3], g[3];
@@ -112,7 +115,8 @@ void MagneticTerm::prepare_assembly(const double* q, const Controls& controls) {
     if (sampled(controls)) fields_ = sample(q, controls, 2);
 }
 
-void MagneticTerm::assemble(const Part& part, const double* q, const Controls& controls, bool, SystemMatrix& out) const {
+void MagneticTerm::assemble(const Part& part, const double* q, const Controls& controls, bool,
+                            SystemMatrix& out) const {
     const bool varies = !fields_.empty();
     if (!varies && (!normal_magnetization_ || controls.flux_density.isZero(0.0))) return;
     const Pack3 uniform = broadcast(controls.flux_density);
@@ -152,8 +156,8 @@ void MagneticTerm::vjp(const double* q, const Controls& controls, const double* 
         for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
             const Index f = loop_.face(pack, lane);
             const Magnetic::Element& e = elements_[pack];
-            const Vec3 coordinates(e.alpha[lane], e.beta[lane], e.gamma[lane]), at[3] = {
-                lane_of(rate[0], lane), lane_of(rate[1], lane), lane_of(rate[2], lane)};
+            const Vec3 coordinates(e.alpha[lane], e.beta[lane], e.gamma[lane]),
+                at[3] = {lane_of(rate[0], lane), lane_of(rate[1], lane), lane_of(rate[2], lane)};
             Mat3 frame, frame_rate;
             frame << lane_of(face.a1, lane), lane_of(face.a2, lane), lane_of(face.normal, lane);
             frame_rate << at[1] - at[0], at[2] - at[0], lane_of(turn, lane);
@@ -181,6 +185,8 @@ void MagneticTerm::vjp(const double* q, const Controls& controls, const double* 
         out.field_sources.push_back(source->vjp(points, probe, controls.field));
 }
 
-std::size_t MagneticTerm::bytes() const { return bytes_of(elements_) + bytes_of(thickness_); }
+std::size_t MagneticTerm::bytes() const {
+    return bytes_of(elements_) + bytes_of(thickness_);
+}
 
 }  // namespace magshell

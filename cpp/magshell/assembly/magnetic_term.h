@@ -1,7 +1,7 @@
 // The magnetic energy of a whole sheet, in a uniform applied flux density and any number of field sources.
 //
-// Where the field is uniform nothing is sampled; where no face is magnetized along its normal as well, the force does
-// not depend on the deformation and there is no Hessian to add.
+// Where the field is uniform nothing is sampled; where no face is magnetized along its normal as well, the
+// force does not depend on the deformation and there is no Hessian to add.
 #pragma once
 
 #include <memory>
@@ -17,15 +17,19 @@ class MagneticTerm final : public Term {
     MagneticTerm(const Sheet& sheet, const FaceLoop& loop);
 
     /// Remanent magnetization [A/m] in world axes at rest and thickness [m], one a face, in our numbering.
-    void set_magnetization(const std::vector<Vec3>& remanent_magnetization, const std::vector<double>& thickness);
+    void set_magnetization(const std::vector<Vec3>& remanent_magnetization,
+                           const std::vector<double>& thickness);
 
-    void set_sources(std::vector<std::shared_ptr<const AppliedField>> sources) { sources_ = std::move(sources); }
+    void set_sources(std::vector<std::shared_ptr<const AppliedField>> sources) {
+        sources_ = std::move(sources);
+    }
 
     std::string_view name() const override { return Magnetic::name; }
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void prepare_assembly(const double* q, const Controls& controls) override;
-    void assemble(const Part& part, const double* q, const Controls& controls, bool, SystemMatrix& out) const override;
+    void assemble(const Part& part, const double* q, const Controls& controls, bool,
+                  SystemMatrix& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, SceneGradient& out) override;
     std::size_t bytes() const override;
 

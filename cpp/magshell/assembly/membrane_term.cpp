@@ -3,7 +3,11 @@
 namespace magshell {
 
 MembraneTerm::MembraneTerm(const Sheet& sheet, const FaceLoop& loop)
-    : sheet_(sheet), loop_(loop), elements_(loop.packs()), stress_(loop.packs()), extrapolated_(loop.packs()) {
+    : sheet_(sheet),
+      loop_(loop),
+      elements_(loop.packs()),
+      stress_(loop.packs()),
+      extrapolated_(loop.packs()) {
     for (Index pack = 0; pack < loop.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const std::array<Index, 3>& c = sheet.corners[loop.face(pack, lane)];
@@ -18,7 +22,8 @@ void MembraneTerm::set_material(const std::vector<SheetMaterial>& materials) {
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = loop_.face(pack, lane);
-            set_lane(elements_[pack].stiffness, lane, RestFace(sheet_.rest_corners(f).data()).membrane_stiffness(materials[f]));
+            set_lane(elements_[pack].stiffness, lane,
+                     RestFace(sheet_.rest_corners(f).data()).membrane_stiffness(materials[f]));
         }
 }
 
@@ -84,7 +89,8 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, S
             const Index f = loop_.face(pack, lane);
             const SheetMaterial& m = materials_[f];
             const double work = lane_of(rate, lane).dot(lane_of(stress_[pack].at, lane));
-            const Mat3 by_poisson_ratio = RestFace(sheet_.rest_corners(f).data()).membrane_by_poisson_ratio(m);
+            const Mat3 by_poisson_ratio =
+                RestFace(sheet_.rest_corners(f).data()).membrane_by_poisson_ratio(m);
             const Index user = sheet_.faces.user[f];
             out.young_modulus[user] += work / m.young_modulus;
             out.thickness[user] += work / m.thickness;
@@ -93,8 +99,8 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, S
     });
 }
 
-// |a|^2 carries its own round-off, and that of the positions whose difference a is: far from the origin, or beside long
-// radii, the larger one.
+// |a|^2 carries its own round-off, and that of the positions whose difference a is: far from the origin, or
+// beside long radii, the larger one.
 void MembraneTerm::add_cancelling_forces(VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const Membrane::Element& element = elements_[f / Pack::width];
@@ -114,7 +120,8 @@ void MembraneTerm::add_cancelling_forces(VectorXd& out) const {
 }
 
 std::size_t MembraneTerm::bytes() const {
-    return bytes_of(materials_) + bytes_of(elements_) + bytes_of(stress_) + bytes_of(extrapolated_) + bytes_of(state_);
+    return bytes_of(materials_) + bytes_of(elements_) + bytes_of(stress_) + bytes_of(extrapolated_) +
+           bytes_of(state_);
 }
 
 }  // namespace magshell

@@ -1,4 +1,5 @@
-// The membrane energy of a whole sheet: energy/membrane.h on every face, and the stresses of the mixed Newton.
+// The membrane energy of a whole sheet: energy/membrane.h on every face, and the stresses of the mixed
+// Newton.
 #pragma once
 
 #include "magshell/assembly/face_loop.h"

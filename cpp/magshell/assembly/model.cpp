@@ -80,7 +80,8 @@ void Model::add_terms(const SceneInput& input) {
     bending_ = add(std::make_unique<BendingTerm>(sheet_, schedule_, matrix_));
     if (input.magnetic) magnetic_ = add(std::make_unique<MagneticTerm>(sheet_, faces_));
     if (!values.gravity.isZero(0.0))
-        gravity_ = add(std::make_unique<LoadTerm>("gravity", no_forces, &Controls::gravity, &SceneGradient::weights));
+        gravity_ = add(
+            std::make_unique<LoadTerm>("gravity", no_forces, &Controls::gravity, &SceneGradient::weights));
     if (values.vertex_loads.rows() > 0)
         loads_ = add(std::make_unique<LoadTerm>("loads", no_forces, &Controls::load, &SceneGradient::loads));
     if (!input.couples.empty()) add_couples(input);
@@ -133,7 +134,8 @@ void Model::add_couples(const SceneInput& input) {
         for (int k = 0; k < 4; ++k)
             for (int lane = 0; lane < Pack::width; ++lane) set_lane(x[k], lane, sheet_.rest[nodes[k]]);
         const double rest_angle = Fold(x[0], x[1], x[2], x[3], Pack(0.0)).angle()[0];
-        couples.push_back({nodes, rest_angle, sheet_.rotation_of_edge[given.edge], forward ? 1.0 : -1.0, 0.0});
+        couples.push_back(
+            {nodes, rest_angle, sheet_.rotation_of_edge[given.edge], forward ? 1.0 : -1.0, 0.0});
     }
     couples_ = add(std::make_unique<CoupleTerm>(sheet_, matrix_, std::move(couples)));
 }
@@ -153,7 +155,8 @@ VectorXd Model::rest_state() const {
 
 VectorXd Model::state(const Rows3& positions, const VectorXd& edge_rotations) const {
     VectorXd q = gradient_by_state(positions, edge_rotations);
-    for (Index node = sheet_.n_vertices(); node < sheet_.n_nodes(); ++node) q.segment<3>(3 * node) = sheet_.rest[node];
+    for (Index node = sheet_.n_vertices(); node < sheet_.n_nodes(); ++node)
+        q.segment<3>(3 * node) = sheet_.rest[node];
     return q;
 }
 
@@ -186,7 +189,8 @@ double Model::energy(const VectorXd& q, const Controls& controls) const {
     return total;
 }
 
-std::vector<std::pair<std::string_view, double>> Model::energies(const VectorXd& q, const Controls& controls) const {
+std::vector<std::pair<std::string_view, double>> Model::energies(const VectorXd& q,
+                                                                 const Controls& controls) const {
     std::vector<std::pair<std::string_view, double>> of_terms;
     for (const std::unique_ptr<Term>& term : terms_)
         of_terms.emplace_back(term->name(), term->energy(q.data(), controls));
@@ -226,8 +230,10 @@ void Model::share_out_columns() {
     };
     for (const Part& part : parts)
         for (Index f = part.first_face; f < part.last_face; ++f) {
-            for (const Index node : sheet_.stencils[f].nodes) take(node_taken, node, first_nodes_[part.number]);
-            for (const Index r : sheet_.stencils[f].rotations) take(rotation_taken, r, first_rotations_[part.number]);
+            for (const Index node : sheet_.stencils[f].nodes)
+                take(node_taken, node, first_nodes_[part.number]);
+            for (const Index r : sheet_.stencils[f].rotations)
+                take(rotation_taken, r, first_rotations_[part.number]);
         }
     for (Index node = 0; node < sheet_.n_nodes(); ++node) take(node_taken, node, first_nodes_.back());
 }
@@ -252,7 +258,8 @@ Model::Memory Model::memory() const {
 
 void Model::set_memory(const Memory& memory) {
     for (std::size_t k = 0; k < terms_.size(); ++k)
-        terms_[k]->set_memory(memory.empty() ? std::vector<double>(terms_[k]->memory().size(), 0.0) : memory[k]);
+        terms_[k]->set_memory(memory.empty() ? std::vector<double>(terms_[k]->memory().size(), 0.0)
+                                             : memory[k]);
 }
 
 std::size_t Model::bytes() const {

@@ -23,8 +23,8 @@ class Model {
   public:
     explicit Model(SceneInput input);
 
-    /// New values for what the scene was built with; they have the same shapes and the same terms. The magnetization
-    /// has to be set again after them, as it takes its volumes from the thickness.
+    /// New values for what the scene was built with; they have the same shapes and the same terms. The
+    /// magnetization has to be set again after them, as it takes its volumes from the thickness.
     void set_values(const SceneValues& values);
 
     /// (n_f, 3) [A/m], rest frame, world axes. Only of a scene that was said to be magnetic.
@@ -50,17 +50,20 @@ class Model {
     Rows3 vertex_rows(const VectorXd& full) const { return positions(full); }
 
     double energy(const VectorXd& q, const Controls& controls) const;
-    std::vector<std::pair<std::string_view, double>> energies(const VectorXd& q, const Controls& controls) const;
+    std::vector<std::pair<std::string_view, double>> energies(const VectorXd& q,
+                                                              const Controls& controls) const;
 
     /// The residual at q; keeps what assemble and extrapolate need.
     void evaluate(const VectorXd& q, const Controls& controls);
     /// The Hessian at the last evaluated state, in matrix().
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
     void extrapolate(const VectorXd& p);
-    /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in them.
+    /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in
+    /// them.
     VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
 
-    /// lambda . dg/dk at the last evaluated state, for all k but what supports do; lambda is zero where they hold.
+    /// lambda . dg/dk at the last evaluated state, for all k but what supports do; lambda is zero where they
+    /// hold.
     SceneGradient vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda);
 
     /// A factorization for the reduced Hessian, analysed once for all of them.
@@ -87,7 +90,8 @@ class Model {
     Schedule schedule_;
     FaceLoop faces_;
     std::vector<std::unique_ptr<Term>> terms_;
-    // By part: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
+    // By part: the nodes and rotations whose columns it is the first to add to, and so clears. Last:
+    // nobody's.
     std::vector<std::vector<Index>> first_nodes_, first_rotations_;
     MembraneTerm* membrane_ = nullptr;
     BendingTerm* bending_ = nullptr;

@@ -17,7 +17,8 @@ Vec3 transposed_jacobian_times(const Vec3& phi, const Vec3& v) {
     const double a = phi.norm(), a2 = a * a;
     const bool small = a < 1e-2;
     const double half_angle_sine = std::sin(0.5 * a);
-    const double first = small ? 0.5 - a2 / 24.0 + a2 * a2 / 720.0 : 2.0 * half_angle_sine * half_angle_sine / a2;
+    const double first =
+        small ? 0.5 - a2 / 24.0 + a2 * a2 / 720.0 : 2.0 * half_angle_sine * half_angle_sine / a2;
     const double second = small ? 1.0 / 6.0 - a2 / 120.0 + a2 * a2 / 5040.0 : (a - std::sin(a)) / (a2 * a);
     const Vec3 across = phi.cross(v);
     return v - first * across + second * phi.cross(across);
@@ -29,7 +30,9 @@ Vec3 Motion::point(const Vec3& rest, double progress) const {
     return centre + direction(rest - centre, progress) + progress * translation;
 }
 
-Vec3 Motion::direction(const Vec3& rest, double progress) const { return rotation(progress * rotation_vector) * rest; }
+Vec3 Motion::direction(const Vec3& rest, double progress) const {
+    return rotation(progress * rotation_vector) * rest;
+}
 
 Vec3 Motion::point_rate(const Vec3& rest, double progress) const {
     return direction_rate(rest - centre, progress) + translation;

@@ -79,15 +79,18 @@ Vec3 Reduction::rate_of(const HeldNode& h, double progress) const {
                                 : motion.direction_rate(rest_[h.node], progress);
 }
 
-void Reduction::vjp(const VectorXd& by_state, double progress, std::vector<Motion>& by_motion, double& by_progress) const {
+void Reduction::vjp(const VectorXd& by_state, double progress, std::vector<Motion>& by_motion,
+                    double& by_progress) const {
     by_motion.assign(motions_.size(), {});
     by_progress = 0.0;
     for (const HeldNode& h : held_) {
         if (h.motion < 0) continue;
         const Vec3 by_place = held_part(h, by_state.segment<3>(3 * h.node));
         const Motion& motion = motions_[h.motion];
-        if (h.node < n_vertices_) motion.point_vjp(rest_[h.node], progress, by_place, by_motion[h.motion]);
-        else motion.direction_vjp(rest_[h.node], progress, by_place, by_motion[h.motion]);
+        if (h.node < n_vertices_)
+            motion.point_vjp(rest_[h.node], progress, by_place, by_motion[h.motion]);
+        else
+            motion.direction_vjp(rest_[h.node], progress, by_place, by_motion[h.motion]);
         by_progress += by_place.dot(rate_of(h, progress));
     }
 }
@@ -106,7 +109,8 @@ void Reduction::turn_blocks(SystemMatrix& full) const {
     for (Index j = 0; j < full.nodes(); ++j) {
         const Index length = full.column_length(j);
         const Index start = full.column_starts()[3 * j];
-        const Index starts[3] = {start, start + length - 1, start + 2 * length - 3};  // of the row where column 0 begins
+        const Index starts[3] = {start, start + length - 1,
+                                 start + 2 * length - 3};  // of the row where column 0 begins
         double* values = full.values().data();
         if (frame_of_[j] >= 0) {
             double &a = values[starts[0]], &b = values[starts[0] + 1], &c = values[starts[0] + 2];
@@ -114,7 +118,8 @@ void Reduction::turn_blocks(SystemMatrix& full) const {
             Mat3 block;
             block << a, b, c, b, d, e, c, e, f;
             const Mat3 turned = frame(j).transpose() * block * frame(j);
-            a = turned(0, 0), b = turned(1, 0), c = turned(2, 0), d = turned(1, 1), e = turned(2, 1), f = turned(2, 2);
+            a = turned(0, 0), b = turned(1, 0), c = turned(2, 0), d = turned(1, 1), e = turned(2, 1),
+            f = turned(2, 2);
         }
         for (Index k = 3; k < length; ++k) {
             const Index row = full.rows()[start + k];
@@ -152,7 +157,8 @@ VectorXd Reduction::vector(const VectorXd& full) const {
     VectorXd turned = full;
     for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
         if (frame_of_[node] >= 0)
-            turned.segment<3>(3 * node) = held_[frame_of_[node]].frame.transpose() * full.segment<3>(3 * node);
+            turned.segment<3>(3 * node) =
+                held_[frame_of_[node]].frame.transpose() * full.segment<3>(3 * node);
     return weights(turned);
 }
 
@@ -175,7 +181,8 @@ VectorXd Reduction::expand(const VectorXd& reduced) const {
 
 std::size_t Reduction::bytes() const {
     return (frame_of_.capacity() + free_unknowns_.capacity() + source_.capacity() + pattern_.rows.capacity() +
-            pattern_.column_starts.capacity()) * sizeof(Index);
+            pattern_.column_starts.capacity()) *
+           sizeof(Index);
 }
 
 }  // namespace magshell

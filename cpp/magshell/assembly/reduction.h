@@ -1,7 +1,8 @@
-// From all unknowns to the free ones: supports hold nodes along some directions and may move them as rigid bodies.
+// From all unknowns to the free ones: supports hold nodes along some directions and may move them as rigid
+// bodies.
 //
-// A node held along directions that are not the world's axes is turned into a frame of its own, in which it is held
-// along the first one or two axes. Nodes without supports cost nothing here.
+// A node held along directions that are not the world's axes is turned into a frame of its own, in which it
+// is held along the first one or two axes. Nodes without supports cost nothing here.
 #pragma once
 
 #include <vector>
@@ -23,7 +24,8 @@ struct HeldNode {
 class Reduction {
   public:
     /// `rest` per node; nodes from `n_vertices` on are directions and turn only.
-    Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const std::vector<Vec3>& rest, Index n_vertices);
+    Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const std::vector<Vec3>& rest,
+              Index n_vertices);
 
     /// As many as held nodes refer to.
     void set_motions(std::vector<Motion> motions) { motions_ = std::move(motions); }
@@ -32,14 +34,16 @@ class Reduction {
     Index size() const { return pattern_.size; }
     const SparsePattern& pattern() const { return pattern_; }
 
-    /// Where the supports want their nodes at this progress of their motion, less where they are: zero elsewhere.
+    /// Where the supports want their nodes at this progress of their motion, less where they are: zero
+    /// elsewhere.
     VectorXd prescribed_increment(const VectorXd& q, double progress) const;
 
     /// d(where the supports want their nodes)/d(progress).
     VectorXd prescribed_rate(double progress) const;
 
     /// Sets the gradients by each motion and by their progress, given the gradient by what supports hold.
-    void vjp(const VectorXd& by_state, double progress, std::vector<Motion>& by_motion, double& by_progress) const;
+    void vjp(const VectorXd& by_state, double progress, std::vector<Motion>& by_motion,
+             double& by_progress) const;
 
     /// The largest angle [rad] by which a support turns in all.
     double largest_turn() const;
@@ -47,7 +51,8 @@ class Reduction {
     /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first.
     void matrix(SystemMatrix& full, std::vector<double>& values) const;
     VectorXd vector(const VectorXd& full) const;
-    /// A diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses, areas.
+    /// A diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses,
+    /// areas.
     VectorXd weights(const VectorXd& full) const;
     /// A free vector back among all unknowns, zero where they are held.
     VectorXd expand(const VectorXd& reduced) const;
@@ -69,7 +74,7 @@ class Reduction {
     std::vector<Index> frame_of_;       // per node: index into held_ where turned, else -1; empty if none is
     std::vector<Index> free_unknowns_;  // reduced -> full, ascending
     SparsePattern pattern_;
-    std::vector<Index> source_;         // reduced entry -> position in the full matrix
+    std::vector<Index> source_;  // reduced entry -> position in the full matrix
 };
 
 }  // namespace magshell

@@ -1,4 +1,5 @@
-// The gradient of a number by everything a solve takes: SceneValues, the magnetization and the controls, shaped like them.
+// The gradient of a number by everything a solve takes: SceneValues, the magnetization and the controls,
+// shaped like them.
 #pragma once
 
 #include <vector>

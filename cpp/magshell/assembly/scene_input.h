@@ -1,4 +1,5 @@
-// A scene as the caller describes it, in the caller's numbering: what fixes the unknowns, and numbers that may change.
+// A scene as the caller describes it, in the caller's numbering: what fixes the unknowns, and numbers that
+// may change.
 #pragma once
 
 #include <memory>

@@ -69,6 +69,8 @@ double Schedule::sum(const std::function<double(const Part&)>& body) const {
     return total;
 }
 
-std::size_t Schedule::bytes() const { return parts_.size() * (sizeof(Part) + sizeof(Index)); }
+std::size_t Schedule::bytes() const {
+    return parts_.size() * (sizeof(Part) + sizeof(Index));
+}
 
 }  // namespace magshell

@@ -1,9 +1,10 @@
 // Which parts of a sheet may be scattered at the same time.
 //
-// Faces are cut into parts of fixed length, each with the folds that it is first to touch, and parts that share a node
-// get different colours. Colours follow each other, parts of one colour run in parallel: no two threads add to one
-// place, and the order of additions at a place is that of the colours, whatever the number of threads. Same bits
-// on one thread and on many. A part also fits in a core's cache with its share of the Hessian.
+// Faces are cut into parts of fixed length, each with the folds that it is first to touch, and parts that
+// share a node get different colours. Colours follow each other, parts of one colour run in parallel: no two
+// threads add to one place, and the order of additions at a place is that of the colours, whatever the number
+// of threads. Same bits on one thread and on many. A part also fits in a core's cache with its share of the
+// Hessian.
 #pragma once
 
 #include <functional>

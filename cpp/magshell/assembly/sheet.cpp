@@ -3,15 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "magshell/assembly/lanes.h"
 #include "magshell/strain/fold_angle.h"
 
 namespace magshell {
-namespace {
-
-Pack3 broadcast(const Vec3& v) { return {Pack(v.x()), Pack(v.y()), Pack(v.z())}; }
-
-}  // namespace
-
 Sheet::Sheet(const TriangleMesh& mesh, const std::vector<DirectedEdge>& directed, const Rows3& directions,
              bool directors) {
     number(mesh);
@@ -87,7 +82,8 @@ void Sheet::add_folds(const TriangleMesh& mesh, const std::vector<DirectedEdge>&
                 int across = 0;
                 while (edges[other][across] != e) ++across;
                 const Index beyond = corners[other][across];
-                fold_of[e] = forward ? add_fold({from, to, tip, beyond}, true) : add_fold({to, from, beyond, tip}, true);
+                fold_of[e] = forward ? add_fold({from, to, tip, beyond}, true)
+                                     : add_fold({to, from, beyond, tip}, true);
             }
             side.fold = fold_of[e];
             (forward ? folds[side.fold].left : folds[side.fold].right) = {f, i};
@@ -107,13 +103,15 @@ void Sheet::add_stencils() {
 
 double Sheet::largest_coordinate(Index face) const {
     double largest = 0.0;
-    for (const Index corner : corners[face]) largest = std::max(largest, rest[corner].lpNorm<Eigen::Infinity>());
+    for (const Index corner : corners[face])
+        largest = std::max(largest, rest[corner].lpNorm<Eigen::Infinity>());
     return largest;
 }
 
 double Sheet::smallest_height(Index face) const {
     const Vec3 &a = rest[corners[face][0]], &b = rest[corners[face][1]], &c = rest[corners[face][2]];
-    const double longest = std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
+    const double longest =
+        std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
     return (b - a).cross(c - a).norm() / longest;
 }
 

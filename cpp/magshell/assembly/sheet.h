@@ -1,7 +1,8 @@
-// A sheet as the core sees it: renumbered for locality, with its folds, its edge rotations and who couples whom.
+// A sheet as the core sees it: renumbered for locality, with its folds, its edge rotations and who couples
+// whom.
 //
-// Nodes are the vertices, followed by the directions that clamped edges, symmetry planes and couples refer to: a
-// direction has three components and derivatives like a vertex, and is always prescribed.
+// Nodes are the vertices, followed by the directions that clamped edges, symmetry planes and couples refer
+// to: a direction has three components and derivatives like a vertex, and is always prescribed.
 #pragma once
 
 #include <array>
@@ -42,8 +43,10 @@ struct FaceSide {
 
 class Sheet {
   public:
-    /// directions (n_d, 3); `directors` gives every edge that is not directed a rotation of its own (midedge).
-    Sheet(const TriangleMesh& mesh, const std::vector<DirectedEdge>& directed, const Rows3& directions, bool directors);
+    /// directions (n_d, 3); `directors` gives every edge that is not directed a rotation of its own
+    /// (midedge).
+    Sheet(const TriangleMesh& mesh, const std::vector<DirectedEdge>& directed, const Rows3& directions,
+          bool directors);
 
     Index n_vertices() const { return vertices.size(); }
     Index n_faces() const { return faces.size(); }
@@ -57,20 +60,21 @@ class Sheet {
         const std::array<Index, 3>& c = corners[face];
         return {rest[c[0]], rest[c[1]], rest[c[2]]};
     }
-    /// The largest coordinate at rest of the corners of a face [m]. A unit of its round-off is how exactly they are known.
+    /// The largest coordinate at rest of the corners of a face [m]. A unit of its round-off is how exactly
+    /// they are known.
     double largest_coordinate(Index face) const;
     /// The smallest height of a face at rest [m].
     double smallest_height(Index face) const;
 
-    Renumbering vertices, faces;            // caller's <-> ours
-    std::vector<Vec3> rest;                 // per node: rest position of a vertex, rest value of a direction
-    std::vector<std::array<Index, 3>> corners;   // per face, our vertices
-    std::vector<std::array<Index, 3>> edges;     // per face, the caller's edges, opposite the corners
+    Renumbering vertices, faces;  // caller's <-> ours
+    std::vector<Vec3> rest;       // per node: rest position of a vertex, rest value of a direction
+    std::vector<std::array<Index, 3>> corners;  // per face, our vertices
+    std::vector<std::array<Index, 3>> edges;    // per face, the caller's edges, opposite the corners
     std::vector<FoldStencil> folds;
     std::vector<std::array<FaceSide, 3>> sides;  // per face
     std::vector<Index> edge_of_rotation;         // our rotation -> caller's edge
     std::vector<Index> rotation_of_edge;         // caller's edge -> our rotation, or -1
-    std::vector<Stencil> stencils;               // per face: corners, the nodes beyond its edges, its rotations
+    std::vector<Stencil> stencils;  // per face: corners, the nodes beyond its edges, its rotations
 
   private:
     void number(const TriangleMesh& mesh);

@@ -11,7 +11,7 @@ namespace {
 // For every unknown of a kind, the stencils that hold it.
 template <std::size_t N>
 std::vector<std::vector<Index>> holders(Index count, const std::vector<Stencil>& stencils,
-                                        std::array<Index, N> Stencil::*members) {
+                                        std::array<Index, N> Stencil::* members) {
     std::vector<std::vector<Index>> of(count);
     for (Index s = 0; s < static_cast<Index>(stencils.size()); ++s)
         for (const Index member : stencils[s].*members)
@@ -38,7 +38,8 @@ class Marks {
 SystemMatrix::SystemMatrix(Index nodes, Index rotations, const std::vector<Stencil>& stencils)
     : nodes_(nodes), rotations_(rotations) {
     const std::vector<std::vector<Index>> node_holders = holders(nodes, stencils, &Stencil::nodes);
-    const std::vector<std::vector<Index>> rotation_holders = holders(rotations, stencils, &Stencil::rotations);
+    const std::vector<std::vector<Index>> rotation_holders =
+        holders(rotations, stencils, &Stencil::rotations);
 
     column_starts_.reserve(size() + 1);
     column_starts_.push_back(0);
@@ -81,7 +82,8 @@ SystemMatrix::SystemMatrix(Index nodes, Index rotations, const std::vector<Stenc
 }
 
 Index SystemMatrix::find(Index column, Index row) const {
-    const auto first = rows_.begin() + column_starts_[column], last = rows_.begin() + column_starts_[column + 1];
+    const auto first = rows_.begin() + column_starts_[column],
+               last = rows_.begin() + column_starts_[column + 1];
     return static_cast<Index>(std::lower_bound(first, last, row) - rows_.begin());
 }
 

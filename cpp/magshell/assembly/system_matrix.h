@@ -1,9 +1,9 @@
 // The Hessian of a scene: lower triangle, compressed columns, in all unknowns before supports take any away.
 //
-// Unknowns are numbered node by node (three each), then the edge rotations (one each). Where things go is worked out
-// once; evaluations add values in place. A place for a 3x3 block of nodes (i, j) is one number, because the three
-// columns of a node have the same rows and shrink by one from column to column: it stands at p, p + L - 1 and
-// p + 2 L - 3 in them, with L the length of the first.
+// Unknowns are numbered node by node (three each), then the edge rotations (one each). Where things go is
+// worked out once; evaluations add values in place. A place for a 3x3 block of nodes (i, j) is one number,
+// because the three columns of a node have the same rows and shrink by one from column to column: it stands
+// at p, p + L - 1 and p + 2 L - 3 in them, with L the length of the first.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,8 @@ struct Stencil {
 
 class SystemMatrix {
   public:
-    /// Where a block of two nodes goes: twice its position, plus one where it is to be transposed. Negative: nowhere.
+    /// Where a block of two nodes goes: twice its position, plus one where it is to be transposed. Negative:
+    /// nowhere.
     using Slot = Index;
 
     SystemMatrix() = default;
@@ -53,11 +54,13 @@ class SystemMatrix {
     /// y = A x with the symmetric matrix.
     void multiply(const double* x, double* y) const;
 
-    /// Adds lane `lane` of block (i, j), i != j; `length` is the column length of the node whose columns the slot is in.
+    /// Adds lane `lane` of block (i, j), i != j; `length` is the column length of the node whose columns the
+    /// slot is in.
     void add_block(Slot slot, Index length, const Pack33& block, int lane) {
         const double* from = reinterpret_cast<const double*>(&block) + lane;
         const bool transposed = slot & 1;
-        const Index row_stride = (transposed ? 1 : 3) * Pack::width, column_stride = (transposed ? 3 : 1) * Pack::width;
+        const Index row_stride = (transposed ? 1 : 3) * Pack::width,
+                    column_stride = (transposed ? 3 : 1) * Pack::width;
         double* to = values_.data() + (slot >> 1);
         for (int column = 0; column < 3; ++column) {
             const double* entry = from + column * column_stride;
@@ -96,7 +99,8 @@ class SystemMatrix {
   private:
     Index find(Index column, Index row) const;
     void clear(Index first_column, Index last_column) {
-        std::fill(values_.data() + column_starts_[first_column], values_.data() + column_starts_[last_column], 0.0);
+        std::fill(values_.data() + column_starts_[first_column], values_.data() + column_starts_[last_column],
+                  0.0);
     }
 
     Index nodes_ = 0, rotations_ = 0;

@@ -9,8 +9,8 @@
 
 namespace magshell {
 
-/// The gradient of the energy, and the sum of the magnitudes of what was added up to it: its round-off is a fraction
-/// of that, not of the little that is left.
+/// The gradient of the energy, and the sum of the magnitudes of what was added up to it: its round-off is a
+/// fraction of that, not of the little that is left.
 struct Residual {
     VectorXd gradient, magnitude;
 
@@ -24,8 +24,8 @@ struct Residual {
     }
 };
 
-/// The order of calls in a Newton step: evaluate at a state; the three of the assembly there, with its own stresses
-/// (plain Newton) or with the extrapolated ones (mixed); once the increment is known, extrapolate.
+/// The order of calls in a Newton step: evaluate at a state; the three of the assembly there, with its own
+/// stresses (plain Newton) or with the extrapolated ones (mixed); once the increment is known, extrapolate.
 class Term {
   public:
     virtual ~Term() = default;
@@ -51,18 +51,20 @@ class Term {
     /// Adds the share of the Hessian that is not on faces.
     virtual void finish_assembly(const double* /*q*/, const Controls&, SystemMatrix& /*out*/) const {}
 
-    /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J p).
+    /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J
+    /// p).
     virtual void extrapolate(const double* /*p*/) {}
 
     /// Adds the magnitude of forces that cancel inside the strains themselves, as for |a|^2 - |a~|^2 at rest.
     virtual void add_cancelling_forces(VectorXd& /*out*/) const {}
 
-    /// Adds lambda . dg/dk at the last evaluated state q for every value k of the scene that the term's gradient g
-    /// depends on; lambda is a vector of all unknowns. With dE/dC = 1/2 d d^T this is (J lambda)^T dC/dk d for a strain.
+    /// Adds lambda . dg/dk at the last evaluated state q for every value k of the scene that the term's
+    /// gradient g depends on; lambda is a vector of all unknowns. With dE/dC = 1/2 d d^T this is (J lambda)^T
+    /// dC/dk d for a strain.
     virtual void vjp(const double* q, const Controls& controls, const double* lambda, SceneGradient& out) = 0;
 
-    /// What the term must know of how its state was reached, such as full turns; a solve that rejects a state puts back
-    /// what it was.
+    /// What the term must know of how its state was reached, such as full turns; a solve that rejects a state
+    /// puts back what it was.
     virtual std::vector<double> memory() const { return {}; }
     virtual void set_memory(const std::vector<double>&) {}
 

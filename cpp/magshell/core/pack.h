@@ -1,7 +1,8 @@
-// A pack of doubles, one a lane: the scalar of every element kernel, so that one instruction serves several elements.
+// A pack of doubles, one a lane: the scalar of every element kernel, so that one instruction serves several
+// elements.
 //
-// Lanes never meet: each holds one element's numbers, so an element's result does not depend on its neighbours in
-// the pack. Written with the compilers' vector extension; -march decides what it becomes.
+// Lanes never meet: each holds one element's numbers, so an element's result does not depend on its
+// neighbours in the pack. Written with the compilers' vector extension; -march decides what it becomes.
 #pragma once
 
 #include <cmath>
@@ -22,15 +23,25 @@ struct Pack {
     Lanes lanes;
 
     Pack() = default;
-    Pack(double value) : lanes(Lanes{} + value) {}  // NOLINT: a number in a formula is the same number in every lane
+    Pack(double value)
+        : lanes(Lanes{} + value) {}  // NOLINT: a number in a formula is the same number in every lane
     explicit Pack(Lanes l) : lanes(l) {}
 
     double operator[](int lane) const { return lanes[lane]; }
     void set(int lane, double value) { lanes[lane] = value; }
 
-    Pack& operator+=(const Pack& b) { lanes += b.lanes; return *this; }
-    Pack& operator-=(const Pack& b) { lanes -= b.lanes; return *this; }
-    Pack& operator*=(const Pack& b) { lanes *= b.lanes; return *this; }
+    Pack& operator+=(const Pack& b) {
+        lanes += b.lanes;
+        return *this;
+    }
+    Pack& operator-=(const Pack& b) {
+        lanes -= b.lanes;
+        return *this;
+    }
+    Pack& operator*=(const Pack& b) {
+        lanes *= b.lanes;
+        return *this;
+    }
 
     friend Pack operator+(const Pack& a, const Pack& b) { return Pack(a.lanes + b.lanes); }
     friend Pack operator-(const Pack& a, const Pack& b) { return Pack(a.lanes - b.lanes); }

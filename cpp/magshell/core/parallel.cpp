@@ -107,7 +107,8 @@ class Pool {
 };
 
 std::mutex pool_in_use;
-Pool* pool = nullptr;  // never destroyed at exit: after a fork, or while Python ends, its threads cannot be joined
+Pool* pool =
+    nullptr;  // never destroyed at exit: after a fork, or while Python ends, its threads cannot be joined
 
 void run_serially(int count, const std::function<void(int)>& body) {
     for (int i = 0; i < count; ++i) body(i);
@@ -115,9 +116,13 @@ void run_serially(int count, const std::function<void(int)>& body) {
 
 }  // namespace
 
-int num_threads() { return thread_count.load(); }
+int num_threads() {
+    return thread_count.load();
+}
 
-void set_num_threads(int count) { thread_count.store(std::max(1, count)); }
+void set_num_threads(int count) {
+    thread_count.store(std::max(1, count));
+}
 
 void parallel_for(int count, const std::function<void(int)>& body) {
     const int workers = std::min(num_threads(), count) - 1;

@@ -8,7 +8,8 @@
 
 namespace magshell {
 
-using Index = std::int32_t;  // vertices, faces, unknowns and matrix entries; 2^31 is far beyond what fits in memory here
+using Index = std::int32_t;  // vertices, faces, unknowns and matrix entries; 2^31 is far beyond what fits in
+                             // memory here
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 using VectorXd = Eigen::VectorXd;

@@ -8,8 +8,18 @@ namespace magshell {
 struct Pack3 {
     Pack x, y, z;
 
-    Pack3& operator+=(const Pack3& b) { x += b.x; y += b.y; z += b.z; return *this; }
-    Pack3& operator-=(const Pack3& b) { x -= b.x; y -= b.y; z -= b.z; return *this; }
+    Pack3& operator+=(const Pack3& b) {
+        x += b.x;
+        y += b.y;
+        z += b.z;
+        return *this;
+    }
+    Pack3& operator-=(const Pack3& b) {
+        x -= b.x;
+        y -= b.y;
+        z -= b.z;
+        return *this;
+    }
 
     friend Pack3 operator+(const Pack3& a, const Pack3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
     friend Pack3 operator-(const Pack3& a, const Pack3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -17,13 +27,17 @@ struct Pack3 {
     friend Pack3 operator*(const Pack& s, const Pack3& a) { return {s * a.x, s * a.y, s * a.z}; }
 };
 
-inline Pack dot(const Pack3& a, const Pack3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Pack dot(const Pack3& a, const Pack3& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 
 inline Pack3 cross(const Pack3& a, const Pack3& b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-inline Pack squared_norm(const Pack3& a) { return dot(a, a); }
+inline Pack squared_norm(const Pack3& a) {
+    return dot(a, a);
+}
 
 /// Row-major 3x3: at[3 * row + column].
 struct Pack33 {
@@ -53,7 +67,8 @@ inline Pack33 transpose(const Pack33& a) {
 
 /// a b^T
 inline Pack33 outer(const Pack3& a, const Pack3& b) {
-    return {{a.x * b.x, a.x * b.y, a.x * b.z, a.y * b.x, a.y * b.y, a.y * b.z, a.z * b.x, a.z * b.y, a.z * b.z}};
+    return {
+        {a.x * b.x, a.x * b.y, a.x * b.z, a.y * b.x, a.y * b.y, a.y * b.z, a.z * b.x, a.z * b.y, a.z * b.z}};
 }
 
 /// a b^T + b a^T

@@ -2,13 +2,13 @@
 //
 //   E_f = - A~ h (F_0 M~_r) . B(x_b)                                                [J]   [Chen22] (20), (24)
 //
-// F_0 carries the rest tangents to the current ones and the rest normal to the current unit normal, so with the
-// rest coordinates (alpha, beta, gamma) of M~_r [A/m] in (a~_1, a~_2, n~)
+// F_0 carries the rest tangents to the current ones and the rest normal to the current unit normal, so with
+// the rest coordinates (alpha, beta, gamma) of M~_r [A/m] in (a~_1, a~_2, n~)
 //
 //   F_0 M~_r = alpha a_1 + beta a_2 + gamma n,     a_1 = x_1 - x_0,  a_2 = x_2 - x_0.
 //
-// Derivatives as in [Chen22] (62), (63) without their misprints: the factor is (n~ . M~_r), and the signs are those
-// below (checked against automatic differentiation). One face a lane.
+// Derivatives as in [Chen22] (62), (63) without their misprints: the factor is (n~ . M~_r), and the signs are
+// those below (checked against automatic differentiation). One face a lane.
 #pragma once
 
 #include <string_view>
@@ -28,9 +28,9 @@ struct Magnetic {
 
     /// The applied field at the barycentre. Gradient and curvature only where it varies in space.
     struct Field {
-        Pack3 flux;             // B                      [T]
-        Pack33 gradient;        // dB_i/dx_j              [T/m]
-        Pack33 curvature;       // d2(M . B)/dx_j dx_k    [A/m T/m2]
+        Pack3 flux;        // B                      [T]
+        Pack33 gradient;   // dB_i/dx_j              [T/m]
+        Pack33 curvature;  // d2(M . B)/dx_j dx_k    [A/m T/m2]
     };
 
     Pack3 a1, a2, normal;
@@ -44,9 +44,7 @@ struct Magnetic {
 
     Pack3 magnetization(const Element& e) const { return e.alpha * a1 + e.beta * a2 + e.gamma * normal; }
 
-    Pack energy(const Element& e, const Pack3& flux) const {
-        return -e.volume * dot(magnetization(e), flux);
-    }
+    Pack energy(const Element& e, const Pack3& flux) const { return -e.volume * dot(magnetization(e), flux); }
 
     /// d(M . b)/da_1 and d(M . b)/da_2 for a fixed vector b.
     void by_edges(const Element& e, const Pack3& b, Pack3& d1, Pack3& d2) const {

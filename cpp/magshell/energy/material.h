@@ -38,8 +38,12 @@ struct RestFace {
     Mat3 bending_stiffness(const SheetMaterial& m) const { return bending(m).stiffness(m.poisson_ratio); }
 
     /// dC/dnu. By the modulus C is linear; by the thickness linear (membrane) or cubic (bending).
-    Mat3 membrane_by_poisson_ratio(const SheetMaterial& m) const { return membrane(m).by_poisson_ratio(m.poisson_ratio); }
-    Mat3 bending_by_poisson_ratio(const SheetMaterial& m) const { return bending(m).by_poisson_ratio(m.poisson_ratio); }
+    Mat3 membrane_by_poisson_ratio(const SheetMaterial& m) const {
+        return membrane(m).by_poisson_ratio(m.poisson_ratio);
+    }
+    Mat3 bending_by_poisson_ratio(const SheetMaterial& m) const {
+        return bending(m).by_poisson_ratio(m.poisson_ratio);
+    }
 
   private:
     // C = modulus / (1 - nu^2) ((1 - nu) products + nu traces)
@@ -55,12 +59,15 @@ struct RestFace {
                 }
         }
 
-        Mat3 stiffness(double nu) const { return modulus / (1.0 - nu * nu) * ((1.0 - nu) * products + nu * traces); }
+        Mat3 stiffness(double nu) const {
+            return modulus / (1.0 - nu * nu) * ((1.0 - nu) * products + nu * traces);
+        }
 
         // products / (1 + nu) and traces nu / (1 - nu^2), differentiated
         Mat3 by_poisson_ratio(double nu) const {
             const double both = 1.0 - nu * nu;
-            return modulus * ((1.0 + nu * nu) / (both * both) * traces - products / ((1.0 + nu) * (1.0 + nu)));
+            return modulus *
+                   ((1.0 + nu * nu) / (both * both) * traces - products / ((1.0 + nu) * (1.0 + nu)));
         }
     };
 

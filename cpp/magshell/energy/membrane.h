@@ -47,8 +47,10 @@ struct Membrane {
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j <= i; ++j) {
                 pair[i][j] = outer((Pack(4.0) * element.stiffness(i, j)) * edge[i], edge[j]);
-                if (i == j) add_to_diagonal(pair[i][i], Pack(2.0) * stress[i]);
-                else pair[j][i] = transpose(pair[i][j]);
+                if (i == j)
+                    add_to_diagonal(pair[i][i], Pack(2.0) * stress[i]);
+                else
+                    pair[j][i] = transpose(pair[i][j]);
             }
         for (int k = 0; k < 3; ++k)
             for (int l = 0; l <= k; ++l) {

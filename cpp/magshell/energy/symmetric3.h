@@ -5,7 +5,9 @@
 
 namespace magshell {
 
-constexpr int lower_index(int row, int column) { return row * (row + 1) / 2 + column; }
+constexpr int lower_index(int row, int column) {
+    return row * (row + 1) / 2 + column;
+}
 
 struct Symmetric3 {
     Pack at[6];

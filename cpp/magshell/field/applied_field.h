@@ -43,7 +43,9 @@ class AppliedField {
                              double scale, FieldSamples& out) const = 0;
 
     /// The gradient of a probe of scale * B by the field's own parameters; empty where it has none.
-    virtual VectorXd vjp(std::span<const Vec3> /*points*/, const FieldProbe&, double /*scale*/) const { return {}; }
+    virtual VectorXd vjp(std::span<const Vec3> /*points*/, const FieldProbe&, double /*scale*/) const {
+        return {};
+    }
 
     /// Whether add_samples runs Python code. It then takes the GIL by itself.
     virtual bool needs_gil() const { return false; }

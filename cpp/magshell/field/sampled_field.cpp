@@ -154,7 +154,8 @@ void SampledField::add_samples(std::span<const Vec3> points, std::span<const Vec
     });
 }
 
-// The samples reach a point through the coefficients around it, linearly. One point after another, as they share them.
+// The samples reach a point through the coefficients around it, linearly. One point after another, as they
+// share them.
 VectorXd SampledField::vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale) const {
     Grid grid;
     for (int a = 0; a < 3; ++a) grid.size[a] = axes_[a].samples + (axes_[a].samples > 1 ? 2 : 0);
@@ -178,7 +179,8 @@ VectorXd SampledField::vjp(std::span<const Vec3> points, const FieldProbe& probe
     for (int a = 2; a >= 0; --a)
         if (axes_[a].samples > 1) grid = map_lines(a, grid, spline_samples_gradient, -2);
     VectorXd by_samples(3 * grid.values.size());
-    for (std::size_t k = 0; k < grid.values.size(); ++k) by_samples.segment<3>(3 * k) = grid.values[k].head<3>();
+    for (std::size_t k = 0; k < grid.values.size(); ++k)
+        by_samples.segment<3>(3 * k) = grid.values[k].head<3>();
     return by_samples;
 }
 

@@ -86,7 +86,9 @@ class CholmodFactor : public Factor {
         cholmod_free_dense(&solution, common);
     }
 
-    std::unique_ptr<Factor> sibling() const override { return std::make_unique<CholmodFactor>(pattern_, ordering_); }
+    std::unique_ptr<Factor> sibling() const override {
+        return std::make_unique<CholmodFactor>(pattern_, ordering_);
+    }
     std::string name() const override { return "cholmod"; }
     Index size() const override { return pattern_.size; }
     std::int64_t nonzeros() const override { return nonzeros_; }

@@ -64,21 +64,11 @@ struct [[gnu::may_alias]] alignas(64) Lanes {
             return magnitude > x ? magnitude : x;
         });
     }
-    [[gnu::always_inline]] friend Lanes operator+(const Lanes& a, const Lanes& b) {
-        return Lanes(a) += b;
-    }
-    [[gnu::always_inline]] friend Lanes operator-(const Lanes& a, const Lanes& b) {
-        return Lanes(a) -= b;
-    }
-    [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, const Lanes& b) {
-        return Lanes(a) *= b;
-    }
-    [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, double b) {
-        return Lanes(a) *= b;
-    }
-    [[gnu::always_inline]] friend Lanes operator/(const Lanes& a, double b) {
-        return Lanes(a) /= b;
-    }
+    [[gnu::always_inline]] friend Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a) += b; }
+    [[gnu::always_inline]] friend Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(a) -= b; }
+    [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a) *= b; }
+    [[gnu::always_inline]] friend Lanes operator*(const Lanes& a, double b) { return Lanes(a) *= b; }
+    [[gnu::always_inline]] friend Lanes operator/(const Lanes& a, double b) { return Lanes(a) /= b; }
 };
 
 inline Lanes& lanes(double* at) {

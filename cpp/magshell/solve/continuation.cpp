@@ -11,8 +11,9 @@ namespace magshell {
 namespace {
 
 constexpr int corrector_iterations = 8, wanted_iterations = 3;
-constexpr double smallest_turn_cosine = 0.5;  // of successive tangents; a sharper bend asks for a shorter step
-constexpr double coincident = 1e-6;           // of a step: critical points closer than that count as one
+constexpr double smallest_turn_cosine =
+    0.5;                             // of successive tangents; a sharper bend asks for a shorter step
+constexpr double coincident = 1e-6;  // of a step: critical points closer than that count as one
 
 struct Tangent {
     VectorXd state;
@@ -53,9 +54,11 @@ class Follower {
             if (!advance(tangent)) return false;
             const PathPoint& last = result_.points.back();
             if (until_ && until_(last)) return true;
-            if (last.parameter >= options_.highest_parameter || last.parameter <= options_.lowest_parameter) return true;
+            if (last.parameter >= options_.highest_parameter || last.parameter <= options_.lowest_parameter)
+                return true;
         }
-        return fail("the path has max_points = " + std::to_string(options_.max_points) + " points and goes on");
+        return fail("the path has max_points = " + std::to_string(options_.max_points) +
+                    " points and goes on");
     }
 
   private:
@@ -102,8 +105,10 @@ class Follower {
         return true;
     }
 
-    // From a point along its tangent; the model's last evaluated state must be that point. False: no convergence.
-    bool correct(const PathPoint& base, const Tangent& along, double step, PathPoint& found, int& iterations) {
+    // From a point along its tangent; the model's last evaluated state must be that point. False: no
+    // convergence.
+    bool correct(const PathPoint& base, const Tangent& along, double step, PathPoint& found,
+                 int& iterations) {
         VectorXd q = base.state;
         model_.set_memory(base.memory);
         double parameter = base.parameter + step * along.parameter;
@@ -126,7 +131,8 @@ class Follower {
             Eigen::MatrixXd pulls(q.size(), 2);
             pulls << gap, held;
             if (!newton_.factorize(q, at, newton_.options().mixed, {}, pulls).succeeded) return false;
-            const VectorXd correction = gap + newton_.solve_with_factor(-model_.residual().gradient - pulls.col(0));
+            const VectorXd correction =
+                gap + newton_.solve_with_factor(-model_.residual().gradient - pulls.col(0));
             const VectorXd by_parameter = response(q, held, pulls.col(1));
             const double change = -product(along.state, correction) /
                                   (product(along.state, by_parameter) + psi_ * psi_ * along.parameter);
@@ -145,7 +151,8 @@ class Follower {
             PathPoint next;
             Tangent there;
             int iterations = 0;
-            if (!correct(base, tangent, step_, next, iterations) || !end_in_range(next) || !find_tangent(next, there))
+            if (!correct(base, tangent, step_, next, iterations) || !end_in_range(next) ||
+                !find_tangent(next, there))
                 continue;
             normalize(there);
             double turn = cosine(tangent, there);
@@ -175,7 +182,8 @@ class Follower {
         return true;
     }
 
-    // The eigenvalue next to zero at the point just factorized, positive on the side of `count` unstable directions.
+    // The eigenvalue next to zero at the point just factorized, positive on the side of `count` unstable
+    // directions.
     double signed_eigenvalue(const PathPoint& point, Index count, VectorXd* mode) {
         const std::vector<Mode> modes = modes_near_zero(newton_, 1);
         if (mode) *mode = modes.front().shape;
@@ -242,8 +250,10 @@ class Follower {
             }
         }
         const VectorXd drive = model_.gradient_rate(best.state, rate_);
-        const VectorXd free_drive = model_.reduction().vector(drive), free_mode = model_.reduction().vector(mode);
-        const double alignment = std::abs(free_drive.dot(free_mode)) / (free_drive.norm() * free_mode.norm() + 1e-300);
+        const VectorXd free_drive = model_.reduction().vector(drive),
+                       free_mode = model_.reduction().vector(mode);
+        const double alignment =
+            std::abs(free_drive.dot(free_mode)) / (free_drive.norm() * free_mode.norm() + 1e-300);
         const CriticalKind kind = alignment > 1e-3 ? CriticalKind::limit : CriticalKind::bifurcation;
         result_.critical.push_back({best, kind, mode, static_cast<Index>(result_.points.size()) - 1});
     }
@@ -261,7 +271,8 @@ class Follower {
 }  // namespace
 
 PathResult follow_path(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
-                       const Controls& to, const PathOptions& options, const Until& until, const StaticsWatch& watch) {
+                       const Controls& to, const PathOptions& options, const Until& until,
+                       const StaticsWatch& watch) {
     model.set_memory(memory);
     PathResult result;
     Newton newton(model, options.newton, [&](double residual) {

@@ -1,11 +1,12 @@
-// Paths of equilibria: pseudo-arclength continuation in the controls, through limit points, with critical points located.
+// Paths of equilibria: pseudo-arclength continuation in the controls, through limit points, with critical
+// points located.
 //
 // A point is a state and a parameter, 0 at the old controls and 1 at the new. Lengths are measured by
 //
 //   ds^2 = |dx|^2 / extent^2 + psi^2 dlambda^2          |.|: root mean square over the sheet's area
 //
-// with psi such that both parts weigh the same at the start. Corrections are mixed Newton steps perpendicular to
-// the tangent.
+// with psi such that both parts weigh the same at the start. Corrections are mixed Newton steps perpendicular
+// to the tangent.
 #pragma once
 
 #include <functional>
@@ -53,7 +54,8 @@ struct PathResult {
 using Until = std::function<bool(const PathPoint&)>;
 
 /// From an equilibrium at `from`, following the controls towards `to`.
-PathResult follow_path(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from, const Controls& to,
-                       const PathOptions& options, const Until& until, const StaticsWatch& watch = {});
+PathResult follow_path(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
+                       const Controls& to, const PathOptions& options, const Until& until,
+                       const StaticsWatch& watch = {});
 
 }  // namespace magshell

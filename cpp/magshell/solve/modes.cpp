@@ -31,8 +31,8 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     const Index massive = (metric.array() > 0.0).count();
     const int columns = static_cast<int>(std::min<Index>(count + 3, massive));
 
-    // With X = K^-1 M Y: X^T K X = X^T M Y, so K itself is not needed. X = Q R is made orthonormal in M first: next to a
-    // critical point all its columns are almost the same.
+    // With X = K^-1 M Y: X^T K X = X^T M Y, so K itself is not needed. X = Q R is made orthonormal in M
+    // first: next to a critical point all its columns are almost the same.
     const VectorXd root = metric.cwiseSqrt();
     MatrixXd y = generic_start(model.reduction().size(), columns);
     VectorXd eigenvalues = VectorXd::Zero(columns);
@@ -76,7 +76,8 @@ Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& contr
     std::vector<Mode> modes = modes_near_zero(newton, count);
     if (modes.front().eigenvalue < 0.0 || negative_pivots == 0) return modes.front();
 
-    // Many stable modes lie nearer to zero. Shift until all are stable; the most unstable one is then the nearest.
+    // Many stable modes lie nearer to zero. Shift until all are stable; the most unstable one is then the
+    // nearest.
     double shift = std::max(std::abs(modes.front().eigenvalue), std::abs(modes.back().eigenvalue));
     Eigen::MatrixXd no_moves(q.size(), 0);
     for (FactorReport factor; !factor.succeeded || factor.negative_pivots > 0;) {

@@ -14,8 +14,9 @@ struct Mode {
 /// factorization of `newton`, which must be that of the Hessian itself.
 std::vector<Mode> modes_near_zero(Newton& newton, int count);
 
-/// The mode with the most negative eigenvalue at q, which the model was last evaluated at and whose factorization has so
-/// many negative pivots; without any, the lowest of all. May leave the factorization of a shifted Hessian behind.
+/// The mode with the most negative eigenvalue at q, which the model was last evaluated at and whose
+/// factorization has so many negative pivots; without any, the lowest of all. May leave the factorization of
+/// a shifted Hessian behind.
 Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& controls, Index negative_pivots);
 
 }  // namespace magshell

@@ -10,9 +10,10 @@ namespace {
 
 constexpr double round_off = std::numeric_limits<double>::epsilon();
 
-// |part| / (|magnitude| + floor / tolerance): below the tolerance when the residual is small beside the forces that
-// cancel in it, or within the round-off of the forces that cancel inside the strains.
-double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd& cancelling, double tolerance) {
+// |part| / (|magnitude| + floor / tolerance): below the tolerance when the residual is small beside the
+// forces that cancel in it, or within the round-off of the forces that cancel inside the strains.
+double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd& cancelling,
+                double tolerance) {
     if (part.size() == 0) return 0.0;
     const double scale = magnitude.norm() + 4.0 * round_off / tolerance * cancelling.norm();
     const double length = part.norm();
@@ -20,7 +21,8 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
     return scale > 0.0 ? length / scale : length > 0.0 ? 1.0 : 0.0;
 }
 
-// An iteration that will converge does so with few unstable directions, and from its sixth step on with steps that shrink.
+// An iteration that will converge does so with few unstable directions, and from its sixth step on with steps
+// that shrink.
 constexpr Index most_new_negative_pivots = 10;
 constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
@@ -58,9 +60,10 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const 
     const VectorXd free = reduction.expand(reduction.vector(gradient(q, anchor)));
     const Index nodes = 3 * model_.sheet().n_nodes(), rotations = model_.sheet().n_rotations();
     const VectorXd &magnitude = model_.residual().magnitude, &cancelling = model_.cancelling_forces();
-    return std::max(relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
-                    relative(free.tail(rotations), magnitude.tail(rotations), cancelling.tail(rotations),
-                             options_.tolerance));
+    return std::max(
+        relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
+        relative(free.tail(rotations), magnitude.tail(rotations), cancelling.tail(rotations),
+                 options_.tolerance));
 }
 
 FactorReport Newton::factorize_assembled(const Anchor& anchor) {
@@ -75,7 +78,8 @@ FactorReport Newton::factorize_assembled(const Anchor& anchor) {
     FactorReport report;
     if (std::all_of(values_.begin(), values_.end(), [](double value) { return std::isfinite(value); }))
         report = factor_->factorize(values_.data());
-    else report.reason = "the forces are not finite: a face has no area, or lies where a field has no value";
+    else
+        report.reason = "the forces are not finite: a face has no area, or lies where a field has no value";
     if (!report.succeeded) ++failed_factorizations_;
     return report;
 }
@@ -122,7 +126,8 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
     for (;; ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);
         watch(report.residual);
-        if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent()) return fail("the iteration diverged");
+        if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent())
+            return fail("the iteration diverged");
         const bool in_place = move.isZero(0.0);
         if (in_place && report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent()) {
             report.converged = true;

@@ -1,12 +1,12 @@
 // Newton's method at fixed controls, on the stationarity of the energy.
 //
-// Mixed (mixed integration points, Magisano, Leonetti, Garcea 2017): the element stresses are unknowns of their own,
-// condensed element by element. Only the geometric stiffness sees them,
+// Mixed (mixed integration points, Magisano, Leonetti, Garcea 2017): the element stresses are unknowns of
+// their own, condensed element by element. Only the geometric stiffness sees them,
 //
 //   K = J^T C J + sum sigma_i d2d_i,   K p = - (J^T C d - f),   q += p,   sigma = C (d(q_old) + J p)
 //
-// and where plain Newton takes sigma = C d(q), a stress that the strains of a trial step have spoiled, the linearized
-// one keeps a thin shell's bending alive. Same matrix, same solution, many fewer iterations.
+// and where plain Newton takes sigma = C d(q), a stress that the strains of a trial step have spoiled, the
+// linearized one keeps a thin shell's bending alive. Same matrix, same solution, many fewer iterations.
 #pragma once
 
 #include <functional>
@@ -20,7 +20,7 @@ namespace magshell {
 
 struct NewtonOptions {
     bool mixed = true;
-    double tolerance = 1e-10;   // of the residual, relative to the forces that cancel in it
+    double tolerance = 1e-10;  // of the residual, relative to the forces that cancel in it
     int max_iterations = 20;
 };
 
@@ -34,8 +34,8 @@ struct NewtonReport {
     std::string reason;         // why not converged
 };
 
-/// A quadratic pull towards an anchor, weight/2 |x - anchor|^2 in the model's metric: one implicit Euler step of a
-/// gradient flow whose time step is 1/weight.
+/// A quadratic pull towards an anchor, weight/2 |x - anchor|^2 in the model's metric: one implicit Euler step
+/// of a gradient flow whose time step is 1/weight.
 struct Anchor {
     double weight = 0.0;
     const VectorXd* state = nullptr;
@@ -58,14 +58,15 @@ class Newton {
 
     /// Evaluates, assembles with the state's own stresses and factorizes.
     FactorReport factorize_at(const VectorXd& q, const Controls& controls);
-    /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes, is replaced
-    /// by the forces K moves that it causes.
+    /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes,
+    /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
                            const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves);
     /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held.
     VectorXd solve_with_factor(const VectorXd& rhs) const;
 
-    /// The residual at the last evaluated state, relative to the forces that cancel in it and to their round-off.
+    /// The residual at the last evaluated state, relative to the forces that cancel in it and to their
+    /// round-off.
     double relative_residual(const VectorXd& q, const Anchor& anchor) const;
 
     Model& model() { return model_; }

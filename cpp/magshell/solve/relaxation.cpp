@@ -55,16 +55,19 @@ class Relaxation {
             // Not far below a rate that was needed a moment ago.
             rate_ = std::max(above_instability * std::abs(mode.eigenvalue), rate_);
             if (first_rate_ == 0.0) first_rate_ = rate_;
-            if (mode.eigenvalue < 0.0 && (at_rest || last_move_ < settled * model_.extent())) leave_saddle(mode);
+            if (mode.eigenvalue < 0.0 && (at_rest || last_move_ < settled * model_.extent()))
+                leave_saddle(mode);
         }
         report_.converged = convex && finish();
         return !report_.converged;
     }
 
-    // With this rate the forces move the sheet by a twentieth of its extent, if nothing but the anchor holds it.
+    // With this rate the forces move the sheet by a twentieth of its extent, if nothing but the anchor holds
+    // it.
     double forced_rate() const {
         const Reduction& reduction = model_.reduction();
-        const VectorXd force = reduction.vector(model_.residual().gradient), area = reduction.weights(model_.metric());
+        const VectorXd force = reduction.vector(model_.residual().gradient),
+                       area = reduction.weights(model_.metric());
         double largest = 0.0;
         for (Index k = 0; k < reduction.size(); ++k)
             if (area[k] > 0.0) largest = std::max(largest, std::abs(force[k]) / area[k]);

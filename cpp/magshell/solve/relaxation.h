@@ -1,10 +1,10 @@
 // The fallback that always descends: pseudo-transient continuation.
 //
-// Implicit Euler steps of the gradient flow M dq/dt = - dE/dq, each solved by the mixed Newton and kept only if it
-// lowers the energy. Where the Hessian has a negative eigenvalue, 1/dt stays just above its size: the unstable mode then
-// grows several times a step, and the step still has one solution. Where it is positive definite the steps get longer and
-// longer, and Newton itself finishes. Where the flow settles on a saddle, it is pushed off along the most unstable mode, as far
-// as the energy falls.
+// Implicit Euler steps of the gradient flow M dq/dt = - dE/dq, each solved by the mixed Newton and kept only
+// if it lowers the energy. Where the Hessian has a negative eigenvalue, 1/dt stays just above its size: the
+// unstable mode then grows several times a step, and the step still has one solution. Where it is positive
+// definite the steps get longer and longer, and Newton itself finishes. Where the flow settles on a saddle,
+// it is pushed off along the most unstable mode, as far as the energy falls.
 #pragma once
 
 #include "magshell/solve/newton.h"

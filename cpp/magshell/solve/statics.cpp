@@ -10,8 +10,9 @@ namespace magshell {
 namespace {
 
 constexpr int quick_iterations = 8;  // a load step that converged in so many is followed by one twice as long
-constexpr double longest_turn = 0.5;  // [rad] of a support in one load step: full circles must be gone through
-constexpr double forgetting = 1.2;   // of a step that failed, with every one that did not
+constexpr double longest_turn =
+    0.5;                            // [rad] of a support in one load step: full circles must be gone through
+constexpr double forgetting = 1.2;  // of a step that failed, with every one that did not
 
 class Statics {
   public:
@@ -47,7 +48,8 @@ class Statics {
             step = (report.lost ? 0.25 : 0.5) * failed_step;
             if (step >= options_.smallest_step * longest_step && options_.start_at_rest) continue;
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
-            if (!descend(longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0)) return false;
+            if (!descend(longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0))
+                return false;
             step = longest_step;
         }
         return check_stability();
@@ -71,7 +73,8 @@ class Statics {
         return factor.succeeded;
     }
 
-    // Relaxes at the controls of `target`. Newton, which finishes a relaxation, may still have been drawn to a saddle: then once more from there.
+    // Relaxes at the controls of `target`. Newton, which finishes a relaxation, may still have been drawn to
+    // a saddle: then once more from there.
     bool descend(double target) {
         constexpr int attempts = 5;
         for (int k = 0; k < attempts; ++k) {
@@ -104,8 +107,9 @@ class Statics {
 
 }  // namespace
 
-StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
-                               const Controls& to, const StaticsOptions& options, const StaticsWatch& watch) {
+StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Memory& memory,
+                               const Controls& from, const Controls& to, const StaticsOptions& options,
+                               const StaticsWatch& watch) {
     model.set_memory(memory);
     StaticsResult result;
     result.state = start;
@@ -128,7 +132,8 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model:
     result.linear_time = newton.linear_time();
     result.bytes = model.bytes() + newton.factor()->bytes();
     result.factorization = newton.factor()->name();
-    if (options.keep_factor && result.outcome == Outcome::converged && result.stable) result.factor = newton.factor();
+    if (options.keep_factor && result.outcome == Outcome::converged && result.stable)
+        result.factor = newton.factor();
     return result;
 }
 

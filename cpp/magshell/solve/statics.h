@@ -1,4 +1,5 @@
-// A stable equilibrium: mixed Newton in adaptive load steps, saddles left, relaxation where it does not converge.
+// A stable equilibrium: mixed Newton in adaptive load steps, saddles left, relaxation where it does not
+// converge.
 #pragma once
 
 #include "magshell/solve/newton.h"
@@ -7,31 +8,31 @@ namespace magshell {
 
 struct StaticsOptions {
     NewtonOptions newton;
-    double first_step = 1.0;       // of the way from the old controls to the new
+    double first_step = 1.0;  // of the way from the old controls to the new
     double smallest_step = 1.0 / 64.0;
-    bool require_stable = true;    // false: hand back what Newton found, a saddle too
-    bool start_at_rest = true;     // the start is an equilibrium at the old controls: worth halving load steps
+    bool require_stable = true;  // false: hand back what Newton found, a saddle too
+    bool start_at_rest = true;   // the start is an equilibrium at the old controls: worth halving load steps
     int max_relaxation_steps = 200;
-    bool keep_factor = false;      // for gradients
+    bool keep_factor = false;  // for gradients
 };
 
 enum class Outcome { converged, failed, interrupted };
 
 struct StaticsResult {
     Outcome outcome = Outcome::failed;
-    VectorXd state;            // the equilibrium, or the last good state
-    Model::Memory memory;      // of the terms, at `state`
-    Controls controls;         // at which `state` holds
-    double progress = 0.0;     // how far the controls got, 0 to 1
+    VectorXd state;         // the equilibrium, or the last good state
+    Model::Memory memory;   // of the terms, at `state`
+    Controls controls;      // at which `state` holds
+    double progress = 0.0;  // how far the controls got, 0 to 1
     std::string reason;
     int iterations = 0, factorizations = 0, failed_factorizations = 0, load_steps = 0, relaxation_steps = 0;
     int saddles_left = 0;
     double residual = 0.0;
     bool stable = false;
     Index unstable_directions = 0;
-    double linear_time = 0.0;  // [s] in factorizations and solves
-    std::size_t bytes = 0;     // of the model and the factorization
-    std::string factorization; // which
+    double linear_time = 0.0;              // [s] in factorizations and solves
+    std::size_t bytes = 0;                 // of the model and the factorization
+    std::string factorization;             // which
     std::shared_ptr<const Factor> factor;  // of the Hessian at a stable `state`, if it was to be kept
 };
 
@@ -39,7 +40,8 @@ struct StaticsResult {
 using StaticsWatch = std::function<void(double progress, double residual)>;
 
 /// From an equilibrium `start` at `from`, with the terms' memory of it, to one at `to`.
-StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from, const Controls& to,
-                               const StaticsOptions& options, const StaticsWatch& watch = {});
+StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Memory& memory,
+                               const Controls& from, const Controls& to, const StaticsOptions& options,
+                               const StaticsWatch& watch = {});
 
 }  // namespace magshell

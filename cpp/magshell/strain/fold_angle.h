@@ -11,7 +11,8 @@
 //   d2α/drde = (s/h^2) (n t^T + t n^T) - e^ n^T / (|e| h)
 //   d2α/de2  = - (s^2/h^2 + 1/(2|e|^2)) (n t^T + t n^T) + (s / (|e| h)) (e^ n^T + n e^^T)
 //
-// up to a rotation about e^ that two wings of one edge share and that cancels in the fold, the difference of the two:
+// up to a rotation about e^ that two wings of one edge share and that cancels in the fold, the difference of
+// the two:
 //
 //   theta = α_left - α_right + π,   0 where the sheet is flat, positive where the two normals lean together.
 //
@@ -73,7 +74,9 @@ struct Fold {
     Pack right_is_point;  // 1: x3 is a point, r = x3 - x0;  0: x3 is a direction, r = x3
 
     Fold(const Pack3& x0, const Pack3& x1, const Pack3& x2, const Pack3& x3, const Pack& right_is_point_)
-        : left(x1 - x0, x2 - x0), right(x1 - x0, x3 - right_is_point_ * x0), right_is_point(right_is_point_) {}
+        : left(x1 - x0, x2 - x0),
+          right(x1 - x0, x3 - right_is_point_ * x0),
+          right_is_point(right_is_point_) {}
 
     /// theta in (-π, π]; the right wing's normal is that of a face turned round, hence the minus sign
     Pack angle() const {
@@ -92,8 +95,8 @@ struct Fold {
     }
 };
 
-/// d2theta as 3x3 blocks of the nodes 0..3, the lower triangle at row (row + 1) / 2 + column. The last but one,
-/// (3, 2), is zero.
+/// d2theta as 3x3 blocks of the nodes 0..3, the lower triangle at row (row + 1) / 2 + column. The last but
+/// one, (3, 2), is zero.
 struct FoldCurvature {
     enum Block { B00, B10, B11, B20, B21, B22, B30, B31, B32, B33, count };
     Pack33 block[count];
@@ -101,7 +104,8 @@ struct FoldCurvature {
     explicit FoldCurvature(const Fold& fold) {
         const WingCurvature l(fold.left), r(fold.right);
         const Pack p = fold.right_is_point;
-        // x1 enters by e, x2 by r_left, x3 by r_right, and x0 by minus their sum (r_right only where x3 is a point).
+        // x1 enters by e, x2 by r_left, x3 by r_right, and x0 by minus their sum (r_right only where x3 is a
+        // point).
         block[B11] = l.edge_edge - r.edge_edge;
         block[B21] = l.point_edge;
         block[B31] = -r.point_edge;

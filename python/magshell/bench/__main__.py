@@ -16,7 +16,10 @@ PARTS = {
     "accuracy": ("magshell.bench.accuracy", "errors against references, and the order of convergence"),
     "kernels": ("magshell.bench.kernels", "gradient and Hessian, a face, and what each part of a scene adds"),
     "gradients": ("magshell.bench.gradients", "the cost of a gradient over that of its equilibrium"),
-    "statics": ("magshell.bench.statics", "factorizations from flat, cost of an iteration, threads, backends"),
+    "statics": (
+        "magshell.bench.statics",
+        "factorizations from flat, cost of an iteration, threads, backends",
+    ),
 }
 
 

@@ -64,7 +64,9 @@ def run(options: argparse.Namespace) -> dict:
     rows = [row for name, each in costs.items() for row in _rows(name, each)]
     headings = ["sheet", "faces", "gradient", "median", "and Hessian", "median", "model [MB]", "built in [s]"]
     print_table(
-        f"Microseconds a face, best and median of {options.rounds}, {ms.num_threads()} thread(s)", headings, rows
+        f"Microseconds a face, best and median of {options.rounds}, {ms.num_threads()} thread(s)",
+        headings,
+        rows,
     )
     _print_targets(costs[SHEETS[0].name])
     return {name: [each._asdict() for each in of_sheet] for name, of_sheet in costs.items()}
@@ -110,14 +112,25 @@ def _rows(name: str, costs: list[Cost]) -> list[list[str]]:
     for k, each in enumerate(costs):
         gradient, hessian = each.microseconds(each.gradient), each.microseconds(each.hessian)
         numbers = [f"{value:.3f}" for value in (*gradient, *hessian)]
-        rows.append([name if k == 0 else "", str(each.faces), *numbers, f"{each.memory / 1e6:.1f}", f"{each.build:.2f}"])
+        rows.append(
+            [
+                name if k == 0 else "",
+                str(each.faces),
+                *numbers,
+                f"{each.memory / 1e6:.1f}",
+                f"{each.build:.2f}",
+            ]
+        )
     return rows
 
 
 def _print_targets(costs: list[Cost]) -> None:
     first, last = costs[0], costs[-1]
     best = first.microseconds(first.hessian).best
-    print(f"\n{SHEETS[0].name}: {best:.2f} us a face at {first.faces} faces (at most {ALLOWED}, wanted {WANTED})", end="")
+    print(
+        f"\n{SHEETS[0].name}: {best:.2f} us a face at {first.faces} faces (at most {ALLOWED}, wanted {WANTED})",
+        end="",
+    )
     if len(costs) > 1:
         growth = last.microseconds(last.hessian).best / best
         print(f", {growth:.2f} times that at {last.faces} (at most {ALLOWED_GROWTH})", end="")

@@ -35,7 +35,9 @@ SOLVERS = {"mixed": ms.MixedNewton(), "plain": ms.Newton(max_iterations=60)}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--faces", type=int, default=8192, help="of the sheet that is bent strongly (default 8192)")
+    parser.add_argument(
+        "--faces", type=int, default=8192, help="of the sheet that is bent strongly (default 8192)"
+    )
     parser.add_argument("--rounds", type=int, default=3, help="of each measurement (default 3)")
 
 
@@ -73,7 +75,9 @@ def _from_flat() -> dict:
                 bound = str(allowed) if (bending, solver_name) == ("midedge", "mixed") else ""
                 counts = [found.factorizations, found.load_steps, found.iterations]
                 shown = [str(count) for count in counts] if found.progress == 1.0 else ["failed", "", ""]
-                rows.append([name, f"{bending}, {solver_name} Newton", *shown, bound, f"{found.wall_time:.3f}"])
+                rows.append(
+                    [name, f"{bending}, {solver_name} Newton", *shown, bound, f"{found.wall_time:.3f}"]
+                )
                 results[f"{name}, {bending}, {solver_name}"] = dict(
                     zip(("factorizations", "load steps", "iterations"), counts, strict=True)
                 )
@@ -130,7 +134,9 @@ def _backends(scene: ms.Scene, controls: dict, rounds: int) -> dict:
     right = np.random.default_rng(0).standard_normal(n)
     rows, results = [], {}
     for name in _core.factor_backends():
-        analysis = measure(lambda name=name: _core.analyze(n, starts, matrix_rows, backend=name), rounds=rounds)
+        analysis = measure(
+            lambda name=name: _core.analyze(n, starts, matrix_rows, backend=name), rounds=rounds
+        )
         factor = _core.analyze(n, starts, matrix_rows, backend=name)
         numeric = measure(lambda factor=factor: factor.factorize(values), rounds=rounds)
         solve = measure(lambda factor=factor: factor.solve(right), rounds=rounds)

@@ -36,7 +36,9 @@ class BoxOptimizer(torch.optim.Optimizer):
             raise ValueError("a parameter group cannot join a run that has begun: make a new optimizer")
         unknown = set(param_group) - {"params", *self.defaults}
         if unknown:
-            raise ValueError(f"unknown option {sorted(unknown)[0]!r}; the options of a group are {sorted(self.defaults)}")
+            raise ValueError(
+                f"unknown option {sorted(unknown)[0]!r}; the options of a group are {sorted(self.defaults)}"
+            )
         super().add_param_group(param_group)
         group = self.param_groups[-1]
         try:

@@ -43,9 +43,13 @@ class GCMMA(MMA):
         self._commit(x, reached, trial.differentiate(), distance, float(sizes[0]))
 
 
-def _more_convex(convexity: np.ndarray, missing: np.ndarray, t: np.ndarray, distance: np.ndarray) -> np.ndarray:
+def _more_convex(
+    convexity: np.ndarray, missing: np.ndarray, t: np.ndarray, distance: np.ndarray
+) -> np.ndarray:
     """[Svanberg 2002] (4.9): enough to close the gap at t, with a tenth to spare, and at most ten times what it was."""
-    gain = 2 * float((distance * t**2 / (distance**2 - t**2)).sum())  # of the approximation, a unit of convexity
+    gain = 2 * float(
+        (distance * t**2 / (distance**2 - t**2)).sum()
+    )  # of the approximation, a unit of convexity
     needed = missing / gain if gain > 0 else np.full_like(missing, np.inf)
     raised = np.minimum(10 * convexity, 1.1 * (convexity + needed))
     return np.where(missing > 0, raised, convexity)

@@ -91,7 +91,9 @@ class LBFGS(BoxOptimizer):
         sized = Box(box.lower, box.upper, _spread(scale, box), box.names, box.sizes)
         moved, trial = self._trial(stepped(x, length * step, sized))
         sample = trial.differentiate()
-        return Probe(length, sample.objective, float(sample.gradient[box.free] * scale @ step), (moved, sample))
+        return Probe(
+            length, sample.objective, float(sample.gradient[box.free] * scale @ step), (moved, sample)
+        )
 
     def _set_gradients(self, gradient: np.ndarray) -> None:
         chunks = torch.from_numpy(gradient).split([parameter.numel() for parameter in self.parameters])
