@@ -108,7 +108,7 @@ def minimize(
 
 
 def _loop(run, max_iterations, tolerance, patience, callback, bar, checkpoint, checkpoint_every) -> Minimum:
-    reason, stopped = "max_iterations reached", False
+    stopped = False
     if not run.history:
         run.begin()
         stopped = callback is not None and callback(run.history[-1]) is True
@@ -125,7 +125,7 @@ def _loop(run, max_iterations, tolerance, patience, callback, bar, checkpoint, c
             return run.minimum("no lower design along the gradient, to rounding")
         elif tolerance > 0 and _settled(run.history, tolerance, patience):
             return run.minimum("the objective has settled")
-    return run.minimum("stopped by the callback" if stopped else reason)
+    return run.minimum("stopped by the callback" if stopped else "max_iterations reached")
 
 
 def _settled(history: list[Record], tolerance: float, patience: int) -> bool:
@@ -143,7 +143,7 @@ class _Run:
         if not callable(objective):
             raise ValueError(f"objective must be a function of the parameters, got {objective!r:.60}")
         self.parameters = [parameters] if is_tensor(parameters) else list(parameters)
-        self.optimizer = optimizer if isinstance(optimizer, BoxOptimizer) else self._made(optimizer)
+        self.optimizer = optimizer(self.parameters) if callable(optimizer) else optimizer
         if not isinstance(self.optimizer, BoxOptimizer):
             raise ValueError(f"optimizer must be one of ms.optim, got {type(self.optimizer).__name__}")
         if {id(p) for p in self.parameters} != {id(p) for p in self.optimizer.parameters}:
@@ -153,12 +153,6 @@ class _Run:
         self.best: dict | None = None
         self._evaluations, self._terms = 0, {}
         self._started = time.perf_counter()
-
-    def _made(self, factory):
-        if isinstance(factory, type) or not hasattr(factory, "step"):
-            if callable(factory):
-                return factory(self.parameters)
-        return factory
 
     @property
     def iteration(self) -> int:

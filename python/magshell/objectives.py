@@ -106,7 +106,8 @@ def cap(remanent_magnetization, limit, sharpness=None):
     if not sharpness > 1:
         raise ValueError(f"sharpness must exceed 1, got {sharpness}")
     largest = squares.detach().max().clamp(min=1e-30)  # taken out, so that the powers neither overflow nor vanish
-    return (largest * ((squares / largest) ** sharpness).sum() ** (1 / sharpness) - 1)[None]
+    powers = ((squares / largest) ** sharpness).sum() + 1e-30  # a root's derivative at zero is not finite
+    return (largest * powers ** (1 / sharpness) - 1)[None]
 
 
 def printable(remanent_magnetization, directions, sharpness=None):

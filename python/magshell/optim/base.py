@@ -34,7 +34,7 @@ class BoxOptimizer(torch.optim.Optimizer):
     def add_param_group(self, param_group: dict) -> None:
         if self._run:
             raise ValueError("a parameter group cannot join a run that has begun: make a new optimizer")
-        unknown = set(param_group) - {"params", *self.defaults}
+        unknown = set(param_group) - {"params", "param_names", *self.defaults}
         if unknown:
             raise ValueError(f"unknown option {sorted(unknown)[0]!r}; the options of a group are {sorted(self.defaults)}")
         super().add_param_group(param_group)
