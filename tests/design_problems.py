@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import nlopt
 import numpy as np
 import torch
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """function(x) -> objective, or (objective, constraints <= 0); start, lower, upper: (n,)."""
 
@@ -138,6 +139,7 @@ def value_and_rows(given: Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return values.detach().numpy(), np.array(rows)
 
 
+@cache
 def nlopt_mma(given: Problem) -> tuple[np.ndarray, float]:
     """The minimizer and the minimum that NLopt's MMA finds, with variables scaled to their bounds."""
     width = given.upper - given.lower
@@ -146,10 +148,17 @@ def nlopt_mma(given: Problem) -> tuple[np.ndarray, float]:
     optimizer.set_upper_bounds(np.ones_like(width))
     values, rows = value_and_rows(given, given.start)
     sizes = np.abs(rows * width).max(axis=1)
+    last = {}
+
+    def at(u):
+        if u.tobytes() not in last:
+            last.clear()
+            last[u.tobytes()] = value_and_rows(given, given.lower + width * u)
+        return last[u.tobytes()]
 
     def function(i):
         def call(u, gradient):
-            values, rows = value_and_rows(given, given.lower + width * u)
+            values, rows = at(u)
             if gradient.size:
                 gradient[:] = rows[i] * width / sizes[i]
             return float(values[i] / sizes[i])
@@ -160,6 +169,6 @@ def nlopt_mma(given: Problem) -> tuple[np.ndarray, float]:
     for i in range(1, len(values)):
         optimizer.add_inequality_constraint(function(i), 1e-10)
     optimizer.set_xtol_rel(1e-9)
-    optimizer.set_maxeval(3000)
+    optimizer.set_maxeval(1000)
     u = optimizer.optimize((given.start - given.lower) / width)
     return given.lower + width * u, optimizer.last_optimum_value() * sizes[0]

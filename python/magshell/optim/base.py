@@ -24,6 +24,8 @@ class BoxOptimizer(torch.optim.Optimizer):
     A step that raises leaves parameters and state as they were.
     """
 
+    _copied = ("_run", "_sample", "_sample_x")  # what a copy takes along, beyond torch's own
+
     def __init__(self, params, defaults: dict):
         self._run: dict = {}
         self._sample: Sample | None = None
@@ -93,7 +95,7 @@ class BoxOptimizer(torch.optim.Optimizer):
         self._closure = None
 
     def __getstate__(self) -> dict:
-        kept = {name: getattr(self, name) for name in ("_run", "_sample", "_sample_x")}
+        kept = {name: getattr(self, name) for name in self._copied}
         return {**super().__getstate__(), **kept, "_closure": None}
 
     def _box(self) -> Box:

@@ -33,6 +33,8 @@ class LBFGS(BoxOptimizer):
     >>> ms.optim.LBFGS([x], upper=0.5).step(lambda: ((x - 1) ** 2).sum())  # doctest: +SKIP
     """
 
+    _copied = (*BoxOptimizer._copied, "memory")
+
     def __init__(self, params, *, lower=-math.inf, upper=math.inf, scale=None, memory: int = 10):
         if not (isinstance(memory, int) and memory > 0):
             raise ValueError(f"memory must be a positive integer, got {memory!r}")

@@ -33,6 +33,8 @@ class MMA(BoxOptimizer):
     >>> optimizer.step(lambda: (x.sum(), (61 / x[0] ** 3 - 1)[None]))  # doctest: +SKIP
     """
 
+    _copied = (*BoxOptimizer._copied, "penalty")
+
     def __init__(
         self,
         params,
