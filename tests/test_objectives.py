@@ -67,7 +67,9 @@ def test_no_magnetization_has_a_finite_gradient(function):
 def test_shape_matching_counts_the_chosen_vertices():
     target = VECTORS[[4, 1]] + torch.tensor([0.0, 0.0, 2.0], dtype=torch.float64)
     assert objectives.shape_matching(VECTORS, target, vertices=[4, 1]).item() == pytest.approx(8)
-    assert objectives.shape_matching(VECTORS, target.numpy(), [4, 1], weights=[0.5, 0.25]).item() == pytest.approx(3)
+    assert objectives.shape_matching(
+        VECTORS, target.numpy(), [4, 1], weights=[0.5, 0.25]
+    ).item() == pytest.approx(3)
 
 
 def test_bilinear_is_exact_for_bilinear_images_and_constant_beyond():

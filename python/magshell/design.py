@@ -84,7 +84,9 @@ def minimize(
     """
     require_torch("minimize")
     if max_iterations < 0 or checkpoint_every < 1 or patience < 1:
-        raise ValueError("max_iterations must not be negative; checkpoint_every and patience must be positive")
+        raise ValueError(
+            "max_iterations must not be negative; checkpoint_every and patience must be positive"
+        )
     if not tolerance >= 0:
         raise ValueError(f"tolerance must not be negative, got {tolerance}")
     if resume and checkpoint is None:
@@ -95,9 +97,13 @@ def minimize(
     bar = tqdm(total=max_iterations, initial=run.iteration, desc="minimize", disable=not progress)
     try:
         with bar:
-            return _loop(run, max_iterations, tolerance, patience, callback, bar, checkpoint, checkpoint_every)
+            return _loop(
+                run, max_iterations, tolerance, patience, callback, bar, checkpoint, checkpoint_every
+            )
     except KeyboardInterrupt as error:
-        raise Interrupted(f"interrupted after {run.iteration} iterations", run.minimum("interrupted")) from error
+        raise Interrupted(
+            f"interrupted after {run.iteration} iterations", run.minimum("interrupted")
+        ) from error
     except Exception as error:
         if run.best is None:
             raise
@@ -117,7 +123,9 @@ def _loop(run, max_iterations, tolerance, patience, callback, bar, checkpoint, c
         last = run.history[-1]
         bar.update()
         bar.set_postfix_str(f"objective {last.objective:.6g}")
-        if checkpoint is not None and (run.iteration % checkpoint_every == 0 or run.iteration == max_iterations):
+        if checkpoint is not None and (
+            run.iteration % checkpoint_every == 0 or run.iteration == max_iterations
+        ):
             save(checkpoint, run.snapshot())
         if callback is not None and callback(last) is True:
             stopped = True
@@ -249,5 +257,7 @@ def _parts(result) -> tuple:
         elif is_tensor(part):
             constraints = part
         else:
-            raise TypeError(f"beside its value an objective returns a dict of terms or a tensor, got {type(part).__name__}")
+            raise TypeError(
+                f"beside its value an objective returns a dict of terms or a tensor, got {type(part).__name__}"
+            )
     return head, {name: float(value) for name, value in terms.items()}, constraints

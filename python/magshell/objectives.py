@@ -32,7 +32,11 @@ def height_map(positions, rest_positions, image, extent, weights=None):
     """
     heights = bilinear(image, rest_positions, extent)
     squares = (positions[:, 2] - heights.to(positions)) ** 2
-    return squares.sum() if weights is None else (_like(weights, squares, "weights", squares.shape) * squares).sum()
+    return (
+        squares.sum()
+        if weights is None
+        else (_like(weights, squares, "weights", squares.shape) * squares).sum()
+    )
 
 
 def bilinear(image, points, extent):
@@ -43,7 +47,9 @@ def bilinear(image, points, extent):
         raise ValueError(f"image must have at least 2 rows and 2 columns, got shape {tuple(image.shape)}")
     x_min, x_max, y_min, y_max = extent
     if not (x_min < x_max and y_min < y_max):
-        raise ValueError(f"extent must be (x_min, x_max, y_min, y_max) with positive sizes, got {tuple(extent)}")
+        raise ValueError(
+            f"extent must be (x_min, x_max, y_min, y_max) with positive sizes, got {tuple(extent)}"
+        )
     points = torch.as_tensor(points, dtype=torch.float64)
     rows, columns = image.shape
     column = ((points[:, 0] - x_min) / (x_max - x_min) * (columns - 1)).clamp(0, columns - 1)
@@ -105,7 +111,9 @@ def cap(remanent_magnetization, limit, sharpness=None):
         return squares - 1
     if not sharpness > 1:
         raise ValueError(f"sharpness must exceed 1, got {sharpness}")
-    largest = squares.detach().max().clamp(min=1e-30)  # taken out, so that the powers neither overflow nor vanish
+    largest = (
+        squares.detach().max().clamp(min=1e-30)
+    )  # taken out, so that the powers neither overflow nor vanish
     powers = ((squares / largest) ** sharpness).sum() + 1e-30  # a root's derivative at zero is not finite
     return (largest * powers ** (1 / sharpness) - 1)[None]
 

@@ -12,9 +12,13 @@ def from_regions(values, regions):
     torch = require_torch("parametrize.from_regions")
     regions = torch.as_tensor(regions)
     if regions.ndim != 1 or regions.is_floating_point() or regions.dtype == torch.bool:
-        raise ValueError(f"regions must be integers of shape (n_f,), got {regions.dtype} {tuple(regions.shape)}")
+        raise ValueError(
+            f"regions must be integers of shape (n_f,), got {regions.dtype} {tuple(regions.shape)}"
+        )
     if len(regions) and not 0 <= int(regions.min()) <= int(regions.max()) < len(values):
-        raise ValueError(f"regions must lie in 0 ... {len(values) - 1}, got {int(regions.min())} ... {int(regions.max())}")
+        raise ValueError(
+            f"regions must lie in 0 ... {len(values) - 1}, got {int(regions.min())} ... {int(regions.max())}"
+        )
     return values[regions.long()]
 
 
@@ -22,8 +26,14 @@ def along(amplitude, directions):
     """Magnetizations (n_f, 3) of free amplitude in fixed directions. amplitude: (n_f,) A/m. directions: (3,) or (n_f, 3), of any length but zero."""
     torch = require_torch("parametrize.along")
     directions = torch.as_tensor(directions).to(amplitude)
-    if directions.shape[-1:] != (3,) or directions.ndim > 2 or (directions.ndim == 2 and len(directions) != len(amplitude)):
-        raise ValueError(f"directions must have shape (3,) or ({len(amplitude)}, 3), got {tuple(directions.shape)}")
+    if (
+        directions.shape[-1:] != (3,)
+        or directions.ndim > 2
+        or (directions.ndim == 2 and len(directions) != len(amplitude))
+    ):
+        raise ValueError(
+            f"directions must have shape (3,) or ({len(amplitude)}, 3), got {tuple(directions.shape)}"
+        )
     lengths = torch.linalg.vector_norm(directions, dim=-1, keepdim=True)
     if not (lengths > 0).all():
         raise ValueError("directions must not be zero")
@@ -62,4 +72,6 @@ def project_to_cap(vectors, limit):
     squares = (vectors**2).sum(-1, keepdim=True)
     # The root only where it is needed: its derivative at zero would make NaN of a zero vector's gradient.
     longer = squares > limit**2
-    return vectors * torch.where(longer, limit / torch.where(longer, squares, torch.ones_like(squares)) ** 0.5, 1.0)
+    return vectors * torch.where(
+        longer, limit / torch.where(longer, squares, torch.ones_like(squares)) ** 0.5, 1.0
+    )

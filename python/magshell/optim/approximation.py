@@ -31,7 +31,9 @@ class Asymptotes:
     shrink: np.ndarray
     grow: np.ndarray
 
-    def distance(self, last: np.ndarray | None, step: np.ndarray | None, step_before: np.ndarray | None) -> np.ndarray:
+    def distance(
+        self, last: np.ndarray | None, step: np.ndarray | None, step_before: np.ndarray | None
+    ) -> np.ndarray:
         """Distances s, (n,): drawn in where the last two steps differ in sign, pushed out where they agree."""
         if step_before is None:
             return self.initial.copy()
@@ -50,7 +52,9 @@ class Approximation:
     distance: np.ndarray
 
     @staticmethod
-    def of(values: np.ndarray, slopes: np.ndarray, distance: np.ndarray, convexity: np.ndarray) -> Approximation:
+    def of(
+        values: np.ndarray, slopes: np.ndarray, distance: np.ndarray, convexity: np.ndarray
+    ) -> Approximation:
         """slopes g: (1 + m, n). convexity rho: (1 + m,)."""
         up, down = np.maximum(slopes, 0.0), np.maximum(-slopes, 0.0)
         p = distance**2 * (1.001 * up + 0.001 * down + convexity[:, None])
@@ -59,11 +63,15 @@ class Approximation:
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """(1 + m,) approximate values at the step t; each term as its difference from t = 0, to keep small steps."""
-        return self.values + self.p @ (t / (self.distance * (self.distance - t))) - self.q @ (
-            t / (self.distance * (self.distance + t))
+        return (
+            self.values
+            + self.p @ (t / (self.distance * (self.distance - t)))
+            - self.q @ (t / (self.distance * (self.distance + t)))
         )
 
-    def subproblem(self, lower: np.ndarray, upper: np.ndarray, sizes: np.ndarray, penalty: float) -> Subproblem:
+    def subproblem(
+        self, lower: np.ndarray, upper: np.ndarray, sizes: np.ndarray, penalty: float
+    ) -> Subproblem:
         """The subproblem with each function in units of its size, (1 + m,), and steps within the bounds."""
         p, q = self.p / sizes[:, None], self.q / sizes[:, None]
         limits = ((p + q) @ (1 / self.distance))[1:] - self.values[1:] / sizes[1:]

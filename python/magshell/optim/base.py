@@ -38,7 +38,9 @@ class BoxOptimizer(torch.optim.Optimizer):
             raise ValueError("a parameter group cannot join a run that has begun: make a new optimizer")
         unknown = set(param_group) - {"params", "param_names", *self.defaults}
         if unknown:
-            raise ValueError(f"unknown option {sorted(unknown)[0]!r}; the options of a group are {sorted(self.defaults)}")
+            raise ValueError(
+                f"unknown option {sorted(unknown)[0]!r}; the options of a group are {sorted(self.defaults)}"
+            )
         super().add_param_group(param_group)
         group = self.param_groups[-1]
         try:
@@ -116,6 +118,12 @@ class BoxOptimizer(torch.optim.Optimizer):
             for parameter, chunk in zip(self.parameters, chunks, strict=True):
                 parameter.copy_(chunk.reshape(parameter.shape))
         return self._read()
+
+    def _leave_gradients(self, gradient: np.ndarray) -> None:
+        """Sets the parameters' `.grad`, (n,)."""
+        chunks = torch.from_numpy(gradient).split([parameter.numel() for parameter in self.parameters])
+        for parameter, chunk in zip(self.parameters, chunks, strict=True):
+            parameter.grad = chunk.reshape(parameter.shape).to(parameter)
 
     def _trial(self, x: np.ndarray) -> tuple[np.ndarray, Trial]:
         """The design x as the parameters hold it, and the closure's values there."""

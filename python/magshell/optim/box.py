@@ -70,13 +70,17 @@ def option_tensors(label: str, value, parameters: list[torch.Tensor]) -> list[to
 def group_box(number: int, group: dict) -> Box:
     """The box of one parameter group. Bounds that cross, and sizes that are not positive, are refused."""
     lowers, uppers, scales, names, sizes = [], [], [], [], []
-    bounds = zip(group["params"], group["lower"], group["upper"], group["scale"] or [None] * len(group["params"]))
+    bounds = zip(
+        group["params"], group["lower"], group["upper"], group["scale"] or [None] * len(group["params"])
+    )
     for position, (parameter, lower, upper, scale) in enumerate(bounds):
         name = f"parameter {position} of group {number}"
         low, high = _inward(lower, parameter, math.inf), _inward(upper, parameter, -math.inf)
         if (low > high).any():
             entry = int((low > high).argmax())
-            raise ValueError(f"the bounds of {name} cross: lower {low[entry]:g} > upper {high[entry]:g} (entry {entry})")
+            raise ValueError(
+                f"the bounds of {name} cross: lower {low[entry]:g} > upper {high[entry]:g} (entry {entry})"
+            )
         if scale is None:
             width = high - low
             size = np.where(np.isfinite(width), width, np.nan)

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-import torch
 
 from .base import BoxOptimizer, Restoring
 from .box import Box
@@ -17,6 +16,8 @@ from .line_search import Probe, strong_wolfe
 from .mma import stepped
 
 _FIRST_CHANGE = 0.1  # of the steepest variable's size, before any curvature is known
+
+_ROUNDING = 4 * np.finfo(float).eps  # of the objective: a smaller decrease cannot be seen
 
 
 class LBFGS(BoxOptimizer):
@@ -64,13 +65,13 @@ class LBFGS(BoxOptimizer):
             reached = self._search(x, gradient, scale, box, lower, upper, pairs)
         if reached is None:
             self._write(x)
-            self._set_gradients(self._sample.gradient)
+            self._leave_gradients(self._sample.gradient)
             return
         moved, sample = reached
         step = (moved - x)[free] / scale
         pairs = remembered(pairs, step, sample.gradient[free] * scale - gradient, self.memory)
         self._write(moved)
-        self._set_gradients(sample.gradient)
+        self._leave_gradients(sample.gradient)
         self._run = {"steps": pairs[0], "changes": pairs[1]}
         self._keep(moved, sample)
 
@@ -82,7 +83,7 @@ class LBFGS(BoxOptimizer):
         cauchy = cauchy_step(gradient, lower, upper, model)
         step = subspace_step(gradient, lower, upper, model, cauchy)
         slope = float(gradient @ step)
-        if not slope < 0:
+        if not -slope > _ROUNDING * abs(self._sample.objective):
             return None
         probe = partial(self._probe, x, step, scale, box)
         start = Probe(0.0, self._sample.objective, slope)
@@ -93,12 +94,9 @@ class LBFGS(BoxOptimizer):
         sized = Box(box.lower, box.upper, _spread(scale, box), box.names, box.sizes)
         moved, trial = self._trial(stepped(x, length * step, sized))
         sample = trial.differentiate()
-        return Probe(length, sample.objective, float(sample.gradient[box.free] * scale @ step), (moved, sample))
-
-    def _set_gradients(self, gradient: np.ndarray) -> None:
-        chunks = torch.from_numpy(gradient).split([parameter.numel() for parameter in self.parameters])
-        for parameter, chunk in zip(self.parameters, chunks, strict=True):
-            parameter.grad = chunk.reshape(parameter.shape).to(parameter)
+        return Probe(
+            length, sample.objective, float(sample.gradient[box.free] * scale @ step), (moved, sample)
+        )
 
 
 def _first_theta(gradient: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]) -> float:

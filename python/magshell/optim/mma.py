@@ -82,7 +82,9 @@ class MMA(BoxOptimizer):
         reached, trial = self._trial(stepped(x, t, box))
         self._commit(x, reached, trial.differentiate(), distance, float(sizes[0]))
 
-    def _commit(self, x: np.ndarray, reached: np.ndarray, sample: Sample, distance: np.ndarray, size: float) -> None:
+    def _commit(
+        self, x: np.ndarray, reached: np.ndarray, sample: Sample, distance: np.ndarray, size: float
+    ) -> None:
         self._run = {"before": x, "before_that": self._run.get("before"), "distance": distance, "size": size}
         self._keep(reached, sample)
 

@@ -68,7 +68,10 @@ class Trial:
         if all(parameter.grad is None for parameter in self._parameters):
             raise ValueError(f"{label} does not depend on the parameters: no gradient reaches them")
         row = torch.cat(
-            [(p.grad if p.grad is not None else torch.zeros_like(p)).reshape(-1).double().cpu() for p in self._parameters]
+            [
+                (p.grad if p.grad is not None else torch.zeros_like(p)).reshape(-1).double().cpu()
+                for p in self._parameters
+            ]
         )
         _require_finite(f"the gradient of {label}", row.numpy())
         return row.numpy()
@@ -95,9 +98,17 @@ def _checked_objective(objective) -> torch.Tensor:
 def _checked_constraints(constraints) -> torch.Tensor | None:
     if constraints is None:
         return None
-    if not isinstance(constraints, torch.Tensor) or constraints.ndim != 1 or not constraints.is_floating_point():
-        came = tuple(constraints.shape) if isinstance(constraints, torch.Tensor) else type(constraints).__name__
-        raise ValueError(f"the constraints must be a tensor of shape (m,), each entry <= 0 when it holds, got {came}")
+    if (
+        not isinstance(constraints, torch.Tensor)
+        or constraints.ndim != 1
+        or not constraints.is_floating_point()
+    ):
+        came = (
+            tuple(constraints.shape) if isinstance(constraints, torch.Tensor) else type(constraints).__name__
+        )
+        raise ValueError(
+            f"the constraints must be a tensor of shape (m,), each entry <= 0 when it holds, got {came}"
+        )
     return constraints if len(constraints) else None
 
 
@@ -106,4 +117,6 @@ def _require_finite(label: str, values: np.ndarray) -> None:
     if bad.any():
         entry = int(bad.argmax())
         where = f" (entry {entry} of {values.size})" if values.size > 1 else ""
-        raise FloatingPointError(f"{label} is {values[entry]}{where}; the parameters are left where they were")
+        raise FloatingPointError(
+            f"{label} is {values[entry]}{where}; the parameters are left where they were"
+        )

@@ -110,7 +110,9 @@ class _Point:
         rates += [-direction[0] / (self.t - sub.lower), direction[0] / (sub.upper - self.t)]
         length = 1.0 / max(1.0, *(1.01 * rate.max() for rate in rates))
         for _ in range(50):
-            moved = _Point(*(value + length * step for value, step in zip(self.parts(), direction, strict=True)))
+            moved = _Point(
+                *(value + length * step for value, step in zip(self.parts(), direction, strict=True))
+            )
             inside = (moved.t > sub.lower).all() and (moved.t < sub.upper).all()
             if inside and np.linalg.norm(moved.residual(sub, barrier)) < norm:
                 return moved
