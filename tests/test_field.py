@@ -3,10 +3,9 @@
 import gc
 import weakref
 
+import magshell as ms
 import numpy as np
 import pytest
-
-import magshell as ms
 from magshell import _core
 
 POSITIONS = np.array([[0.02, -0.01, -0.03], [-0.05, 0.04, 0.06], [0.0, -0.07, 0.01]])

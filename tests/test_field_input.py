@@ -3,10 +3,9 @@
 import sys
 from types import SimpleNamespace
 
+import magshell as ms
 import numpy as np
 import pytest
-
-import magshell as ms
 from magshell import _core
 
 GRID = np.zeros((4, 4, 4, 3))

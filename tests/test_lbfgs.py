@@ -59,7 +59,9 @@ def test_agrees_with_scipy(given):
         return given.function(x)
 
     optimizer = ms.optim.LBFGS([x], lower=lower, upper=upper)
-    result = ms.minimize(objective, [x], optimizer, max_iterations=given.iterations, progress=False)
+    result = ms.minimize(
+        objective, [x], optimizer, max_iterations=given.iterations, tolerance=1e-14, progress=False
+    )
     assert result.objective <= oracle.fun + 1e-8 * max(1.0, abs(oracle.fun))
     assert result.history[-1].evaluations < 4 * oracle.nfev + 60
 

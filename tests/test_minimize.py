@@ -1,4 +1,5 @@
-"""The loop around the optimizers: history, stops, checkpoints, and the best design after every kind of end."""
+"""The loop around the optimizers: history, stops, checkpoints, and the best design after every kind of
+end."""
 
 import pytest
 import torch
@@ -133,7 +134,7 @@ def test_bad_input_is_refused(objective, options, error, message):
 
 def test_other_optimizers_and_other_tensors_are_refused():
     x, y = design(0.0, 0.0), design(1.0)
-    with pytest.raises(ValueError, match="one of ms.optim"):
+    with pytest.raises(ValueError, match=r"one of ms\.optim"):
         quiet(rosenbrock, [x], torch.optim.Adam([x]))
     with pytest.raises(ValueError, match="same tensors"):
         quiet(rosenbrock, [x], lbfgs([y]))

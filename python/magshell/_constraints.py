@@ -27,9 +27,7 @@ def gather(mesh: TriangleMesh, supports, free_directions: np.ndarray) -> Constra
     """All supports of a scene as one. `free_directions` (k, 3) are appended to the directions, held and still."""
     motions: list[RigidMotion] = []
     nodes, frames = _held_vertices(mesh, [held for s in supports for held in s.held(mesh)], motions)
-    pairs, directions, direction_motions = _directed_edges(
-        [d for s in supports for d in s.directed(mesh)], motions
-    )
+    pairs, directions, direction_motions = _directed_edges([d for s in supports for d in s.directed(mesh)], motions)
     directions = np.concatenate([directions, free_directions])
     direction_motions += [-1] * len(free_directions)
     for k, motion in enumerate(direction_motions):
@@ -108,9 +106,7 @@ def _check_against_still(mesh, held: list[Held], motion_of: dict[int, RigidMotio
             point = mesh.rest_positions[[vertex]]
             moves = np.array([(motion.moved(point, at) - point)[0] for at in _LOOKED_AT])
             if np.abs(moves @ along.T).max() > 1e-9 * mesh.size:
-                raise ValueError(
-                    f"one support holds vertex {vertex} along a direction in which another moves it"
-                )
+                raise ValueError(f"one support holds vertex {vertex} along a direction in which another moves it")
 
 
 def _frame(directions: np.ndarray) -> tuple[np.ndarray, int]:

@@ -23,21 +23,14 @@ class Inputs:
         self.given_magnetization = remanent_magnetization
         self.magnetization = self._magnetization(to_array("remanent_magnetization", remanent_magnetization))
         flux_density = self._flux_density(to_array("applied_flux_density", applied_flux_density))
-        names = {
-            "load_factor": "load",
-            "gravity_factor": "gravity",
-            "field_factor": "field",
-            "motion_factor": "motion",
-        }
+        names = {"load_factor": "load", "gravity_factor": "gravity", "field_factor": "field", "motion_factor": "motion"}
         numbers = {names[key]: float(quantity(key, "1", value, ())) for key, value in factors.items()}
         self.controls = _core.Controls(flux_density=flux_density, **numbers)
 
     def _magnetization(self, given) -> np.ndarray | None:
         if not self.scene.fields:
             if given is not None:
-                raise ValueError(
-                    "remanent_magnetization was given, but the scene has no field: Scene(..., field=...)"
-                )
+                raise ValueError("remanent_magnetization was given, but the scene has no field: Scene(..., field=...)")
             return None
         if given is None:
             raise ValueError("the scene has a field, so remanent_magnetization [A/m] is needed")

@@ -17,7 +17,8 @@ from .errors import Interrupted, ObjectiveFailed
 
 @dataclass(frozen=True)
 class Record:
-    """One iteration: the objective, its named terms, the largest positive constraint, |gradient| of the objective,
+    """One iteration: the objective, its named terms, the largest positive constraint, |gradient| of the
+    objective,
     seconds since the start, and how often the objective was asked for."""
 
     iteration: int
@@ -31,7 +32,8 @@ class Record:
 
 @dataclass
 class Minimum:
-    """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an iteration, from the start."""
+    """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an
+    iteration, from the start."""
 
     parameters: list
     objective: float
@@ -65,21 +67,27 @@ def minimize(
 ) -> Minimum:
     """Minimizes objective(*parameters) and leaves the parameters at the best design.
 
-    objective: returns a scalar tensor, or a dict of named terms whose sum it is, or a tuple of one of these with a dict of
+    objective: returns a scalar tensor, or a dict of named terms whose sum it is, or a tuple of one of these
+    with a dict of
     terms to record, with a tensor of constraints (m,) <= 0, or with both.
     parameters: tensors with requires_grad, the ones the optimizer was made with.
     optimizer: one of `ms.optim`, or a function that makes one from the list of parameters.
-    tolerance: stops once the objective changed by no more than this share of itself, `patience` times in a row.
-    feasibility: how far a constraint may be broken by a design that counts as feasible when the best is chosen.
+    tolerance: stops once the objective changed by no more than this share of itself, `patience` times in a
+    row.
+    feasibility: how far a constraint may be broken by a design that counts as feasible when the best is
+    chosen.
     callback: called with each Record; returning True stops.
-    progress: show a bar. checkpoint: a file that is replaced, whole or not at all, every `checkpoint_every` iterations;
+    progress: show a bar. checkpoint: a file that is replaced, whole or not at all, every `checkpoint_every`
+    iterations;
     resume: continue from it if it exists, with the same bits as without the stop.
 
-    Ctrl-C raises `ms.Interrupted`, an error in the objective or the callback `ms.ObjectiveFailed`, once a design is known; both hold the best one,
+    Ctrl-C raises `ms.Interrupted`, an error in the objective or the callback `ms.ObjectiveFailed`, once a
+    design is known; both hold the best one,
     a Minimum, in `last_good`. Before that the error itself comes through.
 
     >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
-    >>> ms.minimize(lambda x: ((x - 1) ** 2).sum(), [x], ms.optim.LBFGS([x], upper=0.5)).objective  # doctest: +SKIP
+    # Doctest: +SKIP
+    >>> ms.minimize(lambda x: ((x - 1) ** 2).sum(), [x], ms.optim.LBFGS([x], upper=0.5)).objective
     0.75
     """
     require_torch("minimize")

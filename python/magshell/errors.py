@@ -20,7 +20,8 @@ class Interrupted(KeyboardInterrupt):
 
 
 class ObjectiveFailed(RuntimeError):
-    """An optimization met an error, its cause, on the way. `last_good` holds the best design until then, as a result of the same kind."""
+    """An optimization met an error, its cause, on the way. `last_good` holds the best design until then, as a
+    result of the same kind."""
 
     def __init__(self, message: str, last_good=None):
         super().__init__(message)

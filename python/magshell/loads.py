@@ -45,11 +45,7 @@ class AreaLoad:
 
     def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
         """(n_v, 3), N."""
-        faces = (
-            np.arange(mesh.n_faces)
-            if self.faces is None
-            else indices("AreaLoad faces", self.faces, mesh.n_faces)
-        )
+        faces = np.arange(mesh.n_faces) if self.faces is None else indices("AreaLoad faces", self.faces, mesh.n_faces)
         density = _rows("force_per_area [N/m2]", self.force_per_area, len(faces))
         return _spread(mesh, mesh.faces[faces], density * (mesh.face_areas[faces] / 3.0)[:, None])
 

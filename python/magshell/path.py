@@ -72,9 +72,7 @@ class Path:
     @property
     def applied_flux_densities(self) -> np.ndarray:
         """The uniform field at each point, (n, 3), T."""
-        return np.array([self._from.towards(self._to, t).flux_density for t in self.parameters]).reshape(
-            -1, 3
-        )
+        return np.array([self._from.towards(self._to, t).flux_density for t in self.parameters]).reshape(-1, 3)
 
     @property
     def stable(self) -> np.ndarray:
@@ -89,13 +87,8 @@ class Path:
             f"Path: {len(self)} equilibria, {int(self.stable.sum())} of them stable, parameter "
             f"{self.parameters.min():.4g} to {self.parameters.max():.4g}"
         ]
-        lines += [
-            f"  {point.kind} at {point.parameter:.6g}, after point {point.after_point}"
-            for point in self.critical
-        ]
-        lines.append(
-            f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s"
-        )
+        lines += [f"  {point.kind} at {point.parameter:.6g}, after point {point.after_point}" for point in self.critical]
+        lines.append(f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s")
         return "\n".join(lines)
 
 
@@ -207,9 +200,7 @@ def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
     return Path(
         scene=scene,
         parameters=np.array([point.parameter for point in points]),
-        positions=np.array([model.positions(point.state) for point in points]).reshape(
-            -1, scene.mesh.n_vertices, 3
-        ),
+        positions=np.array([model.positions(point.state) for point in points]).reshape(-1, scene.mesh.n_vertices, 3),
         unstable_directions=np.array([point.unstable_directions for point in points], dtype=int),
         critical=tuple(_critical(model, point) for point in found.critical),
         remanent_magnetization=inputs.given_magnetization,

@@ -37,14 +37,7 @@ class Scene:
     """
 
     def __init__(
-        self,
-        shell: Shell,
-        *,
-        supports=(),
-        loads=(),
-        field=None,
-        gravity=None,
-        allow_rigid_motions: bool = False,
+        self, shell: Shell, *, supports=(), loads=(), field=None, gravity=None, allow_rigid_motions: bool = False
     ):
         if not isinstance(shell, Shell):
             raise ValueError(f"shell must be a Shell, got {type(shell).__name__}")
@@ -58,9 +51,7 @@ class Scene:
         if not isinstance(allow_rigid_motions, bool):
             raise ValueError(f"allow_rigid_motions must be True or False, got {allow_rigid_motions!r}")
         if sum(isinstance(f, UniformField) for f in self.fields) > 1:
-            raise ValueError(
-                "field holds several UniformFields: one is enough, its value comes when the scene is solved"
-            )
+            raise ValueError("field holds several UniformFields: one is enough, its value comes when the scene is solved")
         self._build(allow_rigid_motions)
 
     def _build(self, allow_rigid_motions: bool) -> None:
@@ -95,18 +86,14 @@ class Scene:
             vertex_mass=shell.vertex_masses if heavy else np.zeros(0),
             gravity=self.gravity,
             vertex_loads=self._vertex_loads(),
-            couple_edges=np.stack([edges, n_directions - n_couples + np.arange(n_couples)], axis=1).astype(
-                np.int32
-            ),
+            couple_edges=np.stack([edges, n_directions - n_couples + np.arange(n_couples)], axis=1).astype(np.int32),
             couples=couples,
             magnetic=bool(self.fields),
             field_sources=[f._core for f in self.fields if not isinstance(f, UniformField)],
         )
 
     def _vertex_loads(self) -> np.ndarray:
-        forces = [
-            load.vertex_forces(self.shell.mesh) for load in self.loads if not isinstance(load, EdgeCouple)
-        ]
+        forces = [load.vertex_forces(self.shell.mesh) for load in self.loads if not isinstance(load, EdgeCouple)]
         return np.sum(forces, axis=0) if forces else np.zeros((0, 3))
 
     def _couples(self) -> tuple[np.ndarray, np.ndarray]:

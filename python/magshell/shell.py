@@ -50,15 +50,8 @@ class Shell:
         self.thickness = _positive("thickness", "m", thickness, faces)
         self.young_modulus = _positive("young_modulus", "Pa", young_modulus, faces)
         self.poisson_ratio = _property("poisson_ratio", "1", poisson_ratio, faces)
-        _refuse(
-            "poisson_ratio [1]",
-            "in (-1, 1/2]",
-            self.poisson_ratio,
-            (self.poisson_ratio <= -1) | (self.poisson_ratio > 0.5),
-        )
-        self.mass_density = (
-            None if mass_density is None else _positive("mass_density", "kg/m3", mass_density, faces)
-        )
+        _refuse("poisson_ratio [1]", "in (-1, 1/2]", self.poisson_ratio, (self.poisson_ratio <= -1) | (self.poisson_ratio > 0.5))
+        self.mass_density = None if mass_density is None else _positive("mass_density", "kg/m3", mass_density, faces)
         self.curvature_scale = _positive("curvature_scale", "1", curvature_scale, ("n_e", mesh.n_edges))
 
     @property
@@ -77,12 +70,7 @@ class Shell:
 
     def __repr__(self) -> str:
         parts = [f"{self.mesh.n_faces} faces"]
-        for name, unit in (
-            ("thickness", " m"),
-            ("young_modulus", " Pa"),
-            ("poisson_ratio", ""),
-            ("mass_density", " kg/m3"),
-        ):
+        for name, unit in (("thickness", " m"), ("young_modulus", " Pa"), ("poisson_ratio", ""), ("mass_density", " kg/m3")):
             values = getattr(self, name)
             if values is not None:
                 parts.append(f"{name} {_range(values)}{unit}")
@@ -93,9 +81,7 @@ def _property(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:
     """One finite number a row, from an array of that length or from a single number."""
     array = real_numbers(f"{name} [{unit}]", value)
     if array.shape not in ((), (rows[1],)):
-        raise ValueError(
-            f"{name} [{unit}] must be a number or have shape ({rows[0]},) = ({rows[1]},), got {array.shape}"
-        )
+        raise ValueError(f"{name} [{unit}] must be a number or have shape ({rows[0]},) = ({rows[1]},), got {array.shape}")
     return np.broadcast_to(quantity(name, unit, array, array.shape), (rows[1],))
 
 

@@ -40,9 +40,7 @@ class Newton:
                 raise ValueError(f"{name} must be an integer of at least 1, got {count!r}")
 
     def _newton_options(self) -> _core.NewtonOptions:
-        return _core.NewtonOptions(
-            mixed=self._mixed, tolerance=self.tolerance, max_iterations=self.max_iterations
-        )
+        return _core.NewtonOptions(mixed=self._mixed, tolerance=self.tolerance, max_iterations=self.max_iterations)
 
     def _options(self) -> _core.StaticsOptions:
         options = _core.StaticsOptions()

@@ -160,9 +160,7 @@ class SymmetryPlane:
         steepness = continuations(mesh, edges) @ self.normal
         lying = np.flatnonzero(np.abs(steepness) < 1e-6)
         if lying.size:
-            raise ValueError(
-                f"the sheet lies in {self!r} at edge {edges[lying[0]]}: its image would lie on it"
-            )
+            raise ValueError(f"the sheet lies in {self!r} at edge {edges[lying[0]]}: its image would lie on it")
         outwards = np.sign(steepness)
         return [DirectedEdges(edges, outwards[:, None] * self.normal, None)]
 
@@ -184,9 +182,7 @@ class _Motion:
     """A displacement and a rotation as a caller gives them."""
 
     def __init__(self, displacement, rotation, center):
-        self.displacement = (
-            None if displacement is None else quantity("displacement", "m", displacement, (3,))
-        )
+        self.displacement = None if displacement is None else quantity("displacement", "m", displacement, (3,))
         self.rotation = None if rotation is None else quantity("rotation", "rad", rotation, (3,))
         self.center = None if center is None else quantity("center", "m", center, (3,))
         if center is not None and rotation is None:
@@ -201,11 +197,7 @@ class _Motion:
         return RigidMotion(center, zero if self.rotation is None else self.rotation, translation)
 
     def summary(self) -> str:
-        done = [
-            word
-            for word, value in (("moved", self.displacement), ("turned", self.rotation))
-            if value is not None
-        ]
+        done = [word for word, value in (("moved", self.displacement), ("turned", self.rotation)) if value is not None]
         return ", " + " and ".join(done) if done else ""
 
 

@@ -1,4 +1,5 @@
-"""What the optimizers share: parameters as one vector in a box, one sample a design, a state that survives a restart."""
+"""What the optimizers share: parameters as one vector in a box, one sample a design, a state that survives a
+restart."""
 
 from __future__ import annotations
 
@@ -15,10 +16,13 @@ _SAMPLE = "sample_"
 
 
 class BoxOptimizer(torch.optim.Optimizer):
-    """A torch optimizer whose groups have bounds. `step(closure)` moves the parameters and returns the new objective.
+    """A torch optimizer whose groups have bounds. `step(closure)` moves the parameters and returns the new
+    objective.
 
-    The closure returns the objective (or the objective and constraints) of the parameters as they stand and does not
-    call backward. What it says of the design that a step ends at is kept for the next step; another closure object, or
+    The closure returns the objective (or the objective and constraints) of the parameters as they stand and
+    does not
+    call backward. What it says of the design that a step ends at is kept for the next step; another closure
+    object, or
     parameters that were changed in between, make the next step ask again.
 
     A step that raises leaves parameters and state as they were.

@@ -46,7 +46,8 @@ class Box:
 
 
 def option_tensors(label: str, value, parameters: list[torch.Tensor]) -> list[torch.Tensor]:
-    """A bound or a scale as one float64 tensor a parameter: a number, a tensor, or a list with one of these each."""
+    """A bound or a scale as one float64 tensor a parameter: a number, a tensor, or a list with one of these
+    each."""
     values = value if isinstance(value, list | tuple) else [value] * len(parameters)
     if len(values) != len(parameters):
         raise ValueError(f"{label} has {len(values)} entries for {len(parameters)} parameters")

@@ -21,14 +21,18 @@ _ROUNDING = 4 * np.finfo(float).eps  # of the objective: a smaller decrease cann
 
 
 class LBFGS(BoxOptimizer):
-    """L-BFGS-B: the generalized Cauchy point of a limited-memory model, its minimum over the free variables, and a
+    """L-BFGS-B: the generalized Cauchy point of a limited-memory model, its minimum over the free variables,
+    and a
     line search for the strong Wolfe conditions within the box. It has no other constraints.
 
-    lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
-    scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite and 1 where not.
+    lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these
+    each.
+    scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite
+    and 1 where not.
     memory: how many steps the model is made from.
 
-    Byrd, Lu, Nocedal, Zhu, A limited memory algorithm for bound constrained optimization, SIAM J. Sci. Comput. 16 (1995).
+    Byrd, Lu, Nocedal, Zhu, A limited memory algorithm for bound constrained optimization, SIAM J. Sci.
+    Comput. 16 (1995).
 
     >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
     >>> ms.optim.LBFGS([x], upper=0.5).step(lambda: ((x - 1) ** 2).sum())  # doctest: +SKIP

@@ -46,7 +46,8 @@ class Trial:
         _require_finite("the constraints", self.constraints)
 
     def differentiate(self) -> Sample:
-        """The sample with gradients. The parameters' `.grad` is left holding the objective's; after an error, what it held."""
+        """The sample with gradients. The parameters' `.grad` is left holding the objective's; after an error,
+        what it held."""
         kept = [parameter.grad for parameter in self._parameters]
         try:
             rows = [self._row(self._objective, "the objective", retain=self._constraints is not None)]
