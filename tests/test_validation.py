@@ -11,12 +11,8 @@ import pytest
 from magshell.bench.accuracy import SINGLE_SOLVES
 from magshell.bench.cases import CASES, Comparison
 from magshell.bench.cases.hemisphere import large_deflection
-from magshell.bench.cases.plates import SQUARE, square_plate
+from magshell.bench.cases.plates import SQUARE, even_plate
 from magshell.bench.convergence import REQUIRED_ORDER, STUDIES, converge
-
-# On 32x32 cells these closed forms are out of the element's reach, and on 128x128 ("B5 finer") they are not:
-# it is Morley's element (tests/test_morley.py), whose errors these are.
-BEYOND_MORLEY = {("B5", "supported, force"), ("B5", "clamped, pressure"), ("B5", "clamped, force")}
 
 # What the project set out to reach: relative errors, of each case's comparisons in turn.
 PLATE = {", ".join(key): 0.005 for key in SQUARE}
@@ -29,7 +25,7 @@ BOUNDS = {
     "B2": {"w, force": 0.01},
     "B3": {"u, hole": 0.01, "u, closed": 0.01},
     "B5": PLATE,
-    "B5 finer": PLATE,
+    "B5 even": dict.fromkeys(PLATE),
     "B5 disk": PLATE,
     "B7": {"P L2 / EI": 0.01},
     "B7 plate": {"k": 0.01},
@@ -46,13 +42,10 @@ def outcome(name: str, bending: str = "midedge"):
 
 
 def rows():
-    reason = "beyond Morley's element on this mesh"
-    out_of_reach = pytest.mark.xfail(reason=reason, raises=AssertionError, strict=True)
     for name, bounds in BOUNDS.items():
         for k, (quantity, bound) in enumerate(bounds.items()):
-            beyond = (name, quantity) in BEYOND_MORLEY
-            marks = [out_of_reach] if beyond else []
-            yield pytest.param(name, k, bound, marks=marks, id=f"{name}: {quantity}")
+            if bound is not None:
+                yield pytest.param(name, k, bound, id=f"{name}: {quantity}")
 
 
 @pytest.mark.parametrize(("name", "k", "bound"), list(rows()))
@@ -89,6 +82,12 @@ def test_hinge_is_worse_on_the_same_mesh(name: str) -> None:
         assert theirs.error > 10 * ours.error
 
 
+def test_an_even_mesh_converges_on_the_plates() -> None:
+    errors = [[c.error for c in even_plate((n, n)).comparisons] for n in (16, 32, 64)]
+    assert all(fine < 0.32 * coarse for coarse, fine in zip(errors[0], errors[1], strict=True))
+    assert all(fine < 0.32 * coarse for coarse, fine in zip(errors[1], errors[2], strict=True))
+
+
 def test_a_comparison_takes_its_worst_entry() -> None:
     comparison = Comparison("w", [1.0, 2.2, 3.0], [1.0, 2.0, 4.0], at=("a", "b", "c"), allowed=0.2)
     assert comparison.at[comparison.worst] == "c" and comparison.error == 0.25 and not comparison.passes
@@ -100,4 +99,4 @@ def test_a_part_of_a_mesh_needs_cells_that_divide() -> None:
     with pytest.raises(ValueError, match="multiple of 4"):
         large_deflection((30, 8))
     with pytest.raises(ValueError, match="even numbers"):
-        square_plate((7, 8))
+        even_plate((7, 8))

@@ -13,6 +13,7 @@ namespace py = pybind11;
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using IndexArray = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
 
+void register_adjoint(py::module_& module);
 void register_errors(py::module_& module);
 void register_mesh(py::module_& module);
 void register_continuation(py::module_& module);

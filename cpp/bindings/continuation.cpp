@@ -60,7 +60,7 @@ void register_continuation(py::module_& module) {
         .def_readonly("factorizations", &PathResult::factorizations)
         .def_readonly("failed_factorizations", &PathResult::failed_factorizations);
 
-    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from"), py::arg("to"),
+    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from_"), py::arg("to"),
                py::arg("options"), py::arg("until") = py::none(), py::arg("progress") = py::none());
 }
 

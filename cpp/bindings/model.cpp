@@ -32,7 +32,25 @@ std::vector<Motion> motions_of(const Array& rows) {
     return motions;
 }
 
-std::unique_ptr<Model> make_model(const std::shared_ptr<TriangleMesh>& mesh, const py::kwargs& given) {
+SceneValues values_of(const py::dict& given) {
+    const auto array = [&](const char* name) { return given[name].cast<Array>(); };
+    SceneValues values;
+    const Array thickness = array("thickness"), young = array("young_modulus"), poisson = array("poisson_ratio");
+    for (py::ssize_t f = 0; f < thickness.size(); ++f)
+        values.materials.push_back({thickness.at(f), young.at(f), poisson.at(f)});
+    values.curvature_scale = to_vector(array("curvature_scale"));
+    values.vertex_mass = to_vector(array("vertex_mass"));
+    values.gravity = to_vector(array("gravity"));
+    values.vertex_loads = to_rows3(array("vertex_loads"));
+    values.couples = to_vector(array("couples"));
+    values.motions = motions_of(array("motions"));
+    for (const py::handle source : given["field_sources"])
+        values.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
+    return values;
+}
+
+std::unique_ptr<Model> make_model(const std::shared_ptr<TriangleMesh>& mesh, const py::dict& values,
+                                  const py::kwargs& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     const auto indices = [&](const char* name) { return given[name].cast<IndexArray>(); };
     SceneInput input(*mesh);
@@ -40,21 +58,11 @@ std::unique_ptr<Model> make_model(const std::shared_ptr<TriangleMesh>& mesh, con
     input.directed_edges = directed_edges(indices("directed_edges"));
     input.directions = to_rows3(array("directions"));
     input.held = held_nodes(indices("held_nodes"), array("held_frames"));
-    input.motions = motions_of(array("motions"));
-    const Array thickness = array("thickness"), young = array("young_modulus"), poisson = array("poisson_ratio");
-    for (Index f = 0; f < mesh->n_faces(); ++f)
-        input.materials.push_back({thickness.at(f), young.at(f), poisson.at(f)});
-    input.curvature_scale = to_vector(array("curvature_scale"));
-    input.vertex_mass = to_vector(array("vertex_mass"));
-    input.gravity = to_vector(array("gravity"));
-    input.vertex_loads = to_rows3(array("vertex_loads"));
     const IndexArray couple_edges = indices("couple_edges");
-    const Array couples = array("couples");
-    for (py::ssize_t k = 0; k < couples.size(); ++k)
-        input.couples.push_back({couple_edges.at(k, 0), couple_edges.at(k, 1), couples.at(k)});
+    for (py::ssize_t k = 0; k < couple_edges.shape(0); ++k)
+        input.couples.push_back({couple_edges.at(k, 0), couple_edges.at(k, 1)});
     input.magnetic = given["magnetic"].cast<bool>();
-    for (const py::handle source : given["field_sources"])
-        input.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
+    input.values = values_of(values);
     const py::gil_scoped_release unlocked;
     return std::make_unique<Model>(std::move(input));
 }
@@ -106,7 +114,14 @@ void register_model(py::module_& module) {
         .def("towards", &interpolate, py::arg("to"), py::arg("parameter"));
 
     py::class_<Model>(module, "Model")
-        .def(py::init(&make_model), py::arg("mesh"))
+        .def(py::init(&make_model), py::arg("mesh"), py::arg("values"))
+        .def("set_values",
+             [](Model& model, const py::dict& values) {
+                 const SceneValues given = values_of(values);
+                 const py::gil_scoped_release unlocked;
+                 const std::lock_guard lock(model.in_use());
+                 model.set_values(given);
+             })
         .def("set_magnetization",
              [](Model& model, const Array& magnetization) {
                  const Rows3 rows = to_rows3(magnetization);
@@ -124,9 +139,7 @@ void register_model(py::module_& module) {
         .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })
         .def("reduce", [](const Model& m, const VectorXd& full) { return m.reduction().vector(full); })
         .def("prescribed_rate",
-             [](const Model& m, const VectorXd& q, double progress) {
-                 return m.reduction().prescribed_rate(q, progress);
-             },
+             [](const Model& m, double progress) { return m.reduction().prescribed_rate(progress); },
              "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")
         .def("energy", &Model::energy, py::call_guard<py::gil_scoped_release>())
         .def("energies", &energies)

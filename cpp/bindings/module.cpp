@@ -6,10 +6,11 @@ PYBIND11_MODULE(_core, module) {
     module.doc() = "The C++ core of magshell; use the functions of the package, not this module.";
     module.attr("__version__") = MAGSHELL_VERSION;
     b::register_errors(module);
-    b::register_continuation(module);
-    b::register_field(module);
     b::register_linalg(module);
     b::register_mesh(module);
+    b::register_field(module);
     b::register_model(module);
     b::register_statics(module);
+    b::register_adjoint(module);  // takes what a solve found
+    b::register_continuation(module);  // after the options that it shares with statics
 }

@@ -31,6 +31,7 @@ void register_statics(py::module_& module) {
         .def_readwrite("first_step", &StaticsOptions::first_step)
         .def_readwrite("smallest_step", &StaticsOptions::smallest_step)
         .def_readwrite("require_stable", &StaticsOptions::require_stable)
+        .def_readwrite("keep_factor", &StaticsOptions::keep_factor)
         .def_readwrite("start_at_rest", &StaticsOptions::start_at_rest)
         .def_readwrite("max_relaxation_steps", &StaticsOptions::max_relaxation_steps);
 
@@ -59,7 +60,7 @@ void register_statics(py::module_& module) {
         .def_readonly("bytes", &StaticsResult::bytes)
         .def_readonly("factorization", &StaticsResult::factorization);
 
-    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from"), py::arg("to"),
+    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("memory"), py::arg("from_"), py::arg("to"),
                py::arg("options"), py::arg("progress") = py::none());
 }
 

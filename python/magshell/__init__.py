@@ -6,7 +6,7 @@ from ._core import __version__
 from .buckling import Buckling, linear_buckling
 from .design import Minimum, minimize
 from .equilibrium import Equilibrium
-from .errors import Interrupted, NotConverged, ObjectiveFailed
+from .errors import Interrupted, NoGradient, NotConverged, ObjectiveFailed
 from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .field_adapters import CustomField, MagpylibField
 from .io import read_fields, read_mesh, write_mesh
@@ -39,6 +39,7 @@ __all__ = [
     "Minimum",
     "MixedNewton",
     "Newton",
+    "NoGradient",
     "NotConverged",
     "ObjectiveFailed",
     "Path",

@@ -12,13 +12,107 @@ import numpy.typing
 
 __all__: list[str] = [
     "AppliedField",
+    "Controls",
+    "CriticalKind",
+    "CriticalPoint",
     "Dipoles",
+    "Factor",
+    "FactorReport",
+    "Model",
+    "NewtonOptions",
+    "Outcome",
+    "PathOptions",
+    "PathPoint",
+    "PathResult",
     "PythonField",
     "SampledField",
+    "StaticsOptions",
+    "StaticsResult",
     "TriangleMesh",
+    "analyze",
+    "build_info",
+    "factor_backends",
+    "find_equilibrium",
+    "follow_path",
+    "num_threads",
     "sample_fields",
+    "set_num_threads",
     "vacuum_permeability",
 ]
+
+class FactorReport:
+    """
+    How a factorization went.
+    """
+    def __repr__(self) -> str: ...
+    @property
+    def negative_pivots(self) -> int:
+        """
+        the number of negative eigenvalues
+        """
+    @property
+    def perturbed_pivots(self) -> int:
+        """
+        pivots that were zero to rounding and were replaced; solve() then refines
+        """
+    @property
+    def pivot_growth(self) -> float:
+        """
+        max l_ik^2 |d_k| over the largest entry: about 1 or less when definite; 10^p costs about p digits
+        """
+    @property
+    def reason(self) -> str:
+        """
+        why not, and what it means; empty on success
+        """
+    @property
+    def succeeded(self) -> bool: ...
+
+class Factor:
+    """
+    An analysed sparse symmetric pattern; factorize() it with values, then solve().
+    """
+    def factorize(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> FactorReport:
+        """
+        Factorizes the matrix with these values (nnz,), in the order of the pattern's rows.
+        """
+    def solve(self, rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        The solution for the right-hand side (n,) or (n, k).
+        """
+    @property
+    def bytes(self) -> int: ...
+    @property
+    def flops(self) -> float:
+        """
+        additions and multiplications of one factorization
+        """
+    @property
+    def name(self) -> str: ...
+    @property
+    def nonzeros(self) -> int:
+        """
+        entries of L, its diagonal included
+        """
+    @property
+    def size(self) -> int: ...
+
+class TriangleMesh:
+    def __init__(
+        self,
+        rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int64],
+    ) -> None: ...
+    @property
+    def edge_faces(self) -> numpy.ndarray: ...
+    @property
+    def edges(self) -> numpy.ndarray: ...
+    @property
+    def face_edges(self) -> numpy.ndarray: ...
+    @property
+    def faces(self) -> numpy.ndarray: ...
+    @property
+    def rest_positions(self) -> numpy.ndarray: ...
 
 class AppliedField:
     @property
@@ -49,23 +143,313 @@ class SampledField(AppliedField):
 class PythonField(AppliedField):
     def __init__(self, sampler: collections.abc.Callable) -> None: ...
 
-class TriangleMesh:
+class Controls:
     def __init__(
         self,
-        rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int64],
+        *,
+        flux_density: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ...,
+        field: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+        load: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+        gravity: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+        motion: typing.SupportsFloat | typing.SupportsIndex = 0.0,
     ) -> None: ...
+    def towards(self, to: Controls, parameter: typing.SupportsFloat | typing.SupportsIndex) -> Controls: ...
     @property
-    def edge_faces(self) -> numpy.ndarray: ...
+    def field(self) -> float: ...
     @property
-    def edges(self) -> numpy.ndarray: ...
+    def flux_density(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
     @property
-    def face_edges(self) -> numpy.ndarray: ...
+    def gravity(self) -> float: ...
     @property
-    def faces(self) -> numpy.ndarray: ...
+    def load(self) -> float: ...
     @property
-    def rest_positions(self) -> numpy.ndarray: ...
+    def motion(self) -> float: ...
 
+class Model:
+    def __init__(self, mesh: TriangleMesh, **kwargs) -> None: ...
+    def assemble(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
+    ) -> None:
+        """
+        Gradient and Hessian, left in the core: what `python -m magshell.bench kernels` times.
+        """
+    def edge_rotations(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def energies(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
+    ) -> dict: ...
+    def energy(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
+    ) -> float: ...
+    def expand(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def gradient(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def hessian(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: Controls,
+        reduced: bool = True,
+    ) -> tuple: ...
+    def positions(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    def prescribed_rate(
+        self,
+        arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        arg1: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.
+        """
+    def reduce(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def rest_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def set_magnetization(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
+    def state(
+        self,
+        arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def bytes(self) -> int: ...
+    @property
+    def free_size(self) -> int: ...
+    @property
+    def size(self) -> int: ...
+
+class NewtonOptions:
+    def __init__(
+        self,
+        *,
+        mixed: bool = True,
+        tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10,
+        max_iterations: typing.SupportsInt | typing.SupportsIndex = 20,
+    ) -> None: ...
+
+class StaticsOptions:
+    newton: NewtonOptions
+    require_stable: bool
+    start_at_rest: bool
+    def __init__(self) -> None: ...
+    @property
+    def first_step(self) -> float: ...
+    @first_step.setter
+    def first_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def max_relaxation_steps(self) -> int: ...
+    @max_relaxation_steps.setter
+    def max_relaxation_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def smallest_step(self) -> float: ...
+    @smallest_step.setter
+    def smallest_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+
+class Outcome:
+    """
+    Members:
+
+      converged
+
+      failed
+
+      interrupted
+    """
+
+    __members__: typing.ClassVar[dict[str, Outcome]]
+    converged: typing.ClassVar[Outcome]
+    failed: typing.ClassVar[Outcome]
+    interrupted: typing.ClassVar[Outcome]
+    @typing.overload
+    def __eq__(self, other: Outcome) -> bool: ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool: ...
+    def __getstate__(self) -> int: ...
+    def __hash__(self) -> int: ...
+    def __index__(self) -> int: ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __int__(self) -> int: ...
+    @typing.overload
+    def __ne__(self, other: Outcome) -> bool: ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool: ...
+    def __repr__(self) -> str: ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __str__(self) -> str: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class StaticsResult:
+    @property
+    def bytes(self) -> int: ...
+    @property
+    def controls(self) -> Controls: ...
+    @property
+    def factorization(self) -> str: ...
+    @property
+    def factorizations(self) -> int: ...
+    @property
+    def failed_factorizations(self) -> int: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def linear_time(self) -> float: ...
+    @property
+    def load_steps(self) -> int: ...
+    @property
+    def memory(self) -> list[list[float]]: ...
+    @property
+    def outcome(self) -> Outcome: ...
+    @property
+    def progress(self) -> float: ...
+    @property
+    def reason(self) -> str: ...
+    @property
+    def relaxation_steps(self) -> int: ...
+    @property
+    def residual(self) -> float: ...
+    @property
+    def saddles_left(self) -> int: ...
+    @property
+    def stable(self) -> bool: ...
+    @property
+    def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def unstable_directions(self) -> int: ...
+
+class PathOptions:
+    locate_critical: bool
+    newton: NewtonOptions
+    def __init__(self) -> None: ...
+    @property
+    def first_step(self) -> float: ...
+    @first_step.setter
+    def first_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def highest_parameter(self) -> float: ...
+    @highest_parameter.setter
+    def highest_parameter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def largest_step(self) -> float: ...
+    @largest_step.setter
+    def largest_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def lowest_parameter(self) -> float: ...
+    @lowest_parameter.setter
+    def lowest_parameter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def max_points(self) -> int: ...
+    @max_points.setter
+    def max_points(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
+class PathPoint:
+    @property
+    def memory(self) -> list[list[float]]: ...
+    @property
+    def parameter(self) -> float: ...
+    @property
+    def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def unstable_directions(self) -> int: ...
+
+class CriticalKind:
+    """
+    Members:
+
+      limit
+
+      bifurcation
+    """
+
+    __members__: typing.ClassVar[dict[str, CriticalKind]]
+    bifurcation: typing.ClassVar[CriticalKind]
+    limit: typing.ClassVar[CriticalKind]
+    @typing.overload
+    def __eq__(self, other: CriticalKind) -> bool: ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool: ...
+    def __getstate__(self) -> int: ...
+    def __hash__(self) -> int: ...
+    def __index__(self) -> int: ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __int__(self) -> int: ...
+    @typing.overload
+    def __ne__(self, other: CriticalKind) -> bool: ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool: ...
+    def __repr__(self) -> str: ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __str__(self) -> str: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class CriticalPoint:
+    @property
+    def after_point(self) -> int: ...
+    @property
+    def kind(self) -> CriticalKind: ...
+    @property
+    def mode(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def point(self) -> PathPoint: ...
+
+class PathResult:
+    @property
+    def critical(self) -> list[CriticalPoint]: ...
+    @property
+    def factorizations(self) -> int: ...
+    @property
+    def failed_factorizations(self) -> int: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def outcome(self) -> Outcome: ...
+    @property
+    def points(self) -> list[PathPoint]: ...
+    @property
+    def reason(self) -> str: ...
+
+def analyze(
+    size: typing.SupportsInt | typing.SupportsIndex,
+    column_starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    backend: str = "supernodal",
+    ordering: str = "best",
+) -> Factor:
+    """
+    Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, diagonal present.
+    """
+
+def build_info() -> list[tuple[str, str]]: ...
+def factor_backends() -> list[str]: ...
+def find_equilibrium(
+    model: Model,
+    start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    memory: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+    from_: Controls,
+    to: Controls,
+    options: StaticsOptions,
+    progress: typing.Any = None,
+) -> StaticsResult: ...
+def follow_path(
+    model: Model,
+    start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    memory: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+    from_: Controls,
+    to: Controls,
+    options: PathOptions,
+    until: typing.Any = None,
+    progress: typing.Any = None,
+) -> PathResult: ...
+def num_threads() -> int: ...
 def sample_fields(
     fields: collections.abc.Sequence[AppliedField],
     scales: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
@@ -77,5 +461,7 @@ def sample_fields(
     The sum of scale * field at the points (n, 3) [m]: flux density, gradient, and second derivative contracted with the moments (n, 3); empty beyond the order.
     """
 
-__version__: str = "0.1.0"
+def set_num_threads(count: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
+__version__: str = "0+dev"
 vacuum_permeability: float = 1.25663706127e-06

@@ -3,29 +3,85 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import _core
 from ._quantity import quantity, real_numbers
-from ._tensors import to_array
+from ._replacements import checked
+from ._tensors import detached, is_tensor, to_array, wants_gradient
+from ._values import Values
 from .scene import Scene
 
 
-class Inputs:
-    """The controls and the magnetization of one solve. Raises ValueError where they do not fit the scene."""
+class Leaf(NamedTuple):
+    """A tensor among the inputs that requires a gradient, and what it is: a value of `owner`, or the solve's own."""
 
-    def __init__(self, scene: Scene, remanent_magnetization, applied_flux_density, **factors):
+    tensor: Any
+    owner: object | None
+    name: str
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(self.tensor.shape)
+
+
+class Inputs:
+    """The controls, the magnetization and the scene's values of one solve. Raises ValueError where they do not fit.
+
+    `replaced`: {object of the scene: {name: value}}. `leaves`: the tensors that a gradient goes back to; without
+    `differentiable` they are refused.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        remanent_magnetization,
+        applied_flux_density,
+        *,
+        replaced: dict[object, dict] | None = None,
+        differentiable: bool = False,
+        **factors,
+    ):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
         self.scene = scene
-        self.given = (remanent_magnetization, applied_flux_density)
-        self.given_magnetization = remanent_magnetization
-        self.magnetization = self._magnetization(to_array("remanent_magnetization", remanent_magnetization))
-        flux_density = self._flux_density(to_array("applied_flux_density", applied_flux_density))
+        self.given = []
+        self.leaves: list[Leaf] = []
+        self.given_magnetization, self.given_flux_density = remanent_magnetization, applied_flux_density
+        self._differentiable = differentiable
+        self.magnetization = self._magnetization(self._numbers("remanent_magnetization", remanent_magnetization))
+        flux_density = self._flux_density(self._numbers("applied_flux_density", applied_flux_density))
         names = {"load_factor": "load", "gravity_factor": "gravity", "field_factor": "field", "motion_factor": "motion"}
-        numbers = {names[key]: float(quantity(key, "1", value, ())) for key, value in factors.items()}
+        numbers = {
+            names[key]: float(quantity(key, "1", self._numbers(key, value), ())) for key, value in factors.items()
+        }
         self.controls = _core.Controls(flux_density=flux_density, **numbers)
+        self.values = self._values(replaced) if replaced else scene._values
+
+    @property
+    def tensors(self) -> list:
+        """Those of the leaves."""
+        return [leaf.tensor for leaf in self.leaves]
+
+    def _numbers(self, name: str, value, owner=None):
+        """A tensor's numbers; anything else as it came."""
+        if is_tensor(value):
+            self.given.append(value)
+        if not self._differentiable:
+            return to_array(name, value)
+        if wants_gradient(value):
+            self.leaves.append(Leaf(value, owner, name))
+        return detached(value)
+
+    def _values(self, replaced: dict[object, dict]) -> Values:
+        scene = self.scene
+        arrays = {
+            owner: {name: checked(scene, owner, name, self._numbers(name, value, owner)) for name, value in named.items()}
+            for owner, named in replaced.items()
+        }
+        return Values(scene, scene._constraints, arrays)
 
     def _magnetization(self, given) -> np.ndarray | None:
         if not self.scene.fields:
@@ -56,6 +112,9 @@ class Inputs:
     def in_core(self):
         """The scene's core with this magnetization in it, for one solve; those of other threads wait."""
         with self.scene._exclusive():
+            if self.scene._in_core is not self.values:
+                self.scene._model.set_values(self.values.core)
+                self.scene._in_core = self.values
             if self.magnetization is not None:
                 self.scene._model.set_magnetization(self.magnetization)
             yield

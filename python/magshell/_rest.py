@@ -49,7 +49,7 @@ class RestStiffness:
     def response(self, inputs: Inputs) -> np.ndarray:
         """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports move."""
         model, unloaded = self._model, _core.Controls()
-        moved = model.prescribed_rate(self.rest, 0.0) * inputs.controls.motion
+        moved = model.prescribed_rate(0.0) * inputs.controls.motion
         forces = model.gradient(self.rest, unloaded) - model.gradient(self.rest, inputs.controls)
         if moved.any():
             forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved

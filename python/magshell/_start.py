@@ -20,7 +20,7 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     if isinstance(start, Equilibrium):
         if start.scene is not scene:
             raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
-        same = np.array_equal(start._magnetization, inputs.magnetization)
+        same = np.array_equal(start._magnetization, inputs.magnetization) and start._values.same_as(inputs.values)
         return start._state, start._memory, start._controls, same
     positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
     n_v = scene.mesh.n_vertices

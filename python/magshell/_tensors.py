@@ -21,13 +21,21 @@ def is_tensor(value) -> bool:
     return torch is not None and isinstance(value, torch.Tensor)
 
 
+def wants_gradient(value) -> bool:
+    """Whether torch is recording what happens to this tensor."""
+    return is_tensor(value) and value.requires_grad and sys.modules["torch"].is_grad_enabled()
+
+
+def detached(value):
+    """A tensor's numbers without their history; anything else as it came."""
+    return value.detach().cpu().numpy() if is_tensor(value) else value
+
+
 def to_array(name: str, value):
     """A tensor's numbers; anything else as it came. Tensors that ask for a gradient are refused."""
-    if not is_tensor(value):
-        return value
-    if value.requires_grad:
-        raise ValueError(f"{name} requires a gradient, and this version has none for it: detach it first")
-    return value.detach().cpu().numpy()
+    if is_tensor(value) and value.requires_grad:
+        raise ValueError(f"{name} requires a gradient, and nothing passes one back to it: detach it first")
+    return detached(value)
 
 
 def like(values: np.ndarray, *inputs):

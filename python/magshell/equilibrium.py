@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ._tensors import detached
 from .scene import Scene
 
 
@@ -45,6 +46,7 @@ class Equilibrium:
     _memory: list = field(repr=False)
     _controls: Any = field(repr=False)
     _magnetization: Any = field(repr=False)
+    _values: Any = field(repr=False)
 
     @property
     def displacements(self):
@@ -60,7 +62,7 @@ class Equilibrium:
         return sum(self.energies.values())
 
     def __repr__(self) -> str:
-        moved = float(np.linalg.norm(np.asarray(self.displacements), axis=1).max())
+        moved = float(np.linalg.norm(np.asarray(detached(self.displacements)), axis=1).max())
         kind = "stable" if self.stable else f"unstable in {self.unstable_directions} directions"
         if not self.stable and self.unstable_directions == 0:
             kind = "not known to be stable"

@@ -20,9 +20,12 @@ class Interrupted(KeyboardInterrupt):
 
 
 class ObjectiveFailed(RuntimeError):
-    """An optimization met an error, its cause, on the way. `last_good` holds the best design until then, as a
-    result of the same kind."""
+    """An optimization met an error, its cause, on the way. `last_good` holds the best design until then."""
 
     def __init__(self, message: str, last_good=None):
         super().__init__(message)
         self.last_good = last_good
+
+
+class NoGradient(RuntimeError):
+    """A gradient was asked for at a state that has none: not converged, or not stable."""

@@ -30,6 +30,7 @@ class AppliedField:
     """
 
     _core: core.AppliedField | None = None
+    _replaceable: tuple[str, ...] = ()
 
     def flux_density(self, points) -> np.ndarray:
         """B [T], (..., 3), at points [m], (..., 3); NaN where the field has no value."""
@@ -75,10 +76,23 @@ class Dipoles(AppliedField):
     array([0.    , 0.    , 0.0002])
     """
 
+    _replaceable = ("positions", "moments")
+
     def __init__(self, positions, moments) -> None:
         self.positions = quantity("positions", "m", positions, ("n", 3))
         self.moments = quantity("moments", "A m^2", moments, (len(self.positions), 3))
         self._core = core.Dipoles(self.positions, self.moments)
+
+    def replaced(self, **values) -> Dipoles:
+        """As many dipoles with other positions or moments."""
+        changed = Dipoles(**{"positions": self.positions, "moments": self.moments, **values})
+        if len(changed.positions) != len(self.positions):
+            raise ValueError(f"there must be {len(self.positions)} dipoles, got {len(changed.positions)}")
+        return changed
+
+    def gradients(self, by_parameters: np.ndarray) -> dict[str, np.ndarray]:
+        positions, moments = by_parameters.reshape(2, -1, 3)
+        return {"positions": positions, "moments": moments}
 
     def __repr__(self) -> str:
         count = len(self.positions)
@@ -106,6 +120,7 @@ class SampledField(AppliedField):
     """
 
     _core: core.SampledField
+    _replaceable = ("flux_density",)
 
     def __init__(self, origin, spacing, flux_density) -> None:
         self.origin = quantity("origin", "m", origin, (3,))
@@ -152,6 +167,13 @@ class SampledField(AppliedField):
         )
         spacing = [(line[-1] - line[0]) / max(len(line) - 1, 1) for line in axes]
         return cls([line[0] for line in axes], spacing, values.reshape(points.shape))
+
+    def replaced(self, *, flux_density) -> SampledField:
+        """Other values on the same grid."""
+        return SampledField(self.origin, self.spacing, quantity("flux_density", "T", flux_density, (*self.counts, 3)))
+
+    def gradients(self, by_parameters: np.ndarray) -> dict[str, np.ndarray]:
+        return {"flux_density": by_parameters.reshape(*self.counts, 3)}
 
     def contains(self, points) -> np.ndarray:
         """Whether points [m], (..., 3), lie in the grid: bool, (...)."""

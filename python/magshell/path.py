@@ -157,7 +157,7 @@ def follow(
     )
     state, memory, from_, at_rest = starting_point(scene, start, inputs)
     if not at_rest:
-        raise ValueError("start must have the same remanent_magnetization as the path")
+        raise ValueError("start must have the same remanent_magnetization, and the values of the scene, as the path")
     options = _core.PathOptions()
     options.newton = solver._newton_options()
     options.first_step, options.largest_step = first_step, largest_step

@@ -10,6 +10,7 @@ import numpy as np
 
 from . import _constraints, _core
 from ._quantity import quantity
+from ._values import Values
 from .field import AppliedField, UniformField
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .shell import Shell
@@ -56,8 +57,9 @@ class Scene:
 
     def _build(self, allow_rigid_motions: bool) -> None:
         shell, mesh = self.shell, self.shell.mesh
-        edges, couples = self._couples()
-        constraints = _constraints.gather(mesh, self.supports, _couple_directions(mesh, edges))
+        edges = _couple_edges(mesh, self.loads)
+        self._couple_directions = _couple_directions(mesh, edges)
+        constraints = _constraints.gather(mesh, self.supports, self._couple_directions)
         held = np.intersect1d(edges, constraints.directed_edges[:, 0])
         if held.size:
             raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
@@ -68,41 +70,21 @@ class Scene:
                 "field or gravity does"
             )
         n_directions, n_couples = len(constraints.directions), len(edges)
-        heavy = bool(self.gravity.any())
         self._constraints = constraints
         self._turn, self._solving = threading.RLock(), False
+        # What the core holds now: a solve with other values puts its own there.
+        self._values = self._in_core = Values(self, constraints)
         self._model = _core.Model(
             mesh._core,
+            self._values.core,
             directors=shell.bending == "midedge",
             directed_edges=constraints.directed_edges,
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
             held_frames=constraints.held_frames,
-            motions=np.array(constraints.motions).reshape(-1, 3, 3),
-            thickness=shell.thickness,
-            young_modulus=shell.young_modulus,
-            poisson_ratio=shell.poisson_ratio,
-            curvature_scale=shell.curvature_scale,
-            vertex_mass=shell.vertex_masses if heavy else np.zeros(0),
-            gravity=self.gravity,
-            vertex_loads=self._vertex_loads(),
             couple_edges=np.stack([edges, n_directions - n_couples + np.arange(n_couples)], axis=1).astype(np.int32),
-            couples=couples,
             magnetic=bool(self.fields),
-            field_sources=[f._core for f in self.fields if not isinstance(f, UniformField)],
         )
-
-    def _vertex_loads(self) -> np.ndarray:
-        forces = [load.vertex_forces(self.shell.mesh) for load in self.loads if not isinstance(load, EdgeCouple)]
-        return np.sum(forces, axis=0) if forces else np.zeros((0, 3))
-
-    def _couples(self) -> tuple[np.ndarray, np.ndarray]:
-        parts = [load.edge_couples(self.shell.mesh) for load in self.loads if isinstance(load, EdgeCouple)]
-        if not parts:
-            return np.zeros(0, dtype=np.int64), np.zeros(0)
-        edges, couples = (np.concatenate(part) for part in zip(*parts, strict=True))
-        unique, inverse = np.unique(edges, return_inverse=True)
-        return unique, np.bincount(inverse, weights=couples)
 
     @contextmanager
     def _exclusive(self):
@@ -148,6 +130,12 @@ def _checked_list(name: str, items, kinds: tuple[type, ...]) -> tuple:
             what = f"the class {item.__name__}: call it" if isinstance(item, type) else type(item).__name__
             raise ValueError(f"{name} must hold {wanted} objects, got {what}")
     return tuple(listed)
+
+
+def _couple_edges(mesh, loads) -> np.ndarray:
+    """Edges that couples turn, ascending, (k,)."""
+    edges = [load.edge_couples(mesh)[0] for load in loads if isinstance(load, EdgeCouple)]
+    return np.unique(np.concatenate(edges)) if edges else np.zeros(0, dtype=np.int64)
 
 
 def _couple_directions(mesh, edges: np.ndarray) -> np.ndarray:

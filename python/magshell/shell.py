@@ -29,6 +29,8 @@ class Shell:
     Shell(40 faces, thickness 0.001 m, young_modulus 100000 Pa, poisson_ratio 0.5, bending midedge)
     """
 
+    _replaceable = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "curvature_scale")
+
     def __init__(
         self,
         mesh: TriangleMesh,
@@ -53,6 +55,23 @@ class Shell:
         _refuse("poisson_ratio [1]", "in (-1, 1/2]", self.poisson_ratio, (self.poisson_ratio <= -1) | (self.poisson_ratio > 0.5))
         self.mass_density = None if mass_density is None else _positive("mass_density", "kg/m3", mass_density, faces)
         self.curvature_scale = _positive("curvature_scale", "1", curvature_scale, ("n_e", mesh.n_edges))
+
+    def replaced(self, **values) -> Shell:
+        """The same sheet with other properties."""
+        properties = {name: getattr(self, name) for name in self._replaceable}
+        return Shell(self.mesh, bending=self.bending, **{**properties, **values})
+
+    def gradients(self, by_weights: np.ndarray | None, gravity: np.ndarray, gradient: dict) -> dict[str, np.ndarray]:
+        """The core's gradients by its properties, with what they do to the weights added.
+
+        by_weights: (n_v, 3), by the weight of every vertex, or None without gravity.
+        """
+        found = {name: gradient[name] for name in self._replaceable if name in gradient}
+        if by_weights is not None:
+            by_mass = (by_weights @ gravity)[self.mesh.faces].sum(axis=1) / 3.0
+            found["thickness"] = found["thickness"] + by_mass * self.mesh.face_areas * self.mass_density
+            found["mass_density"] = by_mass * self.face_volumes
+        return found
 
     @property
     def face_volumes(self) -> np.ndarray:

@@ -16,11 +16,15 @@ _ORDERS = {"".join(axes) for n in (1, 2, 3) for axes in permutations(_AXES, n)}
 
 
 class RigidMotion(NamedTuple):
-    """x -> center + R(rotation) (x - center) + translation; gone through evenly as the motion progresses."""
+    """x -> center + R(rotation) (x - center) + translation; gone through evenly as the motion progresses.
+
+    support: whose motion it is.
+    """
 
     center: np.ndarray
     rotation: np.ndarray
     translation: np.ndarray
+    support: object
 
     def moved(self, points: np.ndarray, progress: float = 1.0) -> np.ndarray:
         """Where points (k, 3) are at this progress, 1 at the end."""
@@ -55,6 +59,8 @@ class Pin:
     Pin(2 vertices, components z, moved)
     """
 
+    _replaceable = ("displacement", "rotation", "center")
+
     def __init__(self, vertices, components: str = "xyz", *, displacement=None, rotation=None, center=None):
         self.vertices = selection("Pin vertices", vertices)
         if not isinstance(components, str) or components not in _ORDERS:
@@ -69,11 +75,15 @@ class Pin:
     def held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = indices("Pin vertices", self.vertices, mesh.n_vertices)
         directions = np.eye(3)[[_AXES.index(c) for c in self.components]]
-        motion = self._motion.about(mesh.rest_positions[vertices])
+        motion = self._motion.about(mesh.rest_positions[vertices], self)
         return [Held(vertices, np.broadcast_to(directions, (len(vertices), *directions.shape)), motion)]
 
     def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
         return []
+
+    def replaced(self, **values) -> Pin:
+        """The same Pin with another displacement, rotation or center."""
+        return Pin(self.vertices, self.components, **{**self._motion.as_arguments(), **values})
 
     def __repr__(self) -> str:
         return f"Pin({len(self.vertices)} vertices, components {self.components}{self._motion.summary()})"
@@ -90,6 +100,8 @@ class Clamp:
     Clamp(2 edges)
     """
 
+    _replaceable = ("displacement", "rotation", "center")
+
     def __init__(self, edges, *, displacement=None, rotation=None, center=None):
         self.edges = selection("Clamp edges", edges)
         self._motion = _Motion(displacement, rotation, center)
@@ -103,11 +115,15 @@ class Clamp:
         # Continues the face in its own plane, so that a clamped flat sheet has no fold at its clamp.
         return [DirectedEdges(edges, continuations(mesh, edges), self._motion_on(mesh))]
 
+    def replaced(self, **values) -> Clamp:
+        """The same Clamp with another displacement, rotation or center."""
+        return Clamp(self.edges, **{**self._motion.as_arguments(), **values})
+
     def _checked(self, mesh: TriangleMesh) -> np.ndarray:
         return indices("Clamp edges", self.edges, mesh.n_edges)
 
     def _motion_on(self, mesh: TriangleMesh) -> RigidMotion | None:
-        return self._motion.about(mesh.rest_positions[np.unique(mesh.edges[self._checked(mesh)])])
+        return self._motion.about(mesh.rest_positions[np.unique(mesh.edges[self._checked(mesh)])], self)
 
     def __repr__(self) -> str:
         return f"Clamp({len(self.edges)} edges{self._motion.summary()})"
@@ -188,13 +204,16 @@ class _Motion:
         if center is not None and rotation is None:
             raise ValueError("center is that of a rotation: give a rotation [rad] too")
 
-    def about(self, points: np.ndarray) -> RigidMotion | None:
+    def as_arguments(self) -> dict[str, np.ndarray | None]:
+        return {"displacement": self.displacement, "rotation": self.rotation, "center": self.center}
+
+    def about(self, points: np.ndarray, support) -> RigidMotion | None:
         if self.displacement is None and self.rotation is None:
             return None
         zero = np.zeros(3)
         center = points.mean(axis=0) if self.center is None else self.center
         translation = zero if self.displacement is None else self.displacement
-        return RigidMotion(center, zero if self.rotation is None else self.rotation, translation)
+        return RigidMotion(center, zero if self.rotation is None else self.rotation, translation, support)
 
     def summary(self) -> str:
         done = [word for word, value in (("moved", self.displacement), ("turned", self.rotation)) if value is not None]

@@ -31,17 +31,21 @@ BendingTerm::BendingTerm(const Sheet& sheet, const Schedule& schedule, const Sys
 }
 
 void BendingTerm::set_material(const std::vector<SheetMaterial>& materials, const VectorXd& curvature_scale) {
+    materials_ = materials;
+    curvature_scale_ = curvature_scale;
     for (Index pack = 0; pack < face_packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = element_of(pack, lane, sheet_.n_faces());
-            const std::array<Index, 3>& c = sheet_.corners[f];
-            const Vec3 x[3] = {sheet_.rest[c[0]], sheet_.rest[c[1]], sheet_.rest[c[2]]};
-            const std::array<Index, 3>& e = sheet_.edges[f];
-            const Vec3 scale(curvature_scale[e[0]], curvature_scale[e[1]], curvature_scale[e[2]]);
-            const Mat3 scaled =
-                scale.asDiagonal() * RestFace(x).bending_stiffness(materials[f]) * scale.asDiagonal();
+            const Vec3 scale = curvature_scales(f);
+            const Mat3 stiffness = RestFace(sheet_.rest_corners(f).data()).bending_stiffness(materials[f]);
+            const Mat3 scaled = scale.asDiagonal() * stiffness * scale.asDiagonal();
             set_lane(stiffness_[pack], lane, scaled);
         }
+}
+
+Vec3 BendingTerm::curvature_scales(Index face) const {
+    const std::array<Index, 3>& e = sheet_.edges[face];
+    return {curvature_scale_[e[0]], curvature_scale_[e[1]], curvature_scale_[e[2]]};
 }
 
 // Lanes past the last fold repeat it.
@@ -230,7 +234,7 @@ void BendingTerm::assemble_folds(Index first, Index last, const double* q, const
         scatter_blocks<4>(out, sheet_.folds[h].nodes, fold_slots_[h], curvature.block, h - first);
 }
 
-void BendingTerm::extrapolate(const double* p) {
+void BendingTerm::store_rates(const double* p) {
     schedule_.each([&](const Part& part) {
         for (Index h = part.first_fold; h < part.last_fold; ++h) {
             folds_[h].rate = 0.0;
@@ -239,6 +243,10 @@ void BendingTerm::extrapolate(const double* p) {
                     folds_[h].rate += folds_[h].gradient[3 * k + c] * p[3 * sheet_.folds[h].nodes[k] + c];
         }
     });
+}
+
+void BendingTerm::extrapolate(const double* p) {
+    store_rates(p);
     schedule_.each([&](const Part& part) {
         for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) {
             Pack rate[3], change[3];
@@ -247,6 +255,35 @@ void BendingTerm::extrapolate(const double* p) {
             for (int i = 0; i < 3; ++i) extrapolated_[pack].at[i] = stress_[pack].at[i] + change[i];
         }
     });
+}
+
+// With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T C + C e_i e_i^T.
+void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, SceneGradient& out) {
+    store_rates(lambda);
+    std::vector<Vec3> by_scale(sheet_.n_faces());
+    schedule_.each([&](const Part& part) {
+        for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) {
+            Pack delta[3], rate[3], stress_rate[3];
+            strain(pack, q, &FoldState::turn, delta);
+            strain(pack, lambda, &FoldState::rate, rate);
+            stiffness_[pack].times(rate, stress_rate);
+            for (Index f = pack * Pack::width; f < std::min((pack + 1) * Pack::width, sheet_.n_faces()); ++f) {
+                const int lane = f % Pack::width;
+                const SheetMaterial& m = materials_[f];
+                const Vec3 d = lane_of(delta, lane), along = lane_of(rate, lane), scale = curvature_scales(f);
+                const Vec3 stress = lane_of(stress_[pack].at, lane);
+                const Mat3 by_poisson_ratio = RestFace(sheet_.rest_corners(f).data()).bending_by_poisson_ratio(m);
+                const double work = along.dot(stress);
+                const Index user = sheet_.faces.user[f];
+                out.young_modulus[user] += work / m.young_modulus;
+                out.thickness[user] += 3.0 * work / m.thickness;
+                out.poisson_ratio[user] += along.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d));
+                by_scale[f] = (along.cwiseProduct(stress) + d.cwiseProduct(lane_of(stress_rate, lane))).cwiseQuotient(scale);
+            }
+        }
+    });
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        for (int i = 0; i < 3; ++i) out.curvature_scale[sheet_.edges[f][i]] += by_scale[f][i];
 }
 
 // A fold angle is exact to about one unit of round-off of a radian, and no better than the positions over the heights of
@@ -264,7 +301,7 @@ void BendingTerm::add_cancelling_forces(VectorXd& out) const {
 }
 
 std::size_t BendingTerm::bytes() const {
-    return bytes_of(face_slots_) + bytes_of(fold_slots_) + bytes_of(stiffness_) + bytes_of(stress_) +
+    return bytes_of(face_slots_) + bytes_of(fold_slots_) + bytes_of(materials_) + bytes_of(stiffness_) + bytes_of(stress_) +
            bytes_of(extrapolated_) + bytes_of(folds_);
 }
 

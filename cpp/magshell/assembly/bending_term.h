@@ -25,6 +25,7 @@ class BendingTerm final : public Term {
     void assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void extrapolate(const double* p) override;
+    void vjp(const double* q, const Controls&, const double* lambda, SceneGradient& out) override;
     void add_cancelling_forces(VectorXd& out) const override;
     std::size_t bytes() const override;
 
@@ -51,6 +52,8 @@ class BendingTerm final : public Term {
     void strain(Index pack, const double* q, const double FoldState::*turn, Pack delta[3]) const;
     double moment(const FoldStencil& fold, const std::vector<Stress>& stress) const;
     void store_folds(const double* q);
+    void store_rates(const double* p);
+    Vec3 curvature_scales(Index face) const;
     void add_forces(Residual& out) const;
     void assemble_faces(Index pack, SystemMatrix& out) const;
     void assemble_folds(Index first, Index last, const double* q, const std::vector<Stress>& stress,
@@ -60,6 +63,8 @@ class BendingTerm final : public Term {
     const Schedule& schedule_;
     std::vector<FaceSlots> face_slots_;
     std::vector<PairSlots<4>> fold_slots_;
+    std::vector<SheetMaterial> materials_;
+    VectorXd curvature_scale_;
     std::vector<Symmetric3> stiffness_;
     std::vector<Stress> stress_, extrapolated_;
     std::vector<FoldState> folds_;

@@ -54,6 +54,24 @@ void CoupleTerm::evaluate(const double* q, const Controls& controls, Residual& o
     }
 }
 
+void CoupleTerm::set_couples(const VectorXd& couples) {
+    for (std::size_t k = 0; k < couples_.size(); ++k) couples_[k].couple = couples[k];
+}
+
+void CoupleTerm::vjp(const double* q, const Controls& controls, const double* lambda, SceneGradient& out) {
+    for (std::size_t k = 0; k < couples_.size(); ++k) {
+        const Couple& couple = couples_[k];
+        Pack3 g[4];
+        fold_at(couple, q).gradient(g);
+        double turn_rate = 0.0;
+        for (int node = 0; node < 4; ++node)
+            turn_rate += lane_of(g[node], 0).dot(Eigen::Map<const Vec3>(lambda + 3 * couple.nodes[node]));
+        if (couple.rotation >= 0) turn_rate -= couple.rotation_sign * lambda[3 * sheet_.n_nodes() + couple.rotation];
+        out.couples[k] = -controls.load * turn_rate;
+        out.controls.load -= couple.couple * turn_rate;
+    }
+}
+
 void CoupleTerm::finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const {
     for (std::size_t k = 0; k < couples_.size(); ++k) {
         FoldCurvature curvature(fold_at(couples_[k], q));

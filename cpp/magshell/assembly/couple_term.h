@@ -18,15 +18,20 @@ class CoupleTerm final : public Term {
         double rest_angle;
         Index rotation;       // -1 without directors
         double rotation_sign;
-        double couple;        // [N m]
+        double couple = 0.0;  // [N m]
     };
 
     CoupleTerm(const Sheet& sheet, const SystemMatrix& matrix, std::vector<Couple> couples);
+
+    Index count() const { return static_cast<Index>(couples_.size()); }
+    /// [N m], one each.
+    void set_couples(const VectorXd& couples);
 
     std::string_view name() const override { return "couple"; }
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, SceneGradient& out) override;
     std::vector<double> memory() const override { return last_turn_; }
     void set_memory(const std::vector<double>& turns) override { last_turn_ = turns; }
     std::size_t bytes() const override { return bytes_of(couples_) + bytes_of(slots_); }

@@ -31,6 +31,10 @@ inline void set_lane(Symmetric3& pack, int lane, const Mat3& from) {
         for (int j = 0; j <= i; ++j) pack.at[lower_index(i, j)].set(lane, from(i, j));
 }
 
+inline Vec3 lane_of(const Pack v[3], int lane) { return {v[0][lane], v[1][lane], v[2][lane]}; }
+
+inline Vec3 lane_of(const Pack3& v, int lane) { return {v.x[lane], v.y[lane], v.z[lane]}; }
+
 /// The nodes of an element, as three-vectors of packs.
 template <int N>
 inline void gather_nodes(const double* q, const std::array<Index, N> (&nodes)[Pack::width], Pack3 x[N]) {

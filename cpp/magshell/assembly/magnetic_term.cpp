@@ -7,24 +7,29 @@ namespace {
 
 Pack3 broadcast(const Vec3& v) { return {Pack(v.x()), Pack(v.y()), Pack(v.z())}; }
 
+// (a~_1, a~_2, n~)
+Mat3 rest_frame(const Sheet& sheet, Index face) {
+    const std::array<Vec3, 3> x = sheet.rest_corners(face);
+    const Vec3 a1 = x[1] - x[0], a2 = x[2] - x[0];
+    Mat3 frame;
+    frame << a1, a2, a1.cross(a2).normalized();
+    return frame;
+}
+
 }  // namespace
 
-MagneticTerm::MagneticTerm(const Sheet& sheet, const FaceLoop& loop,
-                           std::vector<std::shared_ptr<const AppliedField>> sources)
-    : sheet_(sheet), loop_(loop), sources_(std::move(sources)), elements_(loop.packs()) {}
+MagneticTerm::MagneticTerm(const Sheet& sheet, const FaceLoop& loop)
+    : sheet_(sheet), loop_(loop), elements_(loop.packs()) {}
 
 void MagneticTerm::set_magnetization(const std::vector<Vec3>& remanent_magnetization,
                                      const std::vector<double>& thickness) {
     normal_magnetization_ = false;
+    thickness_ = thickness;
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = loop_.face(pack, lane);
-            const std::array<Index, 3>& c = sheet_.corners[f];
-            const Vec3 a1 = sheet_.rest[c[1]] - sheet_.rest[c[0]], a2 = sheet_.rest[c[2]] - sheet_.rest[c[0]];
-            const Vec3 across = a1.cross(a2);
-            Mat3 frame;
-            frame << a1, a2, across.normalized();
-            const Vec3 m = remanent_magnetization[f];
+            const Mat3 frame = rest_frame(sheet_, f);
+            const Vec3 across = frame.col(0).cross(frame.col(1)), m = remanent_magnetization[f];
             Vec3 coordinates = frame.inverse() * m;
             // What the inverse leaves of a tangential magnetization along the normal is round-off, not magnetization.
             if (std::abs(coordinates[2]) <= 1e-14 * m.norm()) coordinates[2] = 0.0;
@@ -36,19 +41,25 @@ void MagneticTerm::set_magnetization(const std::vector<Vec3>& remanent_magnetiza
         }
 }
 
-std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Controls& controls, int order) const {
-    const Index n = sheet_.n_faces();
-    std::vector<Vec3> points(n), moments(n);
+void MagneticTerm::place(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const {
+    points.resize(sheet_.n_faces());
+    magnetizations.resize(sheet_.n_faces());
     loop_.each_pack([&](Index pack) {
         Pack3 x[3];
         loop_.gather(pack, q, x);
         const Pack3 centre = Pack(1.0 / 3.0) * (x[0] + x[1] + x[2]);
         const Pack3 m = Magnetic(x).magnetization(elements_[pack]);
         for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            points[loop_.face(pack, lane)] = {centre.x[lane], centre.y[lane], centre.z[lane]};
-            moments[loop_.face(pack, lane)] = {m.x[lane], m.y[lane], m.z[lane]};
+            points[loop_.face(pack, lane)] = lane_of(centre, lane);
+            magnetizations[loop_.face(pack, lane)] = lane_of(m, lane);
         }
     });
+}
+
+std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Controls& controls, int order) const {
+    const Index n = sheet_.n_faces();
+    std::vector<Vec3> points, moments;
+    place(q, points, moments);
     FieldSamples samples;
     samples.reset(n, order);
     for (const std::shared_ptr<const AppliedField>& source : sources_)
@@ -116,6 +127,60 @@ void MagneticTerm::assemble(const Part& part, const double* q, const Controls& c
     });
 }
 
-std::size_t MagneticTerm::bytes() const { return bytes_of(elements_); }
+// The rate of the energy along lambda, with M' and v the rates of F_0 M~_r and of x_b and G = dB/dx,
+//
+//   D = - A~ h (M' . B + M . G v),   M' = alpha a_1' + beta a_2' + gamma n',
+//
+// is linear in (alpha, beta, gamma), in the thickness and in the field.
+void MagneticTerm::vjp(const double* q, const Controls& controls, const double* lambda, SceneGradient& out) {
+    const Index n = sheet_.n_faces();
+    std::vector<Vec3> points, magnetizations;
+    place(q, points, magnetizations);
+    FieldSamples samples;
+    samples.reset(n, 1);
+    for (const std::shared_ptr<const AppliedField>& source : sources_)
+        source->add_samples(points, magnetizations, 1, 1.0, samples);
+
+    FieldProbe probe;  // - A~ h (M', M, v)
+    probe.flux.resize(n), probe.moment.resize(n), probe.direction.resize(n);
+    loop_.each_pack([&](Index pack) {
+        Pack3 x[3], rate[3];
+        loop_.gather(pack, q, x);
+        loop_.gather(pack, lambda, rate);
+        const Magnetic face(x);
+        const Pack3 turn = face.normal_rate(rate);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.face(pack, lane);
+            const Magnetic::Element& e = elements_[pack];
+            const Vec3 coordinates(e.alpha[lane], e.beta[lane], e.gamma[lane]), at[3] = {
+                lane_of(rate[0], lane), lane_of(rate[1], lane), lane_of(rate[2], lane)};
+            Mat3 frame, frame_rate;
+            frame << lane_of(face.a1, lane), lane_of(face.a2, lane), lane_of(face.normal, lane);
+            frame_rate << at[1] - at[0], at[2] - at[0], lane_of(turn, lane);
+            const Vec3 v = (at[0] + at[1] + at[2]) / 3.0;
+            const Vec3 flux = controls.flux_density + controls.field * samples.flux[f];
+            const Vec3 flux_rate = controls.field * (samples.gradient[f] * v);
+            const double volume = e.volume[lane];
+            const Vec3 by_coordinates =
+                -volume * (frame_rate.transpose() * flux + frame.transpose() * flux_rate);
+            const Index user = sheet_.faces.user[f];
+            out.remanent_magnetization.row(user) =
+                rest_frame(sheet_, f).transpose().inverse() * by_coordinates;
+            out.thickness[user] += by_coordinates.dot(coordinates) / thickness_[f];
+            probe.flux[f] = -volume * (frame_rate * coordinates);
+            probe.moment[f] = -volume * magnetizations[f];
+            probe.direction[f] = v;
+        }
+    });
+    for (Index f = 0; f < n; ++f) {
+        out.controls.flux_density += probe.flux[f];
+        out.controls.field += probe.flux[f].dot(samples.flux[f]) +
+                              probe.moment[f].dot(samples.gradient[f] * probe.direction[f]);
+    }
+    for (const std::shared_ptr<const AppliedField>& source : sources_)
+        out.field_sources.push_back(source->vjp(points, probe, controls.field));
+}
+
+std::size_t MagneticTerm::bytes() const { return bytes_of(elements_) + bytes_of(thickness_); }
 
 }  // namespace magshell

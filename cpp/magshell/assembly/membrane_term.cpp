@@ -14,12 +14,11 @@ MembraneTerm::MembraneTerm(const Sheet& sheet, const FaceLoop& loop)
 }
 
 void MembraneTerm::set_material(const std::vector<SheetMaterial>& materials) {
+    materials_ = materials;
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = loop_.face(pack, lane);
-            const std::array<Index, 3>& c = sheet_.corners[f];
-            const Vec3 x[3] = {sheet_.rest[c[0]], sheet_.rest[c[1]], sheet_.rest[c[2]]};
-            set_lane(elements_[pack].stiffness, lane, RestFace(x).membrane_stiffness(materials[f]));
+            set_lane(elements_[pack].stiffness, lane, RestFace(sheet_.rest_corners(f).data()).membrane_stiffness(materials[f]));
         }
 }
 
@@ -72,6 +71,28 @@ void MembraneTerm::extrapolate(const double* p) {
     });
 }
 
+void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, SceneGradient& out) {
+    loop_.each_pack([&](Index pack) {
+        Pack3 x[3], along[3];
+        Pack strain[3], rate[3];
+        loop_.gather(pack, q, x);
+        loop_.gather(pack, lambda, along);
+        const Membrane membrane(x);
+        membrane.strain(elements_[pack], strain);
+        membrane.strain_rate(along, rate);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.face(pack, lane);
+            const SheetMaterial& m = materials_[f];
+            const double work = lane_of(rate, lane).dot(lane_of(stress_[pack].at, lane));
+            const Mat3 by_poisson_ratio = RestFace(sheet_.rest_corners(f).data()).membrane_by_poisson_ratio(m);
+            const Index user = sheet_.faces.user[f];
+            out.young_modulus[user] += work / m.young_modulus;
+            out.thickness[user] += work / m.thickness;
+            out.poisson_ratio[user] += lane_of(rate, lane).dot(by_poisson_ratio * lane_of(strain, lane));
+        }
+    });
+}
+
 // |a|^2 carries its own round-off, and that of the positions whose difference a is: far from the origin, or beside long
 // radii, the larger one.
 void MembraneTerm::add_cancelling_forces(VectorXd& out) const {
@@ -93,7 +114,7 @@ void MembraneTerm::add_cancelling_forces(VectorXd& out) const {
 }
 
 std::size_t MembraneTerm::bytes() const {
-    return bytes_of(elements_) + bytes_of(stress_) + bytes_of(extrapolated_) + bytes_of(state_);
+    return bytes_of(materials_) + bytes_of(elements_) + bytes_of(stress_) + bytes_of(extrapolated_) + bytes_of(state_);
 }
 
 }  // namespace magshell

@@ -21,6 +21,7 @@ class MembraneTerm final : public Term {
     void assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void extrapolate(const double* p) override;
+    void vjp(const double* q, const Controls&, const double* lambda, SceneGradient& out) override;
     void add_cancelling_forces(VectorXd& out) const override;
     std::size_t bytes() const override;
 
@@ -31,6 +32,7 @@ class MembraneTerm final : public Term {
 
     const Sheet& sheet_;
     const FaceLoop& loop_;
+    std::vector<SheetMaterial> materials_;
     std::vector<Membrane::Element> elements_;
     std::vector<Stress> stress_, extrapolated_;
     std::vector<double> state_;  // the nodes at which stress_ holds

@@ -56,39 +56,67 @@ double extent_of(const TriangleMesh& mesh) {
 Model::Model(SceneInput input)
     : sheet_(input.mesh, input.directed_edges, input.directions, input.directors),
       matrix_(sheet_.n_nodes(), sheet_.n_rotations(), all_stencils(sheet_, input)),
-      reduction_(matrix_, renumbered(input.held, sheet_), input.motions, sheet_.rest, sheet_.n_vertices()),
+      reduction_(matrix_, renumbered(input.held, sheet_), sheet_.rest, sheet_.n_vertices()),
       schedule_(sheet_),
       faces_(sheet_, schedule_, matrix_),
       metric_(area_metric(sheet_)),
       extent_(extent_of(input.mesh)) {
-    const std::vector<SheetMaterial> materials = renumbered(input.materials, sheet_);
-    for (const SheetMaterial& m : materials) thickness_.push_back(m.thickness);
-
-    auto membrane = std::make_unique<MembraneTerm>(sheet_, faces_);
-    membrane->set_material(materials);
-    terms_.push_back(std::move(membrane));
-    auto bending = std::make_unique<BendingTerm>(sheet_, schedule_, matrix_);
-    bending->set_material(materials, input.curvature_scale);
-    terms_.push_back(std::move(bending));
-    if (input.magnetic) {
-        auto magnetic = std::make_unique<MagneticTerm>(sheet_, faces_, input.field_sources);
-        magnetic_ = magnetic.get();
-        magnetic_->set_magnetization(std::vector<Vec3>(sheet_.n_faces(), Vec3::Zero()), thickness_);
-        terms_.push_back(std::move(magnetic));
-    }
-    if (!input.gravity.isZero(0.0)) {
-        const Rows3 weight = input.vertex_mass * input.gravity.transpose();
-        terms_.push_back(
-            std::make_unique<LoadTerm>("gravity", node_forces(weight, sheet_), &Controls::gravity));
-    }
-    if (input.vertex_loads.rows() > 0)
-        terms_.push_back(
-            std::make_unique<LoadTerm>("loads", node_forces(input.vertex_loads, sheet_), &Controls::load));
-    if (!input.couples.empty()) add_couples(input);
-
+    add_terms(input);
     share_out_columns();
+    set_values(input.values);
+}
+
+template <class T>
+T* Model::add(std::unique_ptr<T> term) {
+    T* added = term.get();
+    terms_.push_back(std::move(term));
+    return added;
+}
+
+void Model::add_terms(const SceneInput& input) {
+    const SceneValues& values = input.values;
+    const VectorXd no_forces = VectorXd::Zero(3 * sheet_.n_nodes());
+    membrane_ = add(std::make_unique<MembraneTerm>(sheet_, faces_));
+    bending_ = add(std::make_unique<BendingTerm>(sheet_, schedule_, matrix_));
+    if (input.magnetic) magnetic_ = add(std::make_unique<MagneticTerm>(sheet_, faces_));
+    if (!values.gravity.isZero(0.0))
+        gravity_ = add(std::make_unique<LoadTerm>("gravity", no_forces, &Controls::gravity, &SceneGradient::weights));
+    if (values.vertex_loads.rows() > 0)
+        loads_ = add(std::make_unique<LoadTerm>("loads", no_forces, &Controls::load, &SceneGradient::loads));
+    if (!input.couples.empty()) add_couples(input);
+}
+
+void Model::set_values(const SceneValues& values) {
+    const std::vector<SheetMaterial> materials = renumbered(values.materials, sheet_);
+    thickness_.clear();
+    for (const SheetMaterial& m : materials) thickness_.push_back(m.thickness);
+    membrane_->set_material(materials);
+    bending_->set_material(materials, values.curvature_scale);
+    if (magnetic_) {
+        magnetic_->set_sources(values.field_sources);
+        magnetic_->set_magnetization(std::vector<Vec3>(sheet_.n_faces(), Vec3::Zero()), thickness_);
+    }
+    if (gravity_) gravity_->set_forces(node_forces(values.vertex_mass * values.gravity.transpose(), sheet_));
+    if (loads_) loads_->set_forces(node_forces(values.vertex_loads, sheet_));
+    if (couples_) couples_->set_couples(values.couples);
+    reduction_.set_motions(values.motions);
     cancelling_forces_ = VectorXd::Zero(size());
     for (const std::unique_ptr<Term>& term : terms_) term->add_cancelling_forces(cancelling_forces_);
+}
+
+SceneGradient Model::vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda) {
+    SceneGradient gradient;
+    gradient.thickness = gradient.young_modulus = gradient.poisson_ratio = VectorXd::Zero(sheet_.n_faces());
+    gradient.curvature_scale = VectorXd::Zero(sheet_.n_edges());
+    if (magnetic_) gradient.remanent_magnetization = Rows3::Zero(sheet_.n_faces(), 3);
+    if (couples_) gradient.couples = VectorXd::Zero(couples_->count());
+    for (const std::unique_ptr<Term>& term : terms_) term->vjp(q.data(), controls, lambda.data(), gradient);
+    return gradient;
+}
+
+std::unique_ptr<Factor> Model::new_factor() {
+    if (!analysed_) analysed_ = analyze(reduction_.pattern());
+    return analysed_->sibling();
 }
 
 void Model::add_couples(const SceneInput& input) {
@@ -105,9 +133,9 @@ void Model::add_couples(const SceneInput& input) {
         for (int k = 0; k < 4; ++k)
             for (int lane = 0; lane < Pack::width; ++lane) set_lane(x[k], lane, sheet_.rest[nodes[k]]);
         const double rest_angle = Fold(x[0], x[1], x[2], x[3], Pack(0.0)).angle()[0];
-        couples.push_back({nodes, rest_angle, sheet_.rotation_of_edge[given.edge], forward ? 1.0 : -1.0, given.couple});
+        couples.push_back({nodes, rest_angle, sheet_.rotation_of_edge[given.edge], forward ? 1.0 : -1.0, 0.0});
     }
-    terms_.push_back(std::make_unique<CoupleTerm>(sheet_, matrix_, std::move(couples)));
+    couples_ = add(std::make_unique<CoupleTerm>(sheet_, matrix_, std::move(couples)));
 }
 
 void Model::set_magnetization(const Rows3& remanent_magnetization) {
@@ -124,12 +152,18 @@ VectorXd Model::rest_state() const {
 }
 
 VectorXd Model::state(const Rows3& positions, const VectorXd& edge_rotations) const {
-    VectorXd q = rest_state();
-    for (Index v = 0; v < sheet_.n_vertices(); ++v)
-        q.segment<3>(3 * v) = positions.row(sheet_.vertices.user[v]).transpose();
-    for (Index r = 0; r < sheet_.n_rotations(); ++r)
-        q[3 * sheet_.n_nodes() + r] = edge_rotations[sheet_.edge_of_rotation[r]];
+    VectorXd q = gradient_by_state(positions, edge_rotations);
+    for (Index node = sheet_.n_vertices(); node < sheet_.n_nodes(); ++node) q.segment<3>(3 * node) = sheet_.rest[node];
     return q;
+}
+
+VectorXd Model::gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const {
+    VectorXd gradient = VectorXd::Zero(size());
+    for (Index v = 0; v < sheet_.n_vertices(); ++v)
+        gradient.segment<3>(3 * v) = by_positions.row(sheet_.vertices.user[v]).transpose();
+    for (Index r = 0; r < sheet_.n_rotations(); ++r)
+        gradient[3 * sheet_.n_nodes() + r] = by_edge_rotations[sheet_.edge_of_rotation[r]];
+    return gradient;
 }
 
 Rows3 Model::positions(const VectorXd& q) const {

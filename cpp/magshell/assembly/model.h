@@ -14,38 +14,18 @@
 #include "magshell/assembly/magnetic_term.h"
 #include "magshell/assembly/membrane_term.h"
 #include "magshell/assembly/reduction.h"
+#include "magshell/assembly/scene_input.h"
+#include "magshell/linalg/factor.h"
 
 namespace magshell {
-
-/// A couple on a free edge, in the caller's numbering; `direction` is a row of SceneInput::directions.
-struct EdgeCoupleInput {
-    Index edge, direction;
-    double couple;  // [N m], about the edge with the sheet to its left
-};
-
-/// A scene as the caller describes it, in the caller's numbering. Held nodes count vertices first, then directions.
-struct SceneInput {
-    explicit SceneInput(TriangleMesh mesh_) : mesh(std::move(mesh_)) {}
-
-    TriangleMesh mesh;
-    bool directors = true;  // midedge; false: hinge
-    std::vector<DirectedEdge> directed_edges;
-    Rows3 directions;  // (n_d, 3), of directed edges and of couples
-    std::vector<HeldNode> held;
-    std::vector<Motion> motions;
-    std::vector<SheetMaterial> materials;  // one a face
-    VectorXd curvature_scale;              // one an edge
-    VectorXd vertex_mass;                  // [kg], for gravity
-    Vec3 gravity = Vec3::Zero();           // [m/s2]
-    Rows3 vertex_loads;                    // (n_v, 3) [N], or empty
-    std::vector<EdgeCoupleInput> couples;
-    bool magnetic = false;
-    std::vector<std::shared_ptr<const AppliedField>> field_sources;
-};
 
 class Model {
   public:
     explicit Model(SceneInput input);
+
+    /// New values for what the scene was built with; they have the same shapes and the same terms. The magnetization
+    /// has to be set again after them, as it takes its volumes from the thickness.
+    void set_values(const SceneValues& values);
 
     /// (n_f, 3) [A/m], rest frame, world axes. Only of a scene that was said to be magnetic.
     void set_magnetization(const Rows3& remanent_magnetization);
@@ -62,6 +42,8 @@ class Model {
     VectorXd rest_state() const;
     /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,), and back.
     VectorXd state(const Rows3& positions, const VectorXd& edge_rotations) const;
+    /// A gradient by the caller's positions and edge rotations as one by all unknowns.
+    VectorXd gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const;
     Rows3 positions(const VectorXd& q) const;
     VectorXd edge_rotations(const VectorXd& q) const;
     /// A vector of all unknowns (a gradient, a mode) as rows of the caller's vertices.
@@ -78,6 +60,12 @@ class Model {
     /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in them.
     VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
 
+    /// lambda . dg/dk at the last evaluated state, for all k but what supports do; lambda is zero where they hold.
+    SceneGradient vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda);
+
+    /// A factorization for the reduced Hessian, analysed once for all of them.
+    std::unique_ptr<Factor> new_factor();
+
     /// What the terms remember of how the state was reached. An empty memory is that of the rest state.
     using Memory = std::vector<std::vector<double>>;
     Memory memory() const;
@@ -87,7 +75,10 @@ class Model {
     std::mutex& in_use() { return in_use_; }
 
   private:
+    void add_terms(const SceneInput& input);
     void add_couples(const SceneInput& input);
+    template <class T>
+    T* add(std::unique_ptr<T> term);
     void share_out_columns();
 
     Sheet sheet_;
@@ -98,7 +89,12 @@ class Model {
     std::vector<std::unique_ptr<Term>> terms_;
     // By part: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
     std::vector<std::vector<Index>> first_nodes_, first_rotations_;
+    MembraneTerm* membrane_ = nullptr;
+    BendingTerm* bending_ = nullptr;
     MagneticTerm* magnetic_ = nullptr;
+    LoadTerm *gravity_ = nullptr, *loads_ = nullptr;
+    CoupleTerm* couples_ = nullptr;
+    std::unique_ptr<Factor> analysed_;
     std::vector<double> thickness_;  // in our numbering
     Residual residual_;
     VectorXd metric_;             // area at each unknown of a vertex, zero for directions and rotations

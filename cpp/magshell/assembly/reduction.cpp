@@ -1,28 +1,12 @@
 #include "magshell/assembly/reduction.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 
 namespace magshell {
-namespace {
 
-Mat3 rotation(const Vec3& vector) {
-    const double angle = vector.norm();
-    if (angle == 0.0) return Mat3::Identity();
-    return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
-}
-
-}  // namespace
-
-Vec3 Motion::point(const Vec3& rest, double progress) const {
-    return centre + rotation(progress * rotation_vector) * (rest - centre) + progress * translation;
-}
-
-Vec3 Motion::direction(const Vec3& rest, double progress) const { return rotation(progress * rotation_vector) * rest; }
-
-Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, std::vector<Motion> motions,
-                     const std::vector<Vec3>& rest, Index n_vertices)
-    : held_(std::move(held)), motions_(std::move(motions)), rest_(rest), n_vertices_(n_vertices), full_size_(matrix.size()) {
+Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const std::vector<Vec3>& rest,
+                     Index n_vertices)
+    : held_(std::move(held)), rest_(rest), n_vertices_(n_vertices), full_size_(matrix.size()) {
     std::vector<char> is_held(matrix.size(), 0);
     for (Index k = 0; k < static_cast<Index>(held_.size()); ++k) {
         const HeldNode& h = held_[k];
@@ -71,17 +55,47 @@ VectorXd Reduction::prescribed_increment(const VectorXd& q, double progress) con
         if (h.motion >= 0)
             wanted = h.node < n_vertices_ ? motions_[h.motion].point(wanted, progress)
                                           : motions_[h.motion].direction(wanted, progress);
-        const Vec3 gap = wanted - q.segment<3>(3 * h.node);
-        for (int axis = 0; axis < h.held; ++axis)
-            increment.segment<3>(3 * h.node) += h.frame.col(axis) * h.frame.col(axis).dot(gap);
+        increment.segment<3>(3 * h.node) = held_part(h, wanted - q.segment<3>(3 * h.node));
     }
     return increment;
 }
 
-VectorXd Reduction::prescribed_rate(const VectorXd& q, double progress) const {
-    if (motions_.empty()) return VectorXd::Zero(q.size());
-    constexpr double step = 1e-4;  // motions turn by at most a few radians: exact to 1e-8
-    return (prescribed_increment(q, progress + step) - prescribed_increment(q, progress - step)) / (2.0 * step);
+Vec3 Reduction::held_part(const HeldNode& h, const Vec3& vector) {
+    Vec3 part = Vec3::Zero();
+    for (int axis = 0; axis < h.held; ++axis) part += h.frame.col(axis) * h.frame.col(axis).dot(vector);
+    return part;
+}
+
+VectorXd Reduction::prescribed_rate(double progress) const {
+    VectorXd rate = VectorXd::Zero(full_size_);
+    for (const HeldNode& h : held_)
+        if (h.motion >= 0) rate.segment<3>(3 * h.node) = held_part(h, rate_of(h, progress));
+    return rate;
+}
+
+Vec3 Reduction::rate_of(const HeldNode& h, double progress) const {
+    const Motion& motion = motions_[h.motion];
+    return h.node < n_vertices_ ? motion.point_rate(rest_[h.node], progress)
+                                : motion.direction_rate(rest_[h.node], progress);
+}
+
+void Reduction::vjp(const VectorXd& by_state, double progress, std::vector<Motion>& by_motion, double& by_progress) const {
+    by_motion.assign(motions_.size(), {});
+    by_progress = 0.0;
+    for (const HeldNode& h : held_) {
+        if (h.motion < 0) continue;
+        const Vec3 by_place = held_part(h, by_state.segment<3>(3 * h.node));
+        const Motion& motion = motions_[h.motion];
+        if (h.node < n_vertices_) motion.point_vjp(rest_[h.node], progress, by_place, by_motion[h.motion]);
+        else motion.direction_vjp(rest_[h.node], progress, by_place, by_motion[h.motion]);
+        by_progress += by_place.dot(rate_of(h, progress));
+    }
+}
+
+double Reduction::largest_turn() const {
+    double turn = 0.0;
+    for (const Motion& motion : motions_) turn = std::max(turn, motion.rotation_vector.norm());
+    return turn;
 }
 
 // B_ij -> Q_i^T B_ij Q_j wherever a framed node is i or j. Row triples of a node's three columns stand as

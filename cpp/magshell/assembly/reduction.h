@@ -6,18 +6,11 @@
 
 #include <vector>
 
+#include "magshell/assembly/motion.h"
 #include "magshell/assembly/system_matrix.h"
 #include "magshell/linalg/factor.h"
 
 namespace magshell {
-
-/// A rigid motion of what a support holds: x -> centre + R(t w)(x - centre) + t u at t = controls.motion.
-struct Motion {
-    Vec3 centre = Vec3::Zero(), rotation_vector = Vec3::Zero(), translation = Vec3::Zero();
-
-    Vec3 point(const Vec3& rest, double progress) const;
-    Vec3 direction(const Vec3& rest, double progress) const;
-};
 
 /// A node and the orthonormal directions along which it is held (the first `held` columns of `frame`).
 struct HeldNode {
@@ -30,8 +23,11 @@ struct HeldNode {
 class Reduction {
   public:
     /// `rest` per node; nodes from `n_vertices` on are directions and turn only.
-    Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, std::vector<Motion> motions,
-              const std::vector<Vec3>& rest, Index n_vertices);
+    Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const std::vector<Vec3>& rest, Index n_vertices);
+
+    /// As many as held nodes refer to.
+    void set_motions(std::vector<Motion> motions) { motions_ = std::move(motions); }
+    bool moves() const { return !motions_.empty(); }
 
     Index size() const { return pattern_.size; }
     const SparsePattern& pattern() const { return pattern_; }
@@ -40,7 +36,13 @@ class Reduction {
     VectorXd prescribed_increment(const VectorXd& q, double progress) const;
 
     /// d(where the supports want their nodes)/d(progress).
-    VectorXd prescribed_rate(const VectorXd& q, double progress) const;
+    VectorXd prescribed_rate(double progress) const;
+
+    /// Sets the gradients by each motion and by their progress, given the gradient by what supports hold.
+    void vjp(const VectorXd& by_state, double progress, std::vector<Motion>& by_motion, double& by_progress) const;
+
+    /// The largest angle [rad] by which a support turns in all.
+    double largest_turn() const;
 
     /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first.
     void matrix(SystemMatrix& full, std::vector<double>& values) const;
@@ -53,6 +55,10 @@ class Reduction {
     std::size_t bytes() const;
 
   private:
+    /// The part of a node's vector along which it is held.
+    static Vec3 held_part(const HeldNode& h, const Vec3& vector);
+    /// How fast its motion carries a node, as the progress changes.
+    Vec3 rate_of(const HeldNode& h, double progress) const;
     bool axis_aligned(const HeldNode& h) const;
     void turn_blocks(SystemMatrix& full) const;
 

@@ -52,6 +52,11 @@ class Sheet {
     Index n_rotations() const { return static_cast<Index>(edge_of_rotation.size()); }
     Index n_unknowns() const { return 3 * n_nodes() + n_rotations(); }
     Index direction_node(Index direction) const { return n_vertices() + direction; }
+    /// The corners of a face at rest [m].
+    std::array<Vec3, 3> rest_corners(Index face) const {
+        const std::array<Index, 3>& c = corners[face];
+        return {rest[c[0]], rest[c[1]], rest[c[2]]};
+    }
     /// The largest coordinate at rest of the corners of a face [m]. A unit of its round-off is how exactly they are known.
     double largest_coordinate(Index face) const;
     /// The smallest height of a face at rest [m].

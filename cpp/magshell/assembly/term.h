@@ -3,6 +3,7 @@
 
 #include <string_view>
 
+#include "magshell/assembly/scene_gradient.h"
 #include "magshell/assembly/schedule.h"
 #include "magshell/energy/controls.h"
 
@@ -55,6 +56,10 @@ class Term {
 
     /// Adds the magnitude of forces that cancel inside the strains themselves, as for |a|^2 - |a~|^2 at rest.
     virtual void add_cancelling_forces(VectorXd& /*out*/) const {}
+
+    /// Adds lambda . dg/dk at the last evaluated state q for every value k of the scene that the term's gradient g
+    /// depends on; lambda is a vector of all unknowns. With dE/dC = 1/2 d d^T this is (J lambda)^T dC/dk d for a strain.
+    virtual void vjp(const double* q, const Controls& controls, const double* lambda, SceneGradient& out) = 0;
 
     /// What the term must know of how its state was reached, such as full turns; a solve that rejects a state puts back
     /// what it was.

@@ -72,6 +72,11 @@ struct Magnetic {
         return (e.volume * Pack(-1.0 / 3.0)) * pull;
     }
 
+    /// How fast the normal turns while the nodes move at these rates.
+    Pack3 normal_rate(const Pack3 rate[3]) const {
+        return tangential(cross(rate[1] - rate[0], a2) + cross(a1, rate[2] - rate[0]));
+    }
+
     /// Lower blocks at lower_index(k, l), in a field taken as uniform.
     void hessian(const Element& e, const Pack3& flux, Pack33 h[6]) const {
         const Pack along = dot(normal, flux);

@@ -34,31 +34,51 @@ struct RestFace {
         }
     }
 
-    Mat3 membrane_stiffness(const SheetMaterial& m) const {
+    Mat3 membrane_stiffness(const SheetMaterial& m) const { return membrane(m).stiffness(m.poisson_ratio); }
+    Mat3 bending_stiffness(const SheetMaterial& m) const { return bending(m).stiffness(m.poisson_ratio); }
+
+    /// dC/dnu. By the modulus C is linear; by the thickness linear (membrane) or cubic (bending).
+    Mat3 membrane_by_poisson_ratio(const SheetMaterial& m) const { return membrane(m).by_poisson_ratio(m.poisson_ratio); }
+    Mat3 bending_by_poisson_ratio(const SheetMaterial& m) const { return bending(m).by_poisson_ratio(m.poisson_ratio); }
+
+  private:
+    // C = modulus / (1 - nu^2) ((1 - nu) products + nu traces)
+    struct PlaneStress {
+        Mat3 products, traces;  // tr(S_i S_j), tr S_i tr S_j
+        double modulus;
+
+        PlaneStress(const Eigen::Matrix2d measure[3], double modulus_) : modulus(modulus_) {
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) {
+                    products(i, j) = (measure[i] * measure[j]).trace();
+                    traces(i, j) = measure[i].trace() * measure[j].trace();
+                }
+        }
+
+        Mat3 stiffness(double nu) const { return modulus / (1.0 - nu * nu) * ((1.0 - nu) * products + nu * traces); }
+
+        // products / (1 + nu) and traces nu / (1 - nu^2), differentiated
+        Mat3 by_poisson_ratio(double nu) const {
+            const double both = 1.0 - nu * nu;
+            return modulus * ((1.0 + nu * nu) / (both * both) * traces - products / ((1.0 + nu) * (1.0 + nu)));
+        }
+    };
+
+    PlaneStress membrane(const SheetMaterial& m) const {
         Eigen::Matrix2d measure[3];
         for (int i = 0; i < 3; ++i) {
             const Eigen::Vector2d &tj = turned_edge[(i + 1) % 3], &tk = turned_edge[(i + 2) % 3];
             measure[i] = (tj * tk.transpose() + tk * tj.transpose()) / (16.0 * area * area);
         }
-        return plane_stress(measure, m.poisson_ratio, m.young_modulus * area * m.thickness);
+        return {measure, m.young_modulus * area * m.thickness};
     }
 
-    Mat3 bending_stiffness(const SheetMaterial& m) const {
+    PlaneStress bending(const SheetMaterial& m) const {
         Eigen::Matrix2d measure[3];
         for (int i = 0; i < 3; ++i)
             measure[i] = turned_edge[i] * turned_edge[i].transpose() / (area * edge_length[i]);
         const double cubed = m.thickness * m.thickness * m.thickness;
-        return plane_stress(measure, m.poisson_ratio, m.young_modulus * area * cubed / 12.0);
-    }
-
-  private:
-    static Mat3 plane_stress(const Eigen::Matrix2d measure[3], double poisson_ratio, double modulus) {
-        Mat3 stiffness;
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j)
-                stiffness(i, j) = (1.0 - poisson_ratio) * (measure[i] * measure[j]).trace() +
-                                  poisson_ratio * measure[i].trace() * measure[j].trace();
-        return modulus / (1.0 - poisson_ratio * poisson_ratio) * stiffness;
+        return {measure, m.young_modulus * area * cubed / 12.0};
     }
 };
 

@@ -21,6 +21,13 @@ struct FieldSamples {
     void reset(std::size_t points, int order);
 };
 
+/// Weights u, m and v at n points, which make one number of a field: sum u . B + m . (dB/dx v).
+struct FieldProbe {
+    std::vector<Vec3> flux;       // u
+    std::vector<Vec3> moment;     // m
+    std::vector<Vec3> direction;  // v
+};
+
 /// An applied flux density B(x).
 class AppliedField {
   public:
@@ -34,6 +41,9 @@ class AppliedField {
     /// at a time.
     virtual void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order,
                              double scale, FieldSamples& out) const = 0;
+
+    /// The gradient of a probe of scale * B by the field's own parameters; empty where it has none.
+    virtual VectorXd vjp(std::span<const Vec3> /*points*/, const FieldProbe&, double /*scale*/) const { return {}; }
 
     /// Whether add_samples runs Python code. It then takes the GIL by itself.
     virtual bool needs_gil() const { return false; }

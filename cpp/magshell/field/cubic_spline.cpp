@@ -40,4 +40,40 @@ std::vector<Vec4> spline_coefficients(std::span<const Vec4> f) {
     return padded;
 }
 
+// The lines of spline_coefficients, transposed and from the last to the first.
+std::vector<Vec4> spline_samples_gradient(std::span<const Vec4> by_coefficients) {
+    const int n = static_cast<int>(by_coefficients.size()) - 2;
+    std::vector<Vec4> c(by_coefficients.begin() + 1, by_coefficients.end() - 1);
+    std::vector<Vec4> f(n, Vec4(Vec4::Zero()));
+    // Of c_outer = 6 f_i - 4 c_i - c_inner.
+    const auto extrapolated = [&](const Vec4& by_outer, int i, int inner) {
+        f[i] += 6.0 * by_outer;
+        c[i] -= 4.0 * by_outer;
+        c[inner] -= by_outer;
+    };
+    extrapolated(by_coefficients.back(), n - 1, n - 2);
+    extrapolated(by_coefficients.front(), 0, 1);
+
+    if (n <= 3) {
+        Vec4 sum = Vec4::Zero();
+        for (int i = 0; i < n; ++i) sum += c[i], f[i] += c[i];
+        if (n == 3) f[0] -= sum / 6.0, f[1] += sum / 3.0, f[2] -= sum / 6.0;
+        return f;
+    }
+    extrapolated(c[n - 1], n - 2, n - 3);
+    extrapolated(c[0], 1, 2);
+    // The interior's matrix is symmetric: c = 6 A^-1 (f - ends / 6).
+    std::vector<Vec4> rhs(n), y(n, Vec4(Vec4::Zero()));
+    for (int i = 2; i <= n - 3; ++i) rhs[i] = c[i] / 6.0;
+    solve_interior(y, rhs, 2, n - 3);
+    for (int i = 2; i <= n - 3; ++i) f[i] += 6.0 * y[i];
+    if (n >= 5) c[1] -= y[2], c[n - 2] -= y[n - 3];
+    for (const int i : {1, n - 2}) {
+        f[i - 1] -= c[i] / 6.0;
+        f[i] += 4.0 / 3.0 * c[i];
+        f[i + 1] -= c[i] / 6.0;
+    }
+    return f;
+}
+
 }  // namespace magshell

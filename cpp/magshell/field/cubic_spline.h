@@ -20,6 +20,9 @@ using Vec4 = Eigen::Vector4d;  // three components and a zero: one vector regist
 /// The coefficients c_{-1} ... c_n that interpolate the samples f_0 ... f_{n-1}, n >= 2.
 std::vector<Vec4> spline_coefficients(std::span<const Vec4> samples);
 
+/// The transpose of spline_coefficients: the gradient by the n samples from that by the n + 2 coefficients.
+std::vector<Vec4> spline_samples_gradient(std::span<const Vec4> by_coefficients);
+
 /// The weights of four neighbouring coefficients: of the value, and of its first and second derivative in t.
 using SplineWeights = std::array<std::array<double, 4>, 3>;
 

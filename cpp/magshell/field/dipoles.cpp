@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "magshell/core/errors.h"
+#include "magshell/core/parallel.h"
 #include "magshell/field/point_loop.h"
 
 namespace magshell {
@@ -67,6 +68,28 @@ void Dipoles::add_samples(std::span<const Vec3> points, std::span<const Vec3> mo
             }
         }
     });
+}
+
+// B and dB/dx are linear in p and, as matrices that take p to u . B and m . dB/dx v, symmetric: by p they are
+// the flux of u and the gradient of m along v. By the place of the dipole they change as by the point, reversed.
+VectorXd Dipoles::vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale) const {
+    const double k = scale * vacuum_permeability / (4.0 * std::numbers::pi);
+    const auto n = static_cast<int>(positions_.size());
+    VectorXd out = VectorXd::Zero(6 * n);
+    parallel_for(n, [&](int d) {
+        Vec3 by_position = Vec3::Zero(), by_moment = Vec3::Zero();
+        for (std::size_t point = 0; point < points.size(); ++point) {
+            const Vec3 r = points[point] - positions_[d], &u = probe.flux[point], &m = probe.moment[point];
+            const double distance = r.norm();
+            const Vec3 e = r / distance, v = probe.direction[point] / distance;
+            const double k3 = k / (distance * distance * distance);
+            by_moment += k3 * (flux(u, e) + 3.0 * gradient(m, e) * v);
+            by_position -= 3.0 * k3 / distance * (gradient(moments_[d], e) * u + curvature(moments_[d], m, e) * v);
+        }
+        out.segment<3>(3 * d) = by_position;
+        out.segment<3>(3 * (n + d)) = by_moment;
+    });
+    return out;
 }
 
 }  // namespace magshell

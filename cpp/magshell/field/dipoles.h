@@ -19,6 +19,9 @@ class Dipoles final : public AppliedField {
     void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
                      FieldSamples& out) const override;
 
+    /// By each position, then by each moment, (2 n, 3) row by row.
+    VectorXd vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale) const override;
+
   private:
     std::vector<Vec3> positions_;
     std::vector<Vec3> moments_;

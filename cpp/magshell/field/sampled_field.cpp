@@ -24,23 +24,22 @@ struct Grid {
     }
 };
 
-// Replaces the samples along one axis by their spline coefficients, two more of them.
-Grid interpolate_along(int axis, const Grid& samples) {
-    const Index n = samples.size[axis];
-    if (n == 1) return samples;
-
-    Grid result{samples.size, {}};
-    result.size[axis] = n + 2;
-    const std::ptrdiff_t stride = samples.stride(axis);  // the same in both grids
-    const std::ptrdiff_t lines = static_cast<std::ptrdiff_t>(samples.values.size()) / n;
-    result.values.resize(lines * (n + 2));
+// Replaces every line of values along one axis by another one, two longer or two shorter.
+Grid map_lines(int axis, const Grid& from, std::vector<Vec4> (*map)(std::span<const Vec4>), Index longer) {
+    const Index n = from.size[axis];
+    Grid result{from.size, {}};
+    result.size[axis] = n + longer;
+    const std::ptrdiff_t stride = from.stride(axis);  // the same in both grids
+    const std::ptrdiff_t lines = static_cast<std::ptrdiff_t>(from.values.size()) / n;
+    result.values.resize(lines * (n + longer));
 
     std::vector<Vec4> line(n);
     for (std::ptrdiff_t l = 0; l < lines; ++l) {
         const std::ptrdiff_t slab = l / stride, offset = l % stride;
-        for (Index i = 0; i < n; ++i) line[i] = samples.values[(slab * n + i) * stride + offset];
-        const std::vector<Vec4> c = spline_coefficients(line);
-        for (Index i = 0; i < n + 2; ++i) result.values[(slab * (n + 2) + i) * stride + offset] = c[i];
+        for (Index i = 0; i < n; ++i) line[i] = from.values[(slab * n + i) * stride + offset];
+        const std::vector<Vec4> mapped = map(line);
+        for (Index i = 0; i < n + longer; ++i)
+            result.values[(slab * (n + longer) + i) * stride + offset] = mapped[i];
     }
     return result;
 }
@@ -60,7 +59,8 @@ SampledField::SampledField(const Vec3& origin, const Vec3& spacing, const std::a
     Grid grid{samples, {}};
     grid.values.reserve(expected);
     for (const Vec3& b : flux_density) grid.values.emplace_back(b.x(), b.y(), b.z(), 0.0);
-    for (int a = 0; a < 3; ++a) grid = interpolate_along(a, grid);
+    for (int a = 0; a < 3; ++a)
+        if (samples[a] > 1) grid = map_lines(a, grid, spline_coefficients, 2);
     for (int a = 0; a < 3; ++a) {
         const bool constant = samples[a] == 1;
         axes_[a] = {origin[a], constant ? 0.0 : 1.0 / spacing[a], samples[a], constant ? 0 : grid.stride(a)};
@@ -78,18 +78,24 @@ bool SampledField::contains(const Vec3& point) const {
     return axes_[0].contains(point[0]) && axes_[1].contains(point[1]) && axes_[2].contains(point[2]);
 }
 
-template <int Order>
-void SampledField::add_sample(std::size_t k, const Vec3& point, const Vec3& moment, double scale,
-                              FieldSamples& out) const {
-    std::array<SplineWeights, 3> w;
-    const Vec4* cell = coefficients_.data();
+SampledField::Cell SampledField::cell_of(const Vec3& point) const {
+    Cell cell;
     for (int a = 0; a < 3; ++a) {
         const Axis& axis = axes_[a];
         const double u = axis.knots_from_origin(point[a]);
         const double i = std::clamp(std::floor(u), 0.0, std::max(axis.samples - 2.0, 0.0));
-        w[a] = spline_weights(u - i);
-        cell += static_cast<std::ptrdiff_t>(i) * axis.stride;
+        cell.weights[a] = spline_weights(u - i);
+        cell.first += static_cast<std::ptrdiff_t>(i) * axis.stride;
     }
+    return cell;
+}
+
+template <int Order>
+void SampledField::add_sample(std::size_t k, const Vec3& point, const Vec3& moment, double scale,
+                              FieldSamples& out) const {
+    const Cell found = cell_of(point);
+    const std::array<SplineWeights, 3>& w = found.weights;
+    const Vec4* cell = coefficients_.data() + found.first;
 
     // Partial derivatives by sum factorisation: d[a][b][c] differentiates a, b and c times along x, y and z.
     constexpr int n = Order + 1;
@@ -146,6 +152,34 @@ void SampledField::add_samples(std::span<const Vec3> points, std::span<const Vec
             add_sample<2>(k, points[k], moments[k], scale, out);
         }
     });
+}
+
+// The samples reach a point through the coefficients around it, linearly. One point after another, as they share them.
+VectorXd SampledField::vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale) const {
+    Grid grid;
+    for (int a = 0; a < 3; ++a) grid.size[a] = axes_[a].samples + (axes_[a].samples > 1 ? 2 : 0);
+    grid.values.assign(coefficients_.size(), Vec4(Vec4::Zero()));
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        const Cell cell = cell_of(points[k]);
+        Vec3 along = probe.direction[k];
+        for (int a = 0; a < 3; ++a) along[a] *= axes_[a].knots_per_metre;
+        const auto& [x, y, z] = cell.weights;
+        for (int i = 0; i < 4; ++i)
+            for (int j = 0; j < 4; ++j)
+                for (int l = 0; l < 4; ++l) {
+                    const double value = x[0][i] * y[0][j] * z[0][l];
+                    const double rate = along[0] * x[1][i] * y[0][j] * z[0][l] +
+                                        along[1] * x[0][i] * y[1][j] * z[0][l] +
+                                        along[2] * x[0][i] * y[0][j] * z[1][l];
+                    grid.values[cell.first + i * axes_[0].stride + j * axes_[1].stride + l * axes_[2].stride]
+                        .head<3>() += scale * (value * probe.flux[k] + rate * probe.moment[k]);
+                }
+    }
+    for (int a = 2; a >= 0; --a)
+        if (axes_[a].samples > 1) grid = map_lines(a, grid, spline_samples_gradient, -2);
+    VectorXd by_samples(3 * grid.values.size());
+    for (std::size_t k = 0; k < grid.values.size(); ++k) by_samples.segment<3>(3 * k) = grid.values[k].head<3>();
+    return by_samples;
 }
 
 }  // namespace magshell

@@ -22,6 +22,9 @@ class SampledField final : public AppliedField {
     void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
                      FieldSamples& out) const override;
 
+    /// By the samples, (nx ny nz, 3) row by row. The points lie in the grid.
+    VectorXd vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale) const override;
+
     /// Whether the point lies in the grid; rounding may carry it out by a billionth of a cell.
     bool contains(const Vec3& point) const;
 
@@ -37,6 +40,13 @@ class SampledField final : public AppliedField {
         double knots_from_origin(double x) const { return (x - origin) * knots_per_metre; }
         bool contains(double x) const;
     };
+
+    // Of 64 coefficients around a point the first, and the weights along each axis.
+    struct Cell {
+        std::ptrdiff_t first = 0;
+        std::array<SplineWeights, 3> weights;
+    };
+    Cell cell_of(const Vec3& point) const;
 
     template <int Order>
     void add_sample(std::size_t k, const Vec3& point, const Vec3& moment, double scale,

@@ -28,7 +28,7 @@ namespace {
 
 class CholmodFactor : public Factor {
   public:
-    CholmodFactor(const SparsePattern& pattern, Ordering ordering) : pattern_(pattern) {
+    CholmodFactor(const SparsePattern& pattern, Ordering ordering) : pattern_(pattern), ordering_(ordering) {
         report_.reason = "factorize() has not been called";
         if (pattern_.size == 0) return;
         const SingleThreaded guard;
@@ -86,6 +86,7 @@ class CholmodFactor : public Factor {
         cholmod_free_dense(&solution, common);
     }
 
+    std::unique_ptr<Factor> sibling() const override { return std::make_unique<CholmodFactor>(pattern_, ordering_); }
     std::string name() const override { return "cholmod"; }
     Index size() const override { return pattern_.size; }
     std::int64_t nonzeros() const override { return nonzeros_; }
@@ -100,6 +101,7 @@ class CholmodFactor : public Factor {
     std::string status() const { return " (its status is " + std::to_string(common_.status()) + ")"; }
 
     SparsePattern pattern_;
+    Ordering ordering_;
     CholmodCommon common_;
     ::cholmod_factor* factor_ = nullptr;
     std::int64_t nonzeros_ = 0;

@@ -41,6 +41,7 @@ class EigenFactor : public Factor {
         rhs = solution;
     }
 
+    std::unique_ptr<Factor> sibling() const override { return std::make_unique<EigenFactor>(pattern_); }
     std::string name() const override { return "eigen"; }
     Index size() const override { return pattern_.size; }
 

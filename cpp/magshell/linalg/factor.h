@@ -61,6 +61,9 @@ class Factor {
     /// factorize() succeeded.
     virtual void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const = 0;
 
+    /// Another one for the same pattern, not factorized yet. They share the analysis where the backend can.
+    virtual std::unique_ptr<Factor> sibling() const = 0;
+
     virtual std::string name() const = 0;
     virtual Index size() const = 0;
     virtual std::int64_t nonzeros() const = 0;  // entries of L, its diagonal included

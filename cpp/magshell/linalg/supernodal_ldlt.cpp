@@ -23,24 +23,37 @@ constexpr double doubtful_growth = 1e8;  // half of the digits are gone: check b
 
 }  // namespace
 
-SupernodalLdlt::SupernodalLdlt(const SparsePattern& pattern, Ordering ordering) : pattern_(pattern) {
+SupernodalLdlt::SupernodalLdlt(const SparsePattern& pattern, Ordering ordering)
+    : SupernodalLdlt(analysed(pattern, ordering)) {}
+
+std::shared_ptr<const SupernodalLdlt::Analysis> SupernodalLdlt::analysed(const SparsePattern& pattern,
+                                                                         Ordering ordering) {
     AssemblyTree tree = ordered_assembly_tree(pattern, ordering);
-    nonzeros_ = tree.nonzeros();
-    flops_ = tree.flops();
-    plan_ = assembly_plan(pattern, std::move(tree));
-    factor_ = slabs::Buffer(plan_.factor_doubles);
-    work_ = slabs::Buffer(plan_.work_doubles);
-    scaled_values_.resize(pattern.rows.size());
-    scale_.resize(pattern.size);
-    diagonal_.resize(pattern.size);
-    coupling_.resize(pattern.size);
-    pivot_order_.resize(pattern.size);
+    Analysis analysis{pattern, {}, tree.nonzeros(), tree.flops()};
+    analysis.plan = assembly_plan(pattern, std::move(tree));
+    return std::make_shared<const Analysis>(std::move(analysis));
+}
+
+SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const Analysis> analysis) : analysis_(std::move(analysis)) {
+    scaled_values_.resize(pattern_.rows.size());
+    scale_.resize(pattern_.size);
+    diagonal_.resize(pattern_.size);
+    coupling_.resize(pattern_.size);
+    pivot_order_.resize(pattern_.size);
     report_.reason = "factorize() has not been called";
+}
+
+std::unique_ptr<Factor> SupernodalLdlt::sibling() const {
+    return std::unique_ptr<Factor>(new SupernodalLdlt(analysis_));
 }
 
 FactorReport SupernodalLdlt::factorize(const double* values) {
     report_ = {};
     report_.reason = "the last factorize() did not finish";
+    if (factor_.size() == 0) {  // an analysis that only has siblings needs none
+        factor_ = slabs::Buffer(plan_.factor_doubles);
+        work_ = slabs::Buffer(plan_.work_doubles);
+    }
     largest_scaled_ = equilibrate(pattern_, values, scale_, scaled_values_);
     values_.assign(values, values + pattern_.rows.size());
 

@@ -23,25 +23,35 @@ class SupernodalLdlt : public Factor {
   public:
     SupernodalLdlt(const SparsePattern& pattern, Ordering ordering);
 
+    std::unique_ptr<Factor> sibling() const override;
     FactorReport factorize(const double* values) override;
     void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const override;
 
     std::string name() const override { return "supernodal"; }
     Index size() const override { return pattern_.size; }
-    std::int64_t nonzeros() const override { return nonzeros_; }
-    double flops() const override { return flops_; }
+    std::int64_t nonzeros() const override { return analysis_->nonzeros; }
+    double flops() const override { return analysis_->flops; }
     std::size_t bytes() const override;
 
   private:
+    struct Analysis {
+        SparsePattern pattern;
+        AssemblyPlan plan;
+        std::int64_t nonzeros;
+        double flops;
+    };
+
+    explicit SupernodalLdlt(std::shared_ptr<const Analysis> analysis);
+    static std::shared_ptr<const Analysis> analysed(const SparsePattern& pattern, Ordering ordering);
+
     PivotTally process(Index front);
     void solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const;
     VectorXd refined_solution(const VectorXd& rhs) const;
     bool recovers_known_solution() const;
 
-    SparsePattern pattern_;
-    AssemblyPlan plan_;
-    std::int64_t nonzeros_;
-    double flops_;
+    std::shared_ptr<const Analysis> analysis_;
+    const SparsePattern& pattern_ = analysis_->pattern;
+    const AssemblyPlan& plan_ = analysis_->plan;
 
     std::vector<double> values_, scaled_values_, scale_;  // of A, of S A S, of S
     double largest_scaled_ = 0.0;                         // |entry| of S A S

@@ -93,7 +93,7 @@ class Follower {
     bool find_tangent(PathPoint& point, Tangent& tangent) {
         const Controls at = controls(point.parameter);
         model_.evaluate(point.state, at);
-        const VectorXd held = rate_.motion * model_.reduction().prescribed_rate(point.state, at.motion);
+        const VectorXd held = rate_.motion * model_.reduction().prescribed_rate(at.motion);
         Eigen::MatrixXd pull = held;
         const FactorReport factor = newton_.factorize(point.state, at, false, {}, pull);
         if (!factor.succeeded) return false;
@@ -122,7 +122,7 @@ class Follower {
                 return true;
             }
             if (!std::isfinite(residual) || iterations == corrector_iterations) return false;
-            const VectorXd held = rate_.motion * model_.reduction().prescribed_rate(q, at.motion);
+            const VectorXd held = rate_.motion * model_.reduction().prescribed_rate(at.motion);
             Eigen::MatrixXd pulls(q.size(), 2);
             pulls << gap, held;
             if (!newton_.factorize(q, at, newton_.options().mixed, {}, pulls).succeeded) return false;

@@ -38,7 +38,7 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     VectorXd eigenvalues = VectorXd::Zero(columns);
     for (int round = 0; round < 40; ++round) {
         MatrixXd my = metric.asDiagonal() * y, x = my;
-        newton.factor().solve(x);
+        newton.factor()->solve(x);
         const Eigen::HouseholderQR<MatrixXd> qr(root.asDiagonal() * x);
         const MatrixXd r = qr.matrixQR().topRows(columns);
         r.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(x);

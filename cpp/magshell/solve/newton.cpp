@@ -43,7 +43,7 @@ Newton::Newton(Model& model, const NewtonOptions& options, Watch watch)
     : model_(model),
       options_(options),
       watch_(std::move(watch)),
-      factor_(analyze(model.reduction().pattern())),
+      factor_(model.new_factor()),
       reduced_metric_(model.reduction().weights(model.metric())) {}
 
 VectorXd Newton::gradient(const VectorXd& q, const Anchor& anchor) const {

@@ -69,7 +69,7 @@ class Newton {
     double relative_residual(const VectorXd& q, const Anchor& anchor) const;
 
     Model& model() { return model_; }
-    const Factor& factor() const { return *factor_; }
+    const std::shared_ptr<Factor>& factor() const { return factor_; }
     const NewtonOptions& options() const { return options_; }
     int factorizations() const { return factorizations_; }
     int failed_factorizations() const { return failed_factorizations_; }
@@ -87,7 +87,7 @@ class Newton {
     Model& model_;
     NewtonOptions options_;
     Watch watch_;
-    std::unique_ptr<Factor> factor_;
+    std::shared_ptr<Factor> factor_;
     VectorXd reduced_metric_;
     std::vector<double> values_;
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;

@@ -42,9 +42,11 @@ class Relaxation {
     // From the Hessian at q: done, where Newton finishes from here; otherwise the rate of the next step.
     bool prepare() {
         const FactorReport factor = newton_.factorize_at(q_, controls_);
-        if (!factor.succeeded) {
+        if (!factor.succeeded) {  // as of a sheet that can still turn freely: the forces say how fast it may
+            rate_ = std::max(rate_, forced_rate());
+            if (first_rate_ == 0.0) first_rate_ = rate_;
             report_.reason = factor.reason;
-            return false;
+            return rate_ > 0.0;
         }
         const bool convex = factor.negative_pivots == 0;
         if (!convex || rate_ == 0.0) {
@@ -57,6 +59,16 @@ class Relaxation {
         }
         report_.converged = convex && finish();
         return !report_.converged;
+    }
+
+    // With this rate the forces move the sheet by a twentieth of its extent, if nothing but the anchor holds it.
+    double forced_rate() const {
+        const Reduction& reduction = model_.reduction();
+        const VectorXd force = reduction.vector(model_.residual().gradient), area = reduction.weights(model_.metric());
+        double largest = 0.0;
+        for (Index k = 0; k < reduction.size(); ++k)
+            if (area[k] > 0.0) largest = std::max(largest, std::abs(force[k]) / area[k]);
+        return largest / (0.05 * model_.extent());
     }
 
     void leave_saddle(const Mode& mode) {

@@ -1,6 +1,7 @@
 #include "magshell/solve/statics.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/relaxation.h"
@@ -9,6 +10,7 @@ namespace magshell {
 namespace {
 
 constexpr int quick_iterations = 8;  // a load step that converged in so many is followed by one twice as long
+constexpr double longest_turn = 0.5;  // [rad] of a support in one load step: full circles must be gone through
 constexpr double forgetting = 1.2;   // of a step that failed, with every one that did not
 
 class Statics {
@@ -19,13 +21,16 @@ class Statics {
 
     bool run() {
         if (!load()) return false;
-        return result_.stable || !options_.require_stable || descend(result_.state);
+        return result_.stable || !options_.require_stable || descend(1.0);
     }
 
   private:
     bool load() {
         double step = options_.first_step, failed_step = 2.0;
+        const double turn = std::abs(to_.motion - from_.motion) * newton_.model().reduction().largest_turn();
+        const double longest_step = turn > longest_turn ? longest_turn / turn : 1.0;
         while (result_.progress < 1.0) {
+            step = std::min(step, longest_step);
             const double target = std::min(1.0, result_.progress + step);
             const Controls controls = interpolate(from_, to_, target);
             VectorXd trial = result_.state;
@@ -40,7 +45,10 @@ class Statics {
             result_.reason = report.reason;
             failed_step = target - result_.progress;
             step = (report.lost ? 0.25 : 0.5) * failed_step;
-            if (step < options_.smallest_step || !options_.start_at_rest) return descend(result_.state);
+            if (step >= options_.smallest_step * longest_step && options_.start_at_rest) continue;
+            // What a support turns must be gone through; everything else may be relaxed at its end at once.
+            if (!descend(longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0)) return false;
+            step = longest_step;
         }
         return check_stability();
     }
@@ -56,26 +64,36 @@ class Statics {
 
     // The factorization at the solution itself, with its own stresses, decides.
     bool check_stability() {
-        const FactorReport factor = newton_.factorize_at(result_.state, to_);
+        const FactorReport factor = newton_.factorize_at(result_.state, result_.controls);
         result_.unstable_directions = factor.negative_pivots;
         result_.stable = factor.succeeded && factor.negative_pivots == 0 && factor.perturbed_pivots == 0;
         if (!factor.succeeded) result_.reason = factor.reason;
         return factor.succeeded;
     }
 
-    bool descend(VectorXd trial) {
-        const RelaxationReport report = relax(newton_, trial, to_, options_.max_relaxation_steps);
-        result_.relaxation_steps += report.steps;
-        result_.saddles_left += report.saddles_left;
-        if (!report.converged) {
-            newton_.model().set_memory(result_.memory);
-            result_.reason = report.reason;
-            return false;
+    // Relaxes at the controls of `target`. Newton, which finishes a relaxation, may still have been drawn to a saddle: then once more from there.
+    bool descend(double target) {
+        constexpr int attempts = 5;
+        for (int k = 0; k < attempts; ++k) {
+            VectorXd trial = result_.state;
+            const Controls controls = interpolate(from_, to_, target);
+            const RelaxationReport report = relax(newton_, trial, controls, options_.max_relaxation_steps);
+            result_.relaxation_steps += report.steps;
+            result_.saddles_left += report.saddles_left;
+            if (!report.converged) {
+                newton_.model().set_memory(result_.memory);
+                result_.reason = report.reason;
+                return false;
+            }
+            accept(trial, controls, target, report.residual);
+            if (!check_stability() || result_.stable) return result_.stable;
+            if (result_.unstable_directions == 0) {
+                result_.reason = "the equilibrium is neutral: its Hessian is singular";
+                return false;
+            }
         }
-        accept(trial, to_, 1.0, report.residual);
-        if (!check_stability()) return false;
-        if (!result_.stable) result_.reason = "the equilibrium is neutral: its Hessian is singular";
-        return result_.stable;
+        result_.reason = "every equilibrium that was found is a saddle";
+        return false;
     }
 
     Newton& newton_;
@@ -108,8 +126,9 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model:
     result.factorizations = newton.factorizations();
     result.failed_factorizations = newton.failed_factorizations();
     result.linear_time = newton.linear_time();
-    result.bytes = model.bytes() + newton.factor().bytes();
-    result.factorization = newton.factor().name();
+    result.bytes = model.bytes() + newton.factor()->bytes();
+    result.factorization = newton.factor()->name();
+    if (options.keep_factor && result.outcome == Outcome::converged && result.stable) result.factor = newton.factor();
     return result;
 }
 

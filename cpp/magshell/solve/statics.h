@@ -12,6 +12,7 @@ struct StaticsOptions {
     bool require_stable = true;    // false: hand back what Newton found, a saddle too
     bool start_at_rest = true;     // the start is an equilibrium at the old controls: worth halving load steps
     int max_relaxation_steps = 200;
+    bool keep_factor = false;      // for gradients
 };
 
 enum class Outcome { converged, failed, interrupted };
@@ -31,6 +32,7 @@ struct StaticsResult {
     double linear_time = 0.0;  // [s] in factorizations and solves
     std::size_t bytes = 0;     // of the model and the factorization
     std::string factorization; // which
+    std::shared_ptr<const Factor> factor;  // of the Hessian at a stable `state`, if it was to be kept
 };
 
 /// Called now and then with the progress of the controls and the residual; throws Interrupted to stop.

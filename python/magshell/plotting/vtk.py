@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 
 from .panels import Panel
@@ -24,10 +26,19 @@ def paint(axes, panel: Panel, view: View, window: np.ndarray, pixels: tuple[int,
     )
 
 
+def _quiet_without_a_screen() -> None:
+    """VTK warns of every display it tries and does not find before it turns to one that needs none."""
+    if not os.environ.get("DISPLAY"):
+        from vtkmodules.vtkCommonCore import vtkLogger
+
+        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+
+
 def render(solids: list[Solid], view: View, window: np.ndarray, pixels: tuple[int, int]) -> np.ndarray:
     """(height, width, 3), 0 to 255."""
     import pyvista
 
+    _quiet_without_a_screen()
     right, up, eye = view.axes
     depths = np.concatenate([view.project(solid.positions)[:, 2] for solid in solids])
     reach = np.ptp(depths) + window[1] - window[0]

@@ -12,7 +12,7 @@ from .hemisphere import large_deflection, small_deflection
 from .linear_cylinders import pinched_cylinder, scordelis_lo
 from .magnetic_strip import field_across, field_against, magnetic_end_shear
 from .outcome import Comparison, Outcome
-from .plates import circular_plate, square_plate
+from .plates import circular_plate, even_plate, square_plate
 from .rolled_strip import end_moment
 from .shear_strip import end_shear
 
@@ -37,7 +37,7 @@ CASES = (
     Case("B2", "pinched cylinder", pinched_cylinder, (64, 64), (8, 8)),
     Case("B3", "pinched hemisphere", small_deflection, (128, 32), (32, 8)),
     Case("B5", "square plate", square_plate, (32, 32), (8, 8)),
-    Case("B5 finer", "square plate", square_plate, (128, 128), (16, 16)),
+    Case("B5 even", "square plate, even mesh", even_plate, (32, 32), (8, 8)),
     Case("B5 disk", "circular plate", circular_plate, 48, 6),
     Case("B7", "columns", columns, (40, 4), (20, 2)),
     Case("B7 plate", "plate in compression", plate, (32, 32), (8, 8)),

@@ -1,0 +1,30 @@
+#include "magshell/adjoint/static.h"
+
+#include "magshell/core/errors.h"
+
+namespace magshell {
+
+SceneGradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state) {
+    if (!equilibrium.factor) throw InvalidInput("the equilibrium was found without keeping its factorization");
+    const VectorXd& q = equilibrium.state;
+    const Controls& controls = equilibrium.controls;
+    const Reduction& reduction = model.reduction();
+
+    VectorXd reduced = -reduction.vector(by_state);
+    equilibrium.factor->solve(reduced);
+    const VectorXd lambda = reduction.expand(reduced);
+
+    model.set_memory(equilibrium.memory);
+    model.evaluate(q, controls);
+    SceneGradient gradient = model.vjp(q, controls, lambda);
+    if (reduction.moves()) {
+        model.assemble(q, controls, false);
+        VectorXd reaction(q.size());
+        model.matrix().multiply(lambda.data(), reaction.data());
+        reaction += by_state;
+        reduction.vjp(reaction, controls.motion, gradient.motions, gradient.controls.motion);
+    }
+    return gradient;
+}
+
+}  // namespace magshell

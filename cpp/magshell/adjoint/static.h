@@ -1,0 +1,16 @@
+// The adjoint of an equilibrium g(q, k) = 0, with q_f the free unknowns and q_h what supports hold.
+//
+//   H_ff lambda_f = - dF/dq_f,      dF/dk = lambda^T dg/dk + (dF/dq_h + H_hf lambda_f)^T dq_h/dk
+//
+// One back-substitution with the factorization that found the equilibrium stable serves all k.
+#pragma once
+
+#include "magshell/solve/statics.h"
+
+namespace magshell {
+
+/// dF/dk from dF/dq, a vector of all unknowns, at an equilibrium whose factor was kept. The model must hold the values
+/// that the equilibrium was found with. Throws InvalidInput where no factor was kept.
+SceneGradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state);
+
+}  // namespace magshell

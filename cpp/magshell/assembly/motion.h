@@ -1,0 +1,28 @@
+// A rigid motion of what a support holds.
+//
+//   x -> centre + R(t w)(x - centre) + t u,   direction -> R(t w) direction           t = controls.motion
+//
+// R(phi) turns about phi by |phi|. As phi changes by dphi, R y turns by J(phi) dphi, with the left Jacobian of the
+// rotations, J(phi) = I + (1 - cos a)/a^2 [phi] + (a - sin a)/a^3 [phi]^2, a = |phi|.
+#pragma once
+
+#include "magshell/core/types.h"
+
+namespace magshell {
+
+struct Motion {
+    Vec3 centre = Vec3::Zero(), rotation_vector = Vec3::Zero(), translation = Vec3::Zero();
+
+    Vec3 point(const Vec3& rest, double progress) const;
+    Vec3 direction(const Vec3& rest, double progress) const;
+
+    /// Their rates as the progress changes.
+    Vec3 point_rate(const Vec3& rest, double progress) const;
+    Vec3 direction_rate(const Vec3& rest, double progress) const;
+
+    /// Adds the gradients by the motion's own vectors of `by_place` . point(rest), and of `by_place` . direction(rest).
+    void point_vjp(const Vec3& rest, double progress, const Vec3& by_place, Motion& out) const;
+    void direction_vjp(const Vec3& rest, double progress, const Vec3& by_place, Motion& out) const;
+};
+
+}  // namespace magshell

@@ -1,0 +1,23 @@
+// The gradient of a number by everything a solve takes: SceneValues, the magnetization and the controls, shaped like them.
+#pragma once
+
+#include <vector>
+
+#include "magshell/assembly/motion.h"
+#include "magshell/energy/controls.h"
+
+namespace magshell {
+
+/// In the caller's numbering; a scene without loads, gravity, couples or motions leaves theirs empty.
+struct SceneGradient {
+    VectorXd thickness, young_modulus, poisson_ratio;  // one a face
+    VectorXd curvature_scale;                          // one an edge
+    Rows3 remanent_magnetization;                      // one a face
+    VectorXd weights, loads;                           // by forces, three a node: the core's numbering
+    VectorXd couples;
+    std::vector<Motion> motions;
+    std::vector<VectorXd> field_sources;  // of each source, by its own parameters
+    Controls controls;
+};
+
+}  // namespace magshell

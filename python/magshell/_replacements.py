@@ -1,0 +1,63 @@
+"""What a solve may replace of its scene's values, and how it is asked for."""
+
+from __future__ import annotations
+
+from ._quantity import quantity
+from .loads import EdgeCouple
+
+SHELL_NAMES = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "curvature_scale")
+
+
+def requested(scene, vertex_loads, values, **shell) -> dict[object, dict[str, object]]:
+    """{object of the scene: {name: what was given}} from a solve's arguments. Raises ValueError on what has no place."""
+    asked: dict[object, dict[str, object]] = {}
+    if values is not None and not isinstance(values, dict):
+        raise ValueError(f"values must be a dict {{object of the scene: {{name: value}}}}, got {type(values).__name__}")
+    for owner, named in (values or {}).items():
+        _check(scene, owner, named)
+        asked[owner] = dict(named)
+    for name, value in shell.items():
+        if value is not None:
+            _add(asked, scene.shell, name, value)
+    if vertex_loads is not None:
+        _add(asked, scene, "vertex_loads", vertex_loads)
+    _check_against_scene(scene, asked)
+    return asked
+
+
+def checked(scene, owner, name: str, value):
+    """The values that no constructor checks."""
+    if owner is not scene:
+        return value
+    unit, shape = {"gravity": ("m/s2", (3,)), "vertex_loads": ("N", (scene.mesh.n_vertices, 3))}[name]
+    return quantity(name, unit, value, shape)
+
+
+def _add(asked: dict, owner, name: str, value) -> None:
+    if name in asked.setdefault(owner, {}):
+        raise ValueError(f"{name} was given twice: as an argument and in values")
+    asked[owner][name] = value
+
+
+def _check(scene, owner, named) -> None:
+    if not any(owner is item for item in (scene, scene.shell, *scene.supports, *scene.loads, *scene.fields)):
+        raise ValueError(f"values has a key that is not the scene, nor an object of it: {owner!r}")
+    if not isinstance(named, dict):
+        raise ValueError(f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}")
+    names = ("gravity", "vertex_loads") if owner is scene else getattr(owner, "_replaceable", ())
+    for name in named:
+        if name not in names:
+            what = f"it has {', '.join(names)}" if names else "it has none that can be"
+            raise ValueError(f"{type(owner).__name__} has no value {name!r} to be replaced in a solve: {what}")
+
+
+def _check_against_scene(scene, asked: dict) -> None:
+    heavy = bool(scene.gravity.any())
+    if not heavy and ("gravity" in asked.get(scene, {}) or "mass_density" in asked.get(scene.shell, {})):
+        raise ValueError("gravity or mass_density was given, but the scene has no gravity: Scene(..., gravity=...)")
+    if "vertex_loads" in asked.get(scene, {}):
+        forces = [load for load in scene.loads if not isinstance(load, EdgeCouple)]
+        if not forces:
+            raise ValueError("vertex_loads was given, but the scene has no loads: Scene(..., loads=...), zero will do")
+        if any(load in asked for load in forces):
+            raise ValueError("vertex_loads stands for all loads: leave them out of values")

@@ -1,0 +1,96 @@
+"""python -m magshell.bench gradients: what the gradient by all inputs costs, over the equilibrium it differentiates."""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+
+import magshell as ms
+
+from .report import print_table
+
+ALLOWED_SHARE = 0.10  # of the equilibrium's time
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--faces", type=int, default=8192, help="of the sheet (default 8192)")
+    parser.add_argument("--rounds", type=int, default=5, help="of each measurement (default 5)")
+
+
+def run(options: argparse.Namespace) -> dict:
+    """Prints the table, returns its numbers."""
+    if options.faces < 2 or options.rounds < 1:
+        raise SystemExit("--faces must be at least 2 and --rounds at least 1")
+    results = {bending: _cost(options.faces, options.rounds, bending) for bending in ("midedge", "hinge")}
+    rows = [
+        [bending, f"{cost['faces']} faces", cost["factorizations"]]
+        + [f"{1e3 * cost[name]:.1f}" for name in ("plain equilibrium", "equilibrium", "gradient")]
+        + [f"{100 * cost['share']:.1f} %" + (" MISSED" if cost["share"] > ALLOWED_SHARE else "")]
+        for bending, cost in results.items()
+    ]
+    headings = ["bending", "sheet", "factorizations", "without tensors, ms", "equilibrium, ms", "gradient, ms"]
+    headings.append(f"share (at most {100 * ALLOWED_SHARE:.0f} %)")
+    print_table("The gradient by all inputs at once", headings, rows)
+    return results
+
+
+def _cost(faces: int, rounds: int, bending: str) -> dict:
+    """The best of some rounds of each, s."""
+    import torch
+
+    scene, inputs, values = _sheet(faces, bending)
+
+    def tensors(arrays: dict) -> dict:
+        return {name: torch.tensor(array, requires_grad=True) for name, array in arrays.items()}
+
+    plain, solved, pulled = [], [], []
+    for _ in range(rounds):
+        began = time.perf_counter()
+        ms.equilibrium(scene, **inputs, values=values)
+        plain.append(time.perf_counter() - began)
+        began = time.perf_counter()
+        found = ms.equilibrium(
+            scene, **tensors(inputs), values={owner: tensors(named) for owner, named in values.items()}
+        )
+        solved.append(time.perf_counter() - began)
+        loss = (found.positions**2).sum()
+        began = time.perf_counter()
+        loss.backward()
+        pulled.append(time.perf_counter() - began)
+    return {
+        "faces": scene.mesh.n_faces,
+        "factorizations": found.factorizations,
+        "plain equilibrium": min(plain),
+        "equilibrium": min(solved),
+        "gradient": min(pulled),
+        "share": min(pulled) / min(solved),
+    }
+
+
+def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict, dict]:
+    """A square sheet that has every kind of input: bent by field, gravity and loads, its clamp turned on the way."""
+    cells = max(1, round((faces / 2) ** 0.5))
+    mesh = ms.meshes.rectangle(0.1, 0.1, cells=(cells, cells))
+    sheet = ms.Shell(
+        mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.45, mass_density=1e3, bending=bending
+    )
+    clamp = ms.Clamp(mesh.edges_at(x=0.0), displacement=(0.0, 0.0, 1e-3), rotation=(0.0, -0.1, 0.0))
+    load = ms.EdgeLoad(mesh.edges_at(x=0.1), (0.0, 0.0, 0.01))
+    dipoles = ms.Dipoles([[0.05, 0.05, -0.2]], [[0.0, 0.0, 1.0]])
+    scene = ms.Scene(
+        sheet, supports=[clamp], loads=[load], field=[ms.UniformField(), dipoles], gravity=(0, 0, -9.81)
+    )
+    inputs = {
+        "remanent_magnetization": np.tile((5e4, 0.0, 1e4), (mesh.n_faces, 1)),
+        "applied_flux_density": np.array((0.0, 0.0, 2e-3)),
+        **{name: np.array(getattr(sheet, name)) for name in sheet._replaceable},
+        **{f"{name}_factor": np.array(1.0) for name in ("load", "gravity", "field", "motion")},
+    }
+    values = {
+        clamp: {"displacement": np.array((0.0, 0.0, 1e-3)), "rotation": np.array((0.0, -0.1, 0.0))},
+        load: {"force_per_length": np.array((0.0, 0.0, 0.01))},
+        dipoles: {"positions": np.array(dipoles.positions), "moments": np.array(dipoles.moments)},
+    }
+    return scene, inputs, values

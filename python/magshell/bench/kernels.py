@@ -1,0 +1,125 @@
+"""python -m magshell.bench kernels: what a gradient and a Hessian cost, a face, and what each part of a scene adds."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+import magshell as ms
+from magshell import _core
+
+from .report import print_table
+from .timing import Timing, measure, peak_memory
+
+FACES = (8192, 131072)
+ALLOWED, WANTED = 0.9, 0.6  # us a face, gradient and Hessian, of the first sheet on one core
+ALLOWED_GROWTH = 1.1  # at 131,072 faces over 8192
+
+
+class Sheet(NamedTuple):
+    """What a scene holds: each line of the table."""
+
+    name: str
+    bending: str = "midedge"
+    magnetization: tuple[float, float, float] | None = None  # A/m
+    gravity: bool = False
+
+
+SHEETS = (
+    Sheet("midedge, magnetic", magnetization=(1e3, 2e2, 1e2)),
+    Sheet("midedge, magnetic in its plane", magnetization=(1e3, 2e2, 0.0)),
+    Sheet("midedge, gravity", gravity=True),
+    Sheet("midedge"),
+    Sheet("hinge, magnetic", "hinge", magnetization=(1e3, 2e2, 1e2)),
+    Sheet("hinge", "hinge"),
+)
+
+
+class Cost(NamedTuple):
+    """Of one sheet at one size; times in s."""
+
+    faces: int
+    build: float
+    gradient: Timing
+    hessian: Timing  # gradient and Hessian, into the sparse matrix
+    memory: int  # bytes, of the model
+
+    def microseconds(self, timing: Timing) -> Timing:
+        return Timing(*(1e6 * value / self.faces for value in timing))
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--faces", type=int, nargs="+", default=list(FACES), help="sizes of the square sheet")
+    parser.add_argument("--rounds", type=int, default=7, help="of each measurement (default 7)")
+
+
+def run(options: argparse.Namespace) -> dict:
+    """Prints the table, returns its numbers."""
+    if min(options.faces) < 2 or options.rounds < 1:
+        raise SystemExit("--faces must be at least 2 and --rounds at least 1")
+    costs = {sheet.name: [cost(sheet, faces, options.rounds) for faces in options.faces] for sheet in SHEETS}
+    rows = [row for name, each in costs.items() for row in _rows(name, each)]
+    headings = ["sheet", "faces", "gradient", "median", "and Hessian", "median", "model [MB]", "built in [s]"]
+    print_table(
+        f"Microseconds a face, best and median of {options.rounds}, {ms.num_threads()} thread(s)", headings, rows
+    )
+    _print_targets(costs[SHEETS[0].name])
+    return {name: [each._asdict() for each in of_sheet] for name, of_sheet in costs.items()}
+
+
+def cost(sheet: Sheet, faces: int, rounds: int) -> Cost:
+    """Of a square sheet near its rest shape, clamped at one side, with an irregular mesh."""
+    cells = max(1, round((faces / 2) ** 0.5))
+    mesh = ms.meshes.rectangle(1.0, 1.0, cells=(cells, cells), irregular=0.2)
+    shell = ms.Shell(
+        mesh,
+        thickness=1e-2,
+        young_modulus=1e5,
+        poisson_ratio=0.3,
+        mass_density=1e3 if sheet.gravity else None,
+        bending=sheet.bending,
+    )
+    began = time.perf_counter()
+    scene = ms.Scene(
+        shell,
+        supports=[ms.Clamp(mesh.edges_at(x=0.0))],
+        field=None if sheet.magnetization is None else ms.UniformField(),
+        gravity=(0.0, 0.0, -9.81) if sheet.gravity else None,
+    )
+    build = time.perf_counter() - began
+    model = scene._model
+    if sheet.magnetization is not None:
+        model.set_magnetization(np.tile(sheet.magnetization, (mesh.n_faces, 1)))
+    state = model.rest_state()
+    state += 1e-3 / cells * np.random.default_rng(0).standard_normal(state.size)
+    controls = _core.Controls(flux_density=np.array([0.0, 0.01, 0.02]), gravity=1.0)
+    return Cost(
+        mesh.n_faces,
+        build,
+        measure(lambda: model.gradient(state, controls), rounds=rounds),
+        measure(lambda: model.assemble(state, controls), rounds=rounds),
+        model.bytes,
+    )
+
+
+def _rows(name: str, costs: list[Cost]) -> list[list[str]]:
+    rows = []
+    for k, each in enumerate(costs):
+        gradient, hessian = each.microseconds(each.gradient), each.microseconds(each.hessian)
+        numbers = [f"{value:.3f}" for value in (*gradient, *hessian)]
+        rows.append([name if k == 0 else "", str(each.faces), *numbers, f"{each.memory / 1e6:.1f}", f"{each.build:.2f}"])
+    return rows
+
+
+def _print_targets(costs: list[Cost]) -> None:
+    first, last = costs[0], costs[-1]
+    best = first.microseconds(first.hessian).best
+    print(f"\n{SHEETS[0].name}: {best:.2f} us a face at {first.faces} faces (at most {ALLOWED}, wanted {WANTED})", end="")
+    if len(costs) > 1:
+        growth = last.microseconds(last.hessian).best / best
+        print(f", {growth:.2f} times that at {last.faces} (at most {ALLOWED_GROWTH})", end="")
+    memory = peak_memory()
+    print("." if memory is None else f". Peak memory of the process: {memory / 1e6:.0f} MB.")

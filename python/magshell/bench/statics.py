@@ -1,0 +1,141 @@
+"""python -m magshell.bench statics: factorizations from flat, the cost of a Newton iteration, threads, backends."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+
+import numpy as np
+
+import magshell as ms
+from magshell import _core
+
+from .cases import hemisphere, magnetic_strip, shear_strip
+from .report import print_table
+from .timing import measure, peak_memory
+
+ALLOWED_RATIO = 1.25  # a Newton iteration over its factorization and back-substitution
+
+# Name: a scene of a bending, the controls, how many factorizations it may take from flat in one call.
+CASES: dict[str, tuple[Callable[[str], ms.Scene], dict, int]] = {
+    "A1, full load": (lambda b: shear_strip.scene(shear_strip.irregular_strip((40, 4), 0), b), {}, 12),
+    "A4, full load": (lambda b: hemisphere.scene(hemisphere.quarter((64, 16)), b, 400.0), {}, 25),
+    "C1-90, beta 20": (
+        lambda b: magnetic_strip.scene(
+            ms.meshes.rectangle(
+                magnetic_strip.LENGTH, magnetic_strip.WIDTH, cells=(80, 8), irregular=0.25, seed=0
+            ),
+            b,
+        ),
+        magnetic_strip.controls(20.0, (0.0, 0.0, 1.0)),
+        40,
+    ),
+}
+SOLVERS = {"mixed": ms.MixedNewton(), "plain": ms.Newton(max_iterations=60)}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--faces", type=int, default=8192, help="of the sheet that is bent strongly (default 8192)")
+    parser.add_argument("--rounds", type=int, default=3, help="of each measurement (default 3)")
+
+
+def run(options: argparse.Namespace) -> dict:
+    """Prints the tables, returns their numbers."""
+    if options.faces < 2 or options.rounds < 1:
+        raise SystemExit("--faces must be at least 2 and --rounds at least 1")
+    scene, controls = strongly_bent(options.faces)
+    return {
+        "from flat": _from_flat(),
+        "iteration": _iteration(scene, controls, options.rounds),
+        "threads": _threads(scene, controls, options.rounds),
+        "backends": _backends(scene, controls, options.rounds),
+    }
+
+
+def strongly_bent(faces: int) -> tuple[ms.Scene, dict]:
+    """A square sheet magnetised along one side and clamped across it, that a field turns up by almost a right angle."""
+    cells = max(1, round((faces / 2) ** 0.5))
+    mesh = ms.meshes.rectangle(0.1, 0.1, cells=(cells, cells))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.45)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    return scene, {"remanent_magnetization": (5e4, 0.0, 0.0), "applied_flux_density": (0.0, 0.0, 2e-3)}
+
+
+def _from_flat() -> dict:
+    rows, results = [], {}
+    for name, (build, controls, allowed) in CASES.items():
+        for bending in ("midedge", "hinge"):
+            for solver_name, solver in SOLVERS.items():
+                try:
+                    found = ms.equilibrium(build(bending), solver=solver, require_stable=False, **controls)
+                except ms.NotConverged as error:
+                    found = error.last_good
+                bound = str(allowed) if (bending, solver_name) == ("midedge", "mixed") else ""
+                counts = [found.factorizations, found.load_steps, found.iterations]
+                shown = [str(count) for count in counts] if found.progress == 1.0 else ["failed", "", ""]
+                rows.append([name, f"{bending}, {solver_name} Newton", *shown, bound, f"{found.wall_time:.3f}"])
+                results[f"{name}, {bending}, {solver_name}"] = dict(
+                    zip(("factorizations", "load steps", "iterations"), counts, strict=True)
+                )
+    headings = ["one call from flat", "", "factorizations", "load steps", "iterations", "allowed", "time [s]"]
+    print_table("Factorizations, failed attempts counted", headings, rows)
+    return results
+
+
+def _iteration(scene: ms.Scene, controls: dict, rounds: int) -> dict:
+    """The cost of an iteration: everything, over what the linear algebra takes."""
+    runs = [ms.equilibrium(scene, **controls) for _ in range(rounds)]
+    best = min(runs, key=lambda run: run.wall_time)
+    ratio = best.wall_time / best.linear_time
+    memory = peak_memory()
+    print(
+        f"\nStrongly bent, {scene.mesh.n_faces} faces, {scene.n_unknowns} unknowns: {best.factorizations} factorizations, "
+        f"{best.wall_time:.2f} s; an iteration takes {ratio:.2f} times its factorization and solve (at most "
+        f"{ALLOWED_RATIO}).\nModel and factorization: {best.memory / 1e6:.0f} MB"
+        + ("." if memory is None else f"; peak of the process: {memory / 1e6:.0f} MB.")
+    )
+    return {
+        "factorizations": best.factorizations,
+        "wall time": best.wall_time,
+        "linear time": best.linear_time,
+        "ratio": ratio,
+        "memory": best.memory,
+    }
+
+
+def _threads(scene: ms.Scene, controls: dict, rounds: int) -> dict:
+    """Time and bits on one thread and on two."""
+    before = ms.num_threads()
+    times, positions = {}, {}
+    try:
+        for count in (1, 2):
+            ms.set_num_threads(count)
+            runs = [ms.equilibrium(scene, **controls) for _ in range(rounds)]
+            times[count] = min(run.wall_time for run in runs)
+            positions[count] = runs[0].positions
+    finally:
+        ms.set_num_threads(before)
+    same = bool(np.array_equal(positions[1], positions[2]))
+    print(
+        f"\nTwo threads: {times[1] / times[2]:.2f} times as fast as one, the positions "
+        f"{'the same to the last bit' if same else 'NOT the same bits'}."
+    )
+    return {"one thread": times[1], "two threads": times[2], "same bits": same}
+
+
+def _backends(scene: ms.Scene, controls: dict, rounds: int) -> dict:
+    """The Hessian of the bent sheet, factorized by each backend there is."""
+    found = ms.equilibrium(scene, **controls)
+    n, starts, matrix_rows, values = scene._model.hessian(found._state, found._controls)
+    right = np.random.default_rng(0).standard_normal(n)
+    rows, results = [], {}
+    for name in _core.factor_backends():
+        analysis = measure(lambda name=name: _core.analyze(n, starts, matrix_rows, backend=name), rounds=rounds)
+        factor = _core.analyze(n, starts, matrix_rows, backend=name)
+        numeric = measure(lambda factor=factor: factor.factorize(values), rounds=rounds)
+        solve = measure(lambda factor=factor: factor.solve(right), rounds=rounds)
+        times = {"analysis": analysis.best, "factorization": numeric.best, "solve": solve.best}
+        rows.append([name, "", *(f"{1e3 * value:.2f}" for value in times.values())])
+        results[name] = times
+    print_table("Factorization of its Hessian, ms", ["backend", "", *times], rows)
+    return results

@@ -1,0 +1,278 @@
+"""Gradients of equilibria against central differences: every input, on scenes where it matters."""
+
+import gc
+import weakref
+
+import numpy as np
+import pytest
+
+import magshell as ms
+
+torch = pytest.importorskip("torch")
+
+BENDINGS = ("midedge", "hinge")
+MESH = ms.meshes.rectangle(0.1, 0.06, cells=(3, 2), irregular=0.2, seed=3)
+N_F, N_E, N_V = MESH.n_faces, MESH.n_edges, MESH.n_vertices
+FREE = MESH.vertices_at(x=0.1)
+EXACT = ms.MixedNewton(tolerance=1e-12)
+RNG = np.random.default_rng(7)
+MAGNETIZATION = np.array((3e4, 1e4, 2e4)) * RNG.uniform(0.7, 1.3, (N_F, 3))
+YOUNG = RNG.uniform(0.8e6, 1.2e6, N_F)
+WEIGHTS = torch.from_numpy(RNG.standard_normal((N_V, 3)))
+ROTATION_WEIGHTS = torch.from_numpy(RNG.standard_normal(N_E)) * 0.01
+
+
+def shell(bending="midedge", mesh=MESH):
+    return ms.Shell(
+        mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=2e3, bending=bending
+    )
+
+
+CLAMP = ms.Clamp(MESH.edges_at(x=0.0), displacement=(-2e-4, 1e-4, 2e-3), rotation=(0.1, 0.3, -0.05))
+POINT = ms.PointLoad(FREE, (1e-3, 2e-3, 4e-3))
+EDGE = ms.EdgeLoad(MESH.edges_at(x=0.1), (0.0, 0.02, 0.05))
+AREA = ms.AreaLoad((0.1, 0.0, 1.0))
+COUPLE = ms.EdgeCouple(MESH.edges_at(y=0.0), 1e-4)
+DIPOLES = ms.Dipoles([[0.12, 0.02, -0.1], [0.05, 0.1, 0.09]], [[0.5, 0.2, 1.0], [0.3, -0.8, 0.4]])
+GRID = ms.SampledField.from_function(DIPOLES.flux_density, (-0.04, -0.04, -0.06), (0.15, 0.12, 0.065), (5, 4, 3))
+PLANE_GRID = ms.SampledField.from_function(
+    lambda x: np.stack([0.02 * x[:, 2], 0.1 * x[:, 0] ** 2, 0.01 + 0.1 * x[:, 0]], axis=1),
+    (-0.04, 0, -0.06),
+    (0.15, 0, 0.065),
+    (6, 1, 2),
+)
+
+
+def everything(bending="midedge"):
+    """A clamp that moves, all loads, gravity, and a uniform field over dipoles and a grid."""
+    return ms.Scene(
+        shell(bending),
+        supports=[CLAMP],
+        loads=[POINT, EDGE, AREA, COUPLE],
+        field=[ms.UniformField(), DIPOLES, GRID, PLANE_GRID],
+        gravity=(1.0, 0.5, -9.81),
+    )
+
+
+def tensor(values):
+    return torch.tensor(np.array(values), dtype=torch.float64, requires_grad=True)
+
+
+SOLVE_INPUTS = {
+    "remanent_magnetization": MAGNETIZATION,
+    "applied_flux_density": (1e-3, -2e-3, 3e-3),
+    "thickness": RNG.uniform(0.9e-3, 1.1e-3, N_F),
+    "young_modulus": YOUNG,
+    "poisson_ratio": RNG.uniform(0.2, 0.45, N_F),
+    "mass_density": RNG.uniform(1e3, 3e3, N_F),
+    "curvature_scale": RNG.uniform(0.8, 1.2, N_E),
+    "load_factor": 0.9,
+    "gravity_factor": 0.8,
+    "field_factor": 1.1,
+    "motion_factor": 0.7,
+}
+VALUES = {
+    "point load": (POINT, "force", RNG.uniform(-4e-3, 4e-3, (len(FREE), 3))),
+    "one point load for all": (POINT, "force", (1e-3, 2e-3, 4e-3)),
+    "edge load": (EDGE, "force_per_length", (0.0, 0.02, 0.05)),
+    "area load": (AREA, "force_per_area", RNG.uniform(-1, 1, (N_F, 3))),
+    "couple": (COUPLE, "couple_per_length", 2e-4),
+    "displacement": (CLAMP, "displacement", (-2e-4, 1e-4, 2e-3)),
+    "rotation": (CLAMP, "rotation", (0.2, 0.4, -0.3)),
+    "center": (CLAMP, "center", (0.01, 0.02, 0.03)),
+    "dipole positions": (DIPOLES, "positions", DIPOLES.positions),
+    "dipole moments": (DIPOLES, "moments", DIPOLES.moments),
+    "grid": (GRID, "flux_density", GRID.flux_density(np.zeros((5, 4, 3, 3)) + 0.01)),
+    "plane grid": (PLANE_GRID, "flux_density", RNG.uniform(-1e-3, 1e-3, (6, 1, 2, 3))),
+}
+DEFAULTS = {"remanent_magnetization": MAGNETIZATION, "applied_flux_density": (1e-3, -2e-3, 3e-3)}
+
+
+def loss_of(found):
+    rest = torch.from_numpy(np.array(found.scene.mesh.rest_positions))
+    moved = torch.as_tensor(found.positions) - rest
+    rotations = torch.as_tensor(found.edge_rotations)
+    return (WEIGHTS * moved).sum() + (ROTATION_WEIGHTS * rotations).sum() + 20.0 * (moved**2).sum()
+
+
+def check(solve, at, directions=3, step=1e-4):
+    """The gradient of the loss along random directions and along itself against differences of sixth order."""
+    at = np.array(at, dtype=np.float64)
+    start = solve(at)
+    leaf = tensor(at)
+    loss_of(solve(leaf, start)).backward()
+    gradient = leaf.grad.numpy()
+    assert gradient.shape == at.shape and np.abs(gradient).max() > 0
+    scale = np.abs(at).max() if at.size else 1.0
+    rows = [*RNG.standard_normal((directions, *at.shape)), gradient / np.abs(gradient).max()]
+    for row in rows:
+        along = row / np.linalg.norm(row) * scale
+        slope = 0.0
+        for k, weight in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60)):
+            up, down = (float(loss_of(solve(at + sign * k * step * along, start))) for sign in (1, -1))
+            slope += weight * (up - down) / step
+        exact = float((gradient * along).sum())
+        assert slope == pytest.approx(exact, rel=1e-6, abs=1e-6 * scale * np.linalg.norm(gradient))
+
+
+@pytest.mark.parametrize("bending", BENDINGS)
+@pytest.mark.parametrize("name", SOLVE_INPUTS)
+def test_an_input(name, bending):
+    scene = everything(bending)
+
+    def solve(value, start=None):
+        return ms.equilibrium(scene, **{**DEFAULTS, name: value}, start=start, solver=EXACT)
+
+    check(solve, SOLVE_INPUTS[name])
+
+
+@pytest.mark.parametrize("bending", BENDINGS)
+@pytest.mark.parametrize("what", VALUES)
+def test_a_value_of_an_object(what, bending):
+    scene = everything(bending)
+    owner, name, at = VALUES[what]
+
+    def solve(value, start=None):
+        return ms.equilibrium(scene, **DEFAULTS, values={owner: {name: value}}, start=start, solver=EXACT)
+
+    check(solve, at)
+
+
+def test_gravity_and_vertex_loads():
+    scene = everything()
+
+    def falls(value, start=None):
+        return ms.equilibrium(scene, **DEFAULTS, values={scene: {"gravity": value}}, start=start, solver=EXACT)
+
+    def loaded(value, start=None):
+        return ms.equilibrium(scene, **DEFAULTS, vertex_loads=value, start=start, solver=EXACT)
+
+    check(falls, (1.0, -2.0, -5.0))
+    check(loaded, RNG.uniform(-2e-3, 2e-3, (N_V, 3)))
+
+
+@pytest.mark.parametrize("name", ["thickness", "young_modulus", "poisson_ratio", "curvature_scale", "mass_density"])
+def test_one_number_for_the_whole_sheet(name):
+    scene = everything()
+    at = float(np.mean(SOLVE_INPUTS[name]))
+    check(lambda v, start=None: ms.equilibrium(scene, **DEFAULTS, **{name: v}, start=start, solver=EXACT), at)
+
+
+@pytest.mark.parametrize("bending", BENDINGS)
+def test_an_oblique_symmetry_plane(bending):
+    """Its vertices have frames of their own, and one of them moves within the plane."""
+    angle = 0.4
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    mesh = ms.TriangleMesh(MESH.rest_positions @ turn.T, MESH.faces)
+    pin = ms.Pin(MESH.vertices_at(x=0.1), "z", displacement=(0, 0, 3e-3))
+    scene = ms.Scene(
+        shell(bending, mesh),
+        supports=[ms.SymmetryPlane(turn[:, 0]), ms.Pin(MESH.vertices_at(x=0.0)[:1]), pin],
+        field=ms.UniformField(),
+    )
+    given = {"remanent_magnetization": MAGNETIZATION @ turn.T, "applied_flux_density": (1e-3, 2e-3, 3e-3)}
+
+    def stiff(value, start=None):
+        return ms.equilibrium(scene, **given, young_modulus=value, start=start, solver=EXACT)
+
+    def pushed(value, start=None):
+        return ms.equilibrium(scene, **given, motion_factor=value, start=start, solver=EXACT)
+
+    check(stiff, YOUNG)
+    check(pushed, 0.8)
+
+
+def test_several_inputs_at_once():
+    """torch's own gradcheck, entry by entry."""
+    scene = everything()
+    start = ms.equilibrium(scene, **DEFAULTS, young_modulus=YOUNG, solver=EXACT)
+
+    def positions(magnetization, field, young, force, turn):
+        found = ms.equilibrium(
+            scene,
+            remanent_magnetization=1e4 * magnetization,
+            applied_flux_density=1e-3 * field,
+            young_modulus=1e6 * young,
+            values={POINT: {"force": 1e-3 * force}, CLAMP: {"rotation": turn}},
+            start=start,
+            solver=EXACT,
+        )
+        return 100 * found.positions[FREE], found.edge_rotations[::5]
+
+    inputs = [tensor(MAGNETIZATION[0] / 1e4), tensor((1, -2, 3)), tensor(YOUNG / 1e6), tensor((1, 2, 4)), tensor((0.1, 0.3, 0))]
+    assert torch.autograd.gradcheck(positions, inputs, eps=1e-4, atol=1e-6, rtol=1e-6)
+
+
+def test_repeated_backward_and_inputs_without_gradient():
+    scene = everything()
+    young, field = tensor(YOUNG), torch.tensor((1e-3, -2e-3, 3e-3), dtype=torch.float64)
+    found = ms.equilibrium(
+        scene, remanent_magnetization=MAGNETIZATION, applied_flux_density=field, young_modulus=young
+    )
+    loss = loss_of(found)
+    (first,) = torch.autograd.grad(loss, young, retain_graph=True)
+    # What another solve leaves in the core does not matter.
+    ms.equilibrium(scene, **DEFAULTS, young_modulus=2 * YOUNG, load_factor=0.3)
+    (second,) = torch.autograd.grad(loss, young)
+    assert torch.equal(first, second) and field.grad is None and "stable" in repr(found)
+
+
+def test_a_loss_that_ignores_the_result():
+    young = tensor(YOUNG)
+    found = ms.equilibrium(everything(), **DEFAULTS, young_modulus=young)
+    (0.0 * found.positions.detach().sum() + young.sum()).backward()
+    assert torch.equal(young.grad, torch.ones(N_F, dtype=torch.float64))
+    only = torch.autograd.grad(found.edge_rotations.sum(), young)[0]
+    assert torch.isfinite(only).all() and only.abs().max() > 0
+
+
+def test_other_dtypes_come_back_as_they_were():
+    young, field = tensor(YOUNG).detach().float().requires_grad_(), tensor((1e-3, -2e-3, 3e-3))
+    found = ms.equilibrium(
+        everything(), remanent_magnetization=MAGNETIZATION, applied_flux_density=field, young_modulus=young
+    )
+    assert found.positions.dtype == torch.float64
+    found.positions.sum().backward()
+    assert young.grad.dtype == torch.float32 and field.grad.dtype == torch.float64
+
+
+def test_no_second_derivative():
+    young = tensor(YOUNG)
+    found = ms.equilibrium(everything(), **DEFAULTS, young_modulus=young)
+    (first,) = torch.autograd.grad((found.positions**2).sum(), young, create_graph=True)
+    with pytest.raises(RuntimeError, match="once_differentiable"):
+        first.sum().backward()
+
+
+def test_nothing_is_kept_without_a_gradient_and_nothing_afterwards():
+    scene, young = everything(), tensor(YOUNG)
+    with torch.no_grad():
+        assert not ms.equilibrium(scene, **DEFAULTS, young_modulus=young).positions.requires_grad
+    found = ms.equilibrium(scene, **DEFAULTS, young_modulus=young)
+    kept = weakref.ref(found.positions.grad_fn.adjoint)
+    assert kept() is not None
+    del found
+    gc.collect()
+    assert kept() is None
+
+
+def test_same_bits_on_any_number_of_threads():
+    mesh = ms.meshes.rectangle(0.1, 0.06, cells=(50, 30), irregular=0.2)
+    scene = ms.Scene(shell(mesh=mesh), supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=[ms.UniformField(), DIPOLES])
+    before, gradients = ms.num_threads(), []
+    try:
+        for threads in (1, 2, 3):
+            ms.set_num_threads(threads)
+            inputs = [tensor((3e4, 1e4, 0)), tensor((0, 0, 1e-3)), tensor(np.full(mesh.n_faces, 1e6)), tensor(DIPOLES.moments)]
+            found = ms.equilibrium(
+                scene,
+                remanent_magnetization=inputs[0],
+                applied_flux_density=inputs[1],
+                young_modulus=inputs[2],
+                values={DIPOLES: {"moments": inputs[3]}},
+            )
+            gradients.append(torch.autograd.grad((found.positions**2).sum(), inputs))
+    finally:
+        ms.set_num_threads(before)
+    for others in gradients[1:]:
+        assert all(torch.equal(a, b) for a, b in zip(gradients[0], others, strict=True))
