@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 from tqdm.auto import tqdm
@@ -47,7 +48,8 @@ class Minimum:
 
     def __repr__(self) -> str:
         broken = f", constraints broken by {self.violation:.2g}" if self.violation > 0 else ""
-        return f"Minimum: objective {self.objective:.6g}{broken} after {self.iterations} iterations ({self.reason})"
+        reached = f"Minimum: objective {self.objective:.6g}{broken}"
+        return f"{reached} after {self.iterations} iterations ({self.reason})"
 
 
 def minimize(
@@ -116,7 +118,8 @@ def minimize(
         if run.best is None:
             raise
         raise ObjectiveFailed(
-            f"iteration {run.iteration + 1} failed: {error}\nThe best design so far is in `error.last_good`, and in the parameters.",
+            f"iteration {run.iteration + 1} failed: {error}\n"
+            "The best design so far is in `error.last_good`, and in the parameters.",
             run.minimum("failed"),
         ) from error
 
@@ -146,7 +149,7 @@ def _loop(run, max_iterations, tolerance, patience, callback, bar, checkpoint, c
 
 def _settled(history: list[Record], tolerance: float, patience: int) -> bool:
     values = [record.objective for record in history[-patience - 1 :]]
-    changes = [abs(b - a) <= tolerance * abs(b) for a, b in zip(values, values[1:], strict=False)]
+    changes = [abs(b - a) <= tolerance * abs(b) for a, b in pairwise(values)]
     return len(changes) == patience and all(changes)
 
 
@@ -266,6 +269,6 @@ def _parts(result) -> tuple:
             constraints = part
         else:
             raise TypeError(
-                f"beside its value an objective returns a dict of terms or a tensor, got {type(part).__name__}"
+                f"beside its value an objective returns a dict of terms or a tensor, got {type(part)}"
             )
     return head, {name: float(value) for name, value in terms.items()}, constraints

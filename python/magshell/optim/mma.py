@@ -115,7 +115,8 @@ class MMA(BoxOptimizer):
         if np.isnan(box.scale).any():
             entry = int(np.isnan(box.scale).argmax())
             raise ValueError(
-                f"{box.name_of(entry)} is not bounded on both sides: give `scale`, the size of a large change of it"
+                f"{box.name_of(entry)} is not bounded on both sides: "
+                "give `scale`, the size of a large change of it"
             )
 
 

@@ -90,7 +90,8 @@ def _checked_objective(objective) -> torch.Tensor:
         )
     if objective.ndim != 0 or not objective.is_floating_point():
         raise ValueError(
-            f"the objective must be a real scalar, got shape {tuple(objective.shape)} and dtype {objective.dtype}: "
+            f"the objective must be a real scalar, "
+            f"got shape {tuple(objective.shape)} and dtype {objective.dtype}: "
             "sum it, or take its mean"
         )
     return objective
