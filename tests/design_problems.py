@@ -94,7 +94,7 @@ def bad_scales(x):
 
 
 def resource(x):
-    """10^4 variables share one budget."""
+    """Many variables share one budget."""
     weights = torch.linspace(1, 3, len(x), dtype=x.dtype)
     return (weights / x).sum() / len(x), (x.mean() - 1)[None]
 
@@ -111,7 +111,7 @@ CONSTRAINED = [
     problem("HS 35", hs35, [0.5, 0.5, 0.5], 0.0, 4.0),
     problem("HS 43", hs43, [0.0] * 4, -5.0, 5.0),
     problem("HS 76", hs76, [0.5] * 4, 0.0, 5.0),
-    problem("budget of 10^4", resource, np.full(10_000, 0.5), 0.1, 5.0, iterations=60),
+    problem("budget", resource, np.full(500, 0.5), 0.1, 5.0, iterations=60),
 ]
 
 BOUNDED = [

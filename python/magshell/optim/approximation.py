@@ -20,7 +20,9 @@ from .box import Box
 from .sample import Sample
 from .subproblem import Subproblem
 
-_CLOSEST, _FARTHEST = 0.01, 10.0  # of an asymptote, in sizes
+# Of an asymptote, in sizes. Svanberg's notes keep 0.01: MMA then swings about
+# a minimum inside the box for ever.
+_CLOSEST, _FARTHEST = 1e-6, 10.0
 _GAP = 0.9  # of the way to an asymptote that a step may go
 
 
