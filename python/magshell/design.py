@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 from tqdm.auto import tqdm
@@ -17,7 +18,8 @@ from .errors import Interrupted, ObjectiveFailed
 
 @dataclass(frozen=True)
 class Record:
-    """One iteration: the objective, its named terms, the largest positive constraint, |gradient| of the objective,
+    """One iteration: the objective, its named terms, the largest positive constraint, |gradient| of the
+    objective,
     seconds since the start, and how often the objective was asked for."""
 
     iteration: int
@@ -31,7 +33,8 @@ class Record:
 
 @dataclass
 class Minimum:
-    """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an iteration, from the start."""
+    """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an
+    iteration, from the start."""
 
     parameters: list
     objective: float
@@ -45,7 +48,8 @@ class Minimum:
 
     def __repr__(self) -> str:
         broken = f", constraints broken by {self.violation:.2g}" if self.violation > 0 else ""
-        return f"Minimum: objective {self.objective:.6g}{broken} after {self.iterations} iterations ({self.reason})"
+        reached = f"Minimum: objective {self.objective:.6g}{broken}"
+        return f"{reached} after {self.iterations} iterations ({self.reason})"
 
 
 def minimize(
@@ -65,21 +69,27 @@ def minimize(
 ) -> Minimum:
     """Minimizes objective(*parameters) and leaves the parameters at the best design.
 
-    objective: returns a scalar tensor, or a dict of named terms whose sum it is, or a tuple of one of these with a dict of
+    objective: returns a scalar tensor, or a dict of named terms whose sum it is, or a tuple of one of these
+    with a dict of
     terms to record, with a tensor of constraints (m,) <= 0, or with both.
     parameters: tensors with requires_grad, the ones the optimizer was made with.
     optimizer: one of `ms.optim`, or a function that makes one from the list of parameters.
-    tolerance: stops once the objective changed by no more than this share of itself, `patience` times in a row.
-    feasibility: how far a constraint may be broken by a design that counts as feasible when the best is chosen.
+    tolerance: stops once the objective changed by no more than this share of itself, `patience` times in a
+    row.
+    feasibility: how far a constraint may be broken by a design that counts as feasible when the best is
+    chosen.
     callback: called with each Record; returning True stops.
-    progress: show a bar. checkpoint: a file that is replaced, whole or not at all, every `checkpoint_every` iterations;
+    progress: show a bar. checkpoint: a file that is replaced, whole or not at all, every `checkpoint_every`
+    iterations;
     resume: continue from it if it exists, with the same bits as without the stop.
 
-    Ctrl-C raises `ms.Interrupted`, an error in the objective or the callback `ms.ObjectiveFailed`, once a design is known; both hold the best one,
+    Ctrl-C raises `ms.Interrupted`, an error in the objective or the callback `ms.ObjectiveFailed`, once a
+    design is known; both hold the best one,
     a Minimum, in `last_good`. Before that the error itself comes through.
 
     >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
-    >>> ms.minimize(lambda x: ((x - 1) ** 2).sum(), [x], ms.optim.LBFGS([x], upper=0.5)).objective  # doctest: +SKIP
+    # Doctest: +SKIP
+    >>> ms.minimize(lambda x: ((x - 1) ** 2).sum(), [x], ms.optim.LBFGS([x], upper=0.5)).objective
     0.75
     """
     require_torch("minimize")
@@ -108,13 +118,14 @@ def minimize(
         if run.best is None:
             raise
         raise ObjectiveFailed(
-            f"iteration {run.iteration + 1} failed: {error}\nThe best design so far is in `error.last_good`, and in the parameters.",
+            f"iteration {run.iteration + 1} failed: {error}\n"
+            "The best design so far is in `error.last_good`, and in the parameters.",
             run.minimum("failed"),
         ) from error
 
 
 def _loop(run, max_iterations, tolerance, patience, callback, bar, checkpoint, checkpoint_every) -> Minimum:
-    reason, stopped = "max_iterations reached", False
+    stopped = False
     if not run.history:
         run.begin()
         stopped = callback is not None and callback(run.history[-1]) is True
@@ -133,12 +144,12 @@ def _loop(run, max_iterations, tolerance, patience, callback, bar, checkpoint, c
             return run.minimum("no lower design along the gradient, to rounding")
         elif tolerance > 0 and _settled(run.history, tolerance, patience):
             return run.minimum("the objective has settled")
-    return run.minimum("stopped by the callback" if stopped else reason)
+    return run.minimum("stopped by the callback" if stopped else "max_iterations reached")
 
 
 def _settled(history: list[Record], tolerance: float, patience: int) -> bool:
     values = [record.objective for record in history[-patience - 1 :]]
-    changes = [abs(b - a) <= tolerance * abs(b) for a, b in zip(values, values[1:], strict=False)]
+    changes = [abs(b - a) <= tolerance * abs(b) for a, b in pairwise(values)]
     return len(changes) == patience and all(changes)
 
 
@@ -151,7 +162,7 @@ class _Run:
         if not callable(objective):
             raise ValueError(f"objective must be a function of the parameters, got {objective!r:.60}")
         self.parameters = [parameters] if is_tensor(parameters) else list(parameters)
-        self.optimizer = optimizer if isinstance(optimizer, BoxOptimizer) else self._made(optimizer)
+        self.optimizer = optimizer(self.parameters) if callable(optimizer) else optimizer
         if not isinstance(self.optimizer, BoxOptimizer):
             raise ValueError(f"optimizer must be one of ms.optim, got {type(self.optimizer).__name__}")
         if {id(p) for p in self.parameters} != {id(p) for p in self.optimizer.parameters}:
@@ -161,12 +172,6 @@ class _Run:
         self.best: dict | None = None
         self._evaluations, self._terms = 0, {}
         self._started = time.perf_counter()
-
-    def _made(self, factory):
-        if isinstance(factory, type) or not hasattr(factory, "step"):
-            if callable(factory):
-                return factory(self.parameters)
-        return factory
 
     @property
     def iteration(self) -> int:
@@ -264,6 +269,6 @@ def _parts(result) -> tuple:
             constraints = part
         else:
             raise TypeError(
-                f"beside its value an objective returns a dict of terms or a tensor, got {type(part).__name__}"
+                f"beside its value an objective returns a dict of terms or a tensor, got {type(part)}"
             )
     return head, {name: float(value) for name, value in terms.items()}, constraints

@@ -1,6 +1,7 @@
 """Objectives, penalties and constraints of designs: small functions of torch tensors, differentiable in each.
 
-Each returns a scalar that a sum of others can hold; `cap` returns constraints g <= 0. Lengths in m, magnetizations in A/m.
+Each returns a scalar that a sum of others can hold; `cap` returns constraints g <= 0. Lengths in m,
+magnetizations in A/m.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from ._tensors import require_torch
 def shape_matching(positions, target, vertices=None, weights=None):
     """Sum of squared distances between vertices and their targets [m2].
 
-    positions: (n_v, 3). target: (n_v, 3), or (k, 3) when k vertices are chosen. vertices: (k,) indices, by default all.
+    positions: (n_v, 3). target: (n_v, 3), or (k, 3) when k vertices are chosen. vertices: (k,) indices, by
+    default all.
     weights: (k,), one a distance, for example vertex areas; by default 1.
     """
     chosen = positions if vertices is None else positions[_indices(vertices)]
@@ -26,8 +28,10 @@ def shape_matching(positions, target, vertices=None, weights=None):
 def height_map(positions, rest_positions, image, extent, weights=None):
     """Sum of squared differences between the vertices' heights z and an image [m2].
 
-    The image is sampled bilinearly where the vertices rest. positions, rest_positions: (n_v, 3). image: (rows, columns) heights [m], row 0 at the largest y as
-    pictures are drawn. extent: (x_min, x_max, y_min, y_max) [m] of the centres of its outermost pixels; beyond, the nearest pixel counts.
+    The image is sampled bilinearly where the vertices rest. positions, rest_positions: (n_v, 3). image:
+    (rows, columns) heights [m], row 0 at the largest y as
+    pictures are drawn. extent: (x_min, x_max, y_min, y_max) [m] of the centres of its outermost pixels;
+    beyond, the nearest pixel counts.
     weights: (n_v,), by default 1.
     """
     heights = bilinear(image, rest_positions, extent)
@@ -40,7 +44,8 @@ def height_map(positions, rest_positions, image, extent, weights=None):
 
 
 def bilinear(image, points, extent):
-    """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in `height_map`."""
+    """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in
+    `height_map`."""
     torch = require_torch("objectives.bilinear")
     image = torch.as_tensor(image, dtype=torch.float64)
     if image.ndim != 2 or min(image.shape) < 2:
@@ -62,7 +67,8 @@ def bilinear(image, points, extent):
 
 
 def extension(positions, vertices, direction):
-    """Minus the mean reach of the chosen vertices along a direction [m]: minimize it to pull them as far as they go.
+    """Minus the mean reach of the chosen vertices along a direction [m]: minimize it to pull them as far as
+    they go.
 
     positions: (n_v, 3). vertices: an index, or (k,). direction: (3,), of any length but zero.
     """
@@ -81,9 +87,11 @@ def magnitude(values, areas=None):
 
 
 def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
-    """Sum over interior edges of edge length times the jump of the values across, smooth at zero: sqrt(jump^2 + eps^2) - eps.
+    """Sum over interior edges of edge length times the jump of the values across, smooth at zero: sqrt(jump^2
+    + eps^2) - eps.
 
-    values: (n_f,) or (n_f, k). edge_faces: (n_e, 2), with -1 where an edge has no second face, as in `TriangleMesh`. edge_lengths: (n_e,) [m], by default 1.
+    values: (n_f,) or (n_f, k). edge_faces: (n_e, 2), with -1 where an edge has no second face, as in
+    `TriangleMesh`. edge_lengths: (n_e,) [m], by default 1.
     smoothing eps > 0: in units of the values; jumps far below it count by their squares.
     """
     if not smoothing > 0:
@@ -101,8 +109,10 @@ def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
 def cap(remanent_magnetization, limit, sharpness=None):
     """Constraints g <= 0 that keep |M_r| at or below a limit: (|M_r| / limit)^2 - 1.
 
-    remanent_magnetization: (n_f, 3) A/m. limit: A/m. One constraint a face, (n_f,); with a sharpness p > 1, a single one, (1,), from the
-    p-norm over all faces: for optimizers it costs one gradient instead of n_f, and it is never looser than the limit.
+    remanent_magnetization: (n_f, 3) A/m. limit: A/m. One constraint a face, (n_f,); with a sharpness p > 1, a
+    single one, (1,), from the
+    p-norm over all faces: for optimizers it costs one gradient instead of n_f, and it is never looser than
+    the limit.
     """
     if not float(limit) > 0:
         raise ValueError(f"limit [A/m] must be positive, got {limit}")
@@ -114,14 +124,17 @@ def cap(remanent_magnetization, limit, sharpness=None):
     largest = (
         squares.detach().max().clamp(min=1e-30)
     )  # taken out, so that the powers neither overflow nor vanish
-    return (largest * ((squares / largest) ** sharpness).sum() ** (1 / sharpness) - 1)[None]
+    powers = ((squares / largest) ** sharpness).sum() + 1e-30  # a root's derivative at zero is not finite
+    return (largest * powers ** (1 / sharpness) - 1)[None]
 
 
 def printable(remanent_magnetization, directions, sharpness=None):
     """Sum of squared distances of magnetizations from their nearest printable ray [A2/m2].
 
-    remanent_magnetization: (n_f, 3) A/m. directions: (k, 3), of any length but zero; no magnetization at all can be printed too. The distance
-    is to the ray that starts at zero. sharpness: replaces the minimum over the rays by a smooth one, in 1 / (A2/m2).
+    remanent_magnetization: (n_f, 3) A/m. directions: (k, 3), of any length but zero; no magnetization at all
+    can be printed too. The distance
+    is to the ray that starts at zero. sharpness: replaces the minimum over the rays by a smooth one, in 1 /
+    (A2/m2).
     """
     torch = require_torch("objectives.printable")
     rays = torch.as_tensor(directions).to(remanent_magnetization)

@@ -1,4 +1,5 @@
-"""Optimizers for designs, as torch optimizers with closures: `ms.optim.MMA`, `ms.optim.GCMMA`, `ms.optim.LBFGS`.
+"""Optimizers for designs, as torch optimizers with closures: `ms.optim.MMA`, `ms.optim.GCMMA`,
+`ms.optim.LBFGS`.
 
 torch is imported when one of them is first asked for.
 """

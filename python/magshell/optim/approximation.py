@@ -1,4 +1,5 @@
-"""MMA's convex approximations of objective and constraints around a design, between two asymptotes a variable.
+"""MMA's convex approximations of objective and constraints around a design, between two asymptotes a
+variable.
 
 Written in steps t = (x' - x) / scale, with asymptotes at -s and s:
 
@@ -19,13 +20,16 @@ from .box import Box
 from .sample import Sample
 from .subproblem import Subproblem
 
-_CLOSEST, _FARTHEST = 0.01, 10.0  # of an asymptote, in sizes
+# Of an asymptote, in sizes. Svanberg's notes keep 0.01: MMA then swings about
+# a minimum inside the box for ever.
+_CLOSEST, _FARTHEST = 1e-6, 10.0
 _GAP = 0.9  # of the way to an asymptote that a step may go
 
 
 @dataclass(frozen=True)
 class Asymptotes:
-    """Options of the asymptotes, (n,) each: first distance in sizes, and factors after an oscillation or progress."""
+    """Options of the asymptotes, (n,) each: first distance in sizes, and factors after an oscillation or
+    progress."""
 
     initial: np.ndarray
     shrink: np.ndarray
@@ -34,7 +38,8 @@ class Asymptotes:
     def distance(
         self, last: np.ndarray | None, step: np.ndarray | None, step_before: np.ndarray | None
     ) -> np.ndarray:
-        """Distances s, (n,): drawn in where the last two steps differ in sign, pushed out where they agree."""
+        """Distances s, (n,): drawn in where the last two steps differ in sign, pushed out where they
+        agree."""
         if step_before is None:
             return self.initial.copy()
         agreement = step * step_before
@@ -62,7 +67,8 @@ class Approximation:
         return Approximation(values, p, q, distance)
 
     def at(self, t: np.ndarray) -> np.ndarray:
-        """(1 + m,) approximate values at the step t; each term as its difference from t = 0, to keep small steps."""
+        """(1 + m,) approximate values at the step t; each term as its difference from t = 0, to keep small
+        steps."""
         return (
             self.values
             + self.p @ (t / (self.distance * (self.distance - t)))

@@ -1,4 +1,5 @@
-"""What the optimizers share: parameters as one vector in a box, one sample a design, a state that survives a restart."""
+"""What the optimizers share: parameters as one vector in a box, one sample a design, a state that survives a
+restart."""
 
 from __future__ import annotations
 
@@ -15,14 +16,19 @@ _SAMPLE = "sample_"
 
 
 class BoxOptimizer(torch.optim.Optimizer):
-    """A torch optimizer whose groups have bounds. `step(closure)` moves the parameters and returns the new objective.
+    """A torch optimizer whose groups have bounds. `step(closure)` moves the parameters and returns the new
+    objective.
 
-    The closure returns the objective (or the objective and constraints) of the parameters as they stand and does not
-    call backward. What it says of the design that a step ends at is kept for the next step; another closure object, or
+    The closure returns the objective (or the objective and constraints) of the parameters as they stand and
+    does not
+    call backward. What it says of the design that a step ends at is kept for the next step; another closure
+    object, or
     parameters that were changed in between, make the next step ask again.
 
     A step that raises leaves parameters and state as they were.
     """
+
+    _copied = ("_run", "_sample", "_sample_x")  # what a copy takes along, beyond torch's own
 
     def __init__(self, params, defaults: dict):
         self._run: dict = {}
@@ -34,7 +40,7 @@ class BoxOptimizer(torch.optim.Optimizer):
     def add_param_group(self, param_group: dict) -> None:
         if self._run:
             raise ValueError("a parameter group cannot join a run that has begun: make a new optimizer")
-        unknown = set(param_group) - {"params", *self.defaults}
+        unknown = set(param_group) - {"params", "param_names", *self.defaults}
         if unknown:
             raise ValueError(
                 f"unknown option {sorted(unknown)[0]!r}; the options of a group are {sorted(self.defaults)}"
@@ -95,7 +101,7 @@ class BoxOptimizer(torch.optim.Optimizer):
         self._closure = None
 
     def __getstate__(self) -> dict:
-        kept = {name: getattr(self, name) for name in ("_run", "_sample", "_sample_x")}
+        kept = {name: getattr(self, name) for name in self._copied}
         return {**super().__getstate__(), **kept, "_closure": None}
 
     def _box(self) -> Box:
@@ -116,6 +122,12 @@ class BoxOptimizer(torch.optim.Optimizer):
             for parameter, chunk in zip(self.parameters, chunks, strict=True):
                 parameter.copy_(chunk.reshape(parameter.shape))
         return self._read()
+
+    def _leave_gradients(self, gradient: np.ndarray) -> None:
+        """Sets the parameters' `.grad`, (n,)."""
+        chunks = torch.from_numpy(gradient).split([parameter.numel() for parameter in self.parameters])
+        for parameter, chunk in zip(self.parameters, chunks, strict=True):
+            parameter.grad = chunk.reshape(parameter.shape).to(parameter)
 
     def _trial(self, x: np.ndarray) -> tuple[np.ndarray, Trial]:
         """The design x as the parameters hold it, and the closure's values there."""

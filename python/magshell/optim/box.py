@@ -46,7 +46,8 @@ class Box:
 
 
 def option_tensors(label: str, value, parameters: list[torch.Tensor]) -> list[torch.Tensor]:
-    """A bound or a scale as one float64 tensor a parameter: a number, a tensor, or a list with one of these each."""
+    """A bound or a scale as one float64 tensor a parameter: a number, a tensor, or a list with one of these
+    each."""
     values = value if isinstance(value, list | tuple) else [value] * len(parameters)
     if len(values) != len(parameters):
         raise ValueError(f"{label} has {len(values)} entries for {len(parameters)} parameters")
@@ -59,7 +60,8 @@ def option_tensors(label: str, value, parameters: list[torch.Tensor]) -> list[to
             shape = getattr(given, "shape", None)
             came = f"{given!r:.60}" if shape is None else f"shape {tuple(shape)}"
             raise ValueError(
-                f"{label} of parameter {position} must be a number or fit its shape {tuple(parameter.shape)}, got {came}"
+                f"{label} of parameter {position} must be a number or fit its shape "
+                f"{tuple(parameter.shape)}, got {came}"
             ) from None
         if tensor.isnan().any():
             raise ValueError(f"{label} of parameter {position} holds NaN")
@@ -71,7 +73,11 @@ def group_box(number: int, group: dict) -> Box:
     """The box of one parameter group. Bounds that cross, and sizes that are not positive, are refused."""
     lowers, uppers, scales, names, sizes = [], [], [], [], []
     bounds = zip(
-        group["params"], group["lower"], group["upper"], group["scale"] or [None] * len(group["params"])
+        group["params"],
+        group["lower"],
+        group["upper"],
+        group["scale"] or [None] * len(group["params"]),
+        strict=True,
     )
     for position, (parameter, lower, upper, scale) in enumerate(bounds):
         name = f"parameter {position} of group {number}"

@@ -1,4 +1,5 @@
-"""The quadratic model of L-BFGS-B within the box: its generalized Cauchy point, and its minimum over the free entries.
+"""The quadratic model of L-BFGS-B within the box: its generalized Cauchy point, and its minimum over the free
+entries.
 
 Byrd, Lu, Nocedal, Zhu, SIAM J. Sci. Comput. 16 (1995), sections 4 and 5.
 """
@@ -11,9 +12,11 @@ from .curvature import Curvature
 
 
 def cauchy_step(gradient: np.ndarray, lower: np.ndarray, upper: np.ndarray, model: Curvature) -> np.ndarray:
-    """The step (n,) to the first minimum of the model along the projected path -t gradient. lower <= 0 <= upper: of steps.
+    """The step (n,) to the first minimum of the model along the projected path -t gradient. lower <= 0 <=
+    upper: of steps.
 
-    On the path an entry i stops at its breakpoint t_i. With the entries sorted by it, the path's direction d, W^T d and
+    On the path an entry i stops at its breakpoint t_i. With the entries sorted by it, the path's direction d,
+    W^T d and
     W^T z change by one entry a breakpoint, so that the model's slope on every stretch is a running sum:
 
         f' = -|d|^2 (1 - theta t) - (W^T d) . M (W^T z),     f'' = theta |d|^2 - (W^T d) . M (W^T d)
@@ -47,7 +50,8 @@ def cauchy_step(gradient: np.ndarray, lower: np.ndarray, upper: np.ndarray, mode
 def subspace_step(
     gradient: np.ndarray, lower: np.ndarray, upper: np.ndarray, model: Curvature, cauchy: np.ndarray
 ) -> np.ndarray:
-    """The step (n,) that minimizes the model over the entries which the Cauchy step leaves free, brought back into the box."""
+    """The step (n,) that minimizes the model over the entries which the Cauchy step leaves free, brought back
+    into the box."""
     free = (cauchy > lower) & (cauchy < upper)
     if not free.any() or model.w.shape[1] == 0:
         return cauchy

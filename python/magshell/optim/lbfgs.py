@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-import torch
 
 from .base import BoxOptimizer, Restoring
 from .box import Box
@@ -18,20 +17,28 @@ from .mma import stepped
 
 _FIRST_CHANGE = 0.1  # of the steepest variable's size, before any curvature is known
 
+_ROUNDING = 4 * np.finfo(float).eps  # of the objective: a smaller decrease cannot be seen
+
 
 class LBFGS(BoxOptimizer):
-    """L-BFGS-B: the generalized Cauchy point of a limited-memory model, its minimum over the free variables, and a
+    """L-BFGS-B: the generalized Cauchy point of a limited-memory model, its minimum over the free variables,
+    and a
     line search for the strong Wolfe conditions within the box. It has no other constraints.
 
-    lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
-    scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite and 1 where not.
+    lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these
+    each.
+    scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite
+    and 1 where not.
     memory: how many steps the model is made from.
 
-    Byrd, Lu, Nocedal, Zhu, A limited memory algorithm for bound constrained optimization, SIAM J. Sci. Comput. 16 (1995).
+    Byrd, Lu, Nocedal, Zhu, A limited memory algorithm for bound constrained optimization, SIAM J. Sci.
+    Comput. 16 (1995).
 
     >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
     >>> ms.optim.LBFGS([x], upper=0.5).step(lambda: ((x - 1) ** 2).sum())  # doctest: +SKIP
     """
+
+    _copied = (*BoxOptimizer._copied, "memory")
 
     def __init__(self, params, *, lower=-math.inf, upper=math.inf, scale=None, memory: int = 10):
         if not (isinstance(memory, int) and memory > 0):
@@ -62,13 +69,13 @@ class LBFGS(BoxOptimizer):
             reached = self._search(x, gradient, scale, box, lower, upper, pairs)
         if reached is None:
             self._write(x)
-            self._set_gradients(self._sample.gradient)
+            self._leave_gradients(self._sample.gradient)
             return
         moved, sample = reached
         step = (moved - x)[free] / scale
         pairs = remembered(pairs, step, sample.gradient[free] * scale - gradient, self.memory)
         self._write(moved)
-        self._set_gradients(sample.gradient)
+        self._leave_gradients(sample.gradient)
         self._run = {"steps": pairs[0], "changes": pairs[1]}
         self._keep(moved, sample)
 
@@ -80,7 +87,7 @@ class LBFGS(BoxOptimizer):
         cauchy = cauchy_step(gradient, lower, upper, model)
         step = subspace_step(gradient, lower, upper, model, cauchy)
         slope = float(gradient @ step)
-        if not slope < 0:
+        if not -slope > _ROUNDING * abs(self._sample.objective):
             return None
         probe = partial(self._probe, x, step, scale, box)
         start = Probe(0.0, self._sample.objective, slope)
@@ -94,11 +101,6 @@ class LBFGS(BoxOptimizer):
         return Probe(
             length, sample.objective, float(sample.gradient[box.free] * scale @ step), (moved, sample)
         )
-
-    def _set_gradients(self, gradient: np.ndarray) -> None:
-        chunks = torch.from_numpy(gradient).split([parameter.numel() for parameter in self.parameters])
-        for parameter, chunk in zip(self.parameters, chunks, strict=True):
-            parameter.grad = chunk.reshape(parameter.shape).to(parameter)
 
 
 def _first_theta(gradient: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]) -> float:

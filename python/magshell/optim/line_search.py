@@ -2,7 +2,8 @@
 
     f(a) <= f(0) + c1 a f'(0),     |f'(a)| <= c2 |f'(0)|
 
-Nocedal and Wright, Numerical Optimization (2006), algorithms 3.5 and 3.6, with the interval's end accepted where f still falls.
+Nocedal and Wright, Numerical Optimization (2006), algorithms 3.5 and 3.6, with the interval's end accepted
+where f still falls.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ class Probe:
 def strong_wolfe(
     probe: Callable[[float], Probe], start: Probe, first: float, longest: float, limit: int = 20
 ) -> Probe | None:
-    """The probe of an acceptable length in (0, longest]; the lowest of a search cut short; None if none is below the start."""
+    """The probe of an acceptable length in (0, longest]; the lowest of a search cut short; None if none is
+    below the start."""
 
     def falls_short(at: Probe) -> bool:
         return at.value > start.value + _DECREASE * at.length * start.slope

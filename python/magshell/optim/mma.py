@@ -18,20 +18,27 @@ _CONVEXITY = 1e-6  # of the steepest slope so far: damps steps once the gradient
 class MMA(BoxOptimizer):
     """The method of moving asymptotes, with bounds and any number of constraints g <= 0.
 
-    lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
-    scale: the typical size of a variable, in the same forms; by default upper - lower. Without finite bounds it is needed.
-    move: the longest step of a variable, in sizes. asymptote_initial: first distance of the asymptotes, in sizes;
+    lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these
+    each.
+    scale: the typical size of a variable, in the same forms; by default upper - lower. Without finite bounds
+    it is needed.
+    move: the longest step of a variable, in sizes. asymptote_initial: first distance of the asymptotes, in
+    sizes;
     asymptote_shrink, asymptote_grow: its factors after an oscillation and after progress.
-    penalty: the price of breaking a constraint by as much as its slope would change it over a size, in units of the same
+    penalty: the price of breaking a constraint by as much as its slope would change it over a size, in units
+    of the same
     change of the objective; only a design that cannot keep its constraints pays it.
 
-    Every option but penalty can differ between parameter groups. K. Svanberg, The method of moving asymptotes, Int. J. Numer. Meth. Eng.
+    Every option but penalty can differ between parameter groups. K. Svanberg, The method of moving
+    asymptotes, Int. J. Numer. Meth. Eng.
     24 (1987), with the asymptotes and the subproblem as in his notes of 2007.
 
     >>> x = torch.full((5,), 5.0, dtype=torch.float64, requires_grad=True)
     >>> optimizer = ms.optim.MMA([x], lower=1.0, upper=10.0)
     >>> optimizer.step(lambda: (x.sum(), (61 / x[0] ** 3 - 1)[None]))  # doctest: +SKIP
     """
+
+    _copied = (*BoxOptimizer._copied, "penalty")
 
     def __init__(
         self,
@@ -87,7 +94,8 @@ class MMA(BoxOptimizer):
         self._keep(reached, sample)
 
     def _sizes(self, slopes: np.ndarray) -> np.ndarray:
-        """(1 + m,) steepest slope of each function; the objective's over the whole run, for it vanishes at a minimum."""
+        """(1 + m,) steepest slope of each function; the objective's over the whole run, for it vanishes at a
+        minimum."""
         sizes = np.abs(slopes).max(axis=1, initial=0.0)
         sizes[0] = max(sizes[0], self._run.get("size", 0.0))
         return np.where(sizes > 0, sizes, 1.0)
@@ -107,7 +115,8 @@ class MMA(BoxOptimizer):
         if np.isnan(box.scale).any():
             entry = int(np.isnan(box.scale).argmax())
             raise ValueError(
-                f"{box.name_of(entry)} is not bounded on both sides: give `scale`, the size of a large change of it"
+                f"{box.name_of(entry)} is not bounded on both sides: "
+                "give `scale`, the size of a large change of it"
             )
 
 

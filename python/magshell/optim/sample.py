@@ -46,7 +46,8 @@ class Trial:
         _require_finite("the constraints", self.constraints)
 
     def differentiate(self) -> Sample:
-        """The sample with gradients. The parameters' `.grad` is left holding the objective's; after an error, what it held."""
+        """The sample with gradients. The parameters' `.grad` is left holding the objective's; after an error,
+        what it held."""
         kept = [parameter.grad for parameter in self._parameters]
         try:
             rows = [self._row(self._objective, "the objective", retain=self._constraints is not None)]
@@ -89,7 +90,8 @@ def _checked_objective(objective) -> torch.Tensor:
         )
     if objective.ndim != 0 or not objective.is_floating_point():
         raise ValueError(
-            f"the objective must be a real scalar, got shape {tuple(objective.shape)} and dtype {objective.dtype}: "
+            f"the objective must be a real scalar, "
+            f"got shape {tuple(objective.shape)} and dtype {objective.dtype}: "
             "sum it, or take its mean"
         )
     return objective

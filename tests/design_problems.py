@@ -1,0 +1,173 @@
+"""Optimization problems with known or computable answers, shared by the tests of the optimizers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import nlopt
+import numpy as np
+import torch
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """function(x) -> objective, or (objective, constraints <= 0); start, lower, upper: (n,)."""
+
+    name: str
+    function: Callable
+    start: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    iterations: int = 100
+
+    def parameter(self, dtype=torch.float64) -> torch.Tensor:
+        return torch.tensor(self.start, dtype=dtype, requires_grad=True)
+
+
+def problem(name, function, start, lower, upper, iterations=100) -> Problem:
+    start = np.asarray(start, dtype=float)
+    lower, upper = (np.broadcast_to(np.asarray(bound, dtype=float), start.shape) for bound in (lower, upper))
+    return Problem(name, function, start, lower, upper, iterations)
+
+
+def vector(*values: float) -> torch.Tensor:
+    return torch.tensor(values, dtype=torch.float64)
+
+
+def rosenbrock(x):
+    return (100 * (x[1:] - x[:-1] ** 2) ** 2 + (1 - x[:-1]) ** 2).sum()
+
+
+def cantilever(x):
+    """Case E1: five hollow beams, Svanberg 1987."""
+    return 0.0624 * x.sum(), (vector(61, 37, 19, 7, 1) / x**3).sum()[None] - 1
+
+
+def two_balls(x):
+    """Case E2."""
+    first, second = ((x - vector(*center)) ** 2 for center in ((5, 2, 1), (3, 4, 3)))
+    return (x**2).sum(), torch.stack([first.sum() - 9, second.sum() - 9])
+
+
+def two_bar_truss(x):
+    """Svanberg 1987, 5.1: weight of two bars of area x0 and half distance x1, under two stress limits."""
+    length = torch.sqrt(1 + x[1] ** 2)
+    stresses = [0.124 * length * (8 / x[0] + sign / (x[0] * x[1])) - 1 for sign in (1, -1)]
+    return x[0] * length, torch.stack(stresses)
+
+
+def hs24(x):
+    root = 3**0.5
+    objective = ((x[0] - 3) ** 2 - 9) * x[1] ** 3 / (27 * root)
+    return objective, torch.stack([x[1] - x[0] / root, -x[0] - x[1] * root, x[0] + x[1] * root - 6])
+
+
+def hs35(x):
+    objective = 9 - 8 * x[0] - 6 * x[1] - 4 * x[2] + 2 * x[0] ** 2 + 2 * x[1] ** 2 + x[2] ** 2
+    return objective + 2 * x[0] * x[1] + 2 * x[0] * x[2], (x[0] + x[1] + 2 * x[2] - 3)[None]
+
+
+def hs43(x):
+    a, b, c, d = x
+    objective = a**2 + b**2 + 2 * c**2 + d**2 - 5 * a - 5 * b - 21 * c + 7 * d
+    return objective, torch.stack(
+        [
+            a**2 + b**2 + c**2 + d**2 + a - b + c - d - 8,
+            a**2 + 2 * b**2 + c**2 + 2 * d**2 - a - d - 10,
+            2 * a**2 + b**2 + c**2 + 2 * a - b - d - 5,
+        ]
+    )
+
+
+def hs76(x):
+    a, b, c, d = x
+    objective = a**2 + 0.5 * b**2 + c**2 + 0.5 * d**2 - a * c + c * d - a - 3 * b + c - d
+    return objective, torch.stack([a + 2 * b + c + d - 5, 3 * a + b + 2 * c - d - 4, 1.5 - b - 4 * c])
+
+
+def bad_scales(x):
+    """Variables of sizes 1e8, 1 and 1e-4, an objective of size 1e-9 and a constraint of size 1e6."""
+    u = x / vector(1e8, 1.0, 1e-4)
+    return 1e-9 * ((u - vector(0.7, 0.9, 0.2)) ** 2).sum(), 1e6 * (u.sum() - 1.2)[None]
+
+
+def resource(x):
+    """Many variables share one budget."""
+    weights = torch.linspace(1, 3, len(x), dtype=x.dtype)
+    return (weights / x).sum() / len(x), (x.mean() - 1)[None]
+
+
+def many_quadratics(x):
+    """10^4 variables, a third of them at a bound, coupled to their neighbours."""
+    target = 1.5 * torch.sin(torch.arange(len(x), dtype=x.dtype))
+    return ((x - target) ** 2).sum() + 0.5 * ((x[1:] - x[:-1]) ** 2).sum()
+
+
+CONSTRAINED = [
+    problem("two-bar truss", two_bar_truss, [1.5, 0.5], [0.2, 0.1], [4.0, 1.6]),
+    problem("HS 24", hs24, [1.0, 0.5], 0.0, 5.0),
+    problem("HS 35", hs35, [0.5, 0.5, 0.5], 0.0, 4.0),
+    problem("HS 43", hs43, [0.0] * 4, -5.0, 5.0),
+    problem("HS 76", hs76, [0.5] * 4, 0.0, 5.0),
+    problem("budget", resource, np.full(500, 0.5), 0.1, 5.0, iterations=60),
+]
+
+BOUNDED = [
+    problem("Rosenbrock, corner", rosenbrock, [-1.2, 0.5], -2.0, 0.5),
+    problem("Rosenbrock, 20", rosenbrock, np.linspace(-1.0, 0.7, 20), -1.5, 0.8),
+    problem("HS 4", lambda x: (x[0] + 1) ** 3 / 3 + x[1], [1.125, 0.125], [1.0, 0.0], [5.0, 5.0]),
+    problem("HS 38", lambda x: hs38(x), [-3.0, -1.0, -3.0, -1.0], -10.0, 10.0, iterations=300),
+    problem("coupled 10^4", many_quadratics, np.zeros(10_000), -1.0, 1.0),
+]
+
+
+def hs38(x):
+    a, b, c, d = x
+    objective = 100 * (b - a**2) ** 2 + (1 - a) ** 2 + 90 * (d - c**2) ** 2 + (1 - c) ** 2
+    return objective + 10.1 * ((b - 1) ** 2 + (d - 1) ** 2) + 19.8 * (b - 1) * (d - 1)
+
+
+def value_and_rows(given: Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values (1 + m,) and gradients (1 + m, n), by autograd itself and none of the library's code."""
+    tensor = torch.tensor(x, requires_grad=True)
+    result = given.function(tensor)
+    values = torch.cat([result[0][None], result[1]]) if isinstance(result, tuple) else result[None]
+    rows = [torch.autograd.grad(value, tensor, retain_graph=True)[0].numpy() for value in values]
+    return values.detach().numpy(), np.array(rows)
+
+
+@cache
+def nlopt_mma(given: Problem) -> tuple[np.ndarray, float]:
+    """The minimizer and the minimum that NLopt's MMA finds, with variables scaled to their bounds."""
+    width = given.upper - given.lower
+    optimizer = nlopt.opt(nlopt.LD_MMA, len(given.start))
+    optimizer.set_lower_bounds(np.zeros_like(width))
+    optimizer.set_upper_bounds(np.ones_like(width))
+    values, rows = value_and_rows(given, given.start)
+    sizes = np.abs(rows * width).max(axis=1)
+    last = {}
+
+    def at(u):
+        if u.tobytes() not in last:
+            last.clear()
+            last[u.tobytes()] = value_and_rows(given, given.lower + width * u)
+        return last[u.tobytes()]
+
+    def function(i):
+        def call(u, gradient):
+            values, rows = at(u)
+            if gradient.size:
+                gradient[:] = rows[i] * width / sizes[i]
+            return float(values[i] / sizes[i])
+
+        return call
+
+    optimizer.set_min_objective(function(0))
+    for i in range(1, len(values)):
+        optimizer.add_inequality_constraint(function(i), 1e-10)
+    optimizer.set_xtol_rel(1e-9)
+    optimizer.set_maxeval(1000)
+    u = optimizer.optimize((given.start - given.lower) / width)
+    return given.lower + width * u, optimizer.last_optimum_value() * sizes[0]

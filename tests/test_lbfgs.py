@@ -1,0 +1,178 @@
+"""L-BFGS in a box, against scipy's, and the pieces it is made of."""
+
+import numpy as np
+import pytest
+import torch
+from design_problems import BOUNDED, problem, rosenbrock, value_and_rows
+from scipy.optimize import minimize
+
+import magshell as ms
+from magshell.optim.cauchy import cauchy_step
+from magshell.optim.curvature import Curvature
+from magshell.optim.line_search import Probe, strong_wolfe
+
+
+def beale(x):
+    a, b = x
+    return sum((value - a * (1 - b**k)) ** 2 for k, value in ((1, 1.5), (2, 2.25), (3, 2.625)))
+
+
+def log_barrier(x):
+    return (x - torch.log(x)).sum() + 0.1 * (x.sum() - 3) ** 2
+
+
+MORE = [
+    problem("Rosenbrock, free", rosenbrock, [-1.2, 1.0], -np.inf, np.inf),
+    problem("Beale", beale, [1.0, 1.0], -4.5, 4.5),
+    problem("logarithms", log_barrier, np.linspace(0.2, 4.0, 50), 0.1, np.linspace(0.5, 5.0, 50)),
+    problem(
+        "scales",
+        lambda x: ((x / torch.logspace(-3, 6, 8) - 0.3) ** 4).sum() + (x[0] - 1e-3) ** 2,
+        np.full(8, 0.5e-3),
+        0.0,
+        10.0 ** np.linspace(-3, 6, 8),
+    ),
+    problem(
+        "one-sided",
+        lambda x: ((x - 1) ** 2).sum() + x[0] * x[1],
+        [3.0, 3.0, 3.0],
+        [2.0, -np.inf, 0.0],
+        np.inf,
+    ),
+]
+
+
+@pytest.mark.parametrize("given", BOUNDED + MORE, ids=lambda p: p.name)
+def test_agrees_with_scipy(given):
+    def flat(x):
+        values, rows = value_and_rows(given, x)
+        return values[0], rows[0]
+
+    bounds = list(zip(given.lower, given.upper, strict=True))
+    options = {"ftol": 1e-15, "gtol": 1e-9, "maxiter": 5000, "maxfun": 20000}
+    oracle = minimize(flat, given.start, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
+    lower, upper = torch.tensor(given.lower), torch.tensor(given.upper)
+    x = given.parameter()
+
+    def objective(x):
+        assert ((x >= lower) & (x <= upper)).all(), "left its box"
+        return given.function(x)
+
+    optimizer = ms.optim.LBFGS([x], lower=lower, upper=upper)
+    result = ms.minimize(
+        objective, [x], optimizer, max_iterations=given.iterations, tolerance=1e-14, progress=False
+    )
+    assert result.objective <= oracle.fun + 1e-8 * max(1.0, abs(oracle.fun))
+    assert result.history[-1].evaluations < 4 * oracle.nfev + 60
+
+
+def test_every_step_descends():
+    x = torch.tensor([-1.2, 0.7], dtype=torch.float64, requires_grad=True)
+    optimizer = ms.optim.LBFGS([x], lower=-2.0, upper=0.7, memory=3)
+    values = [rosenbrock(x).item(), *(optimizer.step(lambda: rosenbrock(x)) for _ in range(30))]
+    assert (np.diff(values) <= 0).all() and values[-1] == pytest.approx(0.09, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e9])
+def test_the_path_does_not_depend_on_the_objectives_size(size):
+    ends = []
+    for factor in (1.0, size):
+        x = torch.tensor([-1.2, 1.0], dtype=torch.float64, requires_grad=True)
+        optimizer = ms.optim.LBFGS([x], lower=-2.0, upper=2.0)
+        for _ in range(8):
+            optimizer.step(lambda x=x, factor=factor: factor * rosenbrock(x))
+        ends.append(x.detach().numpy())
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-6)
+
+
+def test_float32_parameters_reach_their_bound_and_no_further():
+    x = torch.full((3,), 0.05, dtype=torch.float32, requires_grad=True)
+    optimizer = ms.optim.LBFGS([x], lower=0.0, upper=0.3)
+    for _ in range(6):
+        optimizer.step(lambda: -x.sum())
+    assert (x.double() <= 0.3).all() and np.allclose(x.detach(), 0.3)
+
+
+def model(rng, n=12, k=4):
+    steps = rng.normal(size=(k, n))
+    hessian = (lambda a: a @ a.T + np.eye(n))(rng.normal(size=(n, n)))
+    changes = steps @ hessian
+    theta = changes[-1] @ changes[-1] / (steps[-1] @ changes[-1])
+    return Curvature(steps, changes, theta), steps, changes, theta
+
+
+def test_compact_form_is_bfgs(rng):
+    curvature, steps, changes, theta = model(rng)
+    dense = theta * np.eye(12)
+    for s, y in zip(steps, changes, strict=True):
+        dense += np.outer(y, y) / (y @ s) - np.outer(dense @ s, dense @ s) / (s @ dense @ s)
+    v = rng.normal(size=12)
+    np.testing.assert_allclose(curvature.times(v), dense @ v, rtol=1e-9)
+    free = np.arange(12) % 3 != 0
+    expected = np.linalg.solve(dense[np.ix_(free, free)], v[free])
+    np.testing.assert_allclose(curvature.solve_free(v[free], free), expected, rtol=1e-8)
+
+
+def test_cauchy_point_is_the_first_minimum_of_the_model_on_the_path(rng):
+    for _ in range(4):
+        curvature = model(rng)[0]
+        gradient = rng.normal(size=12) * 10
+        lower, upper = -rng.uniform(0, 0.5, 12), rng.uniform(0, 0.5, 12)
+        upper[3] = np.inf
+        found = cauchy_step(gradient, lower, upper, curvature)
+        times = np.linspace(0, 0.3, 3001)
+        path = np.clip(-times[:, None] * gradient, lower, upper)
+        values = path @ gradient + 0.5 * np.einsum(
+            "ij,ij->i", path, np.array([curvature.times(z) for z in path])
+        )
+        first = int(np.argmax(np.diff(values) > 0)) if (np.diff(values) > 0).any() else len(values) - 1
+        value = found @ gradient + 0.5 * found @ curvature.times(found)
+        assert value <= values[first] + 1e-9 * abs(values[first])
+        np.testing.assert_allclose(found, path[first], atol=2e-3)
+
+
+@pytest.mark.parametrize("first", [1e-3, 0.3, 1.0, 8.0])
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda a: ((a - 2) ** 2, 2 * (a - 2)),
+        lambda a: (np.cosh(a - 1), np.sinh(a - 1)),
+        lambda a: (-np.sin(a), -np.cos(a)),
+    ],
+)
+def test_line_search_meets_the_wolfe_conditions(first, function):
+    def probe(a):
+        return Probe(a, *function(a))
+
+    start = probe(0.0)
+    found = strong_wolfe(probe, start, first, 10.0)
+    assert found.value <= start.value + 1e-4 * found.length * start.slope
+    assert abs(found.slope) <= 0.9 * abs(start.slope)
+
+
+def test_line_search_stops_at_the_end_of_the_interval():
+    found = strong_wolfe(lambda a: Probe(a, -a, -1.0), Probe(0.0, 0.0, -1.0), 1.0, 3.0)
+    assert found.length == 3.0
+
+
+def test_stopped_and_resumed_gives_the_same_bits():
+    def run(stops):
+        x = torch.linspace(-1, 0.7, 6, dtype=torch.float64).requires_grad_()
+        optimizer = ms.optim.LBFGS([x], lower=-1.5, upper=0.8)
+        for k in range(15):
+            if k in stops:
+                state, x = optimizer.state_dict(), x.detach().clone().requires_grad_()
+                optimizer = ms.optim.LBFGS([x], lower=-1.5, upper=0.8)
+                optimizer.load_state_dict(state)
+            optimizer.step(lambda x=x: rosenbrock(x))
+        return x.detach()
+
+    assert run(()).equal(run((1, 4, 9)))
+
+
+def test_constraints_are_refused():
+    x = torch.ones(2, dtype=torch.float64, requires_grad=True)
+    with pytest.raises(ValueError, match="use MMA or GCMMA"):
+        ms.optim.LBFGS([x]).step(lambda: (x.sum(), x - 1))
+    with pytest.raises(ValueError, match="memory"):
+        ms.optim.LBFGS([x], memory=0)
