@@ -147,9 +147,8 @@ double BendingTerm::moment(const FoldStencil& fold, const std::vector<Stress>& s
     double sum = 0.0;
     for (const FoldStencil::Side& side : {fold.left, fold.right})
         if (side.face >= 0)
-            sum += sheet_.sides[side.face][side.corner].weight *
-                   stress[side.face / Pack::width].at[side.corner][side.face % Pack::width];
-    return sum;
+            sum += stress[side.face / Pack::width].at[side.corner][side.face % Pack::width];
+    return fold.weight() * sum;
 }
 
 void BendingTerm::add_forces(Residual& out) const {

@@ -7,7 +7,7 @@
 namespace magshell {
 namespace {
 
-constexpr Index part_length = 256;  // faces: about 300 kB of Hessian, slots and element data
+constexpr Index part_length = 512;  // faces: about 600 kB of Hessian, slots and element data
 
 }  // namespace
 

@@ -62,7 +62,7 @@ void Sheet::add_folds(const TriangleMesh& mesh, const std::vector<DirectedEdge>&
             const bool forward = mesh.edge_faces()(e, 0) == user_face;
             if (direction_of[e] >= 0) {
                 side.fold = add_fold({from, to, tip, direction_node(direction_of[e])}, false);
-                side.weight = 1.0f;
+                side.weight = static_cast<float>(folds[side.fold].weight());
                 folds[side.fold].left = {f, i};
                 continue;
             }
@@ -75,7 +75,6 @@ void Sheet::add_folds(const TriangleMesh& mesh, const std::vector<DirectedEdge>&
                 side.sign = forward ? 1 : -1;
             }
             if (mesh.is_boundary(e)) continue;
-            side.weight = 0.5f;
             side.on_left = forward;
             if (fold_of[e] < 0) {
                 const Index other = faces.core[mesh.edge_faces()(e, forward ? 1 : 0)];
@@ -86,6 +85,7 @@ void Sheet::add_folds(const TriangleMesh& mesh, const std::vector<DirectedEdge>&
                                      : add_fold({to, from, beyond, tip}, true);
             }
             side.fold = fold_of[e];
+            side.weight = static_cast<float>(folds[side.fold].weight());
             (forward ? folds[side.fold].left : folds[side.fold].right) = {f, i};
         }
 }

@@ -28,6 +28,9 @@ struct FoldStencil {
         Index face = -1, corner = -1;
     } left, right;  // the faces whose strain this fold enters, and the corner it is opposite to
 
+    /// What share of the turn each of them takes: half of it, the whole where it is measured to a direction.
+    double weight() const { return right_is_point ? 0.5 : 1.0; }
+
     Index first_face() const {
         return left.face < 0 || (right.face >= 0 && right.face < left.face) ? right.face : left.face;
     }
