@@ -146,8 +146,7 @@ void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
 double BendingTerm::moment(const FoldStencil& fold, const std::vector<Stress>& stress) const {
     double sum = 0.0;
     for (const FoldStencil::Side& side : {fold.left, fold.right})
-        if (side.face >= 0)
-            sum += stress[side.face / Pack::width].at[side.corner][side.face % Pack::width];
+        if (side.face >= 0) sum += stress[side.face / Pack::width].at[side.corner][side.face % Pack::width];
     return fold.weight() * sum;
 }
 
