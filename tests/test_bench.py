@@ -47,7 +47,11 @@ def test_coarse_run_of_some_cases(tmp_path, capsys) -> None:
     path = tmp_path / "new folder" / "accuracy.json"
     assert main(["accuracy", "--coarse", "--only", "A1", "C4", "--json", str(path), "--threads", "1"]) == 0
     printed = capsys.readouterr().out
-    assert "irregular 20x2" in printed and "of 4 rows within" in printed and "Order" not in printed
+    assert (
+        "irregular 20x2" in printed
+        and "of 4 rows with an allowed error are within it" in printed
+        and "Order" not in printed
+    )
     written = json.loads(path.read_text())
     assert written["part"] == "accuracy" and written["setting"]["threads"] == 1
     assert {"processor", "python", "numpy", "magshell"} <= written["setting"].keys()
@@ -77,7 +81,10 @@ def test_a_case_that_fails_is_a_row(monkeypatch, capsys) -> None:
     )
     assert main(["accuracy", "--only", "A1"]) == 0
     printed = capsys.readouterr().out
-    assert "0 of 1 rows within" in printed and "A1, midedge: it would not converge" in printed
+    assert (
+        "0 of 1 rows with an allowed error are within it" in printed
+        and "A1, midedge: it would not converge" in printed
+    )
 
 
 @pytest.mark.parametrize("option", ["--json", "--figure"])
