@@ -6,7 +6,14 @@ from ._core import __version__
 from .buckling import Buckling, linear_buckling
 from .design import Minimum, minimize
 from .equilibrium import Equilibrium
-from .errors import Interrupted, NoGradient, NotConverged, ObjectiveFailed
+from .errors import (
+    DesignRejected,
+    EquilibriumJumped,
+    Interrupted,
+    NoGradient,
+    NotConverged,
+    ObjectiveFailed,
+)
 from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .field_adapters import CustomField, MagpylibField
 from .io import read_fields, read_mesh, write_mesh
@@ -29,10 +36,12 @@ __all__ = [
     "Clamp",
     "CriticalPoint",
     "CustomField",
+    "DesignRejected",
     "Dipoles",
     "EdgeCouple",
     "EdgeLoad",
     "Equilibrium",
+    "EquilibriumJumped",
     "Interrupted",
     "LinearResponse",
     "MagpylibField",

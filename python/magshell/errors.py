@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 
-class NotConverged(RuntimeError):
-    """A solve failed. `last_good` holds the last converged state, as a result of the same kind."""
+class DesignRejected(RuntimeError):
+    """Raised inside an objective: this design cannot be evaluated, its equilibrium was not found or jumped. Go
+    less far. `last_good` holds the last state of the same kind that could be, if there is one."""
 
     def __init__(self, message: str, last_good=None):
         super().__init__(message)
         self.last_good = last_good
+
+
+class NotConverged(DesignRejected):
+    """A solve failed. `last_good` holds the last converged state, as a result of the same kind."""
+
+
+class EquilibriumJumped(DesignRejected):
+    """Between two designs the equilibrium snapped or buckled. `last_good` holds the one before the jump."""
 
 
 class Interrupted(KeyboardInterrupt):
