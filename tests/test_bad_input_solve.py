@@ -66,9 +66,9 @@ test_solve_is_refused = refused(
             NOT_NUMBERS,
         ),
         (
-            "a flux density a step",
-            lambda: solve_magnetic(applied_flux_density=np.ones((5, 3))),
-            r"applied_flux_density \[T\] must have shape \(3,\), got \(5, 3\)",
+            "flux densities of two components",
+            lambda: solve_magnetic(applied_flux_density=np.ones((5, 2))),
+            r"applied_flux_density \[T\] must have shape \(3,\), got \(2,\)",
         ),
         (
             "a field as value",
@@ -78,8 +78,8 @@ test_solve_is_refused = refused(
         ("factor nan", lambda: solve(load_factor=np.nan), "load_factor is nan"),
         (
             "factors",
-            lambda: solve(motion_factor=(1, 2)),
-            r"motion_factor \[1\] must be a number, got shape \(2,\)",
+            lambda: solve(motion_factor=((1, 2),)),
+            r"motion_factor \[1\] must be a number, got shape \(1, 2\)",
         ),
         ("factor bool", lambda: solve(load_factor=True), rf"load_factor \[1\] {NOT_NUMBERS}, got True"),
         ("scene", lambda: solve(shell()), "scene must be a Scene, got Shell"),

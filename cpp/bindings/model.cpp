@@ -134,6 +134,7 @@ void register_model(py::module_& module) {
                  model.set_magnetization(rows);
              })
         .def_property_readonly("size", &Model::size)
+        .def_property_readonly("analyses", &Model::analyses)
         .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
         .def_property_readonly("bytes", &Model::bytes)
         .def("rest_state", &Model::rest_state)

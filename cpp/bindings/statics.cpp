@@ -3,6 +3,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/watch.h"
+#include "magshell/solve/response.h"
 
 namespace magshell::bindings {
 namespace {
@@ -14,6 +15,12 @@ StaticsResult solve(Model& model, const VectorXd& start, const Model::Memory& me
     const std::lock_guard lock(model.in_use());
     return find_equilibrium(model, start, memory, from, to, options,
                             [&](double at, double residual) { watch(at, residual); });
+}
+
+VectorXd change(Model& model, const StaticsResult& equilibrium, const Controls& to) {
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard lock(model.in_use());
+    return first_order_change(model, equilibrium, to);
 }
 
 }  // namespace
@@ -63,6 +70,9 @@ void register_statics(py::module_& module) {
 
     module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("memory"),
                py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("progress") = py::none());
+    module.def("first_order_change", &change, py::arg("model"), py::arg("equilibrium"), py::arg("to"),
+               "The change of the state to first order, from an equilibrium whose factor was kept to these "
+               "controls and the values that the model holds now.");
 }
 
 }  // namespace magshell::bindings

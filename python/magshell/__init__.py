@@ -5,6 +5,7 @@ from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
 from .design import Minimum, minimize
+from .equilibria import Equilibria
 from .equilibrium import Equilibrium
 from .errors import (
     DesignRejected,
@@ -27,6 +28,7 @@ from .shell import Shell
 from .solvers import MixedNewton, Newton
 from .statics import equilibrium
 from .supports import Clamp, Pin, SymmetryPlane
+from .warm_start import WarmStart
 from .weld import Weld, weld
 
 __all__ = [
@@ -40,6 +42,7 @@ __all__ = [
     "Dipoles",
     "EdgeCouple",
     "EdgeLoad",
+    "Equilibria",
     "Equilibrium",
     "EquilibriumJumped",
     "Interrupted",
@@ -61,6 +64,7 @@ __all__ = [
     "SymmetryPlane",
     "TriangleMesh",
     "UniformField",
+    "WarmStart",
     "Weld",
     "__version__",
     "equilibrium",

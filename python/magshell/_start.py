@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from . import _core
@@ -12,11 +14,21 @@ from .equilibrium import Equilibrium
 from .scene import Scene
 
 
+class Origin(NamedTuple):
+    """A state that is an equilibrium for these inputs, and the core's memory of how it was reached."""
+
+    state: np.ndarray
+    memory: list
+    inputs: Inputs
+
+
 def starting_point(scene: Scene, start, inputs: Inputs):
     """State, the core's memory of it, controls at which it holds, and whether it is an equilibrium there."""
     model = scene._model
     if start is None:
         return model.rest_state(), [], _core.Controls(), True
+    if isinstance(start, Origin):
+        return start.state, start.memory, start.inputs.controls, True
     if isinstance(start, Equilibrium):
         if start.scene is not scene:
             raise ValueError("start is an equilibrium of another scene; hand over its positions instead")

@@ -12,12 +12,12 @@ from tqdm import tqdm
 
 from . import _core
 from ._inputs import Inputs
+from ._solve import solve
 from ._start import starting_point
 from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
 from .scene import Scene
 from .solvers import MixedNewton, Newton
-from .statics import solve
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Path:
         options = MixedNewton()._options()
         options.require_stable = False
         point = self._points[index]
-        return solve(self._inputs, point.state, point.memory, controls, controls, options)
+        return solve(self._inputs, point.state, point.memory, controls, controls, options).equilibrium
 
     @property
     def applied_flux_densities(self) -> np.ndarray:

@@ -116,7 +116,10 @@ SceneGradient Model::vjp(const VectorXd& q, const Controls& controls, const Vect
 }
 
 std::unique_ptr<Factor> Model::new_factor() {
-    if (!analysed_) analysed_ = analyze(reduction_.pattern());
+    if (!analysed_) {
+        analysed_ = analyze(reduction_.pattern());
+        ++analyses_;
+    }
     return analysed_->sibling();
 }
 

@@ -68,6 +68,8 @@ class Model {
 
     /// A factorization for the reduced Hessian, analysed once for all of them.
     std::unique_ptr<Factor> new_factor();
+    /// How often the pattern was analysed.
+    int analyses() const { return analyses_; }
 
     /// What the terms remember of how the state was reached. An empty memory is that of the rest state.
     using Memory = std::vector<std::vector<double>>;
@@ -99,6 +101,7 @@ class Model {
     LoadTerm *gravity_ = nullptr, *loads_ = nullptr;
     CoupleTerm* couples_ = nullptr;
     std::unique_ptr<Factor> analysed_;
+    int analyses_ = 0;
     std::vector<double> thickness_;  // in our numbering
     Residual residual_;
     VectorXd metric_;             // area at each unknown of a vertex, zero for directions and rotations
