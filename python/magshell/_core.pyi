@@ -33,6 +33,7 @@ __all__: list[str] = [
     "build_info",
     "factor_backends",
     "find_equilibrium",
+    "first_order_change",
     "follow_path",
     "num_threads",
     "pull_back",
@@ -215,6 +216,8 @@ class Model:
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def analyses(self) -> int: ...
     @property
     def bytes(self) -> int: ...
     @property
@@ -440,6 +443,13 @@ def find_equilibrium(
     options: StaticsOptions,
     progress: typing.Any = None,
 ) -> StaticsResult: ...
+def first_order_change(
+    model: Model, equilibrium: StaticsResult, to: Controls
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    The change of the state to first order, from an equilibrium whose factor was kept to these controls and the values that the model holds now.
+    """
+
 def follow_path(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
