@@ -140,6 +140,12 @@ void register_model(py::module_& module) {
         .def("rest_state", &Model::rest_state)
         .def("state", [](const Model& m, const Array& x,
                          const Array& r) { return m.state(to_rows3(x), to_vector(r)); })
+        .def(
+            "full_vector",
+            [](const Model& m, const Array& rows) {
+                return m.gradient_by_state(to_rows3(rows), VectorXd::Zero(m.sheet().n_edges()));
+            },
+            "Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.")
         .def("positions", &Model::positions)
         .def("edge_rotations", &Model::edge_rotations)
         .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })

@@ -13,4 +13,5 @@ PYBIND11_MODULE(_core, module) {
     b::register_statics(module);
     b::register_adjoint(module);       // takes what a solve found
     b::register_continuation(module);  // after the options that it shares with statics
+    b::register_dynamics(module);
 }

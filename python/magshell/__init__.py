@@ -5,6 +5,7 @@ from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
 from .design import Minimum, minimize
+from .dynamics import simulate
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
 from .errors import (
@@ -17,6 +18,7 @@ from .errors import (
 )
 from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .field_adapters import CustomField, MagpylibField
+from .integrators import SDIRK2, SDIRK3, ImplicitEuler
 from .io import read_fields, read_mesh, write_mesh
 from .linear import LinearResponse, linear_response
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
@@ -28,6 +30,7 @@ from .shell import Shell
 from .solvers import MixedNewton, Newton
 from .statics import equilibrium
 from .supports import Clamp, Pin, SymmetryPlane
+from .trajectory import MotionState, Trajectory
 from .warm_start import WarmStart
 from .weld import Weld, weld
 
@@ -45,11 +48,13 @@ __all__ = [
     "Equilibria",
     "Equilibrium",
     "EquilibriumJumped",
+    "ImplicitEuler",
     "Interrupted",
     "LinearResponse",
     "MagpylibField",
     "Minimum",
     "MixedNewton",
+    "MotionState",
     "Newton",
     "NoGradient",
     "NotConverged",
@@ -58,10 +63,13 @@ __all__ = [
     "Picture",
     "Pin",
     "PointLoad",
+    "SDIRK2",
+    "SDIRK3",
     "SampledField",
     "Scene",
     "Shell",
     "SymmetryPlane",
+    "Trajectory",
     "TriangleMesh",
     "UniformField",
     "WarmStart",
@@ -83,6 +91,7 @@ __all__ = [
     "residual_to_remanent",
     "set_num_threads",
     "show_config",
+    "simulate",
     "weld",
     "write_mesh",
     "write_page",

@@ -15,23 +15,14 @@ class Adjoint:
     def __init__(self, inputs: Inputs, found):
         self._inputs, self._found = inputs, found
 
-    def gradients(
-        self, by_positions: np.ndarray, by_edge_rotations: np.ndarray, wanted
-    ) -> list[np.ndarray | None]:
+    def gradients(self, by_outputs: list[np.ndarray], wanted) -> list[np.ndarray | None]:
         """By each wanted leaf of the inputs, shaped like it. Raises NoGradient where there is none."""
         self._refuse()
         inputs, model = self._inputs, self._inputs.scene._model
         with inputs.in_core():
-            gradient = _core.pull_back(model, self._found, by_positions, by_edge_rotations)
+            gradient = _core.pull_back(model, self._found, *by_outputs)
         leaves = zip(inputs.leaves, wanted, strict=True)
-        return [self._by_leaf(leaf, gradient) if asked else None for leaf, asked in leaves]
-
-    def _by_leaf(self, leaf, gradient: dict) -> np.ndarray:
-        values = gradient if leaf.owner is None else self._inputs.values.gradients(leaf.owner, gradient)
-        by_rows = np.asarray(values[leaf.name])
-        if by_rows.size == np.prod(leaf.shape, dtype=int):
-            return by_rows.reshape(leaf.shape)
-        return by_rows.sum(axis=0).reshape(leaf.shape)  # one value for every row
+        return [by_leaf(inputs, leaf, gradient) if asked else None for leaf, asked in leaves]
 
     def _refuse(self) -> None:
         found = self._found
@@ -46,3 +37,12 @@ class Adjoint:
                 f"({found.unstable_directions} directions lower its energy, or its Hessian is singular), "
                 "and a sheet would not stay in it. Solve with require_stable=True."
             )
+
+
+def by_leaf(inputs: Inputs, leaf, gradient: dict) -> np.ndarray:
+    """By one leaf, from the core's gradients."""
+    values = gradient if leaf.owner is None else inputs.values.gradients(leaf.owner, gradient)
+    by_rows = np.asarray(values[leaf.name])
+    if by_rows.size == np.prod(leaf.shape, dtype=int):
+        return by_rows.reshape(leaf.shape)
+    return by_rows.sum(axis=0).reshape(leaf.shape)  # one value for every row

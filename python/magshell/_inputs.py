@@ -73,6 +73,10 @@ class Inputs:
         """Those of the leaves."""
         return [leaf.tensor for leaf in self.leaves]
 
+    def take(self, name: str, value):
+        """The numbers of another input, which joins the leaves if it asks for a gradient."""
+        return self._numbers(name, value)
+
     def _numbers(self, name: str, value, owner=None):
         """A tensor's numbers; anything else as it came."""
         if is_tensor(value):

@@ -8,8 +8,11 @@ from .loads import EdgeCouple
 SHELL_NAMES = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "curvature_scale")
 
 
-def requested(scene, vertex_loads, values, **shell) -> dict[object, dict[str, object]]:
-    """{object of the scene: {name: value}} from a solve's arguments. Raises ValueError on what has no place."""
+def requested(scene, vertex_loads, values, moving: bool = False, **shell) -> dict[object, dict[str, object]]:
+    """{object of the scene: {name: value}} from a solve's arguments. Raises ValueError on what has no place.
+
+    moving: the scene has inertia in this solve.
+    """
     asked: dict[object, dict[str, object]] = {}
     if values is not None and not isinstance(values, dict):
         raise ValueError(
@@ -23,7 +26,7 @@ def requested(scene, vertex_loads, values, **shell) -> dict[object, dict[str, ob
             _add(asked, scene.shell, name, value)
     if vertex_loads is not None:
         _add(asked, scene, "vertex_loads", vertex_loads)
-    _check_against_scene(scene, asked)
+    _check_against_scene(scene, asked, moving)
     return asked
 
 
@@ -55,9 +58,10 @@ def _check(scene, owner, named) -> None:
             )
 
 
-def _check_against_scene(scene, asked: dict) -> None:
+def _check_against_scene(scene, asked: dict, moving: bool) -> None:
     heavy = bool(scene.gravity.any())
-    if not heavy and ("gravity" in asked.get(scene, {}) or "mass_density" in asked.get(scene.shell, {})):
+    idle_density = "mass_density" in asked.get(scene.shell, {}) and not moving
+    if not heavy and ("gravity" in asked.get(scene, {}) or idle_density):
         raise ValueError(
             "gravity or mass_density was given, but the scene has no gravity: Scene(..., gravity=...)"
         )

@@ -133,9 +133,9 @@ def _outputs(inputs: Inputs, found):
     arrays = np.ascontiguousarray(model.positions(found.state)), model.edge_rotations(found.state)
     if not inputs.leaves:
         return tuple(like(array, *inputs.given) for array in arrays)
-    from .autograd import at_rest
+    from .autograd import solved
 
-    return at_rest(Adjoint(inputs, found), *arrays, inputs.given[0].dtype, inputs.tensors)
+    return solved(Adjoint(inputs, found), arrays, inputs.given[0].dtype, inputs.tensors)
 
 
 def _flux_density(inputs: Inputs, found):

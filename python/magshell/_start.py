@@ -40,11 +40,11 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     n_v = scene.mesh.n_vertices
     if len(positions) != n_v:
         raise ValueError(f"start [m] must have shape (n_v, 3) = ({n_v}, 3), got {positions.shape}")
-    _check_faces(scene.mesh, positions)
+    check_faces(scene.mesh, positions)
     return model.state(positions, np.zeros(scene.mesh.n_edges)), [], inputs.controls, False
 
 
-def _check_faces(mesh, positions: np.ndarray) -> None:
+def check_faces(mesh, positions: np.ndarray) -> None:
     """A face without area has no normal, and no forces either."""
     corners = positions[mesh.faces]
     a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]

@@ -59,7 +59,10 @@ class Values:
                 found["gravity"] = self.shell.vertex_masses @ by_weights
             return found
         if owner is scene.shell:
-            return self.shell.gradients(by_weights, self.gravity, gradient)
+            by_masses = gradient.get("mass")
+            if by_weights is not None:
+                by_masses = by_weights @ self.gravity + (0.0 if by_masses is None else by_masses)
+            return self.shell.gradients(by_masses, gradient)
         if isinstance(owner, EdgeCouple):
             by_edge = np.zeros(mesh.n_edges)
             by_edge[self.couple_edges] = gradient["couples"]

@@ -1,4 +1,4 @@
-"""Equilibria in torch's graph. The only module that touches torch.autograd; holds no physics."""
+"""What a solve found, in torch's graph. The only module that touches torch.autograd; holds no physics."""
 
 from __future__ import annotations
 
@@ -6,35 +6,28 @@ import numpy as np
 import torch
 from torch.autograd.function import once_differentiable
 
-from ._adjoint import Adjoint
 
-
-class AtRest(torch.autograd.Function):
-    """Positions and edge rotations of an equilibrium that was found from the leaves (tensors)."""
+class Solved(torch.autograd.Function):
+    """Arrays that were computed from the leaves (tensors); the adjoint knows the way back."""
 
     @staticmethod
-    def forward(ctx, adjoint: Adjoint, positions: np.ndarray, edge_rotations: np.ndarray, dtype, *leaves):
+    def forward(ctx, adjoint, arrays, dtype, *leaves):
         ctx.adjoint = adjoint
         ctx.leaves = [(leaf.dtype, leaf.device) for leaf in leaves]
-        return torch.from_numpy(positions).to(dtype=dtype), torch.from_numpy(edge_rotations).to(dtype=dtype)
+        return tuple(torch.from_numpy(array).to(dtype=dtype) for array in arrays)
 
     @staticmethod
     @once_differentiable
-    def backward(ctx, by_positions, by_edge_rotations):
-        arrays = [each.detach().cpu().numpy() for each in (by_positions, by_edge_rotations)]
-        gradients = ctx.adjoint.gradients(*arrays, ctx.needs_input_grad[4:])
-        return (
-            None,
-            None,
-            None,
-            None,
-            *(
-                None if values is None else torch.from_numpy(np.array(values)).to(dtype=dtype, device=device)
-                for values, (dtype, device) in zip(gradients, ctx.leaves, strict=True)
-            ),
+    def backward(ctx, *by_outputs):
+        arrays = [each.detach().cpu().double().numpy() for each in by_outputs]
+        gradients = ctx.adjoint.gradients(arrays, ctx.needs_input_grad[3:])
+        by_leaves = (
+            None if values is None else torch.from_numpy(np.array(values)).to(dtype=dtype, device=device)
+            for values, (dtype, device) in zip(gradients, ctx.leaves, strict=True)
         )
+        return None, None, None, *by_leaves
 
 
-def at_rest(adjoint: Adjoint, positions: np.ndarray, edge_rotations: np.ndarray, dtype, leaves: list):
-    """The two as tensors from which gradients go back to the leaves."""
-    return AtRest.apply(adjoint, positions, edge_rotations, dtype, *leaves)
+def solved(adjoint, arrays: tuple[np.ndarray, ...], dtype, leaves: list) -> tuple[torch.Tensor, ...]:
+    """The arrays as tensors from which gradients go back to the leaves."""
+    return Solved.apply(adjoint, arrays, dtype, *leaves)

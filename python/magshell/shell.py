@@ -68,18 +68,16 @@ class Shell:
         properties = {name: getattr(self, name) for name in self._replaceable}
         return Shell(self.mesh, bending=self.bending, **{**properties, **values})
 
-    def gradients(
-        self, by_weights: np.ndarray | None, gravity: np.ndarray, gradient: dict
-    ) -> dict[str, np.ndarray]:
-        """The core's gradients by its properties, with what they do to the weights added.
+    def gradients(self, by_masses: np.ndarray | None, gradient: dict) -> dict[str, np.ndarray]:
+        """The core's gradients by its properties, with what they do to the masses of the vertices added.
 
-        by_weights: (n_v, 3), by the weight of every vertex, or None without gravity.
+        by_masses: (n_v,), or None where they have no part.
         """
         found = {name: gradient[name] for name in self._replaceable if name in gradient}
-        if by_weights is not None:
-            by_mass = (by_weights @ gravity)[self.mesh.faces].sum(axis=1) / 3.0
-            found["thickness"] = found["thickness"] + by_mass * self.mesh.face_areas * self.mass_density
-            found["mass_density"] = by_mass * self.face_volumes
+        if by_masses is not None:
+            by_face = by_masses[self.mesh.faces].sum(axis=1) / 3.0
+            found["thickness"] = found["thickness"] + by_face * self.mesh.face_areas * self.mass_density
+            found["mass_density"] = by_face * self.face_volumes
         return found
 
     @property

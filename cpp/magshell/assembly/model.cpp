@@ -1,5 +1,7 @@
 #include "magshell/assembly/model.h"
 
+#include <cmath>
+
 #include "magshell/strain/fold_angle.h"
 
 namespace magshell {
@@ -172,6 +174,13 @@ VectorXd Model::gradient_by_state(const Rows3& by_positions, const VectorXd& by_
     return gradient;
 }
 
+VectorXd Model::vertex_weights(const VectorXd& by_vertex) const {
+    VectorXd weights = VectorXd::Zero(size());
+    for (Index v = 0; v < sheet_.n_vertices(); ++v)
+        weights.segment<3>(3 * v).setConstant(by_vertex[sheet_.vertices.user[v]]);
+    return weights;
+}
+
 Rows3 Model::positions(const VectorXd& q) const {
     Rows3 x(sheet_.n_vertices(), 3);
     for (Index v = 0; v < sheet_.n_vertices(); ++v)
@@ -203,6 +212,21 @@ std::vector<std::pair<std::string_view, double>> Model::energies(const VectorXd&
 void Model::evaluate(const VectorXd& q, const Controls& controls) {
     residual_.reset(size());
     for (const std::unique_ptr<Term>& term : terms_) term->evaluate(q.data(), controls, residual_);
+}
+
+std::string Model::not_finite(const VectorXd& q, const Controls& controls) {
+    Residual residual;
+    for (const std::unique_ptr<Term>& term : terms_) {
+        residual.reset(size());
+        term->evaluate(q.data(), controls, residual);
+        for (Index k = 0; k < size(); ++k)
+            if (!std::isfinite(residual.gradient[k])) {
+                const std::string of = "the " + std::string(term->name()) + " force";
+                if (k >= 3 * sheet_.n_vertices()) return of + " is not finite";
+                return of + " on vertex " + std::to_string(sheet_.vertices.user[k / 3]) + " is not finite";
+            }
+    }
+    return {};
 }
 
 void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress) {

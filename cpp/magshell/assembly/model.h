@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <mutex>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -46,6 +47,8 @@ class Model {
     VectorXd gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const;
     Rows3 positions(const VectorXd& q) const;
     VectorXd edge_rotations(const VectorXd& q) const;
+    /// One number a vertex of the caller as one for each unknown, zero for those that are no vertex.
+    VectorXd vertex_weights(const VectorXd& by_vertex) const;
     /// A vector of all unknowns (a gradient, a mode) as rows of the caller's vertices.
     Rows3 vertex_rows(const VectorXd& full) const { return positions(full); }
 
@@ -55,6 +58,8 @@ class Model {
 
     /// The residual at q; keeps what assemble and extrapolate need.
     void evaluate(const VectorXd& q, const Controls& controls);
+    /// Which term's force is not finite at q, and on which vertex; empty if all are.
+    std::string not_finite(const VectorXd& q, const Controls& controls);
     /// The Hessian at the last evaluated state, in matrix().
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
     void extrapolate(const VectorXd& p);

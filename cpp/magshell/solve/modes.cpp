@@ -83,7 +83,8 @@ Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& contr
     for (FactorReport factor; !factor.succeeded || factor.negative_pivots > 0;) {
         shift *= 4.0;
         if (!std::isfinite(shift)) return modes.front();
-        factor = newton.factorize(q, controls, false, {shift, &q}, no_moves);
+        const VectorXd weights = shift * newton.model().metric();
+        factor = newton.factorize(q, controls, false, {&weights, &q}, no_moves);
     }
     Mode mode = modes_near_zero(newton, 1).front();
     mode.eigenvalue -= shift;

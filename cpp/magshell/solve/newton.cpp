@@ -45,12 +45,17 @@ Newton::Newton(Model& model, const NewtonOptions& options, Watch watch)
     : model_(model),
       options_(options),
       watch_(std::move(watch)),
-      factor_(model.new_factor()),
-      reduced_metric_(model.reduction().weights(model.metric())) {}
+      factor_(model.new_factor()) {}
+
+std::shared_ptr<Factor> Newton::release_factor() {
+    std::shared_ptr<Factor> released = std::move(factor_);
+    factor_ = model_.new_factor();
+    return released;
+}
 
 VectorXd Newton::gradient(const VectorXd& q, const Anchor& anchor) const {
     VectorXd g = model_.residual().gradient;
-    if (anchor.state) g += anchor.weight * model_.metric().cwiseProduct(q - *anchor.state);
+    if (anchor.weights) g += anchor.weights->cwiseProduct(q - *anchor.target);
     return g;
 }
 
@@ -59,7 +64,9 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const 
     // Held components have no residual of their own; those of framed nodes are told apart in their frames.
     const VectorXd free = reduction.expand(reduction.vector(gradient(q, anchor)));
     const Index nodes = 3 * model_.sheet().n_nodes(), rotations = model_.sheet().n_rotations();
-    const VectorXd &magnitude = model_.residual().magnitude, &cancelling = model_.cancelling_forces();
+    VectorXd magnitude = model_.residual().magnitude;
+    if (anchor.weights) magnitude += anchor.weights->cwiseProduct(q - *anchor.target).cwiseAbs();
+    const VectorXd& cancelling = model_.cancelling_forces();
     return std::max(
         relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
         relative(free.tail(rotations), magnitude.tail(rotations), cancelling.tail(rotations),
@@ -68,11 +75,7 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const 
 
 FactorReport Newton::factorize_assembled(const Anchor& anchor) {
     model_.reduction().matrix(model_.matrix(), values_);
-    if (anchor.state) {
-        const SparsePattern& pattern = model_.reduction().pattern();
-        for (Index k = 0; k < pattern.size; ++k)
-            values_[pattern.column_starts[k]] += anchor.weight * reduced_metric_[k];
-    }
+    add_weights(anchor);
     ++factorizations_;
     const Stopwatch running(linear_time_);
     FactorReport report;
@@ -84,10 +87,17 @@ FactorReport Newton::factorize_assembled(const Anchor& anchor) {
     return report;
 }
 
-FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls) {
+void Newton::add_weights(const Anchor& anchor) {
+    if (!anchor.weights) return;
+    const SparsePattern& pattern = model_.reduction().pattern();
+    const VectorXd weights = model_.reduction().weights(*anchor.weights);
+    for (Index k = 0; k < pattern.size; ++k) values_[pattern.column_starts[k]] += weights[k];
+}
+
+FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
     model_.evaluate(q, controls);
     model_.assemble(q, controls, false);
-    return factorize_assembled({});
+    return factorize_assembled(anchor);
 }
 
 FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,

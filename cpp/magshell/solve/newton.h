@@ -34,11 +34,11 @@ struct NewtonReport {
     std::string reason;         // why not converged
 };
 
-/// A quadratic pull towards an anchor, weight/2 |x - anchor|^2 in the model's metric: one implicit Euler step
-/// of a gradient flow whose time step is 1/weight.
+/// A quadratic pull, 1/2 sum w_i (q_i - target_i)^2: the inertia of a time step, or one implicit Euler step of
+/// a gradient flow. Among all unknowns; weights are the same along the three axes of a node.
 struct Anchor {
-    double weight = 0.0;
-    const VectorXd* state = nullptr;
+    const VectorXd* weights = nullptr;
+    const VectorXd* target = nullptr;
 };
 
 /// A model with its factorization, counting what it costs. Everything that solves goes through here.
@@ -57,7 +57,7 @@ class Newton {
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
 
     /// Evaluates, assembles with the state's own stresses and factorizes.
-    FactorReport factorize_at(const VectorXd& q, const Controls& controls);
+    FactorReport factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor = {});
     /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes,
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
@@ -75,6 +75,8 @@ class Newton {
     int factorizations() const { return factorizations_; }
     int failed_factorizations() const { return failed_factorizations_; }
     int iterations() const { return iterations_; }
+    /// The factorization, for somebody to keep; the next one goes elsewhere.
+    std::shared_ptr<Factor> release_factor();
     double linear_time() const { return linear_time_; }  // [s] in factorizations and solves
     void count_iteration() { ++iterations_; }
     void watch(double residual) const {
@@ -84,12 +86,12 @@ class Newton {
   private:
     FactorReport factorize_assembled(const Anchor& anchor);
     VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
+    void add_weights(const Anchor& anchor);
 
     Model& model_;
     NewtonOptions options_;
     Watch watch_;
     std::shared_ptr<Factor> factor_;
-    VectorXd reduced_metric_;
     std::vector<double> values_;
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     mutable double linear_time_ = 0.0;

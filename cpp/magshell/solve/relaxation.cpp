@@ -104,10 +104,11 @@ class Relaxation {
         const VectorXd anchor = q_;
         VectorXd trial = q_;
         const Model::Memory memory = model_.memory();
-        const NewtonReport report = newton_.solve(trial, controls_, {rate_, &anchor}, iterations_a_step);
+        const VectorXd weights = rate_ * model_.metric();
+        const NewtonReport report = newton_.solve(trial, controls_, {&weights, &anchor}, iterations_a_step);
         const VectorXd moved = trial - anchor;
         const double energy = report.converged ? model_.energy(trial, controls_) : 0.0;
-        const double pull = 0.5 * rate_ * moved.dot(model_.metric().cwiseProduct(moved));
+        const double pull = 0.5 * moved.dot(weights.cwiseProduct(moved));
         if (!report.converged || !lowers(energy + pull)) {
             model_.set_memory(memory);
             return false;

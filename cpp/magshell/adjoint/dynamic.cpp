@@ -1,0 +1,256 @@
+#include "magshell/adjoint/dynamic.h"
+
+#include "magshell/core/errors.h"
+
+namespace magshell {
+namespace {
+
+void add(VectorXd& sum, const VectorXd& part) {
+    if (sum.size() == 0)
+        sum = part;
+    else if (part.size() > 0)
+        sum += part;
+}
+
+void add(SceneGradient& sum, const SceneGradient& part) {
+    for (VectorXd SceneGradient::* each :
+         {&SceneGradient::thickness, &SceneGradient::young_modulus, &SceneGradient::poisson_ratio,
+          &SceneGradient::curvature_scale, &SceneGradient::weights, &SceneGradient::loads, &SceneGradient::couples})
+        add(sum.*each, part.*each);
+    if (sum.remanent_magnetization.rows() == 0)
+        sum.remanent_magnetization = part.remanent_magnetization;
+    else
+        sum.remanent_magnetization += part.remanent_magnetization;
+    sum.motions.resize(part.motions.size());
+    for (std::size_t k = 0; k < part.motions.size(); ++k) {
+        sum.motions[k].centre += part.motions[k].centre;
+        sum.motions[k].rotation_vector += part.motions[k].rotation_vector;
+        sum.motions[k].translation += part.motions[k].translation;
+    }
+    sum.field_sources.resize(part.field_sources.size());
+    for (std::size_t k = 0; k < part.field_sources.size(); ++k)
+        add(sum.field_sources[k], part.field_sources[k]);
+}
+
+// The rates of all stages of a step, from their states.
+struct Rates {
+    std::vector<VectorXd> x_hat, v_hat, v, w;
+
+    Rates(const StepAlgebra& step, const MotionState& begin, const std::vector<StageState>& stages,
+          Index coordinates)
+        : x_hat(stages.size()), v_hat(stages.size()) {
+        for (int i = 0; i < static_cast<int>(stages.size()); ++i) {
+            step.start_of_stage(i, begin, v, w, x_hat[i], v_hat[i]);
+            v.emplace_back(VectorXd::Zero(begin.q.size()));
+            v.back().head(coordinates) = (stages[i].q - x_hat[i]).head(coordinates) / step.stage_time();
+            w.emplace_back((v.back() - v_hat[i]) / step.stage_time());
+        }
+    }
+};
+
+class Backward {
+  public:
+    Backward(Newton& newton, const MotionInput& input, const MotionResult& motion,
+             const std::vector<VectorXd>& by_q, const std::vector<VectorXd>& by_v)
+        : newton_(newton),
+          model_(newton.model()),
+          input_(input),
+          motion_(motion),
+          by_q_(by_q),
+          by_v_(by_v),
+          stepper_(newton, input.tableau, input.inertia) {
+        g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
+        g_.controls.resize(input.controls.size());
+    }
+
+    MotionGradient run() {
+        take_in(motion_.steps_done);
+        if (motion_.keep == Keep::checkpoints) {
+            Index end = motion_.steps_done, free = motion_.slots - static_cast<Index>(motion_.checkpoints.size()) + 1;
+            for (auto at = motion_.checkpoints.rbegin(); at != motion_.checkpoints.rend(); ++at, ++free) {
+                stretch(at->first, end, at->second, free);
+                end = at->first;
+            }
+        } else {
+            for (Index step = motion_.steps_done - 1; step >= 0; --step)
+                back(step, beginning(step), motion_.stages[step]);
+        }
+        return std::move(g_);
+    }
+
+    double progress() const { return progress_; }
+
+  private:
+    // Steps begin .. end, from the state at begin, with so many checkpoints to spare.
+    void stretch(Index begin, Index end, const MotionState& at_begin, Index slots) {
+        if (begin >= end) return;
+        const Index ahead = next_checkpoint(end - begin, motion_.leaf, slots);
+        MotionState state = at_begin;
+        if (ahead > 0) {
+            forward(begin, begin + ahead, state);
+            stretch(begin + ahead, end, state, slots - 1);
+            stretch(begin, begin + ahead, at_begin, slots);
+            return;
+        }
+        if (end - begin > motion_.leaf) {  // no checkpoint left: all the way again for every leaf
+            forward(begin, end - motion_.leaf, state);
+            leaf(end - motion_.leaf, end, state);
+            stretch(begin, end - motion_.leaf, at_begin, slots);
+            return;
+        }
+        leaf(begin, end, state);
+    }
+
+    void forward(Index begin, Index end, MotionState& state) {
+        for (Index step = begin; step < end; ++step)
+            repeat_step(stepper_, input_, step, parts_of(motion_.halved, step), state, nullptr);
+    }
+
+    void leaf(Index begin, Index end, const MotionState& at_begin) {
+        std::vector<MotionState> starts = {at_begin};
+        std::vector<std::vector<std::vector<StageState>>> stages(end - begin);
+        for (Index step = begin; step < end; ++step) {
+            MotionState state = starts.back();
+            repeat_step(stepper_, input_, step, parts_of(motion_.halved, step), state, &stages[step - begin]);
+            starts.push_back(std::move(state));
+        }
+        for (Index step = end - 1; step >= begin; --step) back(step, starts[step - begin], stages[step - begin]);
+    }
+
+    void back(Index step, MotionState begin, const std::vector<std::vector<StageState>>& stages) {
+        progress_ = 1.0 - static_cast<double>(step + 1) / static_cast<double>(motion_.steps_done);
+        const Parts parts = parts_of(motion_.halved, step);
+        std::vector<MotionState> starts = {std::move(begin)};
+        for (std::size_t k = 0; k + 1 < parts.size(); ++k)
+            starts.push_back(end_of(parts[k], starts.back().q, stages[k]));
+        for (std::size_t k = parts.size(); k-- > 0;) back(step, parts[k], starts[k], stages[k]);
+        take_in(step);
+    }
+
+    // The state in which a step began, where all stages are kept.
+    MotionState beginning(Index step) {
+        if (step == 0) return input_.start;
+        const auto& stages = motion_.stages[step - 1];
+        const Parts parts = parts_of(motion_.halved, step - 1);
+        const VectorXd& q = stages.size() > 1 ? stages[stages.size() - 2].back().q
+                            : step > 1        ? motion_.stages[step - 2].back().back().q
+                                              : input_.start.q;
+        return end_of(parts.back(), q, stages.back());
+    }
+
+    // Velocities follow from the positions of the stages alone.
+    MotionState end_of(const std::pair<double, double>& part, const VectorXd& q_begin,
+                       const std::vector<StageState>& stages) {
+        const StepAlgebra& step = stepper_.algebra((part.second - part.first) * input_.time_step);
+        const MotionState begin{q_begin, VectorXd::Zero(q_begin.size()), {}};
+        Rates rates(step, begin, stages, 3 * model_.sheet().n_vertices());
+        return {stages.back().q, std::move(rates.v.back()), stages.back().memory};
+    }
+
+    void back(Index step, const std::pair<double, double>& part, const MotionState& begin,
+              const std::vector<StageState>& stages) {
+        const double share = part.second - part.first;
+        const StepAlgebra algebra = stepper_.algebra(share * input_.time_step);
+        const Tableau& tableau = input_.tableau;
+        const int n = tableau.stages;
+        const double dt = algebra.dt(), adt = algebra.stage_time();
+        const VectorXd &mass = input_.inertia.mass, &damping = input_.inertia.damping;
+        const Index coordinates = 3 * model_.sheet().n_vertices();
+        const Rates at(algebra, begin, stages, coordinates);
+
+        std::vector<VectorXd> by_v(n, VectorXd::Zero(model_.size())), by_w = by_v;
+        VectorXd by_x = std::move(g_.positions);
+        by_v.back() = std::move(g_.velocities);
+        g_.positions = g_.velocities = VectorXd::Zero(model_.size());
+        double by_dt = 0.0;
+        for (int i = n - 1; i >= 0; --i) {
+            by_dt -= by_w[i].dot(at.w[i]) / dt;
+            by_v[i] += by_w[i] / adt;
+            VectorXd by_v_hat = -by_w[i] / adt;
+            by_dt -= by_v[i].dot(at.v[i]) / dt;
+            by_x.head(coordinates) += by_v[i].head(coordinates) / adt;
+            VectorXd by_x_hat = VectorXd::Zero(model_.size());
+            by_x_hat.head(coordinates) = -by_v[i].head(coordinates) / adt;
+
+            const VectorXd lambda = solve(algebra, at, i, stages[i], step, part, by_x);
+            const VectorXd accelerated = lambda.cwiseProduct(at.w[i]), moved = lambda.cwiseProduct(at.v[i]);
+            g_.mass += accelerated;
+            g_.damping += moved;
+            // d/dt of M (x - x^ - a dt v^)/(a dt)^2 + Gamma (x - x^)/(a dt), with x^ and v^ fixed
+            by_dt -= (mass.dot(accelerated + moved / adt) + damping.dot(moved)) / dt;
+            by_x_hat -= algebra.weights().cwiseProduct(lambda);
+            by_v_hat -= mass.cwiseProduct(lambda) / adt;
+
+            g_.positions += by_x_hat;
+            g_.velocities += by_v_hat;
+            for (int j = 0; j < i; ++j) {
+                by_v[j] += (dt * tableau.a[i][j]) * by_x_hat;
+                by_w[j] += (dt * tableau.a[i][j]) * by_v_hat;
+                by_dt += tableau.a[i][j] * (at.v[j].dot(by_x_hat) + at.w[j].dot(by_v_hat));
+            }
+            by_x.setZero(model_.size());
+        }
+        g_.time_step += share * by_dt;
+    }
+
+    // lambda of a stage; adds what it says of the scene and of the controls.
+    VectorXd solve(const StepAlgebra& algebra, const Rates& at, int i, const StageState& stage, Index step,
+                   const std::pair<double, double>& part, const VectorXd& by_x) {
+        const double share = part.first + input_.tableau.time(i) * (part.second - part.first);
+        const Controls controls = input_.controls_at(step, share);
+        const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
+        model_.set_memory(stage.memory);
+        const FactorReport factor = newton_.factorize_at(stage.q, controls, {&algebra.weights(), &target});
+        if (!factor.succeeded) throw InvalidInput("the adjoint of a step: " + factor.reason);
+        newton_.watch(0.0);
+        const VectorXd lambda = newton_.solve_with_factor(-by_x);
+
+        SceneGradient gradient = model_.vjp(stage.q, controls, lambda);
+        if (model_.reduction().moves()) {
+            model_.assemble(stage.q, controls, false);  // the factorization has turned the blocks of framed nodes
+            VectorXd reaction(model_.size());
+            model_.matrix().multiply(lambda.data(), reaction.data());
+            reaction += by_x;
+            model_.reduction().vjp(reaction, controls.motion, gradient.motions, gradient.controls.motion);
+        }
+        const auto [first, weight] = input_.between(step, share);
+        g_.controls[first] = g_.controls[first] + (1.0 - weight) * gradient.controls;
+        g_.controls[first + 1] = g_.controls[first + 1] + weight * gradient.controls;
+        add(g_.scene, gradient);
+        return lambda;
+    }
+
+    // Adds what the loss says of the state at the beginning of a step.
+    void take_in(Index step) {
+        if (step % input_.record_every != 0) return;
+        const std::size_t k = step / input_.record_every;
+        g_.positions += by_q_[k];
+        g_.velocities += by_v_[k];
+    }
+
+    MotionGradient g_;
+    Newton& newton_;
+    Model& model_;
+    const MotionInput& input_;
+    const MotionResult& motion_;
+    const std::vector<VectorXd>&by_q_, &by_v_;
+    Stepper stepper_;
+    double progress_ = 0.0;
+};
+
+}  // namespace
+
+MotionGradient pull_back(Model& model, const MotionInput& input, const MotionResult& motion,
+                         const std::vector<VectorXd>& by_q, const std::vector<VectorXd>& by_v,
+                         const MotionWatch& watch) {
+    if (motion.keep == Keep::nothing) throw InvalidInput("the motion was computed without keeping its states");
+    const Backward* running = nullptr;
+    Newton newton(model, input.newton, [&](double residual) {
+        if (watch) watch(running ? running->progress() : 0.0, residual);
+    });
+    Backward backward(newton, input, motion, by_q, by_v);
+    running = &backward;
+    return backward.run();
+}
+
+}  // namespace magshell

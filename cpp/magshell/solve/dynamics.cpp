@@ -1,0 +1,199 @@
+#include "magshell/solve/dynamics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "magshell/core/errors.h"
+
+namespace magshell {
+namespace {
+
+constexpr double smallest_part = 1.0 / 64.0;  // of a step
+
+std::vector<Controls> at_stages(const MotionInput& input, Index step, std::pair<double, double> part) {
+    std::vector<Controls> controls;
+    for (int i = 0; i < input.tableau.stages; ++i)
+        controls.push_back(
+            input.controls_at(step, part.first + input.tableau.time(i) * (part.second - part.first)));
+    return controls;
+}
+
+class Run {
+  public:
+    Run(Newton& newton, const MotionInput& input, const KeepOptions& keep, MotionResult& result)
+        : newton_(newton),
+          model_(newton.model()),
+          input_(input),
+          result_(result),
+          stepper_(newton, input.tableau, input.inertia) {
+        result_.last = input.start;
+        if (keep.gradients) plan(keep.budget);
+    }
+
+    bool run() {
+        record();
+        if (result_.keep == Keep::checkpoints) result_.checkpoints[0] = input_.start;
+        for (; result_.steps_done < input_.steps; ++result_.steps_done) {
+            const Index step = result_.steps_done;
+            if (step == next_checkpoint_) keep_checkpoint(step);
+            MotionState state = result_.last;
+            if (!take(step, state)) return false;
+            result_.last = std::move(state);
+            if ((step + 1) % input_.record_every == 0) record();
+        }
+        return true;
+    }
+
+  private:
+    // Everything, if the budget allows it; else as many stages at a time as half of it holds, and checkpoints
+    // in the rest.
+    void plan(std::size_t budget) {
+        const std::size_t vector = sizeof(double) * model_.size();
+        const std::size_t stages = input_.tableau.stages * vector;
+        const std::size_t factors = input_.tableau.stages * newton_.factor()->bytes();
+        const std::size_t steps = static_cast<std::size_t>(input_.steps);
+        if (steps * (stages + factors) <= budget) {
+            result_.keep = Keep::factors;
+        } else if (steps * stages <= budget) {
+            result_.keep = Keep::stages;
+        } else {
+            result_.keep = Keep::checkpoints;
+            result_.leaf = std::max<Index>(1, static_cast<Index>(budget / 2 / stages));
+            result_.slots = std::max<Index>(1, static_cast<Index>(budget / 2 / (2 * vector)));
+            slots_left_ = result_.slots;
+            aim(0);
+        }
+    }
+
+    void aim(Index step) {
+        const Index ahead = next_checkpoint(input_.steps - step, result_.leaf, slots_left_);
+        next_checkpoint_ = ahead > 0 ? step + ahead : -1;
+    }
+
+    void keep_checkpoint(Index step) {
+        result_.checkpoints[step] = result_.last;
+        result_.bytes += 2 * sizeof(double) * model_.size();
+        --slots_left_;
+        aim(step);
+    }
+
+    // In parts where the whole fails.
+    bool take(Index step, MotionState& state) {
+        const bool keep = result_.keep == Keep::stages || result_.keep == Keep::factors;
+        std::vector<std::vector<StageState>> stages;
+        Parts done, ahead = {{0.0, 1.0}};
+        while (!ahead.empty()) {
+            const std::pair<double, double> part = ahead.back();
+            ahead.pop_back();
+            std::vector<StageState> of_part;
+            const std::vector<Controls> controls = at_stages(input_, step, part);
+            const double share = part.second - part.first;
+            if (stepper_.step(state, share * input_.time_step, controls, keep ? &of_part : nullptr,
+                              result_.keep == Keep::factors, result_.reason)) {
+                done.push_back(part);
+                if (keep) stages.push_back(std::move(of_part));
+                continue;
+            }
+            if (share <= smallest_part) return false;
+            const double middle = 0.5 * (part.first + part.second);
+            ahead.push_back({middle, part.second});
+            ahead.push_back({part.first, middle});
+        }
+        if (done.size() > 1) result_.halved[step] = done;
+        if (keep) {
+            for (const std::vector<StageState>& part : stages)
+                for (const StageState& stage : part)
+                    result_.bytes += sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->bytes() : 0);
+            result_.stages.push_back(std::move(stages));
+        }
+        return true;
+    }
+
+    void record() {
+        const MotionState& state = result_.last;
+        result_.recorded.push_back(state);
+        result_.kinetic_energy.push_back(0.5 * state.v.dot(input_.inertia.mass.cwiseProduct(state.v)));
+        const Index step = result_.recorded.size() == 1 ? 0 : result_.steps_done;
+        const Controls now = input_.controls_at(step, result_.recorded.size() == 1 ? 0.0 : 1.0);
+        model_.set_memory(state.memory);
+        std::vector<double> of_terms;
+        for (const auto& [name, energy] : model_.energies(state.q, now)) of_terms.push_back(energy);
+        result_.energies.push_back(std::move(of_terms));
+    }
+
+    Newton& newton_;
+    Model& model_;
+    const MotionInput& input_;
+    MotionResult& result_;
+    Stepper stepper_;
+    Index next_checkpoint_ = -1, slots_left_ = 0;
+};
+
+// How many steps so many checkpoints cover with so many repetitions: leaf (slots + repetitions choose slots).
+double covered(Index leaf, Index slots, Index repetitions) {
+    double steps = static_cast<double>(leaf);
+    for (Index k = 1; k <= slots; ++k) steps *= static_cast<double>(repetitions + k) / static_cast<double>(k);
+    return steps;
+}
+
+}  // namespace
+
+std::pair<Index, double> MotionInput::between(Index step, double share) const {
+    const Index first = step * (tableau.stages + 1);
+    int i = 0;
+    while (i + 1 < tableau.stages && share > tableau.time(i)) ++i;
+    const double begin = i == 0 ? 0.0 : tableau.time(i - 1), end = tableau.time(i);
+    return {first + i, (share - begin) / (end - begin)};
+}
+
+Controls MotionInput::controls_at(Index step, double share) const {
+    const auto [first, weight] = between(step, share);
+    return interpolate(controls[first], controls[first + 1], weight);
+}
+
+Parts parts_of(const std::map<Index, Parts>& halved, Index step) {
+    const auto found = halved.find(step);
+    return found == halved.end() ? Parts{{0.0, 1.0}} : found->second;
+}
+
+void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts, MotionState& state,
+                 std::vector<std::vector<StageState>>* kept, bool with_factors) {
+    for (const std::pair<double, double>& part : parts) {
+        std::vector<StageState> stages;
+        std::string reason;
+        const std::vector<Controls> controls = at_stages(input, step, part);
+        if (!stepper.step(state, (part.second - part.first) * input.time_step, controls, kept ? &stages : nullptr,
+                          with_factors, reason))
+            throw InvalidInput("a step that was taken before cannot be repeated: " + reason);
+        if (kept) kept->push_back(std::move(stages));
+    }
+}
+
+Index next_checkpoint(Index steps, Index leaf, Index slots) {
+    if (steps <= leaf || slots == 0) return 0;
+    Index repetitions = 1;
+    while (covered(leaf, slots, repetitions) < static_cast<double>(steps)) ++repetitions;
+    const double before = covered(leaf, slots, repetitions - 1);
+    return std::clamp<Index>(static_cast<Index>(before), 1, steps - 1);
+}
+
+MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions& keep,
+                      const MotionWatch& watch) {
+    MotionResult result;
+    Newton newton(model, input.newton, [&](double residual) {
+        if (watch) watch(static_cast<double>(result.steps_done) / static_cast<double>(input.steps), residual);
+    });
+    try {
+        Run run(newton, input, keep, result);
+        result.outcome = run.run() ? Outcome::converged : Outcome::failed;
+    } catch (const Interrupted&) {
+        result.outcome = Outcome::interrupted;
+        result.reason = "interrupted";
+    }
+    result.iterations = newton.iterations();
+    result.factorizations = newton.factorizations();
+    result.linear_time = newton.linear_time();
+    return result;
+}
+
+}  // namespace magshell

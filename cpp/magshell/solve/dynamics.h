@@ -1,0 +1,76 @@
+// A motion: steps of equal length, halved where one fails, and what is kept of them for the way back.
+#pragma once
+
+#include <map>
+
+#include "magshell/solve/statics.h"
+#include "magshell/solve/stepper.h"
+
+namespace magshell {
+
+/// What the steps are taken with.
+struct MotionInput {
+    MotionState start;
+    Inertia inertia;
+    Tableau tableau;
+    double time_step = 0.0;  // [s]
+    Index steps = 0;
+    /// Per step, at its beginning and at its stages: steps (stages + 1). In between, straight lines.
+    std::vector<Controls> controls;
+    NewtonOptions newton;
+    Index record_every = 1;  // steps between the states handed out, from the start on
+
+    /// At a share of a step.
+    Controls controls_at(Index step, double share) const;
+    /// The two of `controls` next to it, and the weight of the second.
+    std::pair<Index, double> between(Index step, double share) const;
+};
+
+/// How much of a motion is kept for gradients. Less means more steps taken again on the way back.
+enum class Keep { nothing, checkpoints, stages, factors };
+
+struct KeepOptions {
+    bool gradients = false;
+    std::size_t budget = 0;  // [bytes]
+};
+
+/// A step in parts, each from a share of the step to another.
+using Parts = std::vector<std::pair<double, double>>;
+
+struct MotionResult {
+    Outcome outcome = Outcome::failed;
+    std::string reason;
+    Index steps_done = 0;
+    MotionState last;
+    std::vector<MotionState> recorded;                         // every record_every steps, the start first
+    std::vector<double> kinetic_energy;                        // [J], of those
+    std::vector<std::vector<double>> energies;                 // [J], of those, term by term
+    std::map<Index, Parts> halved;                             // the steps that were taken in parts
+    Keep keep = Keep::nothing;
+    std::vector<std::vector<std::vector<StageState>>> stages;  // by step, part, stage
+    std::map<Index, MotionState> checkpoints;                  // by the step that begins there
+    Index leaf = 0, slots = 0;                                 // steps that fit at once; checkpoints that do
+    int iterations = 0, factorizations = 0;
+    double linear_time = 0.0;
+    std::size_t bytes = 0;  // of what is kept for gradients
+};
+
+/// Called now and then; throws Interrupted to stop.
+using MotionWatch = std::function<void(double progress, double residual)>;
+
+/// Takes the steps. Interrupted or failed, it hands back those that were done.
+MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions& keep,
+                      const MotionWatch& watch = {});
+
+/// The parts in which a step was taken.
+Parts parts_of(const std::map<Index, Parts>& halved, Index step);
+
+/// Takes one step again exactly as it was taken; `kept` gets the stages of its parts.
+void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts, MotionState& state,
+                 std::vector<std::vector<StageState>>* kept, bool with_factors = false);
+
+/// Where to put the next checkpoint in a stretch of so many steps (Griewank and Walther's revolve): the number
+/// of steps before it, or 0 where the stretch fits at once.
+Index next_checkpoint(Index steps, Index leaf, Index slots);
+
+}  // namespace magshell

@@ -1,0 +1,74 @@
+// One time step, as a few implicit stages: each is a static solve with the inertia as a quadratic pull,
+//
+//   W (x_i - z_i) + g(x_i) = 0,   W = M/(a dt)^2 + Gamma/(a dt),   W z_i = M (x^_i + a dt v^_i)/(a dt)^2
+//                                                                          + Gamma x^_i/(a dt)
+//
+// x^_i and v^_i are what the stages before it and the start of the step contribute.       [Chen22] (26)-(28)
+#pragma once
+
+#include <span>
+
+#include "magshell/solve/newton.h"
+#include "magshell/solve/tableau.h"
+
+namespace magshell {
+
+/// Where a sheet is and how fast it moves; v is zero for unknowns that are no vertex.
+struct MotionState {
+    VectorXd q, v;
+    Model::Memory memory;
+};
+
+/// Of all unknowns: masses [kg] and viscous damping [N s/m], zero for those that are no vertex.
+struct Inertia {
+    VectorXd mass, damping;
+};
+
+/// One stage once it is solved.
+struct StageState {
+    VectorXd q;
+    Model::Memory memory;
+    std::shared_ptr<const Factor> factor;  // of Newton's last step, if it was to be kept
+};
+
+/// The linear algebra around a stage, the same forwards and backwards.
+class StepAlgebra {
+  public:
+    StepAlgebra(const Tableau& tableau, const Inertia& inertia, double dt);
+
+    /// What stage i starts from, given the rates of the stages before it.
+    void start_of_stage(int i, const MotionState& begin, const std::vector<VectorXd>& v,
+                        const std::vector<VectorXd>& w, VectorXd& x_hat, VectorXd& v_hat) const;
+    VectorXd target(const VectorXd& x_hat, const VectorXd& v_hat) const;
+    const VectorXd& weights() const { return weights_; }
+    /// a dt [s]
+    double stage_time() const { return stage_time_; }
+    double dt() const { return dt_; }
+    const Tableau& tableau() const { return tableau_; }
+
+  private:
+    Tableau tableau_;
+    double dt_, stage_time_;
+    VectorXd weights_, velocity_share_;
+};
+
+class Stepper {
+  public:
+    Stepper(Newton& newton, const Tableau& tableau, Inertia inertia);
+
+    /// Takes the state over a step with these controls at its stages. On failure the state stays, and the
+    /// reason tells why. `kept`, if given, gets the stages; with_factors: Newton's last factorizations too.
+    bool step(MotionState& state, double dt, std::span<const Controls> at, std::vector<StageState>* kept,
+              bool with_factors, std::string& reason);
+
+    const StepAlgebra& algebra(double dt);
+    const Inertia& inertia() const { return inertia_; }
+
+  private:
+    Newton& newton_;
+    Tableau tableau_;
+    Inertia inertia_;
+    std::unique_ptr<StepAlgebra> algebra_;  // of the last dt
+};
+
+}  // namespace magshell

@@ -1,0 +1,138 @@
+"""What a simulation is asked for beyond the scene's values, checked; and as the core takes it."""
+
+from __future__ import annotations
+
+from numbers import Integral
+
+import numpy as np
+
+from . import _core
+from ._inputs import Inputs
+from ._quantity import quantity
+from ._schedule import scheduled
+from ._start import check_faces
+from ._tensors import is_tensor
+from .equilibrium import Equilibrium
+from .integrators import Integrator
+from .solvers import Newton
+from .trajectory import MotionState, Trajectory
+
+_CONTROLS = {  # (unit, of one time, name in the core)
+    "applied_flux_density": ("T", (3,), "flux_density"),
+    "field_factor": ("1", (), "field"),
+    "load_factor": ("1", (), "load"),
+    "gravity_factor": ("1", (), "gravity"),
+    "motion_factor": ("1", (), "motion"),
+}
+
+
+class MotionInputs:
+    """The inputs of one simulation. Adds to the leaves of `inputs` what of them is a tensor with a gradient."""
+
+    def __init__(
+        self,
+        inputs: Inputs,
+        *,
+        steps,
+        time_step,
+        record_every,
+        memory_budget,
+        start,
+        velocities,
+        damping,
+        integrator: Integrator,
+        solver: Newton,
+        **controls,
+    ):
+        self.inputs, self.integrator = inputs, integrator
+        self.steps = _count("steps", steps)
+        self.record_every = _count("record_every", record_every)
+        if not quantity("memory_budget", "bytes", memory_budget, ()) >= 0:
+            raise ValueError(f"memory_budget must not be negative, got {memory_budget}")
+        self.time_step = float(quantity("time_step", "s", inputs.take("time_step", time_step), ()))
+        if not self.time_step > 0:
+            raise ValueError(f"time_step [s] must be positive, got {self.time_step}")
+        self._mass = inputs.values.shell.vertex_masses
+        self._damping = self._checked_damping(inputs.take("damping", damping))
+        self.start = self._begin(start, velocities)
+        given = {name: self._controls(name, value, time_step) for name, value in controls.items()}
+        self.core = _core.MotionInput(
+            inputs.scene._model,
+            {
+                "state": self.start.state,
+                "velocity": self.start.velocity,
+                "memory": self.start.memory,
+                "mass": self._mass,
+                "damping": self._damping,
+                "integrator": integrator._name,
+                "time_step": self.time_step,
+                "steps": self.steps,
+                "controls": {_CONTROLS[name][2]: array for name, array in given.items()},
+                "newton": solver._newton_options(),
+                "record_every": self.record_every,
+            },
+        )
+
+    def _controls(self, name: str, value, time_step) -> np.ndarray:
+        unit, row, _ = _CONTROLS[name]
+        if name == "applied_flux_density" and value is None:
+            if self.inputs.scene.has_uniform_field:
+                raise ValueError("the scene has a UniformField, so applied_flux_density [T] is needed")
+            value = np.zeros(3)
+        elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
+            raise ValueError("applied_flux_density was given, but the scene has no UniformField")
+        knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, time_step)
+        return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
+
+    def _checked_damping(self, given) -> np.ndarray:
+        n_v = self.inputs.scene.mesh.n_vertices
+        shape = np.shape(given)
+        if shape not in ((), (n_v,)):
+            raise ValueError(f"damping [N s/m] must be a number or have shape (n_v,) = ({n_v},), got {shape}")
+        damping = quantity("damping", "N s/m", given, shape)
+        if (np.asarray(damping) < 0).any():
+            raise ValueError(f"damping [N s/m] must not be negative, but the smallest is {np.min(damping):g}")
+        return np.broadcast_to(damping, (n_v,))
+
+    def _begin(self, start, velocities) -> MotionState:
+        inputs, model = self.inputs, self.inputs.scene._model
+        origin = self._origin(start)
+        velocity = origin.velocity
+        if velocities is not None:
+            n_v = inputs.scene.mesh.n_vertices
+            given = inputs.take("velocities", velocities)
+            if np.shape(given) not in ((3,), (n_v, 3)):
+                raise ValueError(
+                    f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {np.shape(given)}"
+                )
+            rows = np.broadcast_to(quantity("velocities", "m/s", given, np.shape(given)), (n_v, 3))
+            velocity = model.full_vector(np.ascontiguousarray(rows))
+        return MotionState(origin.time, origin.state, velocity, origin.memory)
+
+    def _origin(self, start) -> MotionState:
+        inputs, model, mesh = self.inputs, self.inputs.scene._model, self.inputs.scene.mesh
+        still = np.zeros(model.size)
+        if start is None:
+            return MotionState(0.0, model.rest_state(), still, [])
+        if isinstance(start, Equilibrium | Trajectory):
+            if start.scene is not inputs.scene:
+                raise ValueError("start is of another scene; hand over its positions instead")
+            if isinstance(start, Trajectory):
+                return start.end
+            return MotionState(0.0, start._state, still, start._memory)
+        if isinstance(start, MotionState):
+            if len(start.state) != model.size:
+                raise ValueError(
+                    f"start is a state of {len(start.state)} unknowns, but the scene has {model.size}"
+                )
+            return start
+        given = inputs.take("positions", start)
+        positions = quantity("start", "m", given, (mesh.n_vertices, 3))
+        check_faces(mesh, positions)
+        return MotionState(0.0, model.state(positions, np.zeros(mesh.n_edges)), still, [])
+
+
+def _count(name: str, value) -> int:
+    if isinstance(value, bool) or is_tensor(value) or not isinstance(value, Integral) or not 1 <= value < 2**31:
+        raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
+    return int(value)

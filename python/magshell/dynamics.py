@@ -1,0 +1,189 @@
+"""Motions of a scene: ms.simulate."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from tqdm import tqdm
+
+from . import _core
+from ._inputs import Inputs
+from ._motion_adjoint import MotionAdjoint
+from ._motion_inputs import MotionInputs
+from ._replacements import requested
+from ._tensors import like
+from .errors import Interrupted, NotConverged
+from .integrators import SDIRK2, ImplicitEuler, Integrator, SDIRK3
+from .scene import Scene
+from .solvers import MixedNewton, Newton
+from .trajectory import MotionState, Trajectory
+
+
+def simulate(
+    scene: Scene,
+    *,
+    steps: int,
+    time_step,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    load_factor=1.0,
+    gravity_factor=1.0,
+    field_factor=1.0,
+    motion_factor=1.0,
+    damping=0.0,
+    start=None,
+    velocities=None,
+    thickness=None,
+    young_modulus=None,
+    poisson_ratio=None,
+    mass_density=None,
+    curvature_scale=None,
+    vertex_loads=None,
+    values: dict | None = None,
+    integrator: Integrator | None = None,
+    record_every: int = 1,
+    memory_budget: float = 2e9,
+    solver: Newton | None = None,
+    progress: bool = True,
+) -> Trajectory:
+    """The motion of a scene in time.
+
+    steps, time_step: how many, and s.
+    applied_flux_density: T: constant (3,), one a step (steps, 3), at the ends of all steps (steps + 1, 3) with straight
+        lines between them, or a function of the time [s] that returns (3,).
+    load_factor, gravity_factor, field_factor, motion_factor: as in ms.equilibrium; numbers, or in time as above.
+    damping: N s/m, viscous, on every vertex or (n_v,).
+    start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
+        bits. By default the rest shape.
+    velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
+    remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density.
+    integrator: SDIRK2() by default; ImplicitEuler() or SDIRK3().
+    record_every: steps between the states that come back, the start first.
+    memory_budget: bytes that may be kept for gradients: all states, with factorizations where they fit as well;
+        else checkpoints between which the steps are taken again on the way back.
+    solver: of a step; MixedNewton() by default, of which the load steps are not used.
+    progress: show a bar once the motion has taken two seconds.
+
+    A step that does not converge is taken in halves, down to 1/64 of it. Raises NotConverged and Interrupted with the
+    motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
+    velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
+    continuous, time_step, damping, start positions and velocities among them.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    >>> turning = lambda t: (0, 0, 2e-3 * t)
+    >>> move = ms.simulate(scene, steps=20, time_step=5e-3, remanent_magnetization=(4e4, 0, 0), applied_flux_density=turning)
+    >>> move.positions.shape, bool(move.positions[-1, :, 2].max() > 1e-4)
+    ((21, 33, 3), True)
+    """
+    integrator = SDIRK2() if integrator is None else integrator
+    solver = MixedNewton() if solver is None else solver
+    if not isinstance(integrator, ImplicitEuler | SDIRK2 | SDIRK3):
+        raise ValueError(f"integrator must be ImplicitEuler, SDIRK2 or SDIRK3, got {type(integrator).__name__}")
+    if not isinstance(solver, Newton):
+        raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    replaced = requested(
+        scene,
+        vertex_loads,
+        values,
+        moving=True,
+        thickness=thickness,
+        young_modulus=young_modulus,
+        poisson_ratio=poisson_ratio,
+        mass_density=mass_density,
+        curvature_scale=curvature_scale,
+    )
+    uniform = np.zeros(3) if scene.has_uniform_field else None
+    inputs = Inputs(scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True)
+    asked = MotionInputs(
+        inputs,
+        steps=steps,
+        time_step=time_step,
+        record_every=record_every,
+        memory_budget=memory_budget,
+        start=start,
+        velocities=velocities,
+        damping=damping,
+        integrator=integrator,
+        solver=solver,
+        applied_flux_density=applied_flux_density,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    began = time.perf_counter()
+    with inputs.in_core(), _bar("simulate", progress) as bar:
+        found = _core.simulate(
+            scene._model, asked.core, bool(inputs.leaves), int(memory_budget), _advance(bar)
+        )
+    result = _trajectory(asked, found, time.perf_counter() - began)
+    if found.outcome == _core.Outcome.interrupted:
+        raise Interrupted(f"interrupted after {found.steps_done} of {steps} steps", result)
+    if found.outcome == _core.Outcome.failed:
+        raise NotConverged(
+            f"step {found.steps_done} of {steps}, at {result.end.time:.6g} s, failed even in parts of 1/64: "
+            f"{found.reason}. Take shorter steps. The motion until there is in `error.last_good`.",
+            result,
+        )
+    return result
+
+
+def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
+    scene, model = asked.inputs.scene, asked.inputs.scene._model
+    positions, edge_rotations, velocities = _outputs(asked, found)
+    recorded = len(found.kinetic_energy)
+    names = list(model.energies(found.last_state, _core.Controls()))
+    by_term = np.array(found.energies).reshape(recorded, len(names))
+    return Trajectory(
+        scene=scene,
+        integrator=asked.integrator,
+        times=asked.start.time + asked.time_step * asked.record_every * np.arange(recorded),
+        positions=positions,
+        velocities=velocities,
+        edge_rotations=edge_rotations,
+        kinetic_energy=np.array(found.kinetic_energy),
+        energies={name: by_term[:, k] for k, name in enumerate(names)},
+        steps=asked.steps,
+        steps_done=found.steps_done,
+        halved={step: len(parts) for step, parts in found.halved.items()},
+        end=MotionState(
+            asked.start.time + asked.time_step * found.steps_done,
+            found.last_state,
+            found.last_velocity,
+            found.last_memory,
+        ),
+        iterations=found.iterations,
+        factorizations=found.factorizations,
+        keep=found.keep.name,
+        bytes=found.bytes,
+        wall_time=wall_time,
+        linear_time=found.linear_time,
+    )
+
+
+def _outputs(asked: MotionInputs, found):
+    inputs, model = asked.inputs, asked.inputs.scene._model
+    arrays = found.positions(model), found.edge_rotations(model), found.velocities(model)
+    if not inputs.leaves:
+        return tuple(like(array, *inputs.given) for array in arrays)
+    from .autograd import solved
+
+    return solved(MotionAdjoint(asked, found), arrays, inputs.given[0].dtype, inputs.tensors)
+
+
+def _bar(what: str, shown: bool):
+    form = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
+    return tqdm(total=1.0, desc=what, delay=2.0, disable=not shown, bar_format=form)
+
+
+def _advance(bar):
+    def advance(share: float, residual: float) -> None:
+        bar.update(share - bar.n)
+
+    return advance

@@ -1,0 +1,100 @@
+"""What a simulation computed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .integrators import Integrator
+from .scene import Scene
+
+
+@dataclass(frozen=True)
+class MotionState:
+    """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits.
+
+    time: s, since the start of the motion that led here.
+    """
+
+    time: float
+    state: np.ndarray = field(repr=False)
+    velocity: np.ndarray = field(repr=False)
+    memory: list = field(repr=False)
+
+    def save(self, path: str | Path) -> None:
+        """Writes an .npz file."""
+        lengths = np.array([len(each) for each in self.memory], dtype=np.int64)
+        remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.memory)])
+        with open(path, "wb") as file:
+            np.savez(
+                file,
+                time=self.time,
+                state=self.state,
+                velocity=self.velocity,
+                memory=remembered,
+                memory_lengths=lengths,
+            )
+
+    @classmethod
+    def load(cls, path: str | Path) -> MotionState:
+        """Reads what `save` wrote. Raises ValueError if it is something else."""
+        names = ("time", "state", "velocity", "memory", "memory_lengths")
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                time, state, velocity, remembered, lengths = (file[name] for name in names)
+        except (KeyError, ValueError, EOFError) as error:
+            raise ValueError(f"{path} is not a saved MotionState: {error}") from error
+        memory = [part.tolist() for part in np.split(remembered, np.cumsum(lengths)[:-1])] if len(lengths) else []
+        return cls(float(time), state, velocity, memory)
+
+
+@dataclass(frozen=True, repr=False)
+class Trajectory:
+    """A motion.
+
+    times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
+    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J.
+    steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
+    taken}. end: the last state, from which another simulation goes on. bytes: kept for gradients.
+    """
+
+    scene: Scene
+    integrator: Integrator
+    times: np.ndarray
+    positions: Any
+    velocities: Any
+    edge_rotations: Any
+    kinetic_energy: np.ndarray
+    energies: dict[str, np.ndarray]
+    steps: int
+    steps_done: int
+    halved: dict[int, int]
+    end: MotionState
+    iterations: int
+    factorizations: int
+    keep: str
+    bytes: int
+    wall_time: float
+    linear_time: float
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Kinetic and potential, (n,) J."""
+        return self.kinetic_energy + sum(self.energies.values())
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        stopped = "" if self.steps_done == self.steps else f" of {self.steps}"
+        halved = f", {len(self.halved)} of them in parts" if self.halved else ""
+        a_step = 1e3 * self.wall_time / max(self.steps_done, 1)
+        return (
+            f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
+            f"{type(self.integrator).__name__}\n"
+            f"  {self.iterations} iterations, {self.factorizations} factorizations\n"
+            f"  {self.wall_time:.3g} s, {a_step:.3g} ms a step; for gradients: {self.keep}, {self.bytes / 1e6:.3g} MB"
+        )
