@@ -43,6 +43,30 @@ py::dict rows_of(const std::vector<Controls>& controls) {
     return rows;
 }
 
+// Membrane and bending, (2, n_f, 3) in our order of faces; empty without a Maxwell branch.
+SheetStrains strains_of(const Model& model, const Array& rows) {
+    SheetStrains strains;
+    if (rows.size() == 0) return strains;
+    const Index n_f = model.sheet().n_faces();
+    const double* from = rows.data();
+    for (Strains* part : {&strains.membrane, &strains.bending}) {
+        part->assign(3 * packs_for(n_f), Pack(0.0));
+        for (Index f = 0; f < n_f; ++f)
+            for (int i = 0; i < 3; ++i) (*part)[3 * (f / Pack::width) + i].set(f % Pack::width, *from++);
+    }
+    return strains;
+}
+
+Array rows_of(const Model& model, const SheetStrains& strains) {
+    const py::ssize_t n_f = strains.empty() ? 0 : model.sheet().n_faces();
+    Array rows({py::ssize_t{2}, n_f, py::ssize_t{3}});
+    double* to = rows.mutable_data();
+    for (const Strains* part : {&strains.membrane, &strains.bending})
+        for (Index f = 0; f < n_f; ++f)
+            for (int i = 0; i < 3; ++i) *to++ = (*part)[3 * (f / Pack::width) + i][f % Pack::width];
+    return rows;
+}
+
 MotionInput input_of(const Model& model, const py::dict& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     MotionInput input;
@@ -51,6 +75,10 @@ MotionInput input_of(const Model& model, const py::dict& given) {
     input.start.memory = given["memory"].cast<Model::Memory>();
     input.inertia = {model.vertex_weights(to_vector(array("mass"))),
                      model.vertex_weights(to_vector(array("damping")))};
+    input.start.e = strains_of(model, given["maxwell_strains"].cast<Array>());
+    input.rotations_given = given["rotations_given"].cast<bool>();
+    input.viscosity = {given["stiffness_damping"].cast<double>(), given["maxwell_modulus"].cast<double>(),
+                       given["maxwell_time"].cast<double>()};
     input.tableau = tableau_of(given["integrator"].cast<std::string>());
     input.time_step = given["time_step"].cast<double>();
     input.steps = given["steps"].cast<Index>();
@@ -113,6 +141,9 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     result["mass"] = VectorXd(model.vertex_rows(gradient.mass).rowwise().sum());
     result["damping"] = VectorXd(model.vertex_rows(gradient.damping).rowwise().sum());
     result["time_step"] = gradient.time_step;
+    result["stiffness_damping"] = gradient.viscosity.stiffness_damping;
+    result["maxwell_modulus"] = gradient.viscosity.maxwell_modulus;
+    result["maxwell_time"] = gradient.viscosity.maxwell_time;
     return result;
 }
 
@@ -133,6 +164,7 @@ void register_dynamics(py::module_& module) {
         .def_readonly("steps_done", &MotionResult::steps_done)
         .def_property_readonly("last_state", [](const MotionResult& r) { return r.last.q; })
         .def_property_readonly("last_velocity", [](const MotionResult& r) { return r.last.v; })
+        .def("last_maxwell_strains", [](const MotionResult& r, const Model& m) { return rows_of(m, r.last.e); })
         .def_property_readonly("last_memory", [](const MotionResult& r) { return r.last.memory; })
         .def_readonly("kinetic_energy", &MotionResult::kinetic_energy)
         .def_readonly("energies", &MotionResult::energies)

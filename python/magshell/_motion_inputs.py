@@ -40,6 +40,9 @@ class MotionInputs:
         start,
         velocities,
         damping,
+        stiffness_damping,
+        maxwell_modulus,
+        maxwell_time,
         integrator: Integrator,
         solver: Newton,
         **controls,
@@ -54,6 +57,7 @@ class MotionInputs:
             raise ValueError(f"time_step [s] must be positive, got {self.time_step}")
         self._mass = inputs.values.shell.vertex_masses
         self._damping = self._checked_damping(inputs.take("damping", damping))
+        law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
         self.start = self._begin(start, velocities)
         given = {name: self._controls(name, value, time_step) for name, value in controls.items()}
         self.core = _core.MotionInput(
@@ -62,6 +66,9 @@ class MotionInputs:
                 "state": self.start.state,
                 "velocity": self.start.velocity,
                 "memory": self.start.memory,
+                "maxwell_strains": self.start.maxwell_strains if law["maxwell_modulus"] else np.zeros(0),
+                "rotations_given": start is None or isinstance(start, Equilibrium | Trajectory | MotionState),
+                **law,
                 "mass": self._mass,
                 "damping": self._damping,
                 "integrator": integrator._name,
@@ -94,6 +101,18 @@ class MotionInputs:
             raise ValueError(f"damping [N s/m] must not be negative, but the smallest is {np.min(damping):g}")
         return np.broadcast_to(damping, (n_v,))
 
+    def _viscosity(self, stiffness_damping, maxwell_modulus, maxwell_time) -> dict[str, float]:
+        given = {"stiffness_damping": ("s", stiffness_damping), "maxwell_modulus": ("1", maxwell_modulus)}
+        if maxwell_time is not None:
+            given["maxwell_time"] = ("s", maxwell_time)
+        law = {name: float(quantity(name, unit, self.inputs.take(name, value), ())) for name, (unit, value) in given.items()}
+        for name, value in law.items():
+            if value < 0 or (name == "maxwell_time" and value == 0):
+                raise ValueError(f"{name} must be positive, got {value:g}")
+        if law["maxwell_modulus"] and maxwell_time is None:
+            raise ValueError("maxwell_modulus needs the relaxation time of the branch, maxwell_time [s]")
+        return {"maxwell_time": 1.0, **law}
+
     def _begin(self, start, velocities) -> MotionState:
         inputs, model = self.inputs, self.inputs.scene._model
         origin = self._origin(start)
@@ -107,7 +126,7 @@ class MotionInputs:
                 )
             rows = np.broadcast_to(quantity("velocities", "m/s", given, np.shape(given)), (n_v, 3))
             velocity = model.full_vector(np.ascontiguousarray(rows))
-        return MotionState(origin.time, origin.state, velocity, origin.memory)
+        return MotionState(origin.time, origin.state, velocity, origin.memory, origin.maxwell_strains)
 
     def _origin(self, start) -> MotionState:
         inputs, model, mesh = self.inputs, self.inputs.scene._model, self.inputs.scene.mesh

@@ -32,6 +32,9 @@ def simulate(
     field_factor=1.0,
     motion_factor=1.0,
     damping=0.0,
+    stiffness_damping=0.0,
+    maxwell_modulus=0.0,
+    maxwell_time=None,
     start=None,
     velocities=None,
     thickness=None,
@@ -54,6 +57,10 @@ def simulate(
         lines between them, or a function of the time [s] that returns (3,).
     load_factor, gravity_factor, field_factor, motion_factor: as in ms.equilibrium; numbers, or in time as above.
     damping: N s/m, viscous, on every vertex or (n_v,).
+    stiffness_damping: s. The rate of the strains adds as much stress as this time of it would: for small motions the
+        damping matrix is this time the stiffness matrix.
+    maxwell_modulus, maxwell_time: a Maxwell branch beside the elastic stiffness: its modulus over the elastic one, and
+        its relaxation time, s. It begins relaxed.
     start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
         bits. By default the rest shape.
     velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
@@ -109,6 +116,9 @@ def simulate(
         start=start,
         velocities=velocities,
         damping=damping,
+        stiffness_damping=stiffness_damping,
+        maxwell_modulus=maxwell_modulus,
+        maxwell_time=maxwell_time,
         integrator=integrator,
         solver=solver,
         applied_flux_density=applied_flux_density,
@@ -157,6 +167,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
             found.last_state,
             found.last_velocity,
             found.last_memory,
+            found.last_maxwell_strains(model),
         ),
         iterations=found.iterations,
         factorizations=found.factorizations,

@@ -23,6 +23,7 @@ class MotionState:
     state: np.ndarray = field(repr=False)
     velocity: np.ndarray = field(repr=False)
     memory: list = field(repr=False)
+    maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros((2, 0, 3)))
 
     def save(self, path: str | Path) -> None:
         """Writes an .npz file."""
@@ -36,19 +37,20 @@ class MotionState:
                 velocity=self.velocity,
                 memory=remembered,
                 memory_lengths=lengths,
+                maxwell_strains=self.maxwell_strains,
             )
 
     @classmethod
     def load(cls, path: str | Path) -> MotionState:
         """Reads what `save` wrote. Raises ValueError if it is something else."""
-        names = ("time", "state", "velocity", "memory", "memory_lengths")
+        names = ("time", "state", "velocity", "memory", "memory_lengths", "maxwell_strains")
         try:
             with np.load(path, allow_pickle=False) as file:
-                time, state, velocity, remembered, lengths = (file[name] for name in names)
+                time, state, velocity, remembered, lengths, strains = (file[name] for name in names)
         except (KeyError, ValueError, EOFError) as error:
             raise ValueError(f"{path} is not a saved MotionState: {error}") from error
         memory = [part.tolist() for part in np.split(remembered, np.cumsum(lengths)[:-1])] if len(lengths) else []
-        return cls(float(time), state, velocity, memory)
+        return cls(float(time), state, velocity, memory, strains)
 
 
 @dataclass(frozen=True, repr=False)

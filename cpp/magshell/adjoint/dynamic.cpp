@@ -1,6 +1,8 @@
 #include "magshell/adjoint/dynamic.h"
 
+#include "magshell/adjoint/viscous.h"
 #include "magshell/core/errors.h"
+#include "magshell/solve/rotations.h"
 
 namespace magshell {
 namespace {
@@ -58,7 +60,7 @@ class Backward {
           motion_(motion),
           by_q_(by_q),
           by_v_(by_v),
-          stepper_(newton, input.tableau, input.inertia) {
+          stepper_(newton, input.tableau, input.inertia, input.viscosity) {
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
         g_.controls.resize(input.controls.size());
     }
@@ -75,6 +77,7 @@ class Backward {
             for (Index step = motion_.steps_done - 1; step >= 0; --step)
                 back(step, beginning(step), motion_.stages[step]);
         }
+        back_to_start();
         return std::move(g_);
     }
 
@@ -129,12 +132,12 @@ class Backward {
 
     // The state in which a step began, where all stages are kept.
     MotionState beginning(Index step) {
-        if (step == 0) return input_.start;
+        if (step == 0) return motion_.start;
         const auto& stages = motion_.stages[step - 1];
         const Parts parts = parts_of(motion_.halved, step - 1);
         const VectorXd& q = stages.size() > 1 ? stages[stages.size() - 2].back().q
                             : step > 1        ? motion_.stages[step - 2].back().back().q
-                                              : input_.start.q;
+                                              : motion_.start.q;
         return end_of(parts.back(), q, stages.back());
     }
 
@@ -142,9 +145,9 @@ class Backward {
     MotionState end_of(const std::pair<double, double>& part, const VectorXd& q_begin,
                        const std::vector<StageState>& stages) {
         const StepAlgebra& step = stepper_.algebra((part.second - part.first) * input_.time_step);
-        const MotionState begin{q_begin, VectorXd::Zero(q_begin.size()), {}};
+        const MotionState begin{q_begin, VectorXd::Zero(q_begin.size()), {}, {}};
         Rates rates(step, begin, stages, 3 * model_.sheet().n_vertices());
-        return {stages.back().q, std::move(rates.v.back()), stages.back().memory};
+        return {stages.back().q, std::move(rates.v.back()), stages.back().memory, stages.back().e};
     }
 
     void back(Index step, const std::pair<double, double>& part, const MotionState& begin,
@@ -162,6 +165,7 @@ class Backward {
         VectorXd by_x = std::move(g_.positions);
         by_v.back() = std::move(g_.velocities);
         g_.positions = g_.velocities = VectorXd::Zero(model_.size());
+        ViscousAdjoint viscous(model_, input_.viscosity, algebra, begin, stages, by_e_);
         double by_dt = 0.0;
         for (int i = n - 1; i >= 0; --i) {
             by_dt -= by_w[i].dot(at.w[i]) / dt;
@@ -172,7 +176,7 @@ class Backward {
             VectorXd by_x_hat = VectorXd::Zero(model_.size());
             by_x_hat.head(coordinates) = -by_v[i].head(coordinates) / adt;
 
-            const VectorXd lambda = solve(algebra, at, i, stages[i], step, part, by_x);
+            const VectorXd lambda = solve(algebra, at, i, stages[i], step, part, by_x, viscous);
             const VectorXd accelerated = lambda.cwiseProduct(at.w[i]), moved = lambda.cwiseProduct(at.v[i]);
             g_.mass += accelerated;
             g_.damping += moved;
@@ -190,20 +194,33 @@ class Backward {
             }
             by_x.setZero(model_.size());
         }
+        if (input_.viscosity.any()) {
+            model_.evaluate(begin.q, {});
+            g_.positions += model_.strain_forces(viscous.by_d_begin);
+            by_e_ = std::move(viscous.by_e_begin);
+            by_dt += viscous.by_dt;
+            g_.viscosity.stiffness_damping += viscous.by_law.stiffness_damping;
+            g_.viscosity.maxwell_modulus += viscous.by_law.maxwell_modulus;
+            g_.viscosity.maxwell_time += viscous.by_law.maxwell_time;
+        }
         g_.time_step += share * by_dt;
     }
 
     // lambda of a stage; adds what it says of the scene and of the controls.
     VectorXd solve(const StepAlgebra& algebra, const Rates& at, int i, const StageState& stage, Index step,
-                   const std::pair<double, double>& part, const VectorXd& by_x) {
+                   const std::pair<double, double>& part, VectorXd& by_x, ViscousAdjoint& viscous) {
+        const ElasticAfterwards elastic_afterwards(model_);
         const double share = part.first + input_.tableau.time(i) * (part.second - part.first);
         const Controls controls = input_.controls_at(step, share);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         model_.set_memory(stage.memory);
+        viscous.set_history(i);
         const FactorReport factor = newton_.factorize_at(stage.q, controls, {&algebra.weights(), &target});
         if (!factor.succeeded) throw InvalidInput("the adjoint of a step: " + factor.reason);
         newton_.watch(0.0);
+        viscous.before_solve(i, by_x);
         const VectorXd lambda = newton_.solve_with_factor(-by_x);
+        viscous.after_solve(i, lambda);
 
         SceneGradient gradient = model_.vjp(stage.q, controls, lambda);
         if (model_.reduction().moves()) {
@@ -218,6 +235,25 @@ class Backward {
         g_.controls[first + 1] = g_.controls[first + 1] + weight * gradient.controls;
         add(g_.scene, gradient);
         return lambda;
+    }
+
+    // Rotations that were put to rest depend on everything else.
+    void back_to_start() {
+        const VectorXd& q = motion_.start.q;
+        if (input_.viscosity.maxwell() && input_.start.e.empty()) {
+            model_.evaluate(q, input_.controls_at(0, 0.0));
+            g_.positions += model_.strain_forces(by_e_);
+        }
+        if (input_.rotations_given) return;
+        model_.set_memory(input_.start.memory);
+        const Controls controls = input_.controls_at(0, 0.0);
+        const VectorXd lambda = RotationsAtRest(model_, q, controls).adjoint(g_.positions);
+        VectorXd reaction(model_.size());
+        model_.matrix().multiply(lambda.data(), reaction.data());
+        g_.positions += reaction;
+        const SceneGradient gradient = model_.vjp(q, controls, lambda);
+        g_.controls[0] = g_.controls[0] + gradient.controls;
+        add(g_.scene, gradient);
     }
 
     // Adds what the loss says of the state at the beginning of a step.
@@ -235,6 +271,7 @@ class Backward {
     const MotionResult& motion_;
     const std::vector<VectorXd>&by_q_, &by_v_;
     Stepper stepper_;
+    SheetStrains by_e_;  // of the Maxwell branch, at the beginning of the last step taken back
     double progress_ = 0.0;
 };
 

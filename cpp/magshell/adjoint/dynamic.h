@@ -5,6 +5,7 @@
 //       v'_i += w'_i/(a dt),  v^'_i -= w'_i/(a dt),  x'_i += v'_i/(a dt),  x^'_i -= v'_i/(a dt)
 //   (W + H) lambda_i = - x'_i:
 //       x^'_i -= W lambda_i,  v^'_i -= M/(a dt) lambda_i,  k' += lambda_i . dg/dk
+//   (with a viscous sheet, the strains d and e go back along with them: solve/viscosity.h)
 //   x^_i = x + dt sum a_ij v_j,  v^_i = v + dt sum a_ij w_j:
 //       x' += x^'_i,  v' += v^'_i,  v'_j += dt a_ij x^'_i,  w'_j += dt a_ij v^'_i
 //
@@ -20,6 +21,7 @@ struct MotionGradient {
     VectorXd positions, velocities;  // at the start; of all unknowns
     VectorXd mass, damping;          // of all unknowns
     double time_step = 0.0;
+    Viscosity viscosity{0.0, 0.0, 0.0};
     SceneGradient scene;             // its controls are empty
     std::vector<Controls> controls;  // as MotionInput::controls
 };

@@ -9,8 +9,8 @@ BendingTerm::BendingTerm(const Sheet& sheet, const Schedule& schedule, const Sys
     : sheet_(sheet),
       schedule_(schedule),
       stiffness_(face_packs()),
-      stress_(face_packs()),
-      extrapolated_(face_packs()),
+      stress_(3 * face_packs()),
+      extrapolated_(3 * face_packs()),
       folds_(sheet.folds.size()) {
     for (const Stencil& s : sheet.stencils) {
         FaceSlots& slots = face_slots_.emplace_back();
@@ -132,30 +132,29 @@ double BendingTerm::energy(const double* q, const Controls&) const {
 
 void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
     store_folds(q);
-    schedule_.each([&](const Part& part) {
-        for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) {
-            Pack delta[3];
-            strain(pack, q, &FoldState::turn, delta);
-            stiffness_[pack].times(delta, stress_[pack].at);
-        }
+    each_pack([&](Index pack) {
+        Pack delta[3];
+        strain(pack, q, &FoldState::turn, delta);
+        history_.apply(pack, delta);
+        stiffness_[pack].times(delta, &stress_[3 * pack]);
     });
-    add_forces(out);
+    add_forces(stress_, out);
 }
 
 /// dE/dtheta of a fold: what the strains that it enters are worth.
-double BendingTerm::moment(const FoldStencil& fold, const std::vector<Stress>& stress) const {
+double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const {
     double sum = 0.0;
     for (const FoldStencil::Side& side : {fold.left, fold.right})
-        if (side.face >= 0) sum += stress[side.face / Pack::width].at[side.corner][side.face % Pack::width];
+        if (side.face >= 0) sum += stress[3 * (side.face / Pack::width) + side.corner][side.face % Pack::width];
     return fold.weight() * sum;
 }
 
-void BendingTerm::add_forces(Residual& out) const {
+void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
     // Faces that share a rotation share an edge and so a node: parts of one colour meet at no rotation
     // either.
     schedule_.scatter([&](const Part& part) {
         for (Index h = part.first_fold; h < part.last_fold; ++h) {
-            const double m = moment(sheet_.folds[h], stress_);
+            const double m = moment(sheet_.folds[h], stresses);
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)
                     out.add(3 * sheet_.folds[h].nodes[k] + c, m * folds_[h].gradient[3 * k + c]);
@@ -165,7 +164,7 @@ void BendingTerm::add_forces(Residual& out) const {
                 const FaceSide& side = sheet_.sides[f][i];
                 if (side.rotation >= 0)
                     out.add(3 * sheet_.n_nodes() + side.rotation,
-                            side.sign * stress_[f / Pack::width].at[i][f % Pack::width]);
+                            side.sign * stresses[3 * (f / Pack::width) + i][f % Pack::width]);
             }
     });
 }
@@ -174,7 +173,7 @@ void BendingTerm::assemble(const Part& part, const double* q, const Controls&, b
                            SystemMatrix& out) const {
     for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack)
         assemble_faces(pack, out);
-    const std::vector<Stress>& stress = extrapolated_stress ? extrapolated_ : stress_;
+    const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
     for (Index first = part.first_fold; first < part.last_fold; first += Pack::width)
         assemble_folds(first, std::min(first + Pack::width, part.last_fold), q, stress, out);
 }
@@ -200,9 +199,10 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
     }
     Pack33 blocks[21];
     Pack3 stiff_corner[3][3], rows[3][6];
-    face.node_blocks(stiffness_[pack], blocks, stiff_corner);
+    const Symmetric3 stiffness = history_.scaled(stiffness_[pack]);
+    face.node_blocks(stiffness, blocks, stiff_corner);
     const bool directors = sheet_.n_rotations() > 0;
-    if (directors) face.rotation_rows(stiffness_[pack], stiff_corner, rows);
+    if (directors) face.rotation_rows(stiffness, stiff_corner, rows);
 
     const int lanes = std::min(Pack::width, sheet_.n_faces() - pack * Pack::width);
     for (int lane = 0; lane < lanes; ++lane) {
@@ -220,12 +220,12 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
             for (int j = 0; j <= i; ++j)
                 if (stencil.rotations[j] >= 0)
                     out.add(slots.rotations[lower_index(i, j)],
-                            face.sign[i][lane] * face.sign[j][lane] * stiffness_[pack](i, j)[lane]);
+                            face.sign[i][lane] * face.sign[j][lane] * stiffness(i, j)[lane]);
         }
     }
 }
 
-void BendingTerm::assemble_folds(Index first, Index last, const double* q, const std::vector<Stress>& stress,
+void BendingTerm::assemble_folds(Index first, Index last, const double* q, const Strains& stress,
                                  SystemMatrix& out) const {
     FoldCurvature curvature(folds_at(first, last, q));
     Pack moments(0.0);
@@ -248,14 +248,29 @@ void BendingTerm::store_rates(const double* p) {
 
 void BendingTerm::extrapolate(const double* p) {
     store_rates(p);
-    schedule_.each([&](const Part& part) {
-        for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) {
-            Pack rate[3], change[3];
-            strain(pack, p, &FoldState::rate, rate);
-            stiffness_[pack].times(rate, change);
-            for (int i = 0; i < 3; ++i) extrapolated_[pack].at[i] = stress_[pack].at[i] + change[i];
-        }
+    each_pack([&](Index pack) {
+        Pack rate[3], change[3];
+        strain(pack, p, &FoldState::rate, rate);
+        history_.scaled(stiffness_[pack]).times(rate, change);
+        for (int i = 0; i < 3; ++i) extrapolated_[3 * pack + i] = stress_[3 * pack + i] + change[i];
     });
+}
+
+void BendingTerm::strains(const double* q, Strains& out) {
+    store_folds(q);
+    out.resize(stress_.size());
+    each_pack([&](Index pack) { strain(pack, q, &FoldState::turn, &out[3 * pack]); });
+}
+
+void BendingTerm::strain_rates(const double* p, Strains& out) {
+    store_rates(p);
+    out.resize(stress_.size());
+    each_pack([&](Index pack) { strain(pack, p, &FoldState::rate, &out[3 * pack]); });
+}
+
+void BendingTerm::stresses(const Strains& strains, Strains& out) const {
+    out.resize(strains.size());
+    each_pack([&](Index pack) { stiffness_[pack].times(&strains[3 * pack], &out[3 * pack]); });
 }
 
 // With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T C + C e_i e_i^T.
@@ -266,6 +281,7 @@ void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Sc
         for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) {
             Pack delta[3], rate[3], stress_rate[3];
             strain(pack, q, &FoldState::turn, delta);
+            history_.apply(pack, delta);
             strain(pack, lambda, &FoldState::rate, rate);
             stiffness_[pack].times(rate, stress_rate);
             for (Index f = pack * Pack::width; f < std::min((pack + 1) * Pack::width, sheet_.n_faces());
@@ -273,7 +289,7 @@ void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Sc
                 const int lane = f % Pack::width;
                 const SheetMaterial& m = materials_[f];
                 const Vec3 d = lane_of(delta, lane), along = lane_of(rate, lane), scale = curvature_scales(f);
-                const Vec3 stress = lane_of(stress_[pack].at, lane);
+                const Vec3 stress = lane_of(&stress_[3 * pack], lane);
                 const Mat3 by_poisson_ratio =
                     RestFace(sheet_.rest_corners(f).data()).bending_by_poisson_ratio(m);
                 const double work = along.dot(stress);

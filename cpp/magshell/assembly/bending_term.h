@@ -5,14 +5,14 @@
 // faces' J^T C J, plus each fold's curvature times the moment of the faces beside it.
 #pragma once
 
-#include "magshell/assembly/lanes.h"
+#include "magshell/assembly/strain_history.h"
 #include "magshell/energy/bending.h"
 #include "magshell/energy/material.h"
 #include "magshell/strain/fold_angle.h"
 
 namespace magshell {
 
-class BendingTerm final : public Term {
+class BendingTerm final : public ElasticTerm {
   public:
     BendingTerm(const Sheet& sheet, const Schedule& schedule, const SystemMatrix& matrix);
 
@@ -28,6 +28,10 @@ class BendingTerm final : public Term {
     void extrapolate(const double* p) override;
     void vjp(const double* q, const Controls&, const double* lambda, SceneGradient& out) override;
     void add_cancelling_forces(VectorXd& out) const override;
+    void strains(const double* q, Strains& out) override;
+    void strain_rates(const double* p, Strains& out) override;
+    void stresses(const Strains& strains, Strains& out) const override;
+    void add_forces(const Strains& stresses, Residual& out) override;
     std::size_t bytes() const override;
 
   private:
@@ -38,9 +42,6 @@ class BendingTerm final : public Term {
         double rate;          // of theta, along the last extrapolated step
         double unused[2];     // two cache lines in all
     };
-    struct Stress {
-        Pack at[3];
-    };
     struct FaceSlots {
         PairSlots<6> nodes;
         std::array<Index, 18> rotation_nodes;  // rotation i against node k, at 6 i + k
@@ -48,16 +49,21 @@ class BendingTerm final : public Term {
     };
 
     Index face_packs() const { return packs_for(sheet_.n_faces()); }
+    template <class Body>
+    void each_pack(const Body& body) const {
+        schedule_.each([&](const Part& part) {
+            for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) body(pack);
+        });
+    }
     Fold folds_at(Index first, Index last, const double* q) const;
     double turn_from(double angle, Index fold) const;
     void strain(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const;
-    double moment(const FoldStencil& fold, const std::vector<Stress>& stress) const;
+    double moment(const FoldStencil& fold, const Strains& stress) const;
     void store_folds(const double* q);
     void store_rates(const double* p);
     Vec3 curvature_scales(Index face) const;
-    void add_forces(Residual& out) const;
     void assemble_faces(Index pack, SystemMatrix& out) const;
-    void assemble_folds(Index first, Index last, const double* q, const std::vector<Stress>& stress,
+    void assemble_folds(Index first, Index last, const double* q, const Strains& stress,
                         SystemMatrix& out) const;
 
     const Sheet& sheet_;
@@ -67,7 +73,7 @@ class BendingTerm final : public Term {
     std::vector<SheetMaterial> materials_;
     VectorXd curvature_scale_;
     std::vector<Symmetric3> stiffness_;
-    std::vector<Stress> stress_, extrapolated_;
+    Strains stress_, extrapolated_;
     std::vector<FoldState> folds_;
 };
 

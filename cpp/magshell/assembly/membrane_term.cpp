@@ -6,8 +6,8 @@ MembraneTerm::MembraneTerm(const Sheet& sheet, const FaceLoop& loop)
     : sheet_(sheet),
       loop_(loop),
       elements_(loop.packs()),
-      stress_(loop.packs()),
-      extrapolated_(loop.packs()) {
+      stress_(3 * loop.packs()),
+      extrapolated_(3 * loop.packs()) {
     for (Index pack = 0; pack < loop.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const std::array<Index, 3>& c = sheet.corners[loop.face(pack, lane)];
@@ -46,20 +46,21 @@ void MembraneTerm::evaluate(const double* q, const Controls&, Residual& out) {
         const Membrane membrane(x);
         Pack strain[3];
         membrane.strain(elements_[pack], strain);
-        elements_[pack].stiffness.times(strain, stress_[pack].at);
-        membrane.gradient(stress_[pack].at, g);
+        history_.apply(pack, strain);
+        elements_[pack].stiffness.times(strain, &stress_[3 * pack]);
+        membrane.gradient(&stress_[3 * pack], g);
         loop_.scatter(pack, g, out);
     });
 }
 
 void MembraneTerm::assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
                             SystemMatrix& out) const {
-    const std::vector<Stress>& stress = extrapolated_stress ? extrapolated_ : stress_;
+    const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
     FaceLoop::over_packs(part, [&](Index pack) {
         Pack3 x[3];
         Pack33 h[6];
         loop_.gather(pack, q, x);
-        Membrane(x).hessian(elements_[pack], stress[pack].at, h);
+        Membrane(x).hessian(history_.scaled(elements_[pack].stiffness), &stress[3 * pack], h);
         loop_.scatter(pack, h, out);
     });
 }
@@ -71,8 +72,8 @@ void MembraneTerm::extrapolate(const double* p) {
         loop_.gather(pack, p, step);
         Pack rate[3], change[3];
         Membrane(x).strain_rate(step, rate);
-        elements_[pack].stiffness.times(rate, change);
-        for (int i = 0; i < 3; ++i) extrapolated_[pack].at[i] = stress_[pack].at[i] + change[i];
+        history_.scaled(elements_[pack].stiffness).times(rate, change);
+        for (int i = 0; i < 3; ++i) extrapolated_[3 * pack + i] = stress_[3 * pack + i] + change[i];
     });
 }
 
@@ -84,11 +85,12 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, S
         loop_.gather(pack, lambda, along);
         const Membrane membrane(x);
         membrane.strain(elements_[pack], strain);
+        history_.apply(pack, strain);
         membrane.strain_rate(along, rate);
         for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
             const Index f = loop_.face(pack, lane);
             const SheetMaterial& m = materials_[f];
-            const double work = lane_of(rate, lane).dot(lane_of(stress_[pack].at, lane));
+            const double work = lane_of(rate, lane).dot(lane_of(&stress_[3 * pack], lane));
             const Mat3 by_poisson_ratio =
                 RestFace(sheet_.rest_corners(f).data()).membrane_by_poisson_ratio(m);
             const Index user = sheet_.faces.user[f];
@@ -96,6 +98,39 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, S
             out.thickness[user] += work / m.thickness;
             out.poisson_ratio[user] += lane_of(rate, lane).dot(by_poisson_ratio * lane_of(strain, lane));
         }
+    });
+}
+
+void MembraneTerm::strains(const double* q, Strains& out) {
+    out.resize(3 * loop_.packs());
+    loop_.each_pack([&](Index pack) {
+        Pack3 x[3];
+        loop_.gather(pack, q, x);
+        Membrane(x).strain(elements_[pack], &out[3 * pack]);
+    });
+}
+
+void MembraneTerm::strain_rates(const double* p, Strains& out) {
+    out.resize(3 * loop_.packs());
+    loop_.each_pack([&](Index pack) {
+        Pack3 x[3], along[3];
+        loop_.gather(pack, state_.data(), x);
+        loop_.gather(pack, p, along);
+        Membrane(x).strain_rate(along, &out[3 * pack]);
+    });
+}
+
+void MembraneTerm::stresses(const Strains& strains, Strains& out) const {
+    out.resize(strains.size());
+    loop_.each_pack([&](Index pack) { elements_[pack].stiffness.times(&strains[3 * pack], &out[3 * pack]); });
+}
+
+void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {
+    loop_.scatter_packs([&](Index pack) {
+        Pack3 x[3], g[3];
+        loop_.gather(pack, state_.data(), x);
+        Membrane(x).gradient(&stresses[3 * pack], g);
+        loop_.scatter(pack, g, out);
     });
 }
 

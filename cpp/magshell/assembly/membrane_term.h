@@ -3,12 +3,13 @@
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/strain_history.h"
 #include "magshell/energy/material.h"
 #include "magshell/energy/membrane.h"
 
 namespace magshell {
 
-class MembraneTerm final : public Term {
+class MembraneTerm final : public ElasticTerm {
   public:
     MembraneTerm(const Sheet& sheet, const FaceLoop& loop);
 
@@ -24,18 +25,18 @@ class MembraneTerm final : public Term {
     void extrapolate(const double* p) override;
     void vjp(const double* q, const Controls&, const double* lambda, SceneGradient& out) override;
     void add_cancelling_forces(VectorXd& out) const override;
+    void strains(const double* q, Strains& out) override;
+    void strain_rates(const double* p, Strains& out) override;
+    void stresses(const Strains& strains, Strains& out) const override;
+    void add_forces(const Strains& stresses, Residual& out) override;
     std::size_t bytes() const override;
 
   private:
-    struct Stress {
-        Pack at[3];
-    };
-
     const Sheet& sheet_;
     const FaceLoop& loop_;
     std::vector<SheetMaterial> materials_;
     std::vector<Membrane::Element> elements_;
-    std::vector<Stress> stress_, extrapolated_;
+    Strains stress_, extrapolated_;
     std::vector<double> state_;  // the nodes at which stress_ holds
 };
 

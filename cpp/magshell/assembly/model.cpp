@@ -117,6 +117,40 @@ SceneGradient Model::vjp(const VectorXd& q, const Controls& controls, const Vect
     return gradient;
 }
 
+void Model::set_history(double scale, const SheetStrains* shift) {
+    membrane_->set_history({scale, shift ? &shift->membrane : nullptr});
+    bending_->set_history({scale, shift ? &shift->bending : nullptr});
+}
+
+SheetStrains Model::strains(const VectorXd& q) {
+    SheetStrains strains;
+    membrane_->strains(q.data(), strains.membrane);
+    bending_->strains(q.data(), strains.bending);
+    return strains;
+}
+
+SheetStrains Model::strain_rates(const VectorXd& p) {
+    SheetStrains rates;
+    membrane_->strain_rates(p.data(), rates.membrane);
+    bending_->strain_rates(p.data(), rates.bending);
+    return rates;
+}
+
+VectorXd Model::strain_forces(const SheetStrains& stresses) {
+    Residual forces;
+    forces.reset(size());
+    membrane_->add_forces(stresses.membrane, forces);
+    bending_->add_forces(stresses.bending, forces);
+    return std::move(forces.gradient);
+}
+
+SheetStrains Model::stresses(const SheetStrains& strains) const {
+    SheetStrains stresses;
+    membrane_->stresses(strains.membrane, stresses.membrane);
+    bending_->stresses(strains.bending, stresses.bending);
+    return stresses;
+}
+
 std::unique_ptr<Factor> Model::new_factor() {
     if (!analysed_) {
         analysed_ = analyze(reduction_.pattern());

@@ -71,6 +71,14 @@ class Model {
     /// hold.
     SceneGradient vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda);
 
+    /// The elastic terms' stresses are C (scale d - shift) from now on, and C d without a shift.
+    void set_history(double scale, const SheetStrains* shift);
+    SheetStrains strains(const VectorXd& q);
+    /// At the last evaluated state: J p, and J^T s.
+    SheetStrains strain_rates(const VectorXd& p);
+    VectorXd strain_forces(const SheetStrains& stresses);
+    SheetStrains stresses(const SheetStrains& strains) const;
+
     /// A factorization for the reduced Hessian, analysed once for all of them.
     std::unique_ptr<Factor> new_factor();
     /// How often the pattern was analysed.

@@ -41,12 +41,12 @@ struct Membrane {
     }
 
     /// The lower blocks (k, l) of J^T C J + sum_i sigma_i d2s_i, at lower_index(k, l).
-    void hessian(const Element& element, const Pack stress[3], Pack33 h[6]) const {
+    void hessian(const Symmetric3& stiffness, const Pack stress[3], Pack33 h[6]) const {
         // Node k holds edge k+1 with + and edge k+2 with -; pair[i][j] = d2E/da_i da_j.
         Pack33 pair[3][3];
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j <= i; ++j) {
-                pair[i][j] = outer((Pack(4.0) * element.stiffness(i, j)) * edge[i], edge[j]);
+                pair[i][j] = outer((Pack(4.0) * stiffness(i, j)) * edge[i], edge[j]);
                 if (i == j)
                     add_to_diagonal(pair[i][i], Pack(2.0) * stress[i]);
                 else

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "magshell/core/errors.h"
+#include "magshell/solve/rotations.h"
 
 namespace magshell {
 namespace {
@@ -18,6 +19,24 @@ std::vector<Controls> at_stages(const MotionInput& input, Index step, std::pair<
     return controls;
 }
 
+std::size_t bytes_of(const SheetStrains& strains) {
+    return (strains.membrane.size() + strains.bending.size()) * sizeof(Pack);
+}
+
+std::size_t bytes_of(const StageState& stage) {
+    return sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->bytes() : 0) + bytes_of(stage.e);
+}
+
+// The start with its edge rotations at rest, if none were given, and the Maxwell branch relaxed, if it is new.
+MotionState beginning(Model& model, const MotionInput& input) {
+    MotionState start = input.start;
+    model.set_memory(start.memory);
+    if (!input.rotations_given)
+        start.q += RotationsAtRest(model, start.q, input.controls_at(0, 0.0)).correction();
+    if (input.viscosity.maxwell() && start.e.empty()) start.e = model.strains(start.q);
+    return start;
+}
+
 class Run {
   public:
     Run(Newton& newton, const MotionInput& input, const KeepOptions& keep, MotionResult& result)
@@ -25,14 +44,14 @@ class Run {
           model_(newton.model()),
           input_(input),
           result_(result),
-          stepper_(newton, input.tableau, input.inertia) {
-        result_.last = input.start;
+          stepper_(newton, input.tableau, input.inertia, input.viscosity) {
+        result_.start = result_.last = beginning(newton.model(), input);
         if (keep.gradients) plan(keep.budget);
     }
 
     bool run() {
         record();
-        if (result_.keep == Keep::checkpoints) result_.checkpoints[0] = input_.start;
+        if (result_.keep == Keep::checkpoints) result_.checkpoints[0] = result_.start;
         for (; result_.steps_done < input_.steps; ++result_.steps_done) {
             const Index step = result_.steps_done;
             if (step == next_checkpoint_) keep_checkpoint(step);
@@ -49,7 +68,9 @@ class Run {
     // in the rest.
     void plan(std::size_t budget) {
         const std::size_t vector = sizeof(double) * model_.size();
-        const std::size_t stages = input_.tableau.stages * vector;
+        const std::size_t strains =
+            input_.viscosity.maxwell() ? 6 * sizeof(double) * model_.sheet().n_faces() : 0;
+        const std::size_t stages = input_.tableau.stages * (vector + strains);
         const std::size_t factors = input_.tableau.stages * newton_.factor()->bytes();
         const std::size_t steps = static_cast<std::size_t>(input_.steps);
         if (steps * (stages + factors) <= budget) {
@@ -59,7 +80,7 @@ class Run {
         } else {
             result_.keep = Keep::checkpoints;
             result_.leaf = std::max<Index>(1, static_cast<Index>(budget / 2 / stages));
-            result_.slots = std::max<Index>(1, static_cast<Index>(budget / 2 / (2 * vector)));
+            result_.slots = std::max<Index>(1, static_cast<Index>(budget / 2 / (2 * vector + strains)));
             slots_left_ = result_.slots;
             aim(0);
         }
@@ -72,7 +93,7 @@ class Run {
 
     void keep_checkpoint(Index step) {
         result_.checkpoints[step] = result_.last;
-        result_.bytes += 2 * sizeof(double) * model_.size();
+        result_.bytes += 2 * sizeof(double) * model_.size() + bytes_of(result_.last.e);
         --slots_left_;
         aim(step);
     }
@@ -103,7 +124,7 @@ class Run {
         if (keep) {
             for (const std::vector<StageState>& part : stages)
                 for (const StageState& stage : part)
-                    result_.bytes += sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->bytes() : 0);
+                    result_.bytes += bytes_of(stage);
             result_.stages.push_back(std::move(stages));
         }
         return true;

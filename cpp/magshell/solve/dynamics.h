@@ -11,7 +11,9 @@ namespace magshell {
 /// What the steps are taken with.
 struct MotionInput {
     MotionState start;
+    bool rotations_given = true;  // false: those of the start are to be at rest first
     Inertia inertia;
+    Viscosity viscosity;
     Tableau tableau;
     double time_step = 0.0;  // [s]
     Index steps = 0;
@@ -41,7 +43,7 @@ struct MotionResult {
     Outcome outcome = Outcome::failed;
     std::string reason;
     Index steps_done = 0;
-    MotionState last;
+    MotionState start, last;                                   // start: as the first step took it
     std::vector<MotionState> recorded;                         // every record_every steps, the start first
     std::vector<double> kinetic_energy;                        // [J], of those
     std::vector<std::vector<double>> energies;                 // [J], of those, term by term

@@ -25,8 +25,8 @@ VectorXd StepAlgebra::target(const VectorXd& x_hat, const VectorXd& v_hat) const
     return x_hat + velocity_share_.cwiseProduct(v_hat);
 }
 
-Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia)
-    : newton_(newton), tableau_(tableau), inertia_(std::move(inertia)) {}
+Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity)
+    : newton_(newton), tableau_(tableau), inertia_(std::move(inertia)), viscosity_(viscosity) {}
 
 const StepAlgebra& Stepper::algebra(double dt) {
     if (!algebra_ || algebra_->dt() != dt) algebra_ = std::make_unique<StepAlgebra>(tableau_, inertia_, dt);
@@ -39,6 +39,9 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, 
     Model& model = newton_.model();
     const Index coordinates = 3 * model.sheet().n_vertices();
     model.set_memory(state.memory);
+    const ElasticAfterwards elastic_afterwards(model);
+    const SheetStrains at_begin = viscosity_.any() ? model.strains(state.q) : SheetStrains();
+    std::vector<ViscousStage> viscous;
     std::vector<VectorXd> v, w;
     std::vector<StageState> stages;
     VectorXd q = state.q, x_hat, v_hat;
@@ -48,6 +51,10 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, 
         // As fast as until now; what has no velocity begins where it was.
         q.head(coordinates) = x_hat.head(coordinates) +
                               step.stage_time() * (i == 0 ? state.v : v.back()).head(coordinates);
+        if (viscosity_.any()) {
+            viscous.push_back(ViscousStage(viscosity_, step.stage_time(), dt, tableau_.a[i], viscous, at_begin, state.e));
+            model.set_history(viscosity_.scale(step.stage_time()), &viscous.back().shift);
+        }
         const NewtonReport report = newton_.solve(q, at[i], {&step.weights(), &target});
         if (!report.converged) {
             reason = model.not_finite(q, at[i]);
@@ -58,9 +65,13 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, 
         v.emplace_back(VectorXd::Zero(q.size()));
         v.back().head(coordinates) = (q - x_hat).head(coordinates) / step.stage_time();
         w.emplace_back((v.back() - v_hat) / step.stage_time());
-        if (kept) stages.push_back({q, model.memory(), with_factors ? newton_.release_factor() : nullptr});
+        if (viscosity_.any()) viscous.back().finish(viscosity_, step.stage_time(), model.strains(q));
+        const SheetStrains e = viscosity_.maxwell() ? viscous.back().e : SheetStrains();
+        if (kept)
+            stages.push_back({q, model.memory(), with_factors ? newton_.release_factor() : nullptr, e});
     }
-    state = {std::move(q), std::move(v.back()), model.memory()};
+    state = {std::move(q), std::move(v.back()), model.memory(),
+             viscosity_.maxwell() ? std::move(viscous.back().e) : SheetStrains()};
     if (kept) *kept = std::move(stages);
     return true;
 }

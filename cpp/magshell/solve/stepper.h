@@ -10,6 +10,7 @@
 
 #include "magshell/solve/newton.h"
 #include "magshell/solve/tableau.h"
+#include "magshell/solve/viscosity.h"
 
 namespace magshell {
 
@@ -17,6 +18,7 @@ namespace magshell {
 struct MotionState {
     VectorXd q, v;
     Model::Memory memory;
+    SheetStrains e;  // of the Maxwell branch; empty without one
 };
 
 /// Of all unknowns: masses [kg] and viscous damping [N s/m], zero for those that are no vertex.
@@ -29,6 +31,7 @@ struct StageState {
     VectorXd q;
     Model::Memory memory;
     std::shared_ptr<const Factor> factor;  // of Newton's last step, if it was to be kept
+    SheetStrains e;                        // of the Maxwell branch
 };
 
 /// The linear algebra around a stage, the same forwards and backwards.
@@ -54,7 +57,7 @@ class StepAlgebra {
 
 class Stepper {
   public:
-    Stepper(Newton& newton, const Tableau& tableau, Inertia inertia);
+    Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity);
 
     /// Takes the state over a step with these controls at its stages. On failure the state stays, and the
     /// reason tells why. `kept`, if given, gets the stages; with_factors: Newton's last factorizations too.
@@ -62,12 +65,12 @@ class Stepper {
               bool with_factors, std::string& reason);
 
     const StepAlgebra& algebra(double dt);
-    const Inertia& inertia() const { return inertia_; }
 
   private:
     Newton& newton_;
     Tableau tableau_;
     Inertia inertia_;
+    Viscosity viscosity_;
     std::unique_ptr<StepAlgebra> algebra_;  // of the last dt
 };
 

@@ -1,0 +1,37 @@
+// The viscous part of a step's adjoint, stage by stage; does nothing in an elastic sheet.
+#pragma once
+
+#include "magshell/solve/stepper.h"
+
+namespace magshell {
+
+class ViscousAdjoint {
+  public:
+    /// Finds the strains of the stages again. by_e: by the Maxwell strains at the end of the step.
+    ViscousAdjoint(Model& model, const Viscosity& law, const StepAlgebra& step, const MotionState& begin,
+                   const std::vector<StageState>& stages, const SheetStrains& by_e);
+
+    /// The stresses of stage i have their history from now on.
+    void set_history(int i) const;
+    /// At the evaluated stage: adds to by_q what later rates say of its strains.
+    void before_solve(int i, VectorXd& by_q);
+    /// At the evaluated stage: what lambda says of the history and of the law.
+    void after_solve(int i, const VectorXd& lambda);
+
+    SheetStrains by_d_begin, by_e_begin;
+    Viscosity by_law{0.0, 0.0, 0.0};
+    double by_dt = 0.0;
+
+  private:
+    double dot(const SheetStrains& a, const SheetStrains& b) const;
+    void pass_on(int i, const SheetStrains& by_d_hat, const SheetStrains& by_e_hat);
+
+    Model& model_;
+    const Viscosity& law_;
+    const StepAlgebra& step_;
+    std::vector<ViscousStage> stages_;
+    std::vector<SheetStrains> by_e_, by_d_rate_, by_e_rate_, by_d_hat_, by_e_hat_;
+    std::vector<double> by_ratio_, by_stage_time_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,52 @@
+// Linear viscoelasticity of the sheet's strains d, integrated by the stages of a step.
+//
+//   sigma = C (d + beta d' + g (d - e)),   e' = (d - e)/tau
+//
+// beta [s]: stiffness-proportional damping (Kelvin-Voigt); for small motions the matrix beta K. g and tau [s]:
+// the modulus of a Maxwell branch beside the elastic one, and its relaxation time. With T = a dt and r = T/tau,
+//
+//   d'_i = (d_i - d^_i)/T,   e_i = (e^_i + r d_i)/(1 + r),
+//   sigma_i = C (scale d_i - shift_i),  scale = 1 + beta/T + g/(1 + r),  shift_i = beta/T d^_i + g/(1 + r) e^_i
+#pragma once
+
+#include "magshell/assembly/model.h"
+
+namespace magshell {
+
+struct Viscosity {
+    double stiffness_damping = 0.0;                  // beta [s]
+    double maxwell_modulus = 0.0, maxwell_time = 1.0;  // g, over the elastic one; tau [s]
+
+    bool any() const { return stiffness_damping != 0.0 || maxwell() ; }
+    bool maxwell() const { return maxwell_modulus != 0.0; }
+    double ratio(double stage_time) const { return stage_time / maxwell_time; }
+    double relaxed(double stage_time) const { return maxwell_modulus / (1.0 + ratio(stage_time)); }
+    double scale(double stage_time) const {
+        return 1.0 + stiffness_damping / stage_time + relaxed(stage_time);
+    }
+};
+
+/// The strains of one stage: what it starts from, and what comes out.
+struct ViscousStage {
+    SheetStrains d_hat, e_hat, shift;
+    SheetStrains d, d_rate, e, e_rate;
+
+    /// From the strains at the beginning of the step and the rates of the stages before.
+    ViscousStage(const Viscosity& law, double stage_time, double dt, const double* a,
+                 const std::vector<ViscousStage>& before, const SheetStrains& d_begin,
+                 const SheetStrains& e_begin);
+    /// Once the stage is solved.
+    void finish(const Viscosity& law, double stage_time, SheetStrains strains);
+};
+
+/// Elastic again when it goes.
+class ElasticAfterwards {
+  public:
+    explicit ElasticAfterwards(Model& model) : model_(model) {}
+    ~ElasticAfterwards() { model_.set_history(1.0, nullptr); }
+
+  private:
+    Model& model_;
+};
+
+}  // namespace magshell
