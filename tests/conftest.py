@@ -1,6 +1,8 @@
 """What every test runs under: one BLAS thread, no display, the same random numbers every time."""
 
 import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 # Before numpy is imported: its BLAS reads these once.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -16,3 +18,10 @@ import pytest  # noqa: E402
 def rng() -> np.random.Generator:
     """A generator with a fixed seed, new for each test, so that no test depends on another's draws."""
     return np.random.default_rng(20220701)
+
+
+@pytest.fixture
+def here() -> Iterator[ThreadPoolExecutor]:
+    """An executor in this process that runs one call after another."""
+    with ThreadPoolExecutor(1) as executor:
+        yield executor

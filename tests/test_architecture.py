@@ -33,7 +33,16 @@ HIDDEN_MODULES = {
     "matplotlib": ("plotting", "bench"),  # the bench draws curves, never a sheet
     "pyvista": ("plotting",),
 }
-OPTIONAL_MODULES = ["torch", "matplotlib", "pyvista", "meshio", "gmsh", "magpylib"]
+OPTIONAL_MODULES = [
+    "torch",
+    "matplotlib",
+    "pyvista",
+    "meshio",
+    "gmsh",
+    "magpylib",
+    "distributed",
+    "cloudpickle",
+]
 LONGEST_FILE = 400
 
 

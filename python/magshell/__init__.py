@@ -12,6 +12,7 @@ from .errors import (
     DesignRejected,
     EquilibriumJumped,
     Interrupted,
+    MultistartFailed,
     NoGradient,
     NotConverged,
     ObjectiveFailed,
@@ -23,11 +24,14 @@ from .io import read_fields, read_mesh, write_mesh
 from .linear import LinearResponse, linear_response
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .mesh import TriangleMesh
+from .multistart import multistart
 from .path import CriticalPoint, Path, follow
 from .plotting import Picture, plot, write_page
+from .sampling import random_starts
 from .scene import Scene
 from .shell import Shell
 from .solvers import MixedNewton, Newton
+from .starts import Multistart
 from .statics import equilibrium
 from .supports import Clamp, Pin, SymmetryPlane
 from .trajectory import MotionState, Trajectory
@@ -55,6 +59,8 @@ __all__ = [
     "Minimum",
     "MixedNewton",
     "MotionState",
+    "Multistart",
+    "MultistartFailed",
     "Newton",
     "NoGradient",
     "NotConverged",
@@ -81,11 +87,13 @@ __all__ = [
     "linear_response",
     "meshes",
     "minimize",
+    "multistart",
     "num_threads",
     "objectives",
     "optim",
     "parametrize",
     "plot",
+    "random_starts",
     "read_fields",
     "read_mesh",
     "residual_to_remanent",

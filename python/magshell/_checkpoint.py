@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 from ._tensors import require_torch
 
 
 def save(path: str | Path, contents: dict) -> None:
-    """Replaces the file at once: it is written beside its place and then renamed."""
     torch = require_torch("a checkpoint")
+    replace_file(path, lambda file: torch.save(contents, file))
+
+
+def replace_file(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
+    """Replaces the file at once: it is written beside its place and then renamed."""
     path = Path(path)
     handle, written = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            torch.save(contents, file)
+            write(file)
             file.flush()
             os.fsync(file.fileno())
         os.replace(written, path)

@@ -9,9 +9,8 @@ from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from tqdm.auto import tqdm
-
 from ._checkpoint import load, save
+from ._progress import progress_bar
 from ._tensors import is_tensor, require_torch
 from .errors import Interrupted, ObjectiveFailed
 
@@ -104,7 +103,7 @@ def minimize(
     run = _Run(objective, parameters, optimizer, feasibility)
     if resume and Path(checkpoint).exists():
         run.restore(load(checkpoint))
-    bar = tqdm(total=max_iterations, initial=run.iteration, desc="minimize", disable=not progress)
+    bar = progress_bar("minimize", max_iterations, shown=progress, initial=run.iteration)
     try:
         with bar:
             return _loop(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from tqdm import tqdm
 
 from . import _core
 from ._inputs import Inputs
 from ._motion_adjoint import MotionAdjoint
 from ._motion_inputs import MotionInputs
+from ._progress import progress_bar
 from ._replacements import requested
 from ._tensors import like
 from .errors import Interrupted, NotConverged
@@ -128,7 +128,7 @@ def simulate(
         motion_factor=motion_factor,
     )
     began = time.perf_counter()
-    with inputs.in_core(), _bar("simulate", progress) as bar:
+    with inputs.in_core(), progress_bar("simulate", 1.0, shown=progress, delay=2.0, bar_format=_BAR) as bar:
         found = _core.simulate(
             scene._model, asked.core, bool(inputs.leaves), int(memory_budget), _advance(bar)
         )
@@ -188,9 +188,7 @@ def _outputs(asked: MotionInputs, found):
     return solved(MotionAdjoint(asked, found), arrays, inputs.given[0].dtype, inputs.tensors)
 
 
-def _bar(what: str, shown: bool):
-    form = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
-    return tqdm(total=1.0, desc=what, delay=2.0, disable=not shown, bar_format=form)
+_BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
 
 
 def _advance(bar):

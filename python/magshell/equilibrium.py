@@ -48,6 +48,12 @@ class Equilibrium:
     _magnetization: Any = field(repr=False)
     _values: Any = field(repr=False)
 
+    def __getstate__(self):
+        raise TypeError(
+            "an Equilibrium cannot be copied or pickled, as it holds the solver's own state: keep its positions, "
+            "edge_rotations and energies"
+        )
+
     @property
     def displacements(self):
         """(n_v, 3) m, from the rest shape."""

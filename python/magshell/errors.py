@@ -36,5 +36,14 @@ class ObjectiveFailed(RuntimeError):
         self.last_good = last_good
 
 
+class MultistartFailed(RuntimeError):
+    """The executor of a multistart broke, or none of the starts came to its end. `last_good` holds a Multistart of
+    what finished."""
+
+    def __init__(self, message: str, last_good=None):
+        super().__init__(message)
+        self.last_good = last_good
+
+
 class NoGradient(RuntimeError):
     """A gradient was asked for at a state that has none: not converged, or not stable."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -26,11 +27,19 @@ def residual_to_remanent(residual_flux_density):
 class AppliedField:
     """A flux density B(x) [T] that does not depend on the sheet.
 
-    `_core` is the field of the C++ core, or None where a solve supplies the value.
+    `_core` is the field of the C++ core, or None where a solve supplies the value. `_made_from` are the arguments that
+    a copy, or another process, makes the field from again.
     """
 
     _core: core.AppliedField | None = None
     _replaceable: tuple[str, ...] = ()
+    _made_from: Mapping[str, object] = MappingProxyType({})
+
+    def __getstate__(self) -> dict:
+        return dict(self._made_from)
+
+    def __setstate__(self, arguments: dict) -> None:
+        self.__init__(**arguments)
 
     def flux_density(self, points) -> np.ndarray:
         """B [T], (..., 3), at points [m], (..., 3); NaN where the field has no value."""
@@ -81,7 +90,8 @@ class Dipoles(AppliedField):
     def __init__(self, positions, moments) -> None:
         self.positions = quantity("positions", "m", positions, ("n", 3))
         self.moments = quantity("moments", "A m^2", moments, (len(self.positions), 3))
-        self._core = core.Dipoles(self.positions, self.moments)
+        self._made_from = {"positions": self.positions, "moments": self.moments}
+        self._core = core.Dipoles(**self._made_from)
 
     def replaced(self, **values) -> Dipoles:
         """As many dipoles with other positions or moments."""
@@ -135,7 +145,8 @@ class SampledField(AppliedField):
                     "spacing [m] must be positive along an axis with several samples,"
                     f" but spacing[{axis}] is {step}"
                 )
-        self._core = core.SampledField(self.origin, self.spacing, flux_density)
+        self._made_from = {"origin": self.origin, "spacing": self.spacing, "flux_density": flux_density}
+        self._core = core.SampledField(**self._made_from)
 
     @classmethod
     def from_function(

@@ -32,6 +32,7 @@ class CustomField(AppliedField):
     def __init__(self, function: Function, *, length_scale: float, gradient: Function | None = None) -> None:
         self.length_scale = _checked_length_scale(length_scale)
         self.name = getattr(function, "__name__", type(function).__name__)
+        self._made_from = {"function": function, "length_scale": self.length_scale, "gradient": gradient}
         step = STEP * self.length_scale
         flux_density = _checked_function("function", "T", function, (3,))
         if gradient is None:
@@ -80,6 +81,7 @@ class MagpylibField(AppliedField):
         def flux_density(points: np.ndarray) -> np.ndarray:
             return magpylib.getB(copies, points, sumup=True, squeeze=False).reshape(-1, 3)
 
+        self._made_from = {"sources": copies, "length_scale": self.length_scale}
         self.names = [type(source).__name__ for source in listed]
         self._core = core.PythonField(FluxSampler(flux_density, STEP * self.length_scale))
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from . import _core
 from ._inputs import Inputs
+from ._progress import progress_bar
 from ._solve import solve
 from ._start import starting_point
 from .equilibrium import Equilibrium
@@ -174,8 +174,7 @@ def follow(
     options.locate_critical = locate_critical
 
     began = time.perf_counter()
-    bar_options = {"total": 1.0, "desc": "path", "delay": 2.0, "disable": not progress, "bar_format": _BAR}
-    with inputs.in_core(), tqdm(**bar_options) as bar:
+    with inputs.in_core(), progress_bar("path", 1.0, shown=progress, delay=2.0, bar_format=_BAR) as bar:
         found = _core.follow_path(
             scene._model, state, memory, from_, inputs.controls, options, until, _advance(bar)
         )

@@ -62,7 +62,22 @@ class Scene:
             raise ValueError(
                 "field holds several UniformFields: one is enough, its value comes when the scene is solved"
             )
+        self._allow_rigid_motions = allow_rigid_motions
         self._build(allow_rigid_motions)
+
+    def __getstate__(self) -> dict:
+        """What a copy, or another process, makes the scene from again."""
+        return {
+            "shell": self.shell,
+            "supports": self.supports,
+            "loads": self.loads,
+            "field": self.fields,
+            "gravity": self.gravity,
+            "allow_rigid_motions": self._allow_rigid_motions,
+        }
+
+    def __setstate__(self, arguments: dict) -> None:
+        self.__init__(**arguments)
 
     def _build(self, allow_rigid_motions: bool) -> None:
         shell, mesh = self.shell, self.shell.mesh

@@ -1,0 +1,96 @@
+"""What the tests of multistart have run, and how they look at what comes back. Worker processes import this."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+
+import magshell as ms
+
+STARTS = [[2.0, -3.0], [0.1, 0.2], [-2.2, 1.9], [3.9, 3.9], [1.0, -1.2]]
+
+
+def quiet(*arguments, **options):
+    return ms.multistart(*arguments, progress=False, **options)
+
+
+def bits(found):
+    """Everything that may not depend on where and when `valley` ran."""
+    return [
+        (one.number, one.objective, [x.numpy().tobytes() for x in one.result.parameters]) for one in found
+    ]
+
+
+def valley(start):
+    """A minimization in a landscape with several minima."""
+    import torch  # only where it is used: it takes a worker seconds to import
+
+    x = torch.as_tensor(start, dtype=torch.float64).clone().requires_grad_()
+
+    def objective(x):
+        return (0.1 * (x - 0.3) ** 2 - torch.cos(3 * x)).sum()
+
+    return ms.minimize(objective, [x], ms.optim.LBFGS([x], lower=-4.0, upper=4.0), max_iterations=15)
+
+
+def bend(start):
+    """A strip bent by a field, at a design of three numbers; the scene is made here."""
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(8, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    return bend_in(scene, start)
+
+
+def bend_in(scene, start):
+    magnetization = np.tile(np.asarray(start) * 1e4, (scene.mesh.n_faces, 1))
+    rest = ms.equilibrium(scene, remanent_magnetization=magnetization, applied_flux_density=(0, 0, 2e-3))
+    return float(rest.energy), rest.positions
+
+
+def square(start):
+    return float(start) ** 2
+
+
+def threads_here(start):
+    import torch
+
+    libraries = [os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")]
+    return 0.0, (ms.num_threads(), torch.get_num_threads(), libraries, os.getpid())
+
+
+def fails_at_two(start):
+    if start == 2:
+        raise ms.ObjectiveFailed("two is too much", last_good=ms.Minimum([], 7.0, 0.0))
+    return float(start)
+
+
+def returns_equilibrium(start):
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(2, 1))
+    scene = ms.Scene(
+        ms.Shell(mesh, thickness=1e-3, young_modulus=1e6), supports=[ms.Clamp(mesh.edges_at(x=0.0))]
+    )
+    return 0.0, ms.equilibrium(scene)
+
+
+def kills_itself_at_one(start):
+    if start == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return float(start)
+
+
+def killed_the_first_time(folder, start):
+    """Start 1 brings its process down, once."""
+    mark = Path(folder) / "killed"
+    if start == 1 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return float(start)
+
+
+def slow_bend(folder, start):
+    """`bend`, leaving word of the process it runs in, and slow enough to be caught at it."""
+    (Path(folder) / f"{os.getpid()}-{time.monotonic_ns()}").touch()
+    time.sleep(0.3)
+    return bend(start)
