@@ -39,6 +39,8 @@ from .warm_start import WarmStart
 from .weld import Weld, weld
 
 __all__ = [
+    "SDIRK2",
+    "SDIRK3",
     "AppliedField",
     "AreaLoad",
     "Buckling",
@@ -69,8 +71,6 @@ __all__ = [
     "Picture",
     "Pin",
     "PointLoad",
-    "SDIRK2",
-    "SDIRK3",
     "SampledField",
     "Scene",
     "Shell",

@@ -14,7 +14,7 @@ from ._progress import progress_bar
 from ._replacements import requested
 from ._tensors import like
 from .errors import Interrupted, NotConverged
-from .integrators import SDIRK2, ImplicitEuler, Integrator, SDIRK3
+from .integrators import SDIRK2, SDIRK3, ImplicitEuler, Integrator
 from .scene import Scene
 from .solvers import MixedNewton, Newton
 from .trajectory import MotionState, Trajectory

@@ -118,6 +118,7 @@ SceneGradient Model::vjp(const VectorXd& q, const Controls& controls, const Vect
 }
 
 void Model::set_history(double scale, const SheetStrains* shift) {
+    history_scale_ = scale;
     membrane_->set_history({scale, shift ? &shift->membrane : nullptr});
     bending_->set_history({scale, shift ? &shift->bending : nullptr});
 }

@@ -38,7 +38,8 @@ class Model {
     Index size() const { return sheet_.n_unknowns(); }
     double extent() const { return extent_; }
     const VectorXd& metric() const { return metric_; }
-    const VectorXd& cancelling_forces() const { return cancelling_forces_; }
+    /// The floor under every residual, to be multiplied by the unit of round-off.
+    VectorXd cancelling_forces() const { return history_scale_ * cancelling_forces_; }
 
     VectorXd rest_state() const;
     /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,), and back.
@@ -118,7 +119,8 @@ class Model {
     std::vector<double> thickness_;  // in our numbering
     Residual residual_;
     VectorXd metric_;             // area at each unknown of a vertex, zero for directions and rotations
-    VectorXd cancelling_forces_;  // the floor under every residual, to be multiplied by the unit of round-off
+    VectorXd cancelling_forces_;  // of the elastic terms, without history
+    double history_scale_ = 1.0;
     double extent_;
     std::mutex in_use_;
 };
