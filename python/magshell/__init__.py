@@ -1,6 +1,6 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
-from . import meshes, objectives, optim, parametrize
+from . import control, meshes, objectives, optim, parametrize
 from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
@@ -81,6 +81,7 @@ __all__ = [
     "WarmStart",
     "Weld",
     "__version__",
+    "control",
     "equilibrium",
     "follow",
     "linear_buckling",

@@ -1,0 +1,53 @@
+"""Motions by control: objectives of motions, curves to follow, penalties on fields in time, and parametrisations of them.
+
+    times = ms.control.step_times(steps, time_step)
+    field = ms.control.spline(times, control_points, duration=steps * time_step)
+    move = ms.simulate(scene, steps=steps, time_step=time_step, applied_flux_density=field, ...)
+    tip = ms.control.track(move.positions, vertex)
+    terms = ms.control.track_fitting(tip, curve, start_frame=100, end_frame=-1)
+    terms["strength"] = 1e-4 * ms.control.field_strength(field)
+
+[Chen22] bounds every component of the field by 0.05 T: the box of `ms.optim.MMA` or `LBFGS` on per-step values, or on
+the control points of a spline, holds it exactly.
+"""
+
+from .curves import Arc, Chain, Curve, Polyline
+from .motions import (
+    curve_distance,
+    frames_at,
+    key_frames,
+    path_following,
+    successive_targets,
+    track,
+    track_fitting,
+)
+from .penalties import dmp, field_cap, field_excess, field_rate, field_strength
+from .signals import fit_fourier, fourier, harmonics, held, rotating, step_times
+from .splines import fit_spline, spline
+
+__all__ = [
+    "Arc",
+    "Chain",
+    "Curve",
+    "Polyline",
+    "curve_distance",
+    "dmp",
+    "field_cap",
+    "field_excess",
+    "field_rate",
+    "field_strength",
+    "fit_fourier",
+    "fit_spline",
+    "fourier",
+    "frames_at",
+    "harmonics",
+    "held",
+    "key_frames",
+    "path_following",
+    "rotating",
+    "spline",
+    "step_times",
+    "successive_targets",
+    "track",
+    "track_fitting",
+]

@@ -1,0 +1,134 @@
+"""Objectives of motions: where which vertices should be when. Functions of positions (n, n_v, 3) m, as
+`ms.simulate(...).positions` holds them, or of the track (n, 3) m of one point.
+
+A frame is an index into the recorded states, 0 the start, -1 the last. [Chen22] 5.2 and 6.1 to 6.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._quantity import quantity
+from .._tensors import detached
+from ._arguments import indices, positive, tensor
+from .curves import Curve
+
+
+def frames_at(times, wanted):
+    """The frames at wanted times [s], (k,) or one.
+
+    times: (n,) s, of the frames, ascending. Raises ValueError if the nearest frame is further off than half a step.
+    """
+    times = quantity("times", "s", detached(times), ("n",))
+    asked = quantity("wanted", "s", detached(wanted), np.shape(wanted))
+    if len(times) < 2 or not (np.diff(times) > 0).all():
+        raise ValueError("times [s] must be at least two, ascending")
+    frames = np.abs(times - asked[..., None]).argmin(-1)
+    off = np.abs(times[frames] - asked)
+    allowed = 0.5 * np.diff(times).max() * (1 + 1e-9)
+    if (off > allowed).any():
+        raise ValueError(
+            f"wanted [s] is {off.max():.3g} s from the nearest frame: times are {times[0]} ... {times[-1]}"
+        )
+    return frames
+
+
+def track(positions, vertices, weights=None):
+    """The track (n, 3) m of a vertex, or of the mean of some.
+
+    positions: (n, n_v, 3) m. vertices: an index, or (m,). weights: (m,), for example masses; by default equal.
+    """
+    positions = tensor("positions", "m", positions, ("n", "n_v", 3))
+    chosen = positions[:, indices("vertices", vertices, positions.shape[1]).reshape(-1)]
+    if weights is None:
+        return chosen.mean(1)
+    weights = tensor("weights", "1", weights, (chosen.shape[1],))
+    total = positive("the sum of the weights", "1", weights.sum())
+    return (weights[:, None] * chosen).sum(1) / total
+
+
+def key_frames(positions, frames, targets, vertices=None, weights=None):
+    """Sum of squared distances of vertices from their targets at some frames [m2]; [Chen22] (34).
+
+    positions: (n, n_v, 3) m. frames: (k,). targets: (k, m, 3) m. vertices: (m,) indices, by default all.
+    weights: (k, m), by default 1.
+    """
+    positions = tensor("positions", "m", positions, ("n", "n_v", 3))
+    chosen = positions[indices("frames", frames, len(positions)).reshape(-1)]
+    if vertices is not None:
+        chosen = chosen[:, indices("vertices", vertices, positions.shape[1]).reshape(-1)]
+    squares = ((chosen - tensor("targets", "m", targets, tuple(chosen.shape))) ** 2).sum(-1)
+    if weights is None:
+        return squares.sum()
+    return (tensor("weights", "1", weights, tuple(squares.shape)) * squares).sum()
+
+
+def path_following(track, targets, weights=None):
+    """Sum of squared distances of a track from a target a frame [m2].
+
+    track: (n, 3) m. targets: (n, 3) m. weights: (n,), by default 1; 0 where it does not matter.
+    """
+    track = tensor("track", "m", track, ("n", 3))
+    squares = ((track - tensor("targets", "m", targets, tuple(track.shape))) ** 2).sum(-1)
+    if weights is None:
+        return squares.sum()
+    return (tensor("weights", "1", weights, tuple(squares.shape)) * squares).sum()
+
+
+def successive_targets(targets, begin, times, delay: float = 0.0):
+    """Targets (n, 3) m and weights (n,), a frame, for `path_following`: each target holds until the next appears, and
+    counts once the delay has passed, as in [Chen22] Figure 13.
+
+    targets: (k, 3) m. begin: (k,) s, ascending: when each appears. times: (n,) s, of the frames. delay: s.
+    """
+    targets = tensor("targets", "m", targets, ("k", 3))
+    begin = quantity("begin", "s", detached(begin), (len(targets),))
+    times = quantity("times", "s", detached(times), ("n",))
+    if len(begin) == 0 or not (np.diff(begin) > 0).all():
+        raise ValueError("begin [s] must be ascending, one a target, at least one")
+    if not quantity("delay", "s", delay, ()) >= 0:
+        raise ValueError(f"delay [s] must not be negative, got {delay}")
+    rounding = 1e-9 * np.abs(times).max(initial=0.0)  # times are multiples of a step
+    last = np.searchsorted(begin - rounding, times, side="right") - 1
+    counts = (last >= 0) & (times >= begin[last] + delay - rounding)
+    return targets[np.maximum(last, 0)], targets.new_tensor(counts)
+
+
+def curve_distance(track, curve: Curve, smoothing: float | None = None):
+    """Sum over the frames of a track of its squared distance from a curve [m2].
+
+    track: (n, 3) m. smoothing: m; with it the distances themselves are summed [m], smooth at zero:
+    sqrt(d^2 + eps^2) - eps. They count small misses more, and large ones less.
+    """
+    if not isinstance(curve, Curve):
+        raise ValueError(f"curve must be one of ms.control, got {type(curve).__name__}")
+    squares = curve.squared_distance(track)
+    if smoothing is None:
+        return squares.sum()
+    positive("smoothing", "m", smoothing)
+    return ((squares + smoothing**2) ** 0.5 - smoothing).sum()
+
+
+def track_fitting(
+    track, curve: Curve, start_frame: int, end_frame: int, weights=(1.0, 1.0, 1.0), smoothing=None
+):
+    """The three terms of [Chen22] 6.1, "Track Fitting", for `ms.minimize`: {"start", "end", "curve"}.
+
+    The squared distances [m2] from the curve's start at one frame and from its end at another, and `curve_distance` of
+    all frames from the one to the other. Frames before do not count: the sheet needs time to get there.
+
+    track: (n, 3) m. weights: three numbers. smoothing: as in `curve_distance`.
+    """
+    track = tensor("track", "m", track, ("n", 3))
+    first, last = (
+        int(indices(name, frame, len(track))) % len(track)
+        for name, frame in (("start_frame", start_frame), ("end_frame", end_frame))
+    )
+    if not first < last:
+        raise ValueError(f"start_frame must come before end_frame, got {start_frame} and {end_frame}")
+    to_start, to_end, to_curve = quantity("weights", "1", weights, (3,)).tolist()
+    return {
+        "start": to_start * ((track[first] - curve.start) ** 2).sum(),
+        "end": to_end * ((track[last] - curve.end) ** 2).sum(),
+        "curve": to_curve * curve_distance(track[first : last + 1], curve, smoothing),
+    }
