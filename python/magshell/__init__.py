@@ -4,7 +4,7 @@ from . import meshes, objectives, optim, parametrize
 from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
-from .design import Minimum, minimize
+from .design import minimize
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
 from .errors import (
@@ -21,6 +21,7 @@ from .io import read_fields, read_mesh, write_mesh
 from .linear import LinearResponse, linear_response
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .mesh import TriangleMesh
+from .minimum import Minimum
 from .path import CriticalPoint, Path, follow
 from .plotting import Picture, plot, write_page
 from .scene import Scene

@@ -71,7 +71,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer):
         group = self.param_groups[-1]
         try:
             for parameter in group["params"]:
-                _check_parameter(parameter)
+                check_parameter(parameter)
             for name in ("lower", "upper", "scale"):
                 if group[name] is not None:
                     group[name] = boxes.option_tensors(name, group[name], group["params"])
@@ -131,7 +131,7 @@ def require_range(group: dict, name: str, low: float, high: float) -> None:
         raise ValueError(f"{name} must be a number between {low:g} and {high:g}, got {value!r}")
 
 
-def _check_parameter(parameter: torch.Tensor) -> None:
+def check_parameter(parameter: torch.Tensor) -> None:
     if not parameter.is_floating_point():
         raise ValueError(f"a parameter must be real, got dtype {parameter.dtype}")
     if not parameter.requires_grad:
