@@ -13,16 +13,15 @@ from .sample import Sample
 _INNER_LIMIT = 15
 _ROUNDING = 1e-12  # of a function's values, and ten times that of its slope: below, a difference says nothing
 _SMALLEST_CONVEXITY = 1e-6  # of a function's steepest slope
-_MORE = 10.0  # at most, times the convexity before
 
 
 class GCMMA(MMA):
     """MMA that takes a step only where its approximations lie above the functions; options as `ms.optim.MMA`.
 
     Where one does not, it is made more convex and the subproblem solved again: each such inner iteration costs one
-    evaluation without gradients. A design that the closure rejects is answered in the same way, as if every function
-    were too high there. At a minimum, to rounding, a step stays where it is. From a design that keeps the constraints
-    every step keeps them and lowers the objective.
+    evaluation without gradients. Where the closure rejects a design, all of them are made so much more convex that
+    the step is half as long. At a minimum, to rounding, a step stays where it is. From a design that keeps the
+    constraints every step keeps them and lowers the objective.
 
     K. Svanberg, A class of globally convergent optimization methods ..., SIAM J. Optim. 12 (2002).
     """
@@ -31,16 +30,19 @@ class GCMMA(MMA):
         around, distance = self._surroundings(sample, box, x)
         convexity = self._first_convexity(around)
         steepest = np.abs(around.slopes).max(axis=1, initial=0.0)
+        approximation, t = around.step(convexity, self.penalty)
         rejected = 0
-        for _ in range(_INNER_LIMIT):
-            approximation, t = around.step(convexity, self.penalty)
+        for _ in range(_INNER_LIMIT + self.max_shortenings):
             try:
                 reached, trial = self._trial(box.moved(x, t * around.scale))
             except DesignRejected:
                 rejected += 1
                 if rejected > self.max_shortenings:
                     raise
-                convexity = _MORE * convexity
+                longest = 0.5 * np.abs(t).max()
+                while np.abs(t).max() > longest:
+                    convexity = 4 * convexity
+                    approximation, t = around.step(convexity, self.penalty)
                 continue
             t = (reached - x)[box.free] / around.scale
             actual = np.concatenate([[trial.objective], trial.constraints])
@@ -50,6 +52,7 @@ class GCMMA(MMA):
                 self._commit(x, reached, trial.differentiate(), distance, around.size)
                 return
             convexity = _more_convex(convexity, missing, t, around.distance)
+            approximation, t = around.step(convexity, self.penalty)
         self._write(x)  # the functions' own rounding is all that is left: a minimum
         self._leave_gradients(sample.gradient)
 
@@ -62,7 +65,8 @@ def _more_convex(
     convexity: np.ndarray, missing: np.ndarray, t: np.ndarray, distance: np.ndarray
 ) -> np.ndarray:
     """[Svanberg 2002] (4.9): enough to close the gap at t, with a tenth to spare, and at most ten times what it was."""
-    # Of the approximation, a unit of convexity
-    gain = 2 * float((distance * t**2 / (distance**2 - t**2)).sum())
+    gain = 2 * float(
+        (distance * t**2 / (distance**2 - t**2)).sum()
+    )  # of the approximation, a unit of convexity
     needed = missing / gain if gain > 0 else np.full_like(missing, np.inf)
-    return np.where(missing > 0, np.minimum(_MORE * convexity, 1.1 * (convexity + needed)), convexity)
+    return np.where(missing > 0, np.minimum(10 * convexity, 1.1 * (convexity + needed)), convexity)

@@ -25,8 +25,7 @@ class MMA(BoxOptimizer):
     asymptote_shrink, asymptote_grow: its factors after an oscillation and after progress.
     penalty: the price of breaking a constraint by as much as its slope would change it over a size, in units of the
     same change of the objective; only a design that cannot keep its constraints pays it.
-    max_shortenings: how often a step to a design that the closure rejects is halved; the asymptotes, drawn in as
-    much, keep the next steps short too.
+    max_shortenings: how often a step to a design that the closure rejects is halved.
 
     Every option but the last two can differ between parameter groups. K. Svanberg, The method of moving asymptotes,
     Int. J. Numer. Meth. Eng. 24 (1987), with the asymptotes and the subproblem as in his notes of 2007.
@@ -80,7 +79,7 @@ class MMA(BoxOptimizer):
                 if shortening == self.max_shortenings:
                     raise
             else:
-                self._commit(x, reached, trial.differentiate(), share * distance, around.size)
+                self._commit(x, reached, trial.differentiate(), distance, around.size)
                 return
 
     def _leap(self, sample: Sample, box: Box, x: np.ndarray) -> None:
@@ -109,7 +108,7 @@ class MMA(BoxOptimizer):
         options = Asymptotes(*(self._option(f"asymptote_{name}") for name in ("initial", "shrink", "grow")))
         before, before_that = self._run.get("before"), self._run.get("before_that")
         if before_that is None:
-            return self._run.get("distance", options.initial).copy()
+            return options.initial.copy()
         return options.distance(self._run["distance"], x - before, before - before_that)
 
     def _check_group(self, group: dict, box: Box) -> None:
