@@ -95,7 +95,7 @@ class Surroundings:
     def of(
         sample: Sample, box: Box, x: np.ndarray, distance: np.ndarray, move: np.ndarray, steepest: float
     ) -> Surroundings:
-        """steepest: slope of the objective over the run so far, for at a minimum its own vanishes.
+        """steepest: slope of the objective in the designs before, for at a minimum its own vanishes.
 
         A step stays in the box, short of the asymptotes, and no longer than move.
         """
@@ -112,7 +112,7 @@ class Surroundings:
 
     @property
     def size(self) -> float:
-        """The objective's steepest slope over the run."""
+        """The objective's steepest slope, here or in the designs before."""
         return float(self.sizes[0])
 
     def step(self, convexity: np.ndarray, penalty: float) -> tuple[Approximation, np.ndarray]:

@@ -12,6 +12,7 @@ from .base import BoxOptimizer, require_range
 from .box import Box
 from .sample import Sample
 
+_KEPT = 0.5  # each step, of the steepest slope so far: one wild design must not set the scale for good
 _CONVEXITY = 1e-6  # of the steepest slope so far: damps steps once the gradient has all but vanished
 
 
@@ -91,7 +92,7 @@ class MMA(BoxOptimizer):
     def _surroundings(self, sample: Sample, box: Box, x: np.ndarray) -> tuple[Surroundings, np.ndarray]:
         """What the approximations are made of, over the free entries; and the asymptotes' distances, (n,)."""
         distance = self._distance(x, box)
-        steepest = self._run.get("size", 0.0)
+        steepest = _KEPT * self._run.get("size", 0.0)
         return Surroundings.of(sample, box, x, distance, self._option("move"), steepest), distance
 
     def _first_convexity(self, around: Surroundings) -> np.ndarray:
