@@ -18,10 +18,10 @@ class AnyTorch(Iterate):
     """A torch optimizer that is asked for one step after the other, and knows the objective where it stands.
 
     Each step gets a closure, which answers from the kept sample where the design is known; an optimizer whose step
-    takes none finds the parameters' gradients. A step that leads to a rejected design, or meets one on its way, is
-    taken back and again with half the learning rate, up to `max_shortenings` times; a line search of torch's own, which
-    extends steps, may meet it again each time. A step that raises leaves parameters and the optimizer's state as they
-    were. No constraints, no bounds.
+    takes none finds the parameters' gradients. No constraints, no bounds. A step that leads to a rejected design, or
+    meets one on its way, is taken back and again with half the learning rate, up to `max_shortenings` times; a line
+    search of torch's own, which extends steps, may meet it again each time. A step that raises leaves parameters and
+    the optimizer's state as they were.
     """
 
     def __init__(self, optimizer: torch.optim.Optimizer, max_shortenings: int = 6):
@@ -30,10 +30,6 @@ class AnyTorch(Iterate):
         self._takes_closure = bool(inspect.signature(optimizer.step).parameters)
         for parameter in self.parameters:
             check_parameter(parameter)
-
-    @property
-    def name(self) -> str:
-        return type(self.optimizer).__name__
 
     @property
     def param_groups(self) -> list[dict]:
@@ -45,9 +41,7 @@ class AnyTorch(Iterate):
             try:
                 return self._step(closure, share=0.5**shortening)
             except DesignRejected:
-                if shortening == self.max_shortenings or not any(
-                    "lr" in group for group in self.param_groups
-                ):
+                if shortening == self.max_shortenings:
                     raise
 
     def leap(self, closure: Callable) -> float:
@@ -99,5 +93,6 @@ class AnyTorch(Iterate):
     def _refuse_constraints(self, sample: Sample) -> None:
         if len(sample.constraints):
             raise ValueError(
-                f"{self.name} knows no constraints: use ms.optim.MMA or GCMMA, or add them to the objective as a penalty"
+                f"{type(self.optimizer).__name__} knows no constraints: "
+                "use ms.optim.MMA or GCMMA, or add them to the objective as a penalty"
             )

@@ -1,5 +1,4 @@
-"""What the optimizers share: a box for each parameter group, steps that shorten where a design is rejected, a
-state that survives a restart."""
+"""What the optimizers share: a box for each parameter group, and a state that survives a restart."""
 
 from __future__ import annotations
 

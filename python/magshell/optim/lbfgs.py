@@ -23,14 +23,12 @@ class LBFGS(BoxOptimizer):
     line search for the strong Wolfe conditions within the box. It has no other constraints.
 
     lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
-    scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite and 1
-    where not.
+    scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite, else 1.
     memory: how many steps the model is made from. Before them it is a diagonal, learned from all steps so far, so that
     variables whose sizes were guessed badly still move together.
     first_step: how far the steepest variable is tried to move at first, in sizes. Less costs a few iterations more;
     where an objective is dear and known only nearby, 0.1 is safer.
-    max_shortenings: how often a line search meets a design that the closure rejects; a rejected design counts as
-    higher than any other.
+    max_shortenings: how often a line search may meet a design that the closure rejects; it counts as higher than any.
 
     R. H. Byrd, P. Lu, J. Nocedal, C. Zhu, A limited memory algorithm for bound constrained optimization,
     SIAM J. Sci. Comput. 16 (1995).
@@ -64,9 +62,8 @@ class LBFGS(BoxOptimizer):
             raise ValueError("LBFGS has bounds but no other constraints: use MMA or GCMMA, or add a penalty")
 
     def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
-        for run in (
-            (self._run, {}) if self._run else ({},)
-        ):  # a model may be stale: once more along the gradient
+        # A model may be stale: once more along the gradient then.
+        for run in (self._run, {}) if self._run else ({},):
             line = self._line(sample, box, x, run)
             found = None if line is None else self._search(line, sample.objective)
             if found is not None:
@@ -81,9 +78,8 @@ class LBFGS(BoxOptimizer):
 
     def _leap(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         line = self._line(sample, box, x, self._run)
-        if (
-            line is not None
-        ):  # the gradient's change across a jump is no curvature: nothing is learned from it
+        if line is not None:
+            # The gradient's change across a jump is no curvature: nothing is learned from it.
             moved, trial = self._trial(line.at(1.0))
             self._keep(moved, trial.differentiate())
 

@@ -20,8 +20,7 @@ class MMA(BoxOptimizer):
     """The method of moving asymptotes, with bounds and any number of constraints g <= 0.
 
     lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
-    scale: the typical size of a variable, in the same forms; by default upper - lower. Without finite bounds it is
-    needed.
+    scale: the typical size of a variable, in the same forms; by default upper - lower, and needed without finite bounds.
     move: the longest step of a variable, in sizes. asymptote_initial: first distance of the asymptotes, in sizes;
     asymptote_shrink, asymptote_grow: its factors after an oscillation and after progress.
     penalty: the price of breaking a constraint by as much as its slope would change it over a size, in units of the
