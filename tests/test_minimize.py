@@ -221,6 +221,15 @@ class Noise:
         self.generator.set_state(state["generator"])
 
 
+def test_a_checkpoint_of_something_else_is_refused(tmp_path):
+    path = tmp_path / "run.pt"
+    quiet(rosenbrock, [design(0.0, 0.0)], torch.optim.SGD, max_iterations=1, checkpoint=path)
+    with pytest.raises(ValueError, match="is of SGD, and cannot be resumed with LBFGS"):
+        quiet(rosenbrock, [design(0.0, 0.0)], lbfgs, checkpoint=path, resume=True)
+    with pytest.raises(ValueError, match=r"parameters of shapes \[\(2,\)\]"):
+        quiet(rosenbrock, [design(0.0, 0.0, 0.0)], torch.optim.SGD, checkpoint=path, resume=True)
+
+
 def test_stateful_objects_are_resumed_too(tmp_path):
     def run(iterations, noise, **options):
         x = design(-1.2, 1.0)
@@ -239,7 +248,8 @@ def test_stateful_objects_are_resumed_too(tmp_path):
     found = run(12, Noise(), checkpoint=path, resume=True)
     assert [record.objective for record in found.history] == [record.objective for record in whole.history]
     with pytest.raises(ValueError, match="state of 1 objects"):
-        quiet(rosenbrock, [x := design(0.0, 0.0)], lbfgs([x]), checkpoint=path, resume=True)
+        x = design(0.0, 0.0)
+        quiet(rosenbrock, [x], ms.optim.MMA([x], lower=-2.0, upper=2.0), checkpoint=path, resume=True)
 
 
 def test_a_state_that_no_checkpoint_can_hold_is_refused_when_it_is_saved(tmp_path):

@@ -91,6 +91,7 @@ class Run:
 
     def snapshot(self) -> dict:
         return {
+            "method": _method(self.optimizer),
             "parameters": self._values(),
             "optimizer": self.optimizer.state_dict(),
             "history": [asdict(record) for record in self.history],
@@ -103,6 +104,10 @@ class Run:
         shapes = [tuple(value.shape) for value in snapshot["parameters"]]
         if shapes != [tuple(p.shape) for p in self.parameters]:
             raise ValueError(f"the checkpoint holds parameters of shapes {shapes}, not those of this problem")
+        if snapshot["method"] != _method(self.optimizer):
+            raise ValueError(
+                f"the checkpoint is of {snapshot['method']}, and cannot be resumed with {_method(self.optimizer)}"
+            )
         if len(snapshot["stateful"]) != len(self.stateful):
             raise ValueError(
                 f"the checkpoint holds the state of {len(snapshot['stateful'])} objects, "
@@ -192,6 +197,10 @@ def _checked_stateful(stateful) -> list:
             if not callable(getattr(each, method, None)):
                 raise ValueError(f"every object in `stateful` needs {method}(), and {_name(each)} has none")
     return list(stateful)
+
+
+def _method(optimizer) -> str:
+    return _name(getattr(optimizer, "optimizer", optimizer))  # what AnyTorch drives
 
 
 def _name(each) -> str:

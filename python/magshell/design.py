@@ -55,8 +55,10 @@ def minimize(
     Ctrl-C raises `ms.Interrupted`, an error in the objective or the callback `ms.ObjectiveFailed`, once a design is
     known; both hold the best one, a Minimum, in `last_good`. Before that the error itself comes through.
 
-    >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)  # doctest: +SKIP
-    >>> ms.minimize(lambda x: ((x - 1) ** 2).sum(), [x], ms.optim.LBFGS([x], upper=0.5)).objective
+    >>> import torch, magshell as ms
+    >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
+    >>> optimizer = ms.optim.LBFGS([x], upper=0.5)
+    >>> ms.minimize(lambda x: ((x - 1) ** 2).sum(), [x], optimizer, progress=False).objective
     0.75
     """
     require_torch("minimize")
