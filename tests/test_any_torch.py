@@ -130,9 +130,11 @@ def test_a_rejected_design_halves_the_step(make):
         return rosenbrock(x)
 
     x = design(-1.2, 1.0)
-    found = quiet(objective, [x], make, max_iterations=1)
+    optimizer = make([x])
+    rate = optimizer.param_groups[0]["lr"]
+    found = quiet(objective, [x], optimizer, max_iterations=1)
     assert found.history[1].rejected > 0 and found.history[1].objective < found.history[0].objective
-    assert -1.2 < x[0] <= -1.1
+    assert -1.2 < x[0] <= -1.1 and optimizer.param_groups[0]["lr"] == rate
 
 
 def test_a_design_rejected_at_every_rate_leaves_the_optimizer_as_it_was():

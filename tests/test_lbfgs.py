@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 import magshell as ms
 from magshell.optim.cauchy import cauchy_step
-from magshell.optim.curvature import Curvature
+from magshell.optim.curvature import Curvature, updated_diagonal
 from magshell.optim.line_search import Probe, strong_wolfe
 
 
@@ -97,6 +97,26 @@ def test_compact_form_is_bfgs(rng):
     free = np.arange(12) % 3 != 0
     expected = np.linalg.solve(dense[np.ix_(free, free)], v[free])
     np.testing.assert_allclose(curvature.solve_free(v[free], free), expected, rtol=1e-8)
+
+
+def test_diagonal_is_that_of_bfgs(rng):
+    old, step = rng.uniform(1, 10, 6), rng.normal(size=6)
+    change = step * rng.uniform(1, 10, 6)
+    sized = np.diag(old) * (change @ (change / old)) / (step @ change)
+    dense = sized + np.outer(change, change) / (change @ step)
+    dense -= np.outer(sized @ step, sized @ step) / (step @ sized @ step)
+    np.testing.assert_allclose(updated_diagonal(old, step, change), np.diag(dense), rtol=1e-12)
+
+
+def test_sizes_guessed_badly_are_learned():
+    """The box of the logarithms is ten times as wide for some variables as for others, and they are alike."""
+    given = next(given for given in BOUNDED if given.name == "logarithms")
+    minimum = scipys(given)[1]
+    x = given.parameter()
+    optimizer = ms.optim.LBFGS([x], lower=torch.tensor(given.lower), upper=torch.tensor(given.upper))
+    history = ms.minimize(given.function, [x], optimizer, progress=False).history
+    reached = next(r.evaluations for r in history if r.objective <= minimum + 1e-8 * minimum)
+    assert reached <= 40  # 51 with a model that begins from a multiple of the unit matrix
 
 
 def test_cauchy_point_is_the_first_minimum_of_the_model_on_the_path(rng):
