@@ -1,5 +1,4 @@
-"""MMA and GCMMA: Svanberg's examples, NLopt's MMA as an oracle, and the promises of every optimizer of the
-library."""
+"""MMA and GCMMA: Svanberg's examples, NLopt's MMA as an oracle, and the promises of every optimizer of the library."""
 
 import copy
 
@@ -11,6 +10,7 @@ from design_problems import BOUNDED, CONSTRAINED, bad_scales, cantilever, nlopt_
 import magshell as ms
 from magshell.optim.subproblem import Subproblem
 
+UNCONSTRAINED = [given for given in BOUNDED if given.name in ("HS 4", "logarithms", "coupled 10^4")]
 METHODS = [ms.optim.MMA, ms.optim.GCMMA]
 CANTILEVER = ([5.0] * 5, 1.0, 10.0, cantilever, 1.3399563605990747)
 TWO_BALLS = ([4.0, 3.0, 2.0], 0.0, 5.0, two_balls, 8.770245902791997)
@@ -46,7 +46,7 @@ def test_svanbergs_examples(method, case):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("problem", [*CONSTRAINED, BOUNDED[2]], ids=lambda p: p.name)
+@pytest.mark.parametrize("problem", [*CONSTRAINED, *UNCONSTRAINED], ids=lambda p: p.name)
 def test_agrees_with_nlopt(method, problem):
     x = problem.parameter()
     lower, upper = (torch.tensor(bound) for bound in (problem.lower, problem.upper))
@@ -56,11 +56,16 @@ def test_agrees_with_nlopt(method, problem):
         method([x], lower=lower, upper=upper),
         max_iterations=problem.iterations,
         tolerance=1e-10,
+        feasibility=1e-9,
         progress=False,
     )
     expected, minimum = nlopt_mma(problem)
     width = problem.upper - problem.lower
+    # NLopt ends up to 3e-7 of the objective outside its constraints; published minima show what is ours.
     assert result.objective == pytest.approx(minimum, rel=2e-6, abs=1e-18)
+    if problem.known is not None:
+        assert result.objective == pytest.approx(problem.known, rel=2e-8)
+    assert result.violation <= 1e-9
     np.testing.assert_allclose(x.detach().numpy() / width, expected / width, atol=3e-3)
     assert ((x >= lower) & (x <= upper)).all()
 

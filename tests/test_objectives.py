@@ -12,6 +12,7 @@ from magshell import objectives, parametrize
 
 torch.manual_seed(0)
 VECTORS = torch.randn(6, 3, dtype=torch.float64)
+CASES = torch.randn(2, 6, 3, dtype=torch.float64)
 AMPLITUDE = torch.randn(6, dtype=torch.float64)
 EDGE_FACES = np.array([[0, 1], [1, 2], [3, -1], [2, 5], [-1, 4]], dtype=np.int32)
 IMAGE = torch.rand(4, 5, dtype=torch.float64)
@@ -25,6 +26,12 @@ DIRECTIONS = np.array([[1.0, 0, 0], [0, 2.0, 0], [-1.0, 0, 0], [0, 0, 1.0]])
         (lambda x: objectives.shape_matching(x, 0.5 * VECTORS), VECTORS),
         (lambda x: objectives.shape_matching(x, REST[:2], vertices=[4, 1], weights=[1.0, 3.0]), VECTORS),
         (lambda x: objectives.height_map(x, REST, IMAGE, (0, 1, 0, 1)), VECTORS),
+        (
+            lambda x: objectives.shape_matching(x, REST[:4].reshape(2, 2, 3), [4, 1], [[1.0, 3], [2, 4]]),
+            CASES,
+        ),
+        (lambda x: objectives.height_map(x, REST, IMAGE, (0, 1, 0, 1), weights=np.arange(6.0)), CASES),
+        (lambda x: objectives.extension(x, [0, 3], [(1.0, 2.0, 0.5), (0.0, 0.0, 2.0)]), CASES),
         (lambda image: objectives.bilinear(image, REST, (0, 1, 0, 1)), IMAGE),
         (lambda x: objectives.extension(x, [0, 3], (1.0, 2.0, 0.5)), VECTORS),
         (lambda m: objectives.magnitude(m, areas=REST[:, 0]), VECTORS),
@@ -70,6 +77,39 @@ def test_shape_matching_counts_the_chosen_vertices():
     assert objectives.shape_matching(
         VECTORS, target.numpy(), [4, 1], weights=[0.5, 0.25]
     ).item() == pytest.approx(3)
+
+
+@pytest.mark.parametrize(
+    "objective",
+    [
+        lambda x: objectives.shape_matching(x, VECTORS),
+        lambda x: objectives.shape_matching(x, REST[:2], vertices=[4, 1], weights=[1.0, 3.0]),
+        lambda x: objectives.height_map(x, REST, IMAGE, (0, 1, 0, 1), weights=np.arange(6.0)),
+        lambda x: objectives.extension(x, 2, (1.0, 2.0, 0.5)),
+    ],
+)
+def test_load_cases_are_summed(objective):
+    assert objective(CASES).item() == pytest.approx(sum(objective(case).item() for case in CASES))
+
+
+def test_each_load_case_has_its_own_target():
+    targets = torch.stack([VECTORS, REST])
+    apart = objectives.shape_matching(CASES[0], VECTORS) + objectives.shape_matching(CASES[1], REST)
+    assert objectives.shape_matching(CASES, targets).item() == pytest.approx(apart.item())
+    directions = [(0.0, 0, 3), (0.0, 2, 0)]
+    reach = -CASES[0, 1, 2] - CASES[1, 1, 1]
+    assert objectives.extension(CASES, 1, directions).item() == pytest.approx(reach.item())
+
+
+@pytest.mark.filterwarnings("error")
+def test_arrays_that_cannot_be_written_to_are_taken_quietly():
+    mesh = ms.meshes.rectangle(1.0, 1.0, cells=(2, 2))
+    assert not mesh.edge_faces.flags.writeable
+    objectives.total_variation(torch.rand(mesh.n_faces), mesh.edge_faces)
+    rest = torch.tensor(mesh.rest_positions)
+    objectives.shape_matching(rest, mesh.rest_positions)
+    objectives.height_map(rest, mesh.rest_positions, IMAGE.numpy(), (0, 1, 0, 1))
+    parametrize.from_regions(torch.rand(mesh.n_vertices), mesh.faces[:, 0])
 
 
 def test_bilinear_is_exact_for_bilinear_images_and_constant_beyond():
@@ -132,6 +172,9 @@ def test_parametrisations():
     [
         (lambda: objectives.shape_matching(VECTORS, REST[:2]), "target must have shape"),
         (lambda: objectives.shape_matching(VECTORS, REST, weights=[1.0]), "weights must have shape"),
+        (lambda: objectives.shape_matching(VECTORS, REST[0]), "target must have shape"),
+        (lambda: objectives.shape_matching(CASES, VECTORS[None]), "target must have shape"),
+        (lambda: objectives.extension(VECTORS, 0, CASES[:, 0]), "direction must have shape"),
         (lambda: objectives.shape_matching(VECTORS, REST[:1], vertices=[0.5]), "integers"),
         (lambda: objectives.height_map(VECTORS, REST, [1.0, 2.0], (0, 1, 0, 1)), "2 rows"),
         (lambda: objectives.height_map(VECTORS, REST, IMAGE, (1, 0, 0, 1)), "extent"),

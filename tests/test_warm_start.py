@@ -165,3 +165,40 @@ def test_bad_input(buckled):
         warm(**design(0.0), start=start)
     with pytest.raises(ValueError, match="remanent_magnetization"):
         warm(applied_flux_density=(0, 0, 0))
+
+
+def test_a_design_crosses_a_snap_and_resumes_with_the_same_bits(buckled, critical_field, tmp_path):
+    torch = pytest.importorskip("torch")
+    scene, start = buckled
+    wanted = height(snap(buckled, 2.0 * critical_field))
+    middle = MESH.vertices_at(x=HALF)
+    unit = torch.tensor(design(1.0)["remanent_magnetization"])
+
+    def run(iterations, **options):
+        warm = ms.WarmStart(scene, start=start)
+        share = torch.tensor(0.5, dtype=torch.float64, requires_grad=True)
+
+        def objective(share):
+            rest = warm(
+                remanent_magnetization=share * unit, applied_flux_density=(0, 0, 1.6 * critical_field)
+            )
+            return 1e6 * (rest.positions[middle, 2].mean() - wanted) ** 2
+
+        optimizer = ms.optim.MMA([share], lower=0.1, upper=1.5, max_shortenings=3)
+        return ms.minimize(
+            objective,
+            [share],
+            optimizer,
+            max_iterations=iterations,
+            stateful=[warm],
+            progress=False,
+            **options,
+        )
+
+    whole = run(7)
+    crossed = [record.iteration for record in whole.history if record.jumped]
+    assert len(crossed) == 1 and crossed[0] < 7
+    assert whole.history[crossed[0]].rejected == 4 and whole.objective < 0.05 * whole.history[0].objective
+    run(crossed[0], checkpoint=tmp_path / "run.pt")
+    found = run(7, checkpoint=tmp_path / "run.pt", resume=True)
+    assert [record.objective for record in found.history] == [record.objective for record in whole.history]

@@ -4,7 +4,7 @@ from . import control, meshes, objectives, optim, parametrize
 from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
-from .design import Minimum, minimize
+from .design import minimize
 from .dynamics import simulate
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
@@ -24,6 +24,7 @@ from .io import read_fields, read_mesh, write_mesh
 from .linear import LinearResponse, linear_response
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .mesh import TriangleMesh
+from .minimum import Minimum
 from .multistart import multistart
 from .path import CriticalPoint, Path, follow
 from .plotting import Picture, plot, write_page

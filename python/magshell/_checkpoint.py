@@ -1,4 +1,4 @@
-"""Files that are either the old one or the new one, never a part of either."""
+"""Files that are either the old one or the new one, never a part of either, and that hold nothing but data."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
-from ._tensors import require_torch
+import numpy as np
+
+from ._tensors import is_tensor, require_torch
+
+_ARRAY = "numpy array"  # the only key of a dict that stands for one
 
 
 def save(path: str | Path, contents: dict) -> None:
@@ -38,3 +42,34 @@ def load(path: str | Path) -> dict:
         return torch.load(path, weights_only=True)
     except Exception as error:
         raise ValueError(f"{path} is not a checkpoint of a minimization: {error}") from error
+
+
+def encoded(value, label: str):
+    """A state of tensors, arrays and plain values as what a safe file may hold; anything else is refused."""
+    if isinstance(value, dict):
+        return {key: encoded(entry, f"{label}[{key!r}]") for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        entries = [encoded(entry, f"{label}[{i}]") for i, entry in enumerate(value)]
+        return tuple(entries) if isinstance(value, tuple) else entries
+    if isinstance(value, np.ndarray):
+        return {_ARRAY: require_torch("a checkpoint").from_numpy(value.copy())}
+    if isinstance(value, np.generic):
+        return value.item()
+    if is_tensor(value):
+        return value.detach().clone()
+    if value is None or isinstance(value, bool | int | float | str | bytes):
+        return value
+    raise TypeError(
+        f"{label} is a {type(value).__name__}: a checkpoint holds tensors, arrays and plain values"
+    )
+
+
+def decoded(value):
+    """What was given to `encoded`."""
+    if isinstance(value, dict):
+        if value.keys() == {_ARRAY}:
+            return value[_ARRAY].numpy()
+        return {key: decoded(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(decoded(entry) for entry in value)
+    return value

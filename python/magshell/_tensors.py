@@ -21,6 +21,11 @@ def is_tensor(value) -> bool:
     return torch is not None and isinstance(value, torch.Tensor)
 
 
+def tensor_of(values):
+    """A tensor as it is; of arrays and lists a copy, because the mesh's own arrays cannot be written to."""
+    return values if is_tensor(values) else require_torch("an objective").from_numpy(np.array(values))
+
+
 def wants_gradient(value) -> bool:
     """Whether torch is recording what happens to this tensor."""
     return is_tensor(value) and value.requires_grad and sys.modules["torch"].is_grad_enabled()

@@ -1,53 +1,43 @@
 """Objectives, penalties and constraints of designs: small functions of torch tensors, differentiable in each.
 
-Each returns a scalar that a sum of others can hold; `cap` returns constraints g <= 0. Lengths in m,
-magnetizations in A/m.
+Each returns a scalar that a sum of others can hold; `cap` returns constraints g <= 0. Lengths in m, magnetizations in
+A/m. Positions may be those of one equilibrium, (n_v, 3), or of several load cases, (k, n_v, 3): then the cases' sum.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
-from ._tensors import require_torch
+from ._tensors import require_torch, tensor_of
 
 
 def shape_matching(positions, target, vertices=None, weights=None):
     """Sum of squared distances between vertices and their targets [m2].
 
-    positions: (n_v, 3). target: (n_v, 3), or (k, 3) when k vertices are chosen. vertices: (k,) indices, by
-    default all.
-    weights: (k,), one a distance, for example vertex areas; by default 1.
+    positions: (n_v, 3) or (k, n_v, 3). target: as the positions, or (n_v, 3) for all cases; with only the chosen
+    vertices, in their order. vertices: (n_chosen,) indices, by default all.
+    weights: one a distance, (n_chosen,) or (k, n_chosen), for example vertex areas; by default 1.
     """
-    chosen = positions if vertices is None else positions[_indices(vertices)]
-    squares = ((chosen - _like(target, chosen, "target", chosen.shape)) ** 2).sum(-1)
-    if weights is None:
-        return squares.sum()
-    return (_like(weights, squares, "weights", squares.shape) * squares).sum()
+    chosen = positions if vertices is None else positions[..., _indices(vertices), :]
+    return _weighted_sum(
+        ((chosen - _like(target, chosen, "target", chosen.shape, axes=2)) ** 2).sum(-1), weights
+    )
 
 
 def height_map(positions, rest_positions, image, extent, weights=None):
     """Sum of squared differences between the vertices' heights z and an image [m2].
 
-    The image is sampled bilinearly where the vertices rest. positions, rest_positions: (n_v, 3). image:
-    (rows, columns) heights [m], row 0 at the largest y as
-    pictures are drawn. extent: (x_min, x_max, y_min, y_max) [m] of the centres of its outermost pixels;
-    beyond, the nearest pixel counts.
-    weights: (n_v,), by default 1.
+    The image is sampled bilinearly where the vertices rest. positions: (n_v, 3) or (k, n_v, 3). rest_positions:
+    (n_v, 3). image: (rows, columns) heights [m], row 0 at the largest y as pictures are drawn; one for all cases.
+    extent: (x_min, x_max, y_min, y_max) [m] of the centres of its outermost pixels; beyond, the nearest pixel counts.
+    weights: (n_v,) or (k, n_v), by default 1.
     """
     heights = bilinear(image, rest_positions, extent)
-    squares = (positions[:, 2] - heights.to(positions)) ** 2
-    return (
-        squares.sum()
-        if weights is None
-        else (_like(weights, squares, "weights", squares.shape) * squares).sum()
-    )
+    return _weighted_sum((positions[..., 2] - heights.to(positions)) ** 2, weights)
 
 
 def bilinear(image, points, extent):
-    """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in
-    `height_map`."""
+    """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in `height_map`."""
     torch = require_torch("objectives.bilinear")
-    image = torch.as_tensor(image, dtype=torch.float64)
+    image = tensor_of(image).to(torch.float64)
     if image.ndim != 2 or min(image.shape) < 2:
         raise ValueError(f"image must have at least 2 rows and 2 columns, got shape {tuple(image.shape)}")
     x_min, x_max, y_min, y_max = extent
@@ -55,7 +45,7 @@ def bilinear(image, points, extent):
         raise ValueError(
             f"extent must be (x_min, x_max, y_min, y_max) with positive sizes, got {tuple(extent)}"
         )
-    points = torch.as_tensor(points, dtype=torch.float64)
+    points = tensor_of(points).to(torch.float64)
     rows, columns = image.shape
     column = ((points[:, 0] - x_min) / (x_max - x_min) * (columns - 1)).clamp(0, columns - 1)
     row = ((y_max - points[:, 1]) / (y_max - y_min) * (rows - 1)).clamp(0, rows - 1)
@@ -67,28 +57,29 @@ def bilinear(image, points, extent):
 
 
 def extension(positions, vertices, direction):
-    """Minus the mean reach of the chosen vertices along a direction [m]: minimize it to pull them as far as
-    they go.
+    """Minus the mean reach of the chosen vertices along a direction [m]: minimize it to pull them as far as they go.
 
-    positions: (n_v, 3). vertices: an index, or (k,). direction: (3,), of any length but zero.
+    positions: (n_v, 3) or (k, n_v, 3). vertices: an index, or (n_chosen,). direction: (3,), of any length but zero, or
+    one a case, (k, 3).
     """
     torch = require_torch("objectives.extension")
-    direction = _like(direction, positions, "direction", (3,))
-    length = torch.linalg.vector_norm(direction)
-    if not float(length.detach()) > 0:
+    chosen = positions[..., _indices(vertices).reshape(-1), :]
+    direction = _like(direction, positions, "direction", (*chosen.shape[:-2], 3), axes=1)
+    lengths = torch.linalg.vector_norm(direction, dim=-1, keepdim=True)
+    if not (lengths.detach() > 0).all():
         raise ValueError("direction must not be zero")
-    return -(positions[_indices(vertices)].reshape(-1, 3) @ (direction / length)).mean()
+    return -(chosen * (direction / lengths)[..., None, :]).sum(-1).mean(-1).sum()
 
 
 def magnitude(values, areas=None):
     """Sum of squares, weighted by areas [m2] where given: of magnetizations (n_f, 3), or of any (n, ...)."""
     squares = (values**2).reshape(len(values), -1).sum(-1)
-    return squares.sum() if areas is None else (_like(areas, squares, "areas", squares.shape) * squares).sum()
+    return _weighted_sum(squares, areas, "areas")
 
 
 def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
-    """Sum over interior edges of edge length times the jump of the values across, smooth at zero: sqrt(jump^2
-    + eps^2) - eps.
+    """Sum over interior edges of edge length times the jump of the values across, smooth at zero:
+    sqrt(jump^2 + eps^2) - eps.
 
     values: (n_f,) or (n_f, k). edge_faces: (n_e, 2), with -1 where an edge has no second face, as in
     `TriangleMesh`. edge_lengths: (n_e,) [m], by default 1.
@@ -103,16 +94,15 @@ def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
     rounded = (jumps + smoothing**2) ** 0.5 - smoothing
     if edge_lengths is None:
         return rounded.sum()
-    return (_like(edge_lengths, rounded, "edge_lengths", interior.shape)[interior] * rounded).sum()
+    return (_like(edge_lengths, rounded, "edge_lengths", interior.shape, axes=1)[interior] * rounded).sum()
 
 
 def cap(remanent_magnetization, limit, sharpness=None):
     """Constraints g <= 0 that keep |M_r| at or below a limit: (|M_r| / limit)^2 - 1.
 
-    remanent_magnetization: (n_f, 3) A/m. limit: A/m. One constraint a face, (n_f,); with a sharpness p > 1, a
-    single one, (1,), from the
-    p-norm over all faces: for optimizers it costs one gradient instead of n_f, and it is never looser than
-    the limit.
+    remanent_magnetization: (n_f, 3) A/m. limit: A/m. One constraint a face, (n_f,); with a sharpness p > 1, a single
+    one, (1,), from the p-norm over all faces: for optimizers it costs one gradient instead of n_f, and it is never
+    looser than the limit.
     """
     if not float(limit) > 0:
         raise ValueError(f"limit [A/m] must be positive, got {limit}")
@@ -121,9 +111,7 @@ def cap(remanent_magnetization, limit, sharpness=None):
         return squares - 1
     if not sharpness > 1:
         raise ValueError(f"sharpness must exceed 1, got {sharpness}")
-    largest = (
-        squares.detach().max().clamp(min=1e-30)
-    )  # taken out, so that the powers neither overflow nor vanish
+    largest = squares.detach().max().clamp(min=1e-30)  # taken out: the powers neither overflow nor vanish
     powers = ((squares / largest) ** sharpness).sum() + 1e-30  # a root's derivative at zero is not finite
     return (largest * powers ** (1 / sharpness) - 1)[None]
 
@@ -131,13 +119,12 @@ def cap(remanent_magnetization, limit, sharpness=None):
 def printable(remanent_magnetization, directions, sharpness=None):
     """Sum of squared distances of magnetizations from their nearest printable ray [A2/m2].
 
-    remanent_magnetization: (n_f, 3) A/m. directions: (k, 3), of any length but zero; no magnetization at all
-    can be printed too. The distance
-    is to the ray that starts at zero. sharpness: replaces the minimum over the rays by a smooth one, in 1 /
-    (A2/m2).
+    remanent_magnetization: (n_f, 3) A/m. directions: (k, 3), of any length but zero; no magnetization at all can be
+    printed too. The distance is to the ray that starts at zero.
+    sharpness: replaces the minimum over the rays by a smooth one, in 1 / (A2/m2).
     """
     torch = require_torch("objectives.printable")
-    rays = torch.as_tensor(directions).to(remanent_magnetization)
+    rays = tensor_of(directions).to(remanent_magnetization)
     if rays.ndim != 2 or rays.shape[1] != 3 or len(rays) == 0:
         raise ValueError(f"directions must have shape (k, 3), got {tuple(rays.shape)}")
     lengths = torch.linalg.vector_norm(rays, dim=1, keepdim=True)
@@ -150,18 +137,23 @@ def printable(remanent_magnetization, directions, sharpness=None):
     return -(torch.logsumexp(-sharpness * squares, dim=1) / sharpness).sum()
 
 
+def _weighted_sum(squares, weights, name="weights"):
+    if weights is None:
+        return squares.sum()
+    return (_like(weights, squares, name, squares.shape, axes=1) * squares).sum()
+
+
 def _indices(values):
     torch = require_torch("an objective")
-    indices = torch.as_tensor(values if hasattr(values, "dtype") else np.asarray(values))
+    indices = tensor_of(values)
     if indices.is_floating_point() or indices.dtype == torch.bool:
         raise ValueError(f"indices must be integers, got {indices.dtype}")
     return indices.long()
 
 
-def _like(values, reference, name: str, shape):
-    """A tensor of the reference's dtype, of the shape it must have."""
-    torch = require_torch("an objective")
-    tensor = torch.as_tensor(values).to(reference)
-    if tuple(tensor.shape) != tuple(shape):
+def _like(values, reference, name: str, shape, axes: int):
+    """A tensor of the reference's dtype and shape; of its last axes only, it stands for every load case."""
+    tensor = tensor_of(values).to(reference)
+    if tuple(tensor.shape) not in (tuple(shape), tuple(shape[-axes:])):
         raise ValueError(f"{name} must have shape {tuple(shape)}, got {tuple(tensor.shape)}")
-    return tensor
+    return tensor.broadcast_to(shape)

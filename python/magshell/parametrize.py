@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 
-from ._tensors import require_torch
+from ._tensors import require_torch, tensor_of
 
 
 def from_regions(values, regions):
-    """Values a face, (n_f, ...), equal within a region. values: (n_regions, ...). regions: (n_f,) the region
-    of each face, from 0."""
+    """Values a face, (n_f, ...), equal within a region.
+
+    values: (n_regions, ...). regions: (n_f,) the region of each face, from 0.
+    """
     torch = require_torch("parametrize.from_regions")
-    regions = torch.as_tensor(regions)
+    regions = tensor_of(regions)
     if regions.ndim != 1 or regions.is_floating_point() or regions.dtype == torch.bool:
         raise ValueError(
             f"regions must be integers of shape (n_f,), got {regions.dtype} {tuple(regions.shape)}"
@@ -24,10 +26,12 @@ def from_regions(values, regions):
 
 
 def along(amplitude, directions):
-    """Magnetizations (n_f, 3) of free amplitude in fixed directions. amplitude: (n_f,) A/m. directions: (3,)
-    or (n_f, 3), of any length but zero."""
+    """Magnetizations (n_f, 3) of free amplitude in fixed directions.
+
+    amplitude: (n_f,) A/m. directions: (3,) or (n_f, 3), of any length but zero.
+    """
     torch = require_torch("parametrize.along")
-    directions = torch.as_tensor(directions).to(amplitude)
+    directions = tensor_of(directions).to(amplitude)
     if (
         directions.shape[-1:] != (3,)
         or directions.ndim > 2
@@ -43,11 +47,10 @@ def along(amplitude, directions):
 
 
 def log_scaled(shares, lower, upper):
-    """Values between lower and upper, evenly spread in their logarithm: lower (upper / lower)^share, for
-    shares in [0, 1].
+    """Values between lower and upper, evenly spread in their logarithm: lower (upper / lower)^share, for shares in
+    [0, 1].
 
-    Moduli over decades: young_modulus = log_scaled(s, 1e4, 1e8), with the bounds 0 and 1 of s left to the
-    optimizer.
+    Moduli over decades: young_modulus = log_scaled(s, 1e4, 1e8), with the bounds 0 and 1 of s left to the optimizer.
     """
     if not 0 < lower < upper < math.inf:
         raise ValueError(f"bounds must be positive and in order, got {lower} and {upper}")
@@ -62,8 +65,7 @@ def log_shares(values, lower, upper):
 
 
 def capped(vectors, limit):
-    """Magnetizations (n_f, 3) below a limit [A/m], smoothly from any (n_f, 3): v / sqrt(1 + |v|^2 /
-    limit^2)."""
+    """Magnetizations (n_f, 3) below a limit [A/m], smoothly from any (n_f, 3): v / sqrt(1 + |v|^2 / limit^2)."""
     if not float(limit) > 0:
         raise ValueError(f"limit [A/m] must be positive, got {limit}")
     return vectors / (1 + ((vectors / limit) ** 2).sum(-1, keepdim=True)) ** 0.5

@@ -62,8 +62,7 @@ class Relaxation {
         return !report_.converged;
     }
 
-    // With this rate the forces move the sheet by a twentieth of its extent, if nothing but the anchor holds
-    // it.
+    // With this rate the forces move a sheet that only the anchor holds by a twentieth of its extent.
     double forced_rate() const {
         const Reduction& reduction = model_.reduction();
         const VectorXd force = reduction.vector(model_.residual().gradient),

@@ -1,5 +1,4 @@
-"""Optimizers for designs, as torch optimizers with closures: `ms.optim.MMA`, `ms.optim.GCMMA`,
-`ms.optim.LBFGS`.
+"""Optimizers for designs, as torch optimizers with closures: `MMA`, `GCMMA` and `LBFGS`.
 
 torch is imported when one of them is first asked for.
 """

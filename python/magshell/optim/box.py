@@ -28,6 +28,12 @@ class Box:
         """(n,) bool: the entries whose bounds leave them room."""
         return self.upper > self.lower
 
+    def moved(self, x: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """The design after a change of its free entries, (n free,); never outside the box by a rounding."""
+        moved = x.copy()
+        moved[self.free] += change
+        return np.clip(moved, self.lower, self.upper)
+
     def name_of(self, entry: int) -> str:
         for name, size in zip(self.names, self.sizes, strict=True):
             if entry < size:
@@ -46,8 +52,7 @@ class Box:
 
 
 def option_tensors(label: str, value, parameters: list[torch.Tensor]) -> list[torch.Tensor]:
-    """A bound or a scale as one float64 tensor a parameter: a number, a tensor, or a list with one of these
-    each."""
+    """A bound or a scale as one float64 tensor a parameter: a number, a tensor, or a list with one of these each."""
     values = value if isinstance(value, list | tuple) else [value] * len(parameters)
     if len(values) != len(parameters):
         raise ValueError(f"{label} has {len(values)} entries for {len(parameters)} parameters")

@@ -1,5 +1,4 @@
-"""The quadratic model of L-BFGS-B within the box: its generalized Cauchy point, and its minimum over the free
-entries.
+"""The quadratic model of L-BFGS-B within the box: its generalized Cauchy point, its minimum over the free entries.
 
 Byrd, Lu, Nocedal, Zhu, SIAM J. Sci. Comput. 16 (1995), sections 4 and 5.
 """
@@ -12,12 +11,11 @@ from .curvature import Curvature
 
 
 def cauchy_step(gradient: np.ndarray, lower: np.ndarray, upper: np.ndarray, model: Curvature) -> np.ndarray:
-    """The step (n,) to the first minimum of the model along the projected path -t gradient. lower <= 0 <=
-    upper: of steps.
+    """The step (n,) to the first minimum of the model along the projected path -t gradient.
 
-    On the path an entry i stops at its breakpoint t_i. With the entries sorted by it, the path's direction d,
-    W^T d and
-    W^T z change by one entry a breakpoint, so that the model's slope on every stretch is a running sum:
+    lower <= 0 <= upper: of steps. On the path an entry i stops at its breakpoint t_i. With the entries sorted by it,
+    the path's direction d, W^T d and W^T z change by one entry a breakpoint, so that the model's slope on every
+    stretch is a running sum:
 
         f' = -|d|^2 (1 - theta t) - (W^T d) . M (W^T z),     f'' = theta |d|^2 - (W^T d) . M (W^T d)
     """
@@ -31,7 +29,8 @@ def cauchy_step(gradient: np.ndarray, lower: np.ndarray, upper: np.ndarray, mode
     squares = _tail_sums(gradient[order] ** 2)
     w_d = -_tail_sums(gradient[order][:, None] * model.w[order])
     ends = np.append(times[1:], np.inf)
-    lengths = np.where(np.isfinite(times), np.diff(np.append(times, np.inf)), np.inf)
+    with np.errstate(invalid="ignore"):  # stretches between entries that never stop have no length
+        lengths = np.where(np.isfinite(times), np.diff(np.append(times, np.inf)), np.inf)
     advance = np.where(np.isfinite(ends)[:, None], lengths[:, None], 0.0) * w_d
     w_z = np.concatenate([np.zeros((1, w_d.shape[1])), np.cumsum(advance, axis=0)[:-1]])
 
@@ -50,8 +49,8 @@ def cauchy_step(gradient: np.ndarray, lower: np.ndarray, upper: np.ndarray, mode
 def subspace_step(
     gradient: np.ndarray, lower: np.ndarray, upper: np.ndarray, model: Curvature, cauchy: np.ndarray
 ) -> np.ndarray:
-    """The step (n,) that minimizes the model over the entries which the Cauchy step leaves free, brought back
-    into the box."""
+    """The step (n,) that minimizes the model over the entries which the Cauchy step leaves free, brought back into
+    the box."""
     free = (cauchy > lower) & (cauchy < upper)
     if not free.any() or model.w.shape[1] == 0:
         return cauchy

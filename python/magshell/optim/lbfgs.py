@@ -3,111 +3,159 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 
-from .base import BoxOptimizer, Restoring
+from ..errors import DesignRejected
+from .base import BoxOptimizer
 from .box import Box
 from .cauchy import cauchy_step, subspace_step
-from .curvature import Curvature, remembered
+from .curvature import Curvature, shows_curvature, updated_diagonal
 from .line_search import Probe, strong_wolfe
-from .mma import stepped
-
-_FIRST_CHANGE = 0.1  # of the steepest variable's size, before any curvature is known
+from .sample import Sample
 
 _ROUNDING = 4 * np.finfo(float).eps  # of the objective: a smaller decrease cannot be seen
 
 
 class LBFGS(BoxOptimizer):
-    """L-BFGS-B: the generalized Cauchy point of a limited-memory model, its minimum over the free variables,
-    and a
+    """L-BFGS-B: the generalized Cauchy point of a limited-memory model, its minimum over the free variables, and a
     line search for the strong Wolfe conditions within the box. It has no other constraints.
 
-    lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these
-    each.
-    scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite
-    and 1 where not.
-    memory: how many steps the model is made from.
+    lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
+    scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite, else 1.
+    memory: how many steps the model is made from. Before them it is a diagonal, learned from all steps so far, so that
+    variables whose sizes were guessed badly still move together.
+    first_step: how far the steepest variable is tried to move at first, in sizes. Less costs a few iterations more;
+    where an objective is dear and known only nearby, 0.1 is safer.
+    max_shortenings: how often a line search may meet a design that the closure rejects; it counts as higher than any.
 
-    Byrd, Lu, Nocedal, Zhu, A limited memory algorithm for bound constrained optimization, SIAM J. Sci.
-    Comput. 16 (1995).
+    R. H. Byrd, P. Lu, J. Nocedal, C. Zhu, A limited memory algorithm for bound constrained optimization,
+    SIAM J. Sci. Comput. 16 (1995).
 
+    >>> import torch, magshell as ms
     >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
-    >>> ms.optim.LBFGS([x], upper=0.5).step(lambda: ((x - 1) ** 2).sum())  # doctest: +SKIP
+    >>> ms.optim.LBFGS([x], upper=0.5).step(lambda: ((x - 1) ** 2).sum())
+    0.75
     """
 
-    _copied = (*BoxOptimizer._copied, "memory")
+    _copied = (*BoxOptimizer._copied, "memory", "first_step")
 
-    def __init__(self, params, *, lower=-math.inf, upper=math.inf, scale=None, memory: int = 10):
+    def __init__(
+        self,
+        params,
+        *,
+        lower=-math.inf,
+        upper=math.inf,
+        scale=None,
+        memory: int = 10,
+        first_step: float = 1.0,
+        max_shortenings: int = 6,
+    ):
         if not (isinstance(memory, int) and memory > 0):
             raise ValueError(f"memory must be a positive integer, got {memory!r}")
-        self.memory = memory
-        super().__init__(params, {"lower": lower, "upper": upper, "scale": scale})
+        if not (isinstance(first_step, int | float) and 0 < first_step < math.inf):
+            raise ValueError(f"first_step must be a positive number, got {first_step!r}")
+        self.memory, self.first_step = memory, float(first_step)
+        super().__init__(params, {"lower": lower, "upper": upper, "scale": scale}, max_shortenings)
 
-    def step(self, closure: Callable) -> float:
-        """Moves to a lower design and returns its objective; stays where it is at a minimum, to rounding."""
-        sample = self.evaluate(closure)
+    def _check_sample(self, sample: Sample) -> None:
         if len(sample.constraints):
             raise ValueError("LBFGS has bounds but no other constraints: use MMA or GCMMA, or add a penalty")
-        with Restoring(self):
-            self._advance(self._box(), self._sample_x)
-        return self._sample.objective
 
-    def _advance(self, box: Box, x: np.ndarray) -> None:
-        free = box.free
-        scale = np.where(np.isnan(box.scale), 1.0, box.scale)[free]
-        gradient = self._sample.gradient[free] * scale
-        none = np.zeros((0, gradient.size))
-        pairs = (self._run.get("steps", none), self._run.get("changes", none))
-        lower, upper = (box.lower - x)[free] / scale, (box.upper - x)[free] / scale
-
-        reached = self._search(x, gradient, scale, box, lower, upper, pairs)
-        if reached is None and len(pairs[0]):  # the model may be stale: once more along the gradient itself
-            pairs = (none, none)
-            reached = self._search(x, gradient, scale, box, lower, upper, pairs)
-        if reached is None:
-            self._write(x)
-            self._leave_gradients(self._sample.gradient)
-            return
-        moved, sample = reached
-        step = (moved - x)[free] / scale
-        pairs = remembered(pairs, step, sample.gradient[free] * scale - gradient, self.memory)
-        self._write(moved)
+    def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
+        # A model may be stale: once more along the gradient then.
+        for run in (self._run, {}) if self._run else ({},):
+            line = self._line(sample, box, x, run)
+            found = None if line is None else self._search(line, sample.objective)
+            if found is not None:
+                moved, reached = found
+                self._write(moved)
+                self._leave_gradients(reached.gradient)
+                self._run = self._learned(run, box, moved - x, reached.gradient - sample.gradient)
+                self._keep(moved, reached)
+                return
+        self._write(x)
         self._leave_gradients(sample.gradient)
-        self._run = {"steps": pairs[0], "changes": pairs[1]}
-        self._keep(moved, sample)
 
-    def _search(self, x, gradient, scale, box, lower, upper, pairs):
-        """(design, sample) of a lower design, or None."""
-        model = Curvature(*pairs, _first_theta(gradient, pairs))
-        if not np.any(np.where(gradient < 0, upper, -lower) * gradient != 0):
+    def _leap(self, sample: Sample, box: Box, x: np.ndarray) -> None:
+        line = self._line(sample, box, x, self._run)
+        if line is not None:
+            # The gradient's change across a jump is no curvature: nothing is learned from it.
+            moved, trial = self._trial(line.at(1.0))
+            self._keep(moved, trial.differentiate())
+
+    def _line(self, sample: Sample, box: Box, x: np.ndarray, run: dict) -> _Line | None:
+        """The line to the minimum of the model; None where the model falls nowhere within the box."""
+        stretch = np.sqrt(run["diagonal"]) if run else 1.0
+        unit = _sizes(box) / stretch
+        gradient = sample.gradient[box.free] * unit
+        lower, upper = (box.lower - x)[box.free] / unit, (box.upper - x)[box.free] / unit
+        if not (np.where(gradient < 0, upper > 0, lower < 0) & (gradient != 0)).any():
             return None
-        cauchy = cauchy_step(gradient, lower, upper, model)
-        step = subspace_step(gradient, lower, upper, model, cauchy)
+        if run:
+            steps, changes = run["steps"] * stretch, run["changes"] / stretch
+            theta = float(changes[-1] @ changes[-1] / (steps[-1] @ changes[-1]))
+        else:
+            steps = changes = np.zeros((0, gradient.size))
+            theta = float(np.abs(gradient).max()) / self.first_step
+        model = Curvature(steps, changes, theta)
+        step = subspace_step(gradient, lower, upper, model, cauchy_step(gradient, lower, upper, model))
         slope = float(gradient @ step)
-        if not -slope > _ROUNDING * abs(self._sample.objective):
+        if not -slope > _ROUNDING * abs(sample.objective):
             return None
-        probe = partial(self._probe, x, step, scale, box)
-        start = Probe(0.0, self._sample.objective, slope)
-        best = strong_wolfe(probe, start, 1.0, _longest(step, lower, upper))
+        return _Line(x, step * unit, slope, _longest(step, lower, upper), box)
+
+    def _search(self, line: _Line, objective: float) -> tuple[np.ndarray, Sample] | None:
+        """A lower design on the line and its sample. The last rejection, if nothing short enough was accepted."""
+        rejections = []
+
+        def probe(length: float) -> Probe:
+            try:
+                moved, trial = self._trial(line.at(length))
+            except DesignRejected as error:
+                rejections.append(error)
+                return Probe(length, math.inf, math.nan)
+            sample = trial.differentiate()
+            slope = float(sample.gradient[line.box.free] @ line.change)
+            return Probe(length, sample.objective, slope, (moved, sample))
+
+        start = Probe(0.0, objective, line.slope)
+        best = strong_wolfe(probe, start, 1.0, line.longest, max_rejected=self.max_shortenings)
+        if best is None and len(rejections) > self.max_shortenings:
+            raise rejections[-1]
         return None if best is None else best.found
 
-    def _probe(self, x: np.ndarray, step: np.ndarray, scale: np.ndarray, box: Box, length: float) -> Probe:
-        sized = Box(box.lower, box.upper, _spread(scale, box), box.names, box.sizes)
-        moved, trial = self._trial(stepped(x, length * step, sized))
-        sample = trial.differentiate()
-        return Probe(
-            length, sample.objective, float(sample.gradient[box.free] * scale @ step), (moved, sample)
-        )
+    def _learned(self, run: dict, box: Box, step: np.ndarray, change: np.ndarray) -> dict:
+        """The last steps and changes of the gradient, (k, n) in units of the sizes, and the model before them."""
+        size = _sizes(box)
+        step, change = step[box.free] / size, change[box.free] * size
+        if not shows_curvature(step, change):
+            return run
+        return {
+            "steps": np.vstack([*run.get("steps", ()), step])[-self.memory :],
+            "changes": np.vstack([*run.get("changes", ()), change])[-self.memory :],
+            "diagonal": updated_diagonal(run.get("diagonal"), step, change),
+        }
 
 
-def _first_theta(gradient: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]) -> float:
-    steps, changes = pairs
-    if len(steps) == 0:
-        return float(np.abs(gradient).max(initial=0.0)) / _FIRST_CHANGE or 1.0
-    return float(changes[-1] @ changes[-1] / (steps[-1] @ changes[-1]))
+@dataclass(frozen=True)
+class _Line:
+    """x + a change within the box, 0 <= a <= longest; slope: of the objective at a = 0."""
+
+    x: np.ndarray
+    change: np.ndarray
+    slope: float
+    longest: float
+    box: Box
+
+    def at(self, length: float) -> np.ndarray:
+        return self.box.moved(self.x, length * self.change)
+
+
+def _sizes(box: Box) -> np.ndarray:
+    """(n free,)"""
+    return np.where(np.isnan(box.scale), 1.0, box.scale)[box.free]
 
 
 def _longest(step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
@@ -115,9 +163,3 @@ def _longest(step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         fits = np.where(step > 0, upper / step, np.where(step < 0, lower / step, np.inf))
     return max(1.0, float(fits.min(initial=np.inf)))
-
-
-def _spread(scale: np.ndarray, box: Box) -> np.ndarray:
-    whole = np.ones_like(box.lower)
-    whole[box.free] = scale
-    return whole

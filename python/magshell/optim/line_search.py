@@ -2,8 +2,8 @@
 
     f(a) <= f(0) + c1 a f'(0),     |f'(a)| <= c2 |f'(0)|
 
-Nocedal and Wright, Numerical Optimization (2006), algorithms 3.5 and 3.6, with the interval's end accepted
-where f still falls.
+Nocedal and Wright, Numerical Optimization (2006), algorithms 3.5 and 3.6, with the interval's end accepted where f
+still falls.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ _SAFEGUARD = 0.1  # of a bracket, kept from its ends
 
 @dataclass(frozen=True)
 class Probe:
-    """Value and slope of the objective at a step length, and whatever else the evaluation brought."""
+    """Value and slope of the objective at a step length, and whatever else the evaluation brought.
+
+    A value of infinity says that the design there was rejected.
+    """
 
     length: float
     value: float
@@ -30,16 +33,25 @@ class Probe:
 
 
 def strong_wolfe(
-    probe: Callable[[float], Probe], start: Probe, first: float, longest: float, limit: int = 20
+    probe: Callable[[float], Probe],
+    start: Probe,
+    first: float,
+    longest: float,
+    limit: int = 20,
+    max_rejected: int = 6,
 ) -> Probe | None:
-    """The probe of an acceptable length in (0, longest]; the lowest of a search cut short; None if none is
-    below the start."""
+    """The probe of an acceptable length in (0, longest]; the lowest of a search cut short, by `limit` steps or by
+    more than `max_rejected` rejections; None if none is below the start."""
 
     def falls_short(at: Probe) -> bool:
         return at.value > start.value + _DECREASE * at.length * start.slope
 
     low, high, at = start, None, probe(min(first, longest))
+    rejected = 0
     for _ in range(limit):
+        rejected += np.isinf(at.value)
+        if rejected > max_rejected:
+            break
         if falls_short(at) or (at.value >= low.value and low is not start):
             high = at
         elif abs(at.slope) <= -_CURVATURE * start.slope:

@@ -46,28 +46,40 @@ class Trial:
         _require_finite("the constraints", self.constraints)
 
     def differentiate(self) -> Sample:
-        """The sample with gradients. The parameters' `.grad` is left holding the objective's; after an error,
-        what it held."""
+        """The sample with gradients. The parameters' `.grad` is left holding the objective's; after an error, what it
+        held. Raises ValueError where objective, a constraint or a parameter has no part in them."""
         kept = [parameter.grad for parameter in self._parameters]
+        reached = [False] * len(self._parameters)
         try:
-            rows = [self._row(self._objective, "the objective", retain=self._constraints is not None)]
+            rows = [
+                self._row(self._objective, "the objective", reached, retain=self._constraints is not None)
+            ]
             gradients = [parameter.grad for parameter in self._parameters]
             if self._constraints is not None:
                 last = len(self._constraints) - 1
                 for i, constraint in enumerate(self._constraints):
-                    rows.append(self._row(constraint, f"constraint {i}", retain=i < last))
+                    rows.append(self._row(constraint, f"constraint {i}", reached, retain=i < last))
+            if not all(reached):
+                position = reached.index(False)
+                raise ValueError(
+                    f"parameter {position} of shape {tuple(self._parameters[position].shape)} has no part in the "
+                    "objective or the constraints: no gradient reaches it"
+                )
         except BaseException:
             self._leave(kept)
             raise
         self._leave(gradients)
         return Sample(self.objective, rows[0], self.constraints, np.array(rows[1:]).reshape(-1, rows[0].size))
 
-    def _row(self, value: torch.Tensor, label: str, retain: bool) -> np.ndarray:
+    def _row(self, value: torch.Tensor, label: str, reached: list[bool], retain: bool) -> np.ndarray:
+        """(n,) a gradient; marks the parameters that it reaches."""
         self._leave([None] * len(self._parameters))
         if value.requires_grad:
             value.backward(retain_graph=retain, inputs=self._parameters)
         if all(parameter.grad is None for parameter in self._parameters):
             raise ValueError(f"{label} does not depend on the parameters: no gradient reaches them")
+        for position, parameter in enumerate(self._parameters):
+            reached[position] |= parameter.grad is not None
         row = torch.cat(
             [
                 (p.grad if p.grad is not None else torch.zeros_like(p)).reshape(-1).double().cpu()

@@ -4,13 +4,10 @@
     such that   sum_j p_ij / (s_j - t_j) + q_ij / (s_j + t_j) - y_i <= b_i
                 lower_j <= t_j <= upper_j,  y_i >= 0
 
-K. Svanberg, MMA and GCMMA - two methods for nonlinear optimization (2007), sections 4 and 5, without the
-variable z, which only
-min-max problems need, and with asymptotes at -s and s, where MMA's own rules keep them. The unknowns t are
-steps in
-units of the variables' sizes and the functions are scaled to unit slopes, so that the tolerances below mean
-the same
-in every problem.
+K. Svanberg, MMA and GCMMA - two methods for nonlinear optimization (2007), sections 4 and 5, without the variable
+z, which only min-max problems need, and with asymptotes at -s and s, where MMA's own rules keep them. The unknowns
+t are steps in units of the variables' sizes and the functions are scaled to unit slopes, so that the tolerances
+below mean the same in every problem.
 """
 
 from __future__ import annotations
@@ -25,8 +22,7 @@ _NEWTON_LIMIT = 100  # a barrier value takes 3 to 10
 
 @dataclass(frozen=True)
 class Subproblem:
-    """p, q: (1 + m, n) >= 0, the objective's row first. limits b: (m,). asymptote s, lower, upper: (n,).
-    penalty c."""
+    """p, q: (1 + m, n) >= 0, the objective's row first. limits b: (m,). asymptote s, lower, upper: (n,). penalty c."""
 
     p: np.ndarray
     q: np.ndarray
@@ -63,8 +59,7 @@ class Subproblem:
 
 @dataclass(frozen=True)
 class _Point:
-    """Primal t, y, slack s of the constraints, and multipliers: constraints, lower and upper bounds of t,
-    bound of y."""
+    """Primal t, y, slack s of the constraints, and the multipliers of constraints, of t's bounds and of y's."""
 
     t: np.ndarray
     y: np.ndarray

@@ -78,8 +78,8 @@ def snap_through(
     """The load at each listed deflection, by arc length through both limit points.
 
     Finer meshes converge to loads up to 2.6 % of the full one beside these (at the last deflection), because
-    S4R shears under the point force and a Kirchhoff-Love sheet does not: an extra deflection of 0.155 mm P /
-    Pmax explains all but 0.45 %.
+    S4R shears under the point force and a Kirchhoff-Love sheet does not: an extra deflection of
+    0.155 mm P / Pmax explains all but 0.45 %.
     """
     mesh = quarter(cells)
     centre = mesh.nearest_vertex((0, 0, RADIUS))

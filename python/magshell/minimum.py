@@ -1,0 +1,46 @@
+"""What `ms.minimize` reports: a record an iteration, and the best design."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Record:
+    """One iteration.
+
+    objective, its named terms, violation: the largest positive constraint. gradient_norm: |gradient| of the objective.
+    seconds: since the start. evaluations: how often the objective was asked for, since the start. rejected: trial
+    designs of this iteration that could not be evaluated. jumped: whether the equilibrium jumped in its step.
+    """
+
+    iteration: int
+    objective: float
+    terms: dict[str, float]
+    violation: float
+    gradient_norm: float
+    seconds: float
+    evaluations: int
+    rejected: int = 0
+    jumped: bool = False
+
+
+@dataclass
+class Minimum:
+    """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an
+    iteration, from the start; reason: why it ended."""
+
+    parameters: list
+    objective: float
+    violation: float
+    history: list[Record] = field(default_factory=list)
+    reason: str = ""
+
+    @property
+    def iterations(self) -> int:
+        return self.history[-1].iteration if self.history else 0
+
+    def __repr__(self) -> str:
+        broken = f", constraints broken by {self.violation:.2g}" if self.violation > 0 else ""
+        reached = f"Minimum: objective {self.objective:.6g}{broken}"
+        return f"{reached} after {self.iterations} iterations ({self.reason})"

@@ -1,0 +1,113 @@
+"""Where an optimizer stands: its parameters as one vector, and what the closure says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+
+from .sample import Sample, Trial
+
+_SAMPLE = "sample_"
+
+
+class Iterate:
+    """The design of an optimizer with `param_groups`, and the sample of it, asked for once a design.
+
+    Another closure object, or parameters that were changed in between, make `evaluate` ask again.
+    """
+
+    def __init__(self):
+        self._sample: Sample | None = None
+        self._sample_x: np.ndarray | None = None
+        self._closure: Callable | None = None
+
+    @property
+    def parameters(self) -> list[torch.Tensor]:
+        """Every parameter, group by group."""
+        return [parameter for group in self.param_groups for parameter in group["params"]]
+
+    def evaluate(self, closure: Callable) -> Sample:
+        """The sample of the parameters as they stand; asks the closure only if it is not known yet."""
+        if not callable(closure):
+            raise ValueError(
+                f"{type(self).__name__}.step needs a closure that returns the objective, got {closure!r:.60}"
+            )
+        x = self._read()
+        self._check_design(x)
+        known = self._sample is not None and np.array_equal(x, self._sample_x)
+        if not (known and self._closure in (None, closure)):
+            self._keep(x, Trial(closure, self.parameters).differentiate())
+        self._closure = closure
+        return self._sample
+
+    def _check_design(self, x: np.ndarray) -> None:
+        """Refuses a design to begin a step at."""
+
+    def _read(self) -> np.ndarray:
+        return torch.cat([p.detach().reshape(-1).double().cpu() for p in self.parameters]).numpy()
+
+    def _write(self, x: np.ndarray) -> np.ndarray:
+        """Sets the parameters; returns what they hold now, which their dtype may have rounded."""
+        chunks = torch.from_numpy(x).split([parameter.numel() for parameter in self.parameters])
+        with torch.no_grad():
+            for parameter, chunk in zip(self.parameters, chunks, strict=True):
+                parameter.copy_(chunk.reshape(parameter.shape))
+        return self._read()
+
+    def _leave_gradients(self, gradient: np.ndarray) -> None:
+        """Sets the parameters' `.grad`, (n,)."""
+        chunks = torch.from_numpy(gradient).split([parameter.numel() for parameter in self.parameters])
+        for parameter, chunk in zip(self.parameters, chunks, strict=True):
+            parameter.grad = chunk.reshape(parameter.shape).to(parameter)
+
+    def _trial(self, x: np.ndarray) -> tuple[np.ndarray, Trial]:
+        """The design x as the parameters hold it, and the closure's values there."""
+        x = self._write(x)
+        return x, Trial(self._closure, self.parameters)
+
+    def _keep(self, x: np.ndarray, sample: Sample) -> None:
+        self._sample_x, self._sample = x, sample
+
+    def _sample_state(self) -> dict:
+        """What is known of the design, as tensors and numbers."""
+        if self._sample is None:
+            return {}
+        state = {_SAMPLE + name: as_tensor(value) for name, value in vars(self._sample).items()}
+        return {**state, _SAMPLE + "x": as_tensor(self._sample_x)}
+
+    def _load_sample(self, state: dict) -> None:
+        sample = {
+            name.removeprefix(_SAMPLE): as_array(value)
+            for name, value in state.items()
+            if name.startswith(_SAMPLE)
+        }
+        self._sample_x = sample.pop("x", None)
+        self._sample = Sample(**sample) if sample else None
+        self._closure = None
+
+
+class Restoring:
+    """Puts the parameters and their gradients back where they were if the block raises."""
+
+    def __init__(self, iterate: Iterate):
+        self._iterate = iterate
+
+    def __enter__(self) -> None:
+        self._kept = [(p, p.detach().clone(), p.grad) for p in self._iterate.parameters]
+
+    def __exit__(self, kind, *_) -> None:
+        if kind is not None:
+            with torch.no_grad():
+                for parameter, value, gradient in self._kept:
+                    parameter.copy_(value)
+                    parameter.grad = gradient
+
+
+def as_tensor(value):
+    return torch.from_numpy(value.copy()) if isinstance(value, np.ndarray) else value
+
+
+def as_array(value):
+    return value.detach().cpu().numpy().copy() if isinstance(value, torch.Tensor) else value
