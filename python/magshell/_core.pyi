@@ -18,7 +18,10 @@ __all__: list[str] = [
     "Dipoles",
     "Factor",
     "FactorReport",
+    "Keep",
     "Model",
+    "MotionInput",
+    "MotionResult",
     "NewtonOptions",
     "Outcome",
     "PathOptions",
@@ -37,8 +40,10 @@ __all__: list[str] = [
     "follow_path",
     "num_threads",
     "pull_back",
+    "pull_back_motion",
     "sample_fields",
     "set_num_threads",
+    "simulate",
     "vacuum_permeability",
 ]
 
@@ -187,6 +192,12 @@ class Model:
     def expand(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def full_vector(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.
+        """
     def gradient(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
@@ -421,6 +432,82 @@ class PathResult:
     @property
     def reason(self) -> str: ...
 
+class MotionInput:
+    def __init__(self, model: Model, given: dict) -> None: ...
+
+class Keep:
+    """
+    Members:
+
+      nothing
+
+      checkpoints
+
+      stages
+
+      factors
+    """
+
+    __members__: typing.ClassVar[dict[str, Keep]]
+    checkpoints: typing.ClassVar[Keep]
+    factors: typing.ClassVar[Keep]
+    nothing: typing.ClassVar[Keep]
+    stages: typing.ClassVar[Keep]
+    @typing.overload
+    def __eq__(self, other: Keep) -> bool: ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool: ...
+    def __getstate__(self) -> int: ...
+    def __hash__(self) -> int: ...
+    def __index__(self) -> int: ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __int__(self) -> int: ...
+    @typing.overload
+    def __ne__(self, other: Keep) -> bool: ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool: ...
+    def __repr__(self) -> str: ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def __str__(self) -> str: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class MotionResult:
+    def edge_rotations(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    def last_maxwell_strains(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    def positions(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    def velocities(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    @property
+    def bytes(self) -> int: ...
+    @property
+    def energies(self) -> list[list[float]]: ...
+    @property
+    def factorizations(self) -> int: ...
+    @property
+    def halved(self) -> dict[int, list[tuple[float, float]]]: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def keep(self) -> Keep: ...
+    @property
+    def kinetic_energy(self) -> list[float]: ...
+    @property
+    def last_memory(self) -> list[list[float]]: ...
+    @property
+    def last_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def last_velocity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def linear_time(self) -> float: ...
+    @property
+    def outcome(self) -> Outcome: ...
+    @property
+    def reason(self) -> str: ...
+    @property
+    def steps_done(self) -> int: ...
+
 def analyze(
     size: typing.SupportsInt | typing.SupportsIndex,
     column_starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
@@ -471,6 +558,15 @@ def pull_back(
     The gradients by everything a solve takes, of a function of positions (n_v, 3) and edge rotations (n_e,) with these gradients. The model must hold the values of that solve.
     """
 
+def pull_back_motion(
+    model: Model,
+    input: MotionInput,
+    motion: MotionResult,
+    by_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    by_velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    progress: typing.Any = None,
+) -> dict: ...
 def sample_fields(
     fields: collections.abc.Sequence[AppliedField],
     scales: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
@@ -483,6 +579,13 @@ def sample_fields(
     """
 
 def set_num_threads(count: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+def simulate(
+    model: Model,
+    input: MotionInput,
+    gradients: bool,
+    budget: typing.SupportsInt | typing.SupportsIndex,
+    progress: typing.Any = None,
+) -> MotionResult: ...
 
 __version__: str = "0+dev"
 vacuum_permeability: float = 1.25663706127e-06
