@@ -59,7 +59,7 @@ def test_momenta_of_a_free_sheet(integrator):
     """Spinning and stretched, it keeps its momentum; and, to the order of the method, its angular momentum."""
     scene = ms.Scene(shell(), allow_rigid_motions=True)
     masses = shell().vertex_masses[:, None]
-    turning = np.cross((0.0, 3.0, 20.0), MESH.rest_positions) + (0.1, 0.2, 0.3)
+    turning = np.array((0.1, 0.2, 0.3)) + np.cross((0.0, 3.0, 20.0), MESH.rest_positions)
 
     def momenta(time_step):
         start = MESH.rest_positions * (1.02, 1.0, 1.0)
@@ -230,6 +230,7 @@ BAD = [
     ({"solver": "newton"}, "solver must be"),
     ({"record_every": 0}, "record_every"),
     ({"memory_budget": -1}, "memory_budget"),
+    ({"keep": "all"}, "keep must be"),
     ({"remanent_magnetization": None}, "remanent_magnetization"),
 ]
 

@@ -107,11 +107,11 @@ Array rotations_of(const Model& model, const MotionResult& motion) {
 }
 
 MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget,
-                 const py::object& progress) {
+                 Keep keep, const py::object& progress) {
     const Watch watch(progress);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
-    return simulate(model, input, {gradients, budget},
+    return simulate(model, input, {gradients, budget, keep},
                     [&](double at, double residual) { watch(at, residual); });
 }
 
@@ -185,7 +185,7 @@ void register_dynamics(py::module_& module) {
         .def("edge_rotations", [](const MotionResult& r, const Model& m) { return rotations_of(m, r); });
 
     module.def("simulate", &run, py::arg("model"), py::arg("input"), py::arg("gradients"), py::arg("budget"),
-               py::arg("progress") = py::none());
+               py::arg("keep"), py::arg("progress") = py::none());
     module.def("pull_back_motion", &back, py::arg("model"), py::arg("input"), py::arg("motion"),
                py::arg("by_positions"), py::arg("by_edge_rotations"), py::arg("by_velocities"),
                py::arg("progress") = py::none());

@@ -584,6 +584,7 @@ def simulate(
     input: MotionInput,
     gradients: bool,
     budget: typing.SupportsInt | typing.SupportsIndex,
+    keep: Keep,
     progress: typing.Any = None,
 ) -> MotionResult: ...
 

@@ -37,6 +37,7 @@ class MotionInputs:
         time_step,
         record_every,
         memory_budget,
+        keep,
         start,
         velocities,
         damping,
@@ -52,6 +53,9 @@ class MotionInputs:
         self.record_every = _count("record_every", record_every)
         if not quantity("memory_budget", "bytes", memory_budget, ()) >= 0:
             raise ValueError(f"memory_budget must not be negative, got {memory_budget}")
+        if keep not in (None, "stages", "checkpoints", "factors"):
+            raise ValueError(f'keep must be "stages", "checkpoints", "factors" or None, got {keep!r}')
+        self.keep = getattr(_core.Keep, keep or "nothing")
         self.time_step = float(quantity("time_step", "s", inputs.take("time_step", time_step), ()))
         if not self.time_step > 0:
             raise ValueError(f"time_step [s] must be positive, got {self.time_step}")

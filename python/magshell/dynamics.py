@@ -47,6 +47,7 @@ def simulate(
     integrator: Integrator | None = None,
     record_every: int = 1,
     memory_budget: float = 2e9,
+    keep: str | None = None,
     solver: Newton | None = None,
     progress: bool = True,
 ) -> Trajectory:
@@ -67,8 +68,10 @@ def simulate(
     remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density.
     integrator: SDIRK2() by default; ImplicitEuler() or SDIRK3().
     record_every: steps between the states that come back, the start first.
-    memory_budget: bytes that may be kept for gradients: all states, with factorizations where they fit as well;
-        else checkpoints between which the steps are taken again on the way back.
+    memory_budget: bytes that may be kept for gradients: all states if they fit; else checkpoints, between which the
+        steps are taken again on the way back, some of them several times.
+    keep: "stages" or "checkpoints", whatever the budget says; "factors": all states with their factorizations, which
+        pays where several gradients are taken of one motion.
     solver: of a step; MixedNewton() by default, of which the load steps are not used.
     progress: show a bar once the motion has taken two seconds.
 
@@ -113,6 +116,7 @@ def simulate(
         time_step=time_step,
         record_every=record_every,
         memory_budget=memory_budget,
+        keep=keep,
         start=start,
         velocities=velocities,
         damping=damping,
@@ -130,7 +134,7 @@ def simulate(
     began = time.perf_counter()
     with inputs.in_core(), progress_bar("simulate", 1.0, shown=progress, delay=2.0, bar_format=_BAR) as bar:
         found = _core.simulate(
-            scene._model, asked.core, bool(inputs.leaves), int(memory_budget), _advance(bar)
+            scene._model, asked.core, bool(inputs.leaves), int(memory_budget), asked.keep, _advance(bar)
         )
     result = _trajectory(asked, found, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:

@@ -176,7 +176,7 @@ class Backward {
             VectorXd by_x_hat = VectorXd::Zero(model_.size());
             by_x_hat.head(coordinates) = -by_v[i].head(coordinates) / adt;
 
-            const VectorXd lambda = solve(algebra, at, i, stages[i], step, part, by_x, viscous);
+            const VectorXd lambda = back_through(algebra, at, i, stages[i], step, part, by_x, viscous);
             const VectorXd accelerated = lambda.cwiseProduct(at.w[i]), moved = lambda.cwiseProduct(at.v[i]);
             g_.mass += accelerated;
             g_.damping += moved;
@@ -206,8 +206,18 @@ class Backward {
         g_.time_step += share * by_dt;
     }
 
+    // With the Hessian at a stage, by the factorization that was kept from nearby if there is one.
+    VectorXd solve(const StageState& stage, const Controls& controls, const Anchor& anchor, const VectorXd& rhs) {
+        newton_.watch(0.0);
+        if (stage.factor)
+            if (const auto found = newton_.solve_nearby(stage.q, controls, anchor, *stage.factor, rhs)) return *found;
+        const FactorReport factor = newton_.factorize_at(stage.q, controls, anchor);
+        if (!factor.succeeded) throw InvalidInput("the adjoint of a step: " + factor.reason);
+        return newton_.solve_with_factor(rhs);
+    }
+
     // lambda of a stage; adds what it says of the scene and of the controls.
-    VectorXd solve(const StepAlgebra& algebra, const Rates& at, int i, const StageState& stage, Index step,
+    VectorXd back_through(const StepAlgebra& algebra, const Rates& at, int i, const StageState& stage, Index step,
                    const std::pair<double, double>& part, VectorXd& by_x, ViscousAdjoint& viscous) {
         const ElasticAfterwards elastic_afterwards(model_);
         const double share = part.first + input_.tableau.time(i) * (part.second - part.first);
@@ -215,11 +225,10 @@ class Backward {
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         model_.set_memory(stage.memory);
         viscous.set_history(i);
-        const FactorReport factor = newton_.factorize_at(stage.q, controls, {&algebra.weights(), &target});
-        if (!factor.succeeded) throw InvalidInput("the adjoint of a step: " + factor.reason);
-        newton_.watch(0.0);
+        model_.evaluate(stage.q, controls);
         viscous.before_solve(i, by_x);
-        const VectorXd lambda = newton_.solve_with_factor(-by_x);
+        const Anchor anchor{&algebra.weights(), &target};
+        const VectorXd lambda = solve(stage, controls, anchor, -by_x);
         viscous.after_solve(i, lambda);
 
         SceneGradient gradient = model_.vjp(stage.q, controls, lambda);

@@ -46,7 +46,7 @@ class Run {
           result_(result),
           stepper_(newton, input.tableau, input.inertia, input.viscosity) {
         result_.start = result_.last = beginning(newton.model(), input);
-        if (keep.gradients) plan(keep.budget);
+        if (keep.gradients) plan(keep);
     }
 
     bool run() {
@@ -64,26 +64,20 @@ class Run {
     }
 
   private:
-    // Everything, if the budget allows it; else as many stages at a time as half of it holds, and checkpoints
-    // in the rest.
-    void plan(std::size_t budget) {
+    // All stages, if the budget allows it; else as many at a time as half of it holds, and checkpoints in the
+    // rest. Factorizations only on demand: fresh memory for each costs more than the way back saves.
+    void plan(const KeepOptions& keep) {
         const std::size_t vector = sizeof(double) * model_.size();
         const std::size_t strains =
             input_.viscosity.maxwell() ? 6 * sizeof(double) * model_.sheet().n_faces() : 0;
         const std::size_t stages = input_.tableau.stages * (vector + strains);
-        const std::size_t factors = input_.tableau.stages * newton_.factor()->bytes();
-        const std::size_t steps = static_cast<std::size_t>(input_.steps);
-        if (steps * (stages + factors) <= budget) {
-            result_.keep = Keep::factors;
-        } else if (steps * stages <= budget) {
-            result_.keep = Keep::stages;
-        } else {
-            result_.keep = Keep::checkpoints;
-            result_.leaf = std::max<Index>(1, static_cast<Index>(budget / 2 / stages));
-            result_.slots = std::max<Index>(1, static_cast<Index>(budget / 2 / (2 * vector + strains)));
-            slots_left_ = result_.slots;
-            aim(0);
-        }
+        const bool fits = stages * static_cast<std::size_t>(input_.steps) <= keep.budget;
+        result_.keep = keep.wanted != Keep::nothing ? keep.wanted : fits ? Keep::stages : Keep::checkpoints;
+        if (result_.keep != Keep::checkpoints) return;
+        result_.leaf = std::max<Index>(1, static_cast<Index>(keep.budget / 2 / stages));
+        result_.slots = std::max<Index>(1, static_cast<Index>(keep.budget / 2 / (2 * vector + strains)));
+        slots_left_ = result_.slots;
+        aim(0);
     }
 
     void aim(Index step) {

@@ -33,7 +33,8 @@ enum class Keep { nothing, checkpoints, stages, factors };
 
 struct KeepOptions {
     bool gradients = false;
-    std::size_t budget = 0;  // [bytes]
+    std::size_t budget = 0;       // [bytes]
+    Keep wanted = Keep::nothing;  // nothing: stages, or checkpoints where the budget does not hold them
 };
 
 /// A step in parts, each from a share of the step to another.

@@ -27,6 +27,21 @@ constexpr Index most_new_negative_pivots = 10;
 constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
 
+// A x, of the symmetric A whose lower triangle is given.
+VectorXd product(const SparsePattern& pattern, const std::vector<double>& values, const VectorXd& x) {
+    VectorXd y = VectorXd::Zero(x.size());
+    for (Index j = 0; j < pattern.size; ++j) {
+        Index k = pattern.column_starts[j];
+        double sum = values[k] * x[j];
+        for (++k; k < pattern.column_starts[j + 1]; ++k) {
+            sum += values[k] * x[pattern.rows[k]];
+            y[pattern.rows[k]] += values[k] * x[j];
+        }
+        y[j] += sum;
+    }
+    return y;
+}
+
 // Adds the time it lives to a sum.
 class Stopwatch {
   public:
@@ -73,9 +88,13 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const 
                  options_.tolerance));
 }
 
-FactorReport Newton::factorize_assembled(const Anchor& anchor) {
+void Newton::reduce_assembled(const Anchor& anchor) {
     model_.reduction().matrix(model_.matrix(), values_);
     add_weights(anchor);
+}
+
+FactorReport Newton::factorize_assembled(const Anchor& anchor) {
+    reduce_assembled(anchor);
     ++factorizations_;
     const Stopwatch running(linear_time_);
     FactorReport report;
@@ -109,6 +128,25 @@ FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool
         model_.matrix().multiply(move.data(), moves.col(k).data());
     }
     return factorize_assembled(anchor);
+}
+
+std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
+                                             const Factor& nearby, const VectorXd& rhs) {
+    constexpr int most_refinements = 4;
+    constexpr double exact = 1e-13;  // of the right-hand side
+    model_.evaluate(q, controls);
+    model_.assemble(q, controls, false);
+    reduce_assembled(anchor);
+    const Stopwatch running(linear_time_);
+    const VectorXd b = model_.reduction().vector(rhs);
+    VectorXd solution = VectorXd::Zero(b.size()), left = b;
+    for (int k = 0; k <= most_refinements; ++k) {
+        if (left.norm() <= exact * b.norm()) return model_.reduction().expand(solution);
+        nearby.solve(left);
+        solution += left;
+        left = b - product(model_.reduction().pattern(), values_, solution);
+    }
+    return std::nullopt;
 }
 
 VectorXd Newton::solve_with_factor(const VectorXd& rhs) const {

@@ -11,6 +11,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "magshell/assembly/model.h"
@@ -62,6 +63,10 @@ class Newton {
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
                            const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves);
+    /// K p = rhs with the last evaluated state's own Hessian, by refinement with a factorization from nearby. Empty
+    /// where that does not converge quickly.
+    std::optional<VectorXd> solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
+                                         const Factor& nearby, const VectorXd& rhs);
     /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held.
     VectorXd solve_with_factor(const VectorXd& rhs) const;
 
@@ -84,6 +89,7 @@ class Newton {
     }
 
   private:
+    void reduce_assembled(const Anchor& anchor);
     FactorReport factorize_assembled(const Anchor& anchor);
     VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
     void add_weights(const Anchor& anchor);
