@@ -14,7 +14,8 @@ What comes out:
 - Tips do not turn all the way: no torque acts on a tip that already points along the field, and what would have to
   turn it before, a magnetization that grows without limit, is capped.
 - From no magnetization at all MMA gets down more slowly than from the one that beam theory proposes.
-- In a field that goes round a cone the arms shake one after the other; a turn ends where it began.
+- In a field that goes round a cone the arms shake; a turn ends where it began. The feet, which take the field's torque
+  on the sheet as a whole, stand under every second corner: arms on either side of a foot go down together.
 
 Beside Table 1 of the paper (50 iterations, 16000 s on six cores, residual 6.7e-2): faces, vertices, variables, material
 and iterations are the same. The star's size, its targets and the field's strength are not printed there, nor the unit
@@ -30,7 +31,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from _hexagram.design import BOUND, CAP, FIELDS, FLUX_DENSITY, ROLL, Design, design, from_beam_theory
+from _hexagram.design import BOUND, FIELDS, FLUX_DENSITY, ROLL, Design, design, from_beam_theory
 from _hexagram.report import draw_objective, draw_profile, summary
 from _hexagram.sheet import ARM_LENGTH, arm_coordinates, tips
 
@@ -50,20 +51,23 @@ def main(edges_per_side=12, n_vertices=1097, iterations=50) -> dict:
     best = runs["from beam theory"]
     magnetization, down, up = best["magnetization"], *best["positions"]
     shaking = shaken(star, magnetization, start=best["equilibria"][0])
-    arm, s = arm_coordinates(star.mesh.rest_positions)
+    _, distances = arm_coordinates(star.mesh.rest_positions)
     return {
         "design": star,
         "runs": runs,
         "magnetization": magnetization,
         "positions": best["positions"],
         "plain_sum": float(star.misses(torch.from_numpy(best["positions"]))),
-        "rms": ARM_LENGTH * np.sqrt(best["history"][-1].objective / len(FIELDS)),
+        "rms": ARM_LENGTH * np.sqrt(best["objective"] / len(FIELDS)),
         "largest_magnetization": np.linalg.norm(magnetization, axis=1).max(),
         "normal_magnetization": np.abs(magnetization[:, 2]).max(),
         "mirror": np.abs(down * (1, 1, -1) - up).max() / ARM_LENGTH,
         "chord_angles": {"reached": chord_angles(star.mesh, down), "wanted": ROLL / 2},
-        "tip_angles": {name: tip_angles(star.mesh, x) for name, x in (("reached", down), ("wanted", star.targets[0]))},
-        "hexagon_height": np.abs(down[s <= 1e-9 * ARM_LENGTH, 2]).max(),
+        "tip_angles": {
+            "reached": tip_angles(star.mesh, down),
+            "wanted": tip_angles(star.mesh, star.targets[0].numpy()),
+        },
+        "hexagon_height": np.abs(down[distances <= 1e-9 * ARM_LENGTH, 2]).max(),
         "shaking": shaking,
     }
 
@@ -87,6 +91,7 @@ def optimized(star: Design, start: torch.Tensor, iterations: int) -> dict:
         magnetization = star.remanent_magnetization(found.parameters[0]).numpy()
     rest = at_rest(remanent_magnetization=magnetization, applied_flux_density=FIELDS)
     return {
+        "objective": found.objective,
         "history": found.history,
         "seconds_per_iteration": found.history[-1].seconds / iterations,
         "share_of_equilibria": sum(seconds) / found.history[-1].seconds,
@@ -99,10 +104,17 @@ def optimized(star: Design, start: torch.Tensor, iterations: int) -> dict:
 def shaken(star: Design, magnetization: np.ndarray, start: ms.Equilibrium) -> dict:
     """Equilibria in a field on a cone about the vertical, step by step round it: fields, positions, tips' heights."""
     at_rest = ms.WarmStart(star.scene, start=start)
-    around = [np.sin(TILT) * np.cos(AZIMUTHS), np.sin(TILT) * np.sin(AZIMUTHS), np.full(len(AZIMUTHS), np.cos(TILT))]
+    around = [
+        np.sin(TILT) * np.cos(AZIMUTHS),
+        np.sin(TILT) * np.sin(AZIMUTHS),
+        np.full(len(AZIMUTHS), np.cos(TILT)),
+    ]
     fields = FLUX_DENSITY * np.stack(around, axis=1)
     positions = np.stack(
-        [at_rest(remanent_magnetization=magnetization, applied_flux_density=field).positions for field in fields]
+        [
+            at_rest(remanent_magnetization=magnetization, applied_flux_density=field).positions
+            for field in fields
+        ]
     )
     return {
         "fields": fields,
@@ -121,7 +133,7 @@ def chord_angles(mesh: ms.TriangleMesh, positions: np.ndarray) -> np.ndarray:
 def tip_angles(mesh: ms.TriangleMesh, positions: np.ndarray) -> np.ndarray:
     """By how much the faces at the tips have turned from the horizontal, (6,), rad."""
     faces = [np.flatnonzero((mesh.faces == tip).any(axis=1))[0] for tip in tips(mesh)]
-    a, b, c = np.moveaxis(np.asarray(positions)[mesh.faces[faces]], 1, 0)
+    a, b, c = np.moveaxis(positions[mesh.faces[faces]], 1, 0)
     normal = np.cross(b - a, c - a)
     return np.arctan2(np.hypot(normal[:, 0], normal[:, 1]), normal[:, 2])
 
@@ -132,6 +144,7 @@ def plot(result: dict):
 
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
     draw_objective(left, result["runs"], against="iteration")
+    left.set_ylabel("objective (mean square distance)")
     draw_objective(middle, result["runs"], against="seconds")
     draw_profile(right, result)
     for axes, letter in ((left, "a"), (middle, "b"), (right, "c")):

@@ -86,20 +86,24 @@ def design(edges_per_side: int, n_vertices: int) -> Design:
 def from_beam_theory(mesh: ms.TriangleMesh) -> torch.Tensor:
     """Variables (n_f, 3) whose magnetization would roll the arms if they were beams on a rigid hexagon.
 
-    An arm of width w(s) with its magnetization M turned against its axis, rolled to the curvature k in a vertical field
-    B, is in equilibrium if (Y h^3 / 12) k w' = - M h B cos(k s) w. The width falls linearly to the tip, so
+    An arm of width w(s), magnetized by M inwards along its axis and rolled to the curvature k, is in equilibrium in a
+    vertical field B if D k w' = - M h B cos(k s) w. D is a plate's stiffness Y h^3 / (12 (1 - nu^2)), for a rolled arm
+    has no curvature across. Its width falls linearly to the tip, so
 
-        M(s) = Y h^2 k / (12 B (l - s) cos(k s)).
+        M(s) = Y h^2 k / (12 (1 - nu^2) B (l - s) cos(k s)).
 
     That is infinite at the tip, also because no torque turns a tip any more that points along the field: it is cut off
     below the cap. The hexagon gets none.
     """
     _, s = arm_coordinates(mesh.face_barycenters)
     curvature = ROLL / ARM_LENGTH
-    moment = YOUNG_MODULUS * THICKNESS**2 * curvature / (12.0 * FLUX_DENSITY)
-    shares = np.minimum(moment / (CAP * (ARM_LENGTH - s) * np.cos(curvature * s)), 0.9)
+    stiffness = YOUNG_MODULUS * THICKNESS**3 / (12.0 * (1.0 - POISSON_RATIO**2))
+    strength = stiffness * curvature / (THICKNESS * FLUX_DENSITY)  # A
+    shares = np.minimum(strength / (CAP * (ARM_LENGTH - s) * np.cos(curvature * s)), 0.9)
     variables = np.zeros((mesh.n_faces, 3))
-    variables[:, 0] = np.where(s > 0.0, -shares / np.sqrt(1.0 - shares**2), 0.0)  # the inverse of ms.parametrize.capped
+    variables[:, 0] = np.where(
+        s > 0.0, -shares / np.sqrt(1.0 - shares**2), 0.0
+    )  # the inverse of ms.parametrize.capped
     return torch.from_numpy(variables)
 
 
@@ -116,4 +120,5 @@ def _brush(mesh: ms.TriangleMesh) -> torch.Tensor:
     near = centers.sparse_distance_matrix(centers, BRUSH, output_type="coo_matrix")
     weights = (1.0 - near.data / BRUSH) * mesh.face_areas[near.col]
     weights /= np.bincount(near.row, weights)[near.row]
-    return torch.sparse_coo_tensor(np.stack([near.row, near.col]), weights, near.shape).coalesce()
+    places = np.stack([near.row, near.col])
+    return torch.sparse_coo_tensor(places, weights, near.shape, check_invariants=True).coalesce()

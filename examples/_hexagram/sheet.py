@@ -90,6 +90,7 @@ def _at(mesh: ms.TriangleMesh, radius: float, angles: np.ndarray) -> np.ndarray:
 
 def _corners() -> tuple[np.ndarray, np.ndarray]:
     """The tips and the corners of the hexagon, (6, 2) each; corner k comes after tip k."""
+
     def ring(radius, angles):
         return radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
@@ -99,13 +100,15 @@ def _corners() -> tuple[np.ndarray, np.ndarray]:
 def _outline(edges_per_side: int) -> np.ndarray:
     tip, corner = _corners()
     corners = np.stack([tip, corner], axis=1).reshape(12, 2)
-    return np.concatenate([_divided(*ends, edges_per_side) for ends in zip(corners, np.roll(corners, -1, 0))])
+    return np.concatenate(
+        [_divided(*ends, edges_per_side) for ends in zip(corners, np.roll(corners, -1, 0), strict=True)]
+    )
 
 
 def _kept(edges_per_side: int) -> np.ndarray:
     """The vertices along the roots, without their ends, and the centre."""
     _, corner = _corners()
-    roots = [_divided(*ends, edges_per_side)[1:] for ends in zip(corner, np.roll(corner, -1, 0))]
+    roots = [_divided(*ends, edges_per_side)[1:] for ends in zip(corner, np.roll(corner, -1, 0), strict=True)]
     return np.concatenate([*roots, np.zeros((1, 2))])
 
 
