@@ -1,25 +1,29 @@
 """A six-armed star that curls its arms down in a field and up in the reversed one: [Chen22] Figures 3b and 4.
 
-The star is two overlapping triangles, 1 mm thick, of 2048 faces. One remanent magnetization is sought, a vector a
-face, with which its arms roll down by 90 degrees in a vertical field of +10 mT and up in -10 mT, while the hexagon in
-their middle stays flat. The targets are the isometric shapes (`_hexagram/sheet.py`), the cap on |M_r| is 40 kA/m, and
-MMA runs for 50 iterations as in the paper; the objective is the mean square distance from the targets, by mass.
+The star is two overlapping triangles, 1 mm thick, of 2048 faces. One remanent magnetization is sought, a
+vector a face, with which its arms roll down by 90 degrees in a vertical field of +10 mT and up in -10 mT,
+while the hexagon in their middle stays flat. The targets are the isometric shapes (`_hexagram/sheet.py`), the
+cap on |M_r| is 40 kA/m, and MMA runs for 50 iterations as in the paper; the objective is the mean square
+distance from the targets, by mass.
 
 What comes out:
 
-- Magnetization that points inwards in the arms, ever stronger to the tips, and outwards in the hexagon, where it holds
-  against the arms' moment: the pattern of Kim et al. (2018) and of the paper.
-- It lies in the sheet. For such a magnetization a reflection of z turns an equilibrium in +B into one in -B, so one
-  field for both targets asks for nothing that contradicts itself. Nothing forbids a normal component; none arises.
-- Tips do not turn all the way: no torque acts on a tip that already points along the field, and what would have to
-  turn it before, a magnetization that grows without limit, is capped.
+- Magnetization that points inwards in the arms, ever stronger to the tips, and outwards in the hexagon, where
+  it holds against the arms' moment.
+- It lies in the sheet. For such a magnetization a reflection of z turns an equilibrium in +B into one in -B,
+  so one field for both targets asks for nothing that contradicts itself. Nothing forbids a normal component;
+  none arises.
+- Tips do not turn all the way: no torque acts on a tip that already points along the field, and what would
+  have to turn it before, a magnetization that grows without limit, is capped.
 - From no magnetization at all MMA gets down more slowly than from the one that beam theory proposes.
-- In a field that goes round a cone the arms shake; a turn ends where it began. The feet, which take the field's torque
-  on the sheet as a whole, stand under every second corner: arms on either side of a foot go down together.
+- In a field that goes round a cone the arms shake; a turn ends where it began. The feet, which take the
+  field's torque on the sheet as a whole, stand under every second corner: the two arms between two feet
+  go down together.
 
-Beside Table 1 of the paper (50 iterations, 16000 s on six cores, residual 6.7e-2): faces, vertices, variables, material
-and iterations are the same. The star's size, its targets and the field's strength are not printed there, nor the unit
-of the residual, a sum of |x - x*|^2 over vertices: that number cannot be compared, and theirs is another computer.
+Beside Table 1 of the paper (50 iterations, 16000 s on six cores, residual 6.7e-2): faces, vertices,
+variables, material and iterations are the same. The star's size, its targets and the field's strength are not
+printed there, nor the unit of the residual, a sum of |x - x*|^2 over vertices: that number cannot be
+compared, and theirs is another computer.
 
 Run it: prints a summary and writes pictures into out/.
 """
@@ -73,7 +77,7 @@ def main(edges_per_side=12, n_vertices=1097, iterations=50) -> dict:
 
 
 def optimized(star: Design, start: torch.Tensor, iterations: int) -> dict:
-    """MMA's run from these variables: its history, magnetization, equilibria, and the seconds spent on these."""
+    """MMA's run from these variables: history, magnetization, equilibria, and what these took."""
     at_rest, seconds = ms.WarmStart(star.scene), []
 
     def objective(variables):
@@ -102,7 +106,7 @@ def optimized(star: Design, start: torch.Tensor, iterations: int) -> dict:
 
 
 def shaken(star: Design, magnetization: np.ndarray, start: ms.Equilibrium) -> dict:
-    """Equilibria in a field on a cone about the vertical, step by step round it: fields, positions, tips' heights."""
+    """Equilibria in a field that goes round a cone about the vertical: fields, positions, tips' heights."""
     at_rest = ms.WarmStart(star.scene, start=start)
     around = [
         np.sin(TILT) * np.cos(AZIMUTHS),
@@ -154,7 +158,7 @@ def plot(result: dict):
 
 
 def pictures(result: dict) -> dict[str, ms.Picture]:
-    """Figure 3b, the magnetization from above; Figure 4, (a) relaxed, (b) down, (c) up, (d) shaking; and a turn."""
+    """Of Figure 3b the magnetization; of Figure 4 relaxed, down, up and shaking; the shaking in six steps."""
     mesh, magnetization, shaking = result["design"].mesh, result["magnetization"], result["shaking"]
     down, up = result["positions"]
     chosen = [0, 2, 4, 6, 8, 10]

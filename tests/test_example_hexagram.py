@@ -40,7 +40,7 @@ def test_mesh_that_cannot_be_had_is_refused() -> None:
 
 @pytest.mark.parametrize("degrees", [-90.0, 0.0, 90.0, 200.0])
 def test_rolling_is_an_isometry(degrees) -> None:
-    """The metric of the rolled sheet, from differences of the formula at points off the roots, is the flat one."""
+    """The metric of the rolled sheet, from differences of the formula off the roots, is the flat one."""
     mesh, step = sheet.hexagram(6, 280), 1e-7
     centers = mesh.face_barycenters
     columns = [

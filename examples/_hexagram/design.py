@@ -1,4 +1,4 @@
-"""The design problem: the sheet in its field, the magnetizations to choose from, and what is wanted of them."""
+"""The design problem: the sheet in its field, the magnetizations to choose from, and what is wanted."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ FIELDS = np.array([(0.0, 0.0, FLUX_DENSITY), (0.0, 0.0, -FLUX_DENSITY)])  # T, t
 
 @dataclass(frozen=True)
 class Design:
-    """The scene; targets (2, n_v, 3) m; shares of the mass (n_v,); frames (n_f, 3, 3) of arm axis, root and normal;
-    and the brush, an averaging matrix (n_f, n_f)."""
+    """The scene; targets (2, n_v, 3) m; shares of the mass (n_v,); frames (n_f, 3, 3) of arm axis, root and
+    normal; and the brush, an averaging matrix (n_f, n_f)."""
 
     scene: ms.Scene
     targets: torch.Tensor
@@ -38,10 +38,10 @@ class Design:
         return self.scene.mesh
 
     def remanent_magnetization(self, variables: torch.Tensor) -> torch.Tensor:
-        """(n_f, 3) A/m, below the cap, of any variables (n_f, 3): outwards along the arm, along its root, and up.
+        """(n_f, 3) A/m, below the cap, of variables (n_f, 3): outwards along the arm, along its root, up.
 
-        MMA treats every variable by itself, so what it does depends on the axes: in these the six arms are alike.
-        The brush, a cone filter [Bourdin 2001], leaves no features finer than itself.
+        MMA treats every variable by itself, so what it does depends on the axes: in these the six arms are
+        alike. The brush, a cone filter (Bourdin 2001), leaves no features finer than itself.
         """
         vectors = torch.einsum("fk,fki->fi", variables, self.frames)
         return CAP * ms.parametrize.capped(self.brush @ vectors, 1.0)
@@ -52,16 +52,17 @@ class Design:
         return sum(ms.objectives.shape_matching(x, target, weights=weights) for x, target in cases)
 
     def objective(self, rest: ms.Equilibria) -> torch.Tensor:
-        """The mean square, by mass, of the distance from the targets in arm lengths, added up over the two cases."""
+        """Mean square distance from the targets, by mass, in squares of the arm length; the sum of both cases."""
         return self.misses(rest.positions, self.mass_shares) / ARM_LENGTH**2
 
 
 def design(edges_per_side: int, n_vertices: int) -> Design:
     """The sheet without gravity, held as far as a free body has to be, and no further.
 
-    The centre cannot move sideways, a corner of the hexagon cannot move round it, and every second corner keeps its
-    height: six conditions for six rigid motions. The reactions are those that balance the field's torque on the whole
-    sheet. Heights stay zero under a reflection of z, so the supports do not tell up from down.
+    The centre cannot move sideways, a corner of the hexagon cannot move round it, and every second corner
+    keeps its height: six conditions for six rigid motions. The reactions are those that balance the field's
+    torque on the whole sheet. Heights stay zero under a reflection of z, so the supports do not tell up from
+    down.
     """
     mesh = hexagram(edges_per_side, n_vertices)
     sheet = ms.Shell(
@@ -86,14 +87,14 @@ def design(edges_per_side: int, n_vertices: int) -> Design:
 def from_beam_theory(mesh: ms.TriangleMesh) -> torch.Tensor:
     """Variables (n_f, 3) whose magnetization would roll the arms if they were beams on a rigid hexagon.
 
-    An arm of width w(s), magnetized by M inwards along its axis and rolled to the curvature k, is in equilibrium in a
-    vertical field B if D k w' = - M h B cos(k s) w. D is a plate's stiffness Y h^3 / (12 (1 - nu^2)), for a rolled arm
-    has no curvature across. Its width falls linearly to the tip, so
+    An arm of width w(s), magnetized by M inwards along its axis and rolled to the curvature k, is in
+    equilibrium in a vertical field B if D k w' = - M h B cos(k s) w. The stiffness D is a plate's, for a
+    rolled arm has no curvature across. The width falls linearly to the tip, so
 
         M(s) = Y h^2 k / (12 (1 - nu^2) B (l - s) cos(k s)).
 
-    That is infinite at the tip, also because no torque turns a tip any more that points along the field: it is cut off
-    below the cap. The hexagon gets none.
+    That is infinite at the tip, also because no torque turns a tip any more that points along the field: it
+    is cut off below the cap. The hexagon gets none.
     """
     _, s = arm_coordinates(mesh.face_barycenters)
     curvature = ROLL / ARM_LENGTH
@@ -115,7 +116,7 @@ def _frames(mesh: ms.TriangleMesh) -> np.ndarray:
 
 
 def _brush(mesh: ms.TriangleMesh) -> torch.Tensor:
-    """Means over the faces around each, weighted by their areas and by a cone that falls to zero at the radius."""
+    """Means over the faces around each, weighted by areas and by a cone that is zero at the radius."""
     centers = cKDTree(mesh.face_barycenters)
     near = centers.sparse_distance_matrix(centers, BRUSH, output_type="coo_matrix")
     weights = (1.0 - near.data / BRUSH) * mesh.face_areas[near.col]

@@ -23,7 +23,7 @@ def draw_objective(axes, runs: dict, against: str) -> None:
 
 
 def draw_profile(axes, result: dict) -> None:
-    """Every face's magnetization along its arm's axis, against the distance from the root; beam theory's beside it."""
+    """Every face's magnetization along its arm, against the distance from the root, beside beam theory's."""
     star = result["design"]
     _, s = arm_coordinates(star.mesh.face_barycenters)
     along = 1e-3 * np.einsum("fi,fi->f", result["magnetization"], star.frames[:, 0].numpy())
@@ -46,7 +46,7 @@ def summary(result: dict) -> str:
     turned = ", ".join(f"{np.degrees(angle):.1f}" for angle in tip["reached"])
     heights = 1e3 * result["shaking"]["heights"]
     lines = [
-        f"Hexagram: {star.mesh.n_faces} faces, {star.mesh.n_vertices} vertices, {3 * star.mesh.n_faces} variables, "
+        f"{star.mesh.n_faces} faces, {star.mesh.n_vertices} vertices, {3 * star.mesh.n_faces} variables, "
         f"{1e3 * FLUX_DENSITY:g} mT up and down",
         "",
         "objective            start        end   iterations   s an iteration   of it equilibria",
@@ -70,9 +70,9 @@ def summary(result: dict) -> str:
         f"Shaking: tips go between {heights.min():.1f} and {heights.max():.1f} mm; a turn closes to "
         f"{result['shaking']['not_closed']:.1e} arm lengths.",
         "",
-        "[Chen22] Table 1, hexagram: 2048 faces, 1097 vertices, 6 k variables, Y = 1e5 Pa, nu = 0.5; 50 iterations in",
-        f"16000 s, 320 s each, on six cores. Here {star.mesh.n_faces} faces and {history[-1].iteration} iterations took "
+        "[Chen22] Table 1: 2048 faces, 1097 vertices, 6 k variables, Y = 1e5 Pa, nu = 0.5; 50 iterations in 16000 s,",
+        f"320 s each, on six cores. Here {star.mesh.n_faces} faces and {history[-1].iteration} iterations took "
         f"{history[-1].seconds:.0f} s. Their residual, 6.7e-2,",
-        "cannot be compared: its unit, the star's size, the targets and the field are not printed, nor the start.",
+        "cannot be compared: its unit, the star's size, the targets, the field and the start are not printed.",
     ]
     return "\n".join(lines)

@@ -19,9 +19,10 @@ _CLEARANCE = 0.6  # of an edge of the outline: no vertex closer to outline or ro
 def hexagram(edges_per_side: int, n_vertices: int) -> ms.TriangleMesh:
     """The sheet in the plane z = 0, its centre at the origin, its arms' roots along edges of the mesh.
 
-    Each of the outline's 12 sides has `edges_per_side` edges. By Euler's formula a triangulation of n_v vertices,
-    n_b of them on the outline, has 2 n_v - 2 - n_b faces: 1097 vertices and 12 edges a side give the 2048 faces of
-    [Chen22] Table 1. (2048 is no multiple of 3: no mesh of so many faces has the star's sixfold symmetry.)
+    Each of the outline's 12 sides has `edges_per_side` edges. By Euler's formula a triangulation of n_v
+    vertices, n_b of them on the outline, has 2 n_v - 2 - n_b faces: 1097 vertices and 12 edges a side give
+    the 2048 faces of [Chen22] Table 1. (2048 is 3 x 682 + 2: no mesh of so many faces has the threefold
+    symmetry of the star.)
     """
     outline, kept = _outline(edges_per_side), _kept(edges_per_side)
     fixed = np.concatenate([outline, kept])
@@ -37,13 +38,13 @@ def hexagram(edges_per_side: int, n_vertices: int) -> ms.TriangleMesh:
 def rolled(rest_positions: np.ndarray, angle: float) -> np.ndarray:
     """The sheet with every arm rolled isometrically about its root, the hexagon flat: positions (n_v, 3), m.
 
-    An arm becomes a piece of a circular cylinder whose axis is parallel to its root. With s the distance of a point
-    from the root at rest, and the curvature k = angle / ARM_LENGTH constant up to the tip,
+    An arm becomes a piece of a circular cylinder whose axis is parallel to its root. With s the distance of a
+    point from the root at rest, and the curvature k = angle / ARM_LENGTH constant up to the tip,
 
         s -> sin(k s) / k outwards and -(1 - cos(k s)) / k upwards,
 
-    while its coordinate along the root stays. Lengths and angles do too, and the tangent is continuous at the root.
-    angle: rad, by which the tip has turned: positive downwards.
+    while its coordinate along the root stays. Lengths and angles do too, and the tangent is continuous at the
+    root. angle: rad, by which the tip has turned: positive downwards.
     """
     curvature = angle / ARM_LENGTH
     positions = np.array(rest_positions)
@@ -61,7 +62,7 @@ def rolled(rest_positions: np.ndarray, angle: float) -> np.ndarray:
 
 
 def arm_coordinates(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The arm (0 to 5) nearest each point (n, 3), and the distance s [m] outwards from its root, negative inside."""
+    """The arm (0 to 5) nearest each point (n, 3), and the distance s [m] outwards from its root."""
     outwards = np.column_stack([np.cos(ARM_ANGLES), np.sin(ARM_ANGLES)])
     distances = points[:, :2] @ outwards.T - ROOT_DISTANCE
     arm = distances.argmax(axis=1)
@@ -118,7 +119,7 @@ def _divided(start: np.ndarray, end: np.ndarray, parts: int) -> np.ndarray:
 
 
 def _filling(fixed: np.ndarray, count: int, edge: float) -> np.ndarray:
-    """So many points of a triangular lattice, clear of the fixed points: the finest lattice's that just has them."""
+    """So many points of a triangular lattice as coarse as can be, clear of the fixed points."""
     rows, columns = np.meshgrid(np.arange(-200, 200), np.arange(-200, 200), indexing="ij")
     lattice = np.column_stack([(columns + 0.5 * rows).ravel() + 0.25, np.sqrt(0.75) * (rows.ravel() + 0.25)])
     spacing = 1.1 * edge
