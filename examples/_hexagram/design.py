@@ -52,7 +52,7 @@ class Design:
         return sum(ms.objectives.shape_matching(x, target, weights=weights) for x, target in cases)
 
     def objective(self, rest: ms.Equilibria) -> torch.Tensor:
-        """Mean square distance from the targets, by mass, in squares of the arm length; the sum of both cases."""
+        """Mean square distance from the targets, by mass, in squares of the arm length; both cases' sum."""
         return self.misses(rest.positions, self.mass_shares) / ARM_LENGTH**2
 
 
