@@ -1,0 +1,1 @@
+"""What examples/hexagram.py is made of: the sheet and its wanted shape, the design problem, the report."""
