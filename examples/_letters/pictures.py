@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 import magshell as ms
 
 from .designs import MODULI, VARIANTS, Design
-from .paper import ITERATIONS, TIME
+from .paper import ITERATIONS, RESIDUAL, TIME
 from .relief import bare, draw_relief
 from .task import LARGEST_MAGNETIZATION, RELIEF
 
@@ -110,7 +110,7 @@ def draw_convergence(axes, result: dict) -> None:
     by_time.text(
         0.75 * TIME,
         0.97,
-        f"[Chen22]\n{ITERATIONS} iterations\nin {TIME:,.0f} s,\nother units",
+        f"[Chen22]\n{ITERATIONS} iterations\nin {TIME:,.0f} s;\nresidual {RESIDUAL},\nunit not stated",
         ha="right",
         va="top",
         fontsize=9,

@@ -32,8 +32,9 @@ def summary(result: dict) -> str:
         "",
         f"[Chen22] Table 1, Letters: 8192 faces, {ITERATIONS} iterations, {TIME:,.0f} s on six cores, "
         f"{paper:.0f} s/iteration; residual {RESIDUAL}.",
-        f"Comparable are the faces, the material, the kind of supports, the method and the iterations: here one takes "
-        f"{paper / max(seconds):,.0f} to {paper / min(seconds):,.0f} times less, on {ms.num_threads()} cores of another machine.",
+        "Comparable are the faces, the material, the kind of supports, the method and the iterations: here one takes "
+        f"{paper / max(seconds):,.0f} to {paper / min(seconds):,.0f} times less, on {ms.num_threads()} cores "
+        "of another machine.",
         "Its 9.0 k variables are fewer than three a face; how faces share them is not said.",
         "Its residual is a sum of squared distances as well, but in a unit, at a size and for a height that are not "
         "stated: it is not comparable.",
