@@ -5,7 +5,7 @@ sheet as in `letters.py`, with magnetization, Young's modulus and the edges' cur
 become one sheet of 800 x 100 mm and 65536 faces, held at the points where each square was. Its field is raised from zero
 to 50 mT, with no knowledge of the letters' own equilibria.
 
-What comes out: every letter in the banner is as good as alone, and no vertex is more than 0.05 mm from where it was.
+What comes out: every letter in the banner is as good as alone, and no vertex is more than 0.06 mm from where it was.
 Where two squares join, their edges now bend together and pull at each other; but between letters the sheet is stiff and
 flat, so that next to nothing of it reaches them.
 
