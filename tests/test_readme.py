@@ -10,10 +10,12 @@ README = Path(__file__).parents[1] / "README.md"
 
 def test_quick_start(tmp_path, monkeypatch) -> None:
     section = README.read_text().split("## Quick start")[1].split("\n## ")[0]
-    code = re.search(r"```python\n(.*?)```", section, re.DOTALL)[1]
     monkeypatch.chdir(tmp_path)
     names: dict = {}
-    exec(code, names)
-    promised = float(re.search(r"has risen: ([\d.]+) m", code)[1])
-    assert names["rest"].positions[:, 2].max() == pytest.approx(promised, abs=5e-5)
+    for code in re.findall(r"```python\n(.*?)```", section, re.DOTALL):
+        exec(code, names)
+    risen, distance = (float(re.search(rf"{words} ([\d.]+) m", section)[1]) for words in ("has risen:", "rms:"))
+    assert names["rest"].positions[:, 2].max() == pytest.approx(risen, abs=5e-5)
+    assert names["best"].objective ** 0.5 == pytest.approx(distance, abs=0.05)  # mm
+    assert names["move"].steps_done == 200
     assert (tmp_path / "strip.png").stat().st_size > 10_000
