@@ -77,7 +77,8 @@ def to_first_order(sheet: Kirigami, magnetization: np.ndarray, start=None) -> fl
     """By how much the best magnetization within the limit would raise the centre if its height were linear [m]."""
     values = torch.from_numpy(magnetization).requires_grad_()
     sheet.height(solve(sheet, values, start=start).positions).backward()
-    return float((LIMIT * values.grad.norm(dim=1) - (values.grad * values).sum(1)).sum())
+    gradient = values.grad.numpy()
+    return float((LIMIT * np.linalg.norm(gradient, axis=1) - (gradient * magnetization).sum(axis=1)).sum())
 
 
 def finer(sheet: Kirigami, magnetization: np.ndarray) -> dict:

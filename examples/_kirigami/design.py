@@ -73,12 +73,12 @@ class Search:
         design.requires_grad_()
         optimizer = self.optimizer([design], lower=-FARTHEST, upper=FARTHEST, **self.options)
         found = ms.minimize(tower, [design], optimizer, max_iterations=iterations, progress=False)
-        positions = np.array(tower.tallest.positions.detach())
+        positions = tower.tallest.positions.detach().numpy().copy()
         return {
             "name": self.name,
             "height": float(sheet.height(positions)),
             "positions": positions,
-            "remanent_magnetization": np.array(tower.tallest.remanent_magnetization.detach()),
+            "remanent_magnetization": tower.tallest.remanent_magnetization.detach().numpy().copy(),
             "seconds": np.array([record.seconds for record in found.history]),
             "heights": np.array([-record.objective for record in found.history]),
             "iterations": found.iterations,
