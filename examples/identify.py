@@ -9,16 +9,20 @@ Unknown are log Y at nodes 5 mm apart and the three components of M in each stri
 square misfit, in units of the noise, plus a price on the total variation of log Y. The price is lowered until the
 misfit is what the noise alone would leave, 1, and no further (the discrepancy principle).
 
-The numbers that come out are in `summary`. What they teach:
+What comes out: log10 Y to 0.10 on average (27 % of Y, half of the faces within 13 %) and M to 9 %; from exact data
+to 0.04, 6 % and 4 %, which the coarser mesh and the bilinear modulus leave. Data from the same mesh, the inverse
+crime, look no better: at this noise the noise decides. What it teaches:
 
 - Without its weight the sheet would tell Y and M only up to a common factor: twice of both leaves every vertex where
-  it is. Gravity, with a known density, is the known load that sets the scale.
+  it is, to 1e-13 mm. Gravity, with a known density, is the known load that sets the scale, to 0.02 %.
 - In-plane magnetization is felt through its poles, the jumps of its normal component: a sheet that hardly stretches
-  does not notice what has none. Five strips tell their M to a few kA/m; squares, with the same data, do not.
-- What noise leaves open is not the same everywhere: where a sheet hardly bends, at its free end, it tells little of
-  its stiffness.
-- Half of the work is in the variables. Those of equal effect on the data (`whitened`) take tens of iterations; face
-  by face, hundreds were not enough.
+  does not notice what has none. Five strips tell their M to a few kA/m; fifteen squares, with the same data, leave
+  one of their components open by 66 kA/m, though Y be known.
+- The noise leaves log10 Y at a node open by 0.9 if nothing else is known: the price of variation is knowledge too,
+  and it flattens the inclusion. The error bars, which are without it, are not to be trusted where it decides.
+- Half of the work is in the variables. In those of about equal effect on the data (`whitened`) L-BFGS takes tens of
+  iterations; in the modulus of every face, 800 were not enough. MMA, which takes each variable by itself, is slower
+  and stops higher.
 
 Run it: prints a summary and writes pictures into out/.
 """

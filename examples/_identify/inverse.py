@@ -24,6 +24,7 @@ class Problem:
         self.sheet, self.noise, self.nodes = sheet, noise, nodes
         self.positions = torch.from_numpy(positions)
         self.n_nodes = nodes[0] * nodes[1]
+        self._barycenters = torch.tensor(sheet.mesh.face_barycenters)
         self._warm = ms.WarmStart(sheet.scene)
 
     def guess(self, young_modulus: float = GUESS) -> torch.Tensor:
@@ -33,7 +34,7 @@ class Problem:
     def decades(self, p: torch.Tensor) -> torch.Tensor:
         """(n_f,) log10 of Young's modulus in Pa."""
         image = p[: self.n_nodes].reshape(self.nodes[1], self.nodes[0])
-        return ms.objectives.bilinear(image, self.sheet.mesh.face_barycenters, (0.0, LENGTH, 0.0, WIDTH))
+        return ms.objectives.bilinear(image, self._barycenters, (0.0, LENGTH, 0.0, WIDTH))
 
     def magnetization(self, p: torch.Tensor) -> torch.Tensor:
         """(n_regions, 3) A/m."""
@@ -103,4 +104,4 @@ def lbfgs(parameters):
 
 
 def mma(parameters):
-    return ms.optim.MMA(parameters, scale=1.0)
+    return ms.optim.MMA(parameters, scale=0.05)

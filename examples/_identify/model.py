@@ -10,7 +10,9 @@ import magshell as ms
 
 LENGTH, WIDTH, THICKNESS = 50e-3, 30e-3, 1e-3  # m
 MASS_DENSITY, GRAVITY = 1e3, (0.0, 0.0, -9.81)  # kg/m3, m/s2
-FIELDS = 20e-3 * np.array([(0, 0, 1), (1, 0, 0), (0, 1, 0), (0, 0, 0)])  # T: three load cases, and one without
+FIELDS = 20e-3 * np.array(
+    [(0, 0, 1), (1, 0, 0), (0, 1, 0), (0, 0, 0)]
+)  # T: three load cases, and one without
 NOISE = 0.1e-3  # m, standard deviation of each measured coordinate
 STRIPS = (5, 1)  # of equal magnetization: how many along and across
 INCLUSION, EDGE = ((18e-3, 16e-3), 8e-3), 1.5e-3  # its centre and radius, and how sharp it is, m

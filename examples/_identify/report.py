@@ -70,6 +70,7 @@ def draw_magnetization(axes, result: dict) -> None:
             places, 1e-3 * found[:, k], deviation, fmt="o", ms=4, color=color, capsize=2, label=name
         )
     axes.axhline(0.0, color=GREY, lw=0.8)
+    axes.text(0.02, 0.02, "bars: true; points: found", color=GREY, transform=axes.transAxes)
     axes.set(xlabel="strip, from the clamp", ylabel="magnetization [kA/m]", xticks=strips)
     axes.legend(frameon=False, ncols=3, loc="upper center", bbox_to_anchor=(0.5, 1.12))
 
