@@ -41,7 +41,11 @@ def solve(sheet: Kirigami, magnetization, share: float = 1.0, **options) -> ms.E
     """At rest in a share of the field."""
     field = share * np.array(FIELD)
     return ms.equilibrium(
-        sheet.scene, remanent_magnetization=magnetization, applied_flux_density=field, **options
+        sheet.scene,
+        remanent_magnetization=magnetization,
+        applied_flux_density=field,
+        solver=ms.Newton(),
+        **options,
     )
 
 

@@ -64,7 +64,7 @@ def draw_convergence(axes, searches: list[dict]) -> None:
     axes.axhline(0.0, color=GREY, lw=0.8)
     axes.text(0.98, 0.0, "floor", color=GREY, va="bottom", ha="right", transform=axes.get_yaxis_transform())
     axes.set(xscale="log", xlabel="time [s]", ylabel="height of the centre [mm]")
-    axes.legend(frameon=False, loc="center right", bbox_to_anchor=(1.0, 0.42))
+    axes.legend(frameon=False, loc="center right", bbox_to_anchor=(1.0, 0.5))
 
 
 def draw_switching(axes, found: dict, switched: dict) -> None:
@@ -87,7 +87,8 @@ def summary(result: dict) -> str:
     """What a person would ask first."""
     best, check = result["tower"], result["checks"]
     rows = [
-        f"  {found['name']:<24}{1e3 * found['height']:8.2f}{found['height'] / RADIUS:8.3f}{found['iterations']:12d}"
+        f"  {found['name']:<24}{1e3 * found['height']:8.2f}{found['height'] / RADIUS:9.3f}"
+        f"{1e3 * found['rises_to']:10.2f}{found['iterations']:12d}"
         f"{found['evaluations']:13d}{found['seconds'][-1]:9.2f}{found['seconds'][-1] / found['iterations']:11.3f}"
         for found in result["searches"]
     ]
@@ -97,7 +98,7 @@ def summary(result: dict) -> str:
         (
             f"Kirigami tower, {result['faces']} faces, {result['vertices']} vertices, radius {1e3 * RADIUS:.0f} mm,"
             f" B = {1e3 * FIELD[2]:.0f} mT, |M_r| at most {1e-3 * LIMIT:.0f} kA/m",
-            "  search                    [mm]  /radius  iterations  evaluations  time [s]  s/iteration",
+            "  search                    [mm]  /radius  rises to  iterations  evaluations  time [s]  s/iteration",
             *rows,
             f"  [Chen22] Table 1: {PAPER['iterations']} iterations in {PAPER['seconds']:.0f} s on six cores, "
             f"{PAPER['seconds'] / PAPER['iterations']:.1f} s each, objective {PAPER['objective']} in a unit not given,",
