@@ -9,7 +9,7 @@ Unknown are log Y at nodes 5 mm apart and the three components of M in each stri
 square misfit, in units of the noise, plus a price on the total variation of log Y. The price is lowered until the
 misfit is what the noise alone would leave, 1, and no further (the discrepancy principle).
 
-What comes out: log10 Y to 0.10 on average (27 % of Y, half of the faces within 13 %) and M to 9 %; from exact data
+What comes out: log10 Y to 0.10 on average (28 % of Y, half of the faces within 12 %) and M to 8 %; from exact data
 to 0.04, 6 % and 4 %, which the coarser mesh and the bilinear modulus leave. Data from the same mesh, the inverse
 crime, look no better: at this noise the noise decides. What it teaches:
 
@@ -21,8 +21,8 @@ crime, look no better: at this noise the noise decides. What it teaches:
 - The noise leaves log10 Y at a node open by 0.9 if nothing else is known: the price of variation is knowledge too,
   and it flattens the inclusion. The error bars, which are without it, are not to be trusted where it decides.
 - Half of the work is in the variables. In those of about equal effect on the data (`whitened`) L-BFGS takes tens of
-  iterations; in the modulus of every face, 800 were not enough. MMA, which takes each variable by itself, is slower
-  and stops higher.
+  iterations; in the modulus of every face, 800 were not enough. MMA, which takes each variable by itself, needs
+  four times as many to come as low.
 
 Run it: prints a summary and writes pictures into out/.
 """

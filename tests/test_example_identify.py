@@ -8,7 +8,7 @@ from test_examples import load
 @pytest.fixture(scope="module")
 def identified() -> dict:
     return load("identify").main(
-        cells=(20, 12), nodes=(6, 4), prices=(1.0, 0.1, 0.03), iterations=25, limits_on=(10, 6)
+        cells=(20, 12), nodes=(6, 4), prices=(1.0, 0.1, 0.03, 0.01), iterations=25, limits_on=(10, 6)
     )
 
 

@@ -14,6 +14,7 @@ UNIT = 50e3  # A/m, of the magnetization's parameters
 FLOOR = 1e-2  # of the curvature that counts as none
 SMOOTHING = 0.05  # decades: jumps between faces below it are priced by their squares, above it by their size
 STEPS = (0.02, 0.02)  # of decades and of UNIT, for differences
+ROUGH = ms.MixedNewton(tolerance=1e-5)  # one iteration from an equilibrium nearby: enough for a difference
 
 
 class Problem:
@@ -66,7 +67,7 @@ class Problem:
             step = STEPS[0] if k < self.n_nodes else STEPS[1]
             moved = p.clone()
             moved[k] += step
-            there = ms.equilibrium(self.sheet.scene, **self.design(moved), start=base)
+            there = ms.equilibrium(self.sheet.scene, **self.design(moved), start=base, solver=ROUGH)
             columns.append((there.positions - base.positions).numpy().ravel() / (step * self.noise))
         return np.stack(columns, axis=1)
 

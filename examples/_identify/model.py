@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -78,10 +79,15 @@ def measured(cells, noise: float, same_mesh: bool = False, seed: int = 7) -> np.
     What is seen is another sheet, of four times as many cells of four faces each: the inverse problem is not solved
     with the model that made its data, unless with `same_mesh`.
     """
+    exact = _exact(tuple(cells), same_mesh)
+    return exact + noise * np.random.default_rng(seed).standard_normal(exact.shape)
+
+
+@cache
+def _exact(cells: tuple[int, int], same_mesh: bool) -> np.ndarray:
     seen = sheet(cells) if same_mesh else sheet((2 * cells[0], 2 * cells[1]), "crossed")
     rest = ms.equilibrium(
         seen.scene, remanent_magnetization=true_magnetization()[seen.regions], applied_flux_density=FIELDS
     )
     points = ms.meshes.rectangle(LENGTH, WIDTH, cells=cells).rest_positions
-    exact = rest.positions[:, [seen.mesh.nearest_vertex(point) for point in points]]
-    return exact + noise * np.random.default_rng(seed).standard_normal(exact.shape)
+    return rest.positions[:, [seen.mesh.nearest_vertex(point) for point in points]]
