@@ -10,8 +10,8 @@ square misfit, in units of the noise, plus a price on the total variation of log
 misfit is what the noise alone would leave, 1, and no further (the discrepancy principle).
 
 What comes out: log10 Y to 0.10 on average (28 % of Y, half of the faces within 12 %) and M to 8 %; from exact data
-to 0.04, 6 % and 4 %, which the coarser mesh and the bilinear modulus leave. Data from the same mesh, the inverse
-crime, look no better: at this noise the noise decides. What it teaches:
+to 0.04 (12 %, 6 %) and 4 %, which the coarser mesh, the bilinear modulus and the last price leave. Data from the same
+mesh, the inverse crime, do no better: at this noise the noise decides. What it teaches:
 
 - Without its weight the sheet would tell Y and M only up to a common factor: twice of both leaves every vertex where
   it is, to 1e-13 mm. Gravity, with a known density, is the known load that sets the scale, to 0.02 %.
@@ -21,8 +21,8 @@ crime, look no better: at this noise the noise decides. What it teaches:
 - The noise leaves log10 Y at a node open by 0.9 if nothing else is known: the price of variation is knowledge too,
   and it flattens the inclusion. The error bars, which are without it, are not to be trusted where it decides.
 - Half of the work is in the variables. In those of about equal effect on the data (`whitened`) L-BFGS takes tens of
-  iterations; in the modulus of every face, 800 were not enough. MMA, which takes each variable by itself, needs
-  four times as many to come as low.
+  iterations; in the modulus of every face, 800 were not enough. MMA, which takes each variable by itself, has come
+  to 0.996 after 40 iterations where L-BFGS is at 0.987 after 10.
 
 Run it: prints a summary and writes pictures into out/.
 """
