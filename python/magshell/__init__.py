@@ -27,7 +27,7 @@ from .mesh import TriangleMesh
 from .minimum import Minimum
 from .multistart import multistart
 from .path import CriticalPoint, Path, follow
-from .plotting import Picture, plot, write_page
+from .plotting import Picture, animate, plot, write_page
 from .sampling import random_starts
 from .scene import Scene
 from .shell import Shell
@@ -82,6 +82,7 @@ __all__ = [
     "WarmStart",
     "Weld",
     "__version__",
+    "animate",
     "control",
     "equilibrium",
     "follow",

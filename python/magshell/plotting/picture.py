@@ -61,7 +61,7 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
-        self.figure.savefig(buffer, format="png", dpi=DPI)
+        self.figure.savefig(buffer, format="png", dpi=self.figure.dpi)
         return buffer.getvalue()
 
     def __repr__(self) -> str:
@@ -69,7 +69,9 @@ class Picture:
         return f"Picture({width} x {height} pixels, painted by {self.backend})"
 
 
-def paint(drawing: Drawing, width: int, columns: int | None, backend: str) -> Picture:
+def paint(
+    drawing: Drawing, width: int, columns: int | None, backend: str, dpi: int = DPI, quick: bool = False
+) -> Picture:
     """The drawing, `width` pixels wide, in so many columns (None: those that fill the picture best)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -77,13 +79,13 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str) -> Pi
     count = len(drawing.panels)
     columns = columns or _best_columns(count, drawing.window)
     rows = -(-count // columns)
-    inches = width / DPI
+    inches = width / dpi
     window = _with_room(drawing, (inches - 2 * MARGIN) / columns)
     panel_width = (inches - 2 * MARGIN) / columns
     panel_height = panel_width * (window[3] - window[2]) / (window[1] - window[0])
     title = TITLE if any(panel.title for panel in drawing.panels) else 0.0
     height = rows * (panel_height + title) + LEGEND + 2 * MARGIN
-    figure = Figure(figsize=(inches, height), dpi=DPI, facecolor="white")
+    figure = Figure(figsize=(inches, height), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
 
     for number, panel in enumerate(drawing.panels):
@@ -91,20 +93,20 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str) -> Pi
         left = MARGIN + column * panel_width
         bottom = height - MARGIN - (row + 1) * (panel_height + title)
         axes = figure.add_axes((left / inches, bottom / height, panel_width / inches, panel_height / height))
-        _paint_panel(axes, panel, drawing, window, (panel_width, panel_height), backend)
+        paint_panel(axes, panel, drawing, window, backend, quick)
     strip = figure.add_axes((0.0, 0.0, 1.0, LEGEND / height))
     _legend(strip, drawing, inches, panel_width / (window[1] - window[0]))
     return Picture(figure, backend)
 
 
-def _paint_panel(
-    axes, panel: Panel, drawing: Drawing, window, inches: tuple[float, float], backend: str
-) -> None:
+def paint_panel(axes, panel: Panel, drawing: Drawing, window, backend: str, quick: bool = False) -> None:
+    """Into axes that have their place in the figure. quick: as a frame of a movie."""
     axes.set_axis_off()
     axes.set_xlim(window[0], window[1])
     axes.set_ylim(window[2], window[3])
     if backend == "pyvista":
-        vtk.paint(axes, panel, drawing.view, window, (round(DPI * inches[0]), round(DPI * inches[1])))
+        box = axes.get_window_extent()
+        vtk.paint(axes, panel, drawing.view, window, (round(box.width), round(box.height)), quick)
     else:
         polygons.paint(axes, panel, drawing.view)
     if panel.title:

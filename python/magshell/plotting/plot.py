@@ -10,6 +10,7 @@ from .colors import scalar_of
 from .glyphs import ARROWS
 from .panels import Options, draw, size_of
 from .picture import Picture, paint
+from .playing import spread
 from .states import State, states_of
 from .units import length_unit
 from .view import view_of
@@ -79,17 +80,22 @@ def plot(
     titles = checked_titles(titles, drawn)
     unit = length_unit(size_of(drawn))
     scalar = scalar_of(drawn, color, color_label, color_range, unit)
-    count = ARROWS if arrows is True else int(arrows)
-    if count < 0:
-        raise ValueError(f"arrows must be True, False or a count, got {arrows}")
     if width < 400 or (columns is not None and columns < 1):
         raise ValueError(
             f"width must be at least 400 pixels and columns at least 1, got {width} and {columns}"
         )
     groups = [drawn] if overlay or fade else [[state] for state in drawn]
-    options = Options(count, show_field, rest, mesh_lines, fade)
+    options = Options(arrow_count(arrows), show_field, rest, mesh_lines, fade)
     drawing = draw(groups, titles, scalar, view_of(drawn, view), unit, options)
     return paint(drawing, width, columns, painter)
+
+
+def arrow_count(arrows: bool | int) -> int:
+    """About how many arrows are on a sheet."""
+    count = ARROWS if arrows is True else int(arrows)
+    if count < 0:
+        raise ValueError(f"arrows must be True, False or a count, got {arrows}")
+    return count
 
 
 def checked_titles(titles, states: list[State]) -> list[str]:
@@ -105,8 +111,7 @@ def checked_titles(titles, states: list[State]) -> list[str]:
 def _chosen(states: list[State], chosen) -> list[State]:
     """The states of the given numbers; by default all, and of many some evenly spread ones."""
     if chosen is None:
-        some = np.round(np.linspace(0, len(states) - 1, min(len(states), MOST_STATES))).astype(np.int64)
-        return [states[k] for k in some]
+        return spread(states, MOST_STATES)
     numbers = np.atleast_1d(index_array("states", chosen))
     if not numbers.size or numbers.min() < -len(states) or numbers.max() >= len(states):
         raise ValueError(f"states must be numbers of the {len(states)} states, got {numbers.tolist()}")

@@ -14,16 +14,16 @@ from .view import View
 OVERSAMPLING = 2
 
 
-def paint(axes, panel: Panel, view: View, window: np.ndarray, pixels: tuple[int, int]) -> None:
+def paint(
+    axes, panel: Panel, view: View, window: np.ndarray, pixels: tuple[int, int], quick: bool = False
+) -> None:
     """Adds the image of a panel to matplotlib axes whose coordinates are metres on the screen.
 
-    window: (left, right, bottom, top), m. pixels: (width, height) of the image.
+    window: (left, right, bottom, top), m. pixels: (width, height) of the image. quick: as a frame of a movie.
     """
-    image = render(panel.solids, view, window, (OVERSAMPLING * pixels[0], OVERSAMPLING * pixels[1]))
-    blocks = image.reshape(pixels[1], OVERSAMPLING, pixels[0], OVERSAMPLING, 3)
-    axes.imshow(
-        blocks.mean(axis=(1, 3)) / 255.0, extent=window, interpolation="none", aspect="auto", zorder=0
-    )
+    fine = render(panel.solids, view, window, (OVERSAMPLING * pixels[0], OVERSAMPLING * pixels[1]), quick)
+    image = sum(fine[i::OVERSAMPLING, j::OVERSAMPLING] / 255.0 for i in range(OVERSAMPLING) for j in range(OVERSAMPLING))
+    axes.imshow(image / OVERSAMPLING**2, extent=window, interpolation="none", aspect="auto", zorder=0)
 
 
 def _quiet_without_a_screen() -> None:
@@ -34,8 +34,10 @@ def _quiet_without_a_screen() -> None:
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
 
 
-def render(solids: list[Solid], view: View, window: np.ndarray, pixels: tuple[int, int]) -> np.ndarray:
-    """(height, width, 3), 0 to 255."""
+def render(
+    solids: list[Solid], view: View, window: np.ndarray, pixels: tuple[int, int], quick: bool = False
+) -> np.ndarray:
+    """(height, width, 3), 0 to 255. quick: one sample a pixel."""
     import pyvista
 
     _quiet_without_a_screen()
@@ -44,6 +46,8 @@ def render(solids: list[Solid], view: View, window: np.ndarray, pixels: tuple[in
     reach = np.ptp(depths) + window[1] - window[0]
     center = (window[0] + window[1]) / 2 * right + (window[2] + window[3]) / 2 * up + depths.mean() * eye
     plotter = pyvista.Plotter(off_screen=True, window_size=pixels, lighting="none")
+    if quick:
+        plotter.render_window.SetMultiSamples(0)
     try:
         plotter.set_background("white")
         plotter.add_light(
