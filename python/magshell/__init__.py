@@ -30,6 +30,7 @@ from .path import CriticalPoint, Path, follow
 from .plotting import Picture, animate, plot, write_page
 from .sampling import random_starts
 from .scene import Scene
+from .series import write_series
 from .shell import Shell
 from .solvers import MixedNewton, Newton
 from .starts import Multistart
@@ -106,4 +107,5 @@ __all__ = [
     "weld",
     "write_mesh",
     "write_page",
+    "write_series",
 ]
