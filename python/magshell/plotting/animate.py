@@ -13,10 +13,10 @@ from . import films
 from .colors import Scalar, scalar_of
 from .frames import Reel, Scenery
 from .panels import Drawing, Options, size_of
-from .playing import Moment, between, duration_of, moments, speed_of, spoken, spread, state_at, with_times
+from .playing import Moment, between, moments, same_faces, speed_of, spoken, spread, state_at, with_times
 from .plot import arrow_count
 from .states import State, states_of
-from .units import length_unit, prefixed
+from .units import length_unit
 from .view import view_of
 
 PALETTE_FRAMES = 12  # that a GIF's colours are chosen from
@@ -80,8 +80,7 @@ def animate(
     )
     if len(states) < 2:
         raise ValueError("a movie needs at least two states, got one; ms.plot makes a picture of it")
-    if any(not np.array_equal(state.mesh.faces, states[0].mesh.faces) for state in states):
-        raise ValueError("a movie shows the states of one mesh, but these have different faces")
+    same_faces(states, "a movie")
     states = with_times(states, times)
     speed = speed_of(states, speed)
     unit = length_unit(size_of(states))
@@ -89,11 +88,10 @@ def animate(
     options = Options(arrow_count(arrows), show_field, rest, mesh_lines)
     scenery = Scenery(states, scalar, view_of(states, view), unit, options)
     shown = moments(states, fps, speed)
-    caption = _Caption(title, states, speed)
 
     def drawing(moment: Moment) -> Drawing:
         state = state_at(states, moment)
-        return scenery.drawing(state, _values(scalar, moment), caption(state))
+        return scenery.drawing(state, _values(scalar, moment), _caption(title, state, states[-1], speed))
 
     reel = Reel(drawing(shown[-1]), width, painter)
     some = spread(shown, PALETTE_FRAMES) if path.suffix.lower() == ".gif" else []
@@ -111,22 +109,9 @@ def _values(scalar: Scalar | None, moment: Moment) -> np.ndarray | None:
     return between(scalar.values[moment.before], scalar.values[moment.before + 1], moment.share)
 
 
-class _Caption:
-    """What stands above a frame: the title, the time with the same digits in all frames, and how fast it goes."""
-
-    def __init__(self, title: str | None, states: list[State], speed: float):
-        self._title = [title] if title else []
-        self._speed = spoken(speed)
-        duration = duration_of(states)
-        self._factor, self._unit = prefixed(duration, "s")
-        self._decimals = max(0, 2 - int(np.floor(np.log10(max(duration, 1e-9) / self._factor))))
-        self._width = len(self._number(states[-1].time or 0.0))
-
-    def __call__(self, state: State) -> str:
-        if state.time is None:
-            return "   ".join([*self._title, state.title])
-        digits = self._number(state.time).rjust(self._width, "\N{FIGURE SPACE}")
-        return "   ".join([*self._title, f"{digits} {self._unit}", self._speed])
-
-    def _number(self, time: float) -> str:
-        return f"{time / self._factor:.{self._decimals}f}"
+def _caption(title: str | None, state: State, last: State, speed: float) -> str:
+    """What stands above a frame: the title, the time, and how fast it goes."""
+    parts = [title] if title else []
+    if state.time is None:
+        return "   ".join([*parts, state.title])
+    return "   ".join([*parts, state.title.rjust(len(last.title), "\N{FIGURE SPACE}"), spoken(speed)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 import shutil
@@ -122,7 +123,7 @@ def _write_mp4(path: Path, images: Iterable[np.ndarray], fps: float) -> None:
         if failed:
             complaints.seek(0)
             said = complaints.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
-            raise OSError(None, f"ffmpeg failed: {said[-1]}")
+            raise OSError(errno.EIO, f"ffmpeg failed: {said[-1]}")
 
 
 def ffmpeg() -> str:

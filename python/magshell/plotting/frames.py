@@ -20,14 +20,13 @@ from .panels import (
     sources_key,
 )
 from .picture import paint, paint_panel
-from .playing import spread
+from .playing import SAMPLES, spread
 from .solids import arrows
 from .states import State
 from .units import LengthUnit, prefixed
 from .view import View
 
 DPI = 140
-SAMPLES = 50  # states that say how far arrows reach and where a field is drawn
 
 
 class Scenery:

@@ -8,9 +8,11 @@ import numpy as np
 
 from .._quantity import quantity
 from .states import State, timed
+from .units import clock
 
 BEARABLE = (3.0, 20.0)  # s: a motion that takes this long is played as it was
 HANDY = 8.0  # s: about this long is any other, by default
+SAMPLES = 50  # states of a motion that say how far arrows reach and where a field is drawn
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,12 @@ def speed_of(states: list[State], speed) -> float:
     return float(min((power, 2 * power, 5 * power, 10 * power), key=lambda s: abs(np.log(duration / HANDY / s))))
 
 
+def same_faces(states: list[State], what: str) -> None:
+    """Raises ValueError where states have different faces."""
+    if any(not np.array_equal(state.mesh.faces, states[0].mesh.faces) for state in states):
+        raise ValueError(f"{what} shows the states of one mesh, but these have different faces")
+
+
 def spoken(speed: float) -> str:
     """
     >>> spoken(0.05), spoken(1.0), spoken(20.0)
@@ -83,7 +91,8 @@ def state_at(states: list[State], moment: Moment) -> State:
     if start.flux_density is not None and end.flux_density is not None:
         flux_density = between(start.flux_density, end.flux_density, moment.share)
     positions = between(start.positions, end.positions, moment.share)
-    return replace(nearer, positions=positions, flux_density=flux_density, time=moment.time)
+    title = clock(max(abs(states[0].time), abs(states[-1].time)))(moment.time)
+    return replace(nearer, positions=positions, flux_density=flux_density, time=moment.time, title=title)
 
 
 def between(start: np.ndarray, end: np.ndarray, share: float) -> np.ndarray:

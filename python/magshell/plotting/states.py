@@ -16,7 +16,7 @@ from ..path import Path
 from ..scene import Scene
 from ..shell import Shell
 from ..trajectory import Trajectory
-from .units import with_unit
+from .units import clock
 
 
 @dataclass(frozen=True)
@@ -107,15 +107,17 @@ def states_of(
 
 
 def timed(states: list[State], times) -> list[State]:
-    """The states at these times, (n,), s. Raises ValueError unless there is one a state and none falls."""
+    """The states at these times, (n,), s, which are their titles too. Raises ValueError unless there is one a state
+    and none falls."""
     array = quantity("times", "s", _detached(times), ("n",))
     if len(array) != len(states):
         raise ValueError(f"times [s] must be {len(states)} numbers, one a state, got {len(array)}")
     if (np.diff(array) < 0).any():
         first = int(np.argmax(np.diff(array) < 0))
         raise ValueError(f"times [s] must not fall, but {array[first]:g} is followed by {array[first + 1]:g}")
+    written = clock(float(np.abs(array).max()))
     return [
-        replace(state, time=time, title=state.title or with_unit(time, "s"))
+        replace(state, time=time, title=written(time))
         for state, time in zip(states, array.tolist(), strict=True)
     ]
 
