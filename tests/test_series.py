@@ -8,6 +8,7 @@ import pytest
 
 import magshell as ms
 from magshell import series
+from motions import lifted_strip
 
 pytest.importorskip("meshio")
 
@@ -16,17 +17,7 @@ MESH = ms.meshes.rectangle(0.05, 0.01, cells=(8, 2))
 
 @pytest.fixture(scope="module")
 def move() -> ms.Trajectory:
-    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
-    scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=ms.UniformField())
-    turning = np.linspace(0, 1, 11)[:, None] * (0, 0, 4e-3)
-    return ms.simulate(
-        scene,
-        steps=10,
-        time_step=5e-3,
-        remanent_magnetization=(4e4, 0, 0),
-        applied_flux_density=turning,
-        record_every=2,
-    )
+    return lifted_strip(MESH, steps=10, record_every=2)
 
 
 def listed(pvd) -> dict[float, str]:
@@ -45,7 +36,9 @@ def test_a_motion_comes_back(move, tmp_path) -> None:
     for k, file in enumerate(found.values()):
         mesh = ms.read_mesh(tmp_path / file)
         on_vertices, on_faces = ms.read_fields(tmp_path / file)
-        assert np.array_equal(mesh.rest_positions, move.positions[k]) and np.array_equal(mesh.faces, MESH.faces)
+        assert np.array_equal(mesh.rest_positions, move.positions[k]) and np.array_equal(
+            mesh.faces, MESH.faces
+        )
         assert np.array_equal(on_vertices["velocity"], move.velocities[k])
         assert np.array_equal(on_vertices["displacement"], move.displacements[k])
         assert np.array_equal(on_vertices["flux_density"][3], move.applied_flux_density[k])
@@ -104,7 +97,9 @@ def test_what_was_written_before_an_error_is_listed(move, tmp_path, monkeypatch,
     assert np.array_equal(ms.read_mesh(tmp_path / found[move.times[2]]).rest_positions, move.positions[2])
     if isinstance(reason, OSError):
         assert caught.value.errno == errno.ENOSPC
-        assert "No space left on device; 3 of 6 states are on disk, listed in 'strip.pvd'" in str(caught.value)
+        assert "No space left on device; 3 of 6 states are on disk, listed in 'strip.pvd'" in str(
+            caught.value
+        )
 
 
 def test_a_disk_that_takes_nothing(move, tmp_path, monkeypatch) -> None:
@@ -125,7 +120,10 @@ def test_a_disk_that_takes_nothing(move, tmp_path, monkeypatch) -> None:
     [
         ({"times": [0.0, 1.0]}, r"times \[s\] must be 3 numbers, one a state, got 2"),
         ({"times": [0.0, 2.0, 1.0]}, "must not fall, but 2 is followed by 1"),
-        ({"velocities": np.zeros((2, MESH.n_vertices, 3))}, r"velocities \[m/s\] must have shape \(3, 27, 3\)"),
+        (
+            {"velocities": np.zeros((2, MESH.n_vertices, 3))},
+            r"velocities \[m/s\] must have shape \(3, 27, 3\)",
+        ),
         ({"vertex_fields": {"heat": np.zeros(27)}}, r"vertex field 'heat' must have shape \(3, 27\)"),
         ({"face_fields": {"strain": np.zeros((3, 27))}}, r"face field 'strain' must have shape \(3, 32\)"),
         ({"positions": np.zeros((0, 27, 3))}, r"positions \[m\] must have shape"),

@@ -71,7 +71,10 @@ def write_series(
     )
     states = with_times(states, times)
     velocities = getattr(what, "velocities", None) if velocities is None else velocities
-    more = {"vertex": _by_state(vertex_fields, "vertex", states), "face": _by_state(face_fields, "face", states)}
+    more = {
+        "vertex": _by_state(vertex_fields, "vertex", states),
+        "face": _by_state(face_fields, "face", states),
+    }
     if velocities is not None:
         row = (states[0].mesh.n_vertices, 3)
         more["vertex"]["velocity"] = quantity("velocities", "m/s", detached(velocities), (len(states), *row))
@@ -131,7 +134,9 @@ def _listed(path: Path, names: list[str], states: list[State]) -> Iterator[list[
         kept = "no state is" if not done else f"{len(done)} of {len(states)} states are"
         where = f", listed in {path.name!r}" if done else ""
         reason = error.strerror or str(error)
-        raise OSError(error.errno, f"cannot write the series {str(path)!r}: {reason}; {kept} on disk{where}") from error
+        raise OSError(
+            error.errno, f"cannot write the series {str(path)!r}: {reason}; {kept} on disk{where}"
+        ) from error
     finally:
         if done:
             contents = _contents(names, states, done)
@@ -158,8 +163,7 @@ def _time(states: list[State], number: int) -> float:
 
 def _contents(names: list[str], states: list[State], chosen) -> bytes:
     rows = [
-        f'    <DataSet timestep="{_time(states, k)!r}" part="0" file={quoteattr(names[k])}/>'
-        for k in chosen
+        f'    <DataSet timestep="{_time(states, k)!r}" part="0" file={quoteattr(names[k])}/>' for k in chosen
     ]
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
     return "\n".join([head, *rows, "  </Collection>\n</VTKFile>\n"]).encode()

@@ -15,7 +15,9 @@ from pathlib import Path
 import numpy as np
 
 _NO_PILLOW = 'a GIF needs pillow: pip install "magshell[plot]"'
-_NO_FFMPEG = 'an MP4 needs ffmpeg: pip install "magshell[movie]", or have ffmpeg on the PATH; a .gif needs neither'
+_NO_FFMPEG = (
+    'an MP4 needs ffmpeg: pip install "magshell[movie]", or have ffmpeg on the PATH; a .gif needs neither'
+)
 COLORS = 256
 
 
@@ -107,7 +109,11 @@ def _write_mp4(path: Path, images: Iterable[np.ndarray], fps: float) -> None:
     with tempfile.TemporaryFile() as complaints:
         # a session of its own: Ctrl-C is for this process, which then ends the other
         process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=complaints, start_new_session=True
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=complaints,
+            start_new_session=True,
         )
         try:
             process.stdin.write(first.tobytes())

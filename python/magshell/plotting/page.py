@@ -154,7 +154,9 @@ def _states(
     states: list[State], kept: list[int], titles: list[str], fields, count: int, dtype: str
 ) -> list[dict]:
     strongest, (around, full_length) = glyphs.largest(states), fields
-    magnitude = max((np.linalg.norm(s.flux_density) for s in states if s.flux_density is not None), default=0.0)
+    magnitude = max(
+        (np.linalg.norm(s.flux_density) for s in states if s.flux_density is not None), default=0.0
+    )
     factor, unit = prefixed(float(magnitude), "T")
     packed = []
     for k in kept:

@@ -189,9 +189,7 @@ def _uniform_fields(
             place -= width + 0.12 * size
 
 
-def _fan(
-    panel: Panel, fields: np.ndarray, scale: float, place: np.ndarray, view: View, size: float
-) -> None:
+def _fan(panel: Panel, fields: np.ndarray, scale: float, place: np.ndarray, view: View, size: float) -> None:
     """Uniform fields (n, 3) that follow each other, as arrows from one tail, to the left of a place (3,), m."""
     right, up, _ = view.axes
     vectors = scale * fields

@@ -49,7 +49,9 @@ def speed_of(states: list[State], speed) -> float:
     if duration <= 0 or BEARABLE[0] <= duration <= BEARABLE[1]:
         return 1.0
     power = 10.0 ** np.floor(np.log10(duration / HANDY))
-    return float(min((power, 2 * power, 5 * power, 10 * power), key=lambda s: abs(np.log(duration / HANDY / s))))
+    return float(
+        min((power, 2 * power, 5 * power, 10 * power), key=lambda s: abs(np.log(duration / HANDY / s)))
+    )
 
 
 def same_faces(states: list[State], what: str) -> None:

@@ -22,7 +22,11 @@ def paint(
     window: (left, right, bottom, top), m. pixels: (width, height) of the image. quick: as a frame of a movie.
     """
     fine = render(panel.solids, view, window, (OVERSAMPLING * pixels[0], OVERSAMPLING * pixels[1]), quick)
-    image = sum(fine[i::OVERSAMPLING, j::OVERSAMPLING] / 255.0 for i in range(OVERSAMPLING) for j in range(OVERSAMPLING))
+    image = sum(
+        fine[i::OVERSAMPLING, j::OVERSAMPLING] / 255.0
+        for i in range(OVERSAMPLING)
+        for j in range(OVERSAMPLING)
+    )
     axes.imshow(image / OVERSAMPLING**2, extent=window, interpolation="none", aspect="auto", zorder=0)
 
 
