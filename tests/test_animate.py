@@ -35,7 +35,7 @@ def frames_of(gif) -> tuple[list[np.ndarray], list[float]]:
         for k in range(file.n_frames):
             file.seek(k)
             frames.append(np.asarray(file.convert("RGB")).astype(int))
-            shown.append(file.info["duration"] / 1e3)
+            shown.append(file.info.get("duration", 0) / 1e3)
     return frames, shown
 
 
@@ -49,6 +49,17 @@ def test_a_gif_shows_the_motion_and_its_field(move, tmp_path) -> None:
     green = [(np.abs(frame[:bottom] - 255 * rgb(FIELD)).sum(axis=2) < 40).sum() for frame in frames]
     assert np.diff(green[1::3]).min() > 0 and green[-1] > 2 * green[1]  # the arrow grows with the field
     assert (frames[-1][:bottom] != frames[-2][:bottom]).any()
+
+
+def test_a_gif_keeps_white_and_many_colors_apart(tmp_path) -> None:
+    shades = (
+        np.stack(np.meshgrid(*[np.linspace(40, 250, 16)] * 3), axis=-1).reshape(64, 64, 3).astype(np.uint8)
+    )
+    paper = np.full((64, 64, 3), 255, np.uint8)
+    films.write(tmp_path / "a.gif", [np.hstack([shades, paper])], [np.hstack([shades, paper])], 25.0)
+    [frame], _ = frames_of(tmp_path / "a.gif")
+    assert (frame[:, 64:] == 255).all()
+    assert np.abs(frame[:, :64] - shades).mean() < 16 and np.abs(frame[:, :64] - shades).max() < 60
 
 
 def test_an_mp4_is_a_video(move, tmp_path) -> None:

@@ -10,14 +10,12 @@ import magshell as ms
 from magshell.plotting import backend as backends
 from magshell.plotting import colors, glyphs
 from magshell.plotting.colors import rgb, scalar_of
-from magshell.plotting.panels import Options, draw, outline
+from magshell.plotting.panels import outline
 from magshell.plotting.states import State, states_of
 from magshell.plotting.units import length_unit, prefixed, round_below, with_unit
 from magshell.plotting.view import view_of
-from motions import lifted_strip
 
 MAGNETIZATION = (4e4, 0.0, 0.0)
-LIFTS = 0.03 * np.arange(3)[:, None, None]
 
 
 @pytest.fixture(params=["matplotlib", "pyvista"])
@@ -316,44 +314,6 @@ def test_of_many_states_some_are_drawn(mesh) -> None:
 def test_bad_input_is_refused(mesh, arguments, message) -> None:
     with pytest.raises(ValueError, match=message):
         ms.plot(mesh, **{"backend": "matplotlib", **arguments})
-
-
-def test_a_motion_fades_towards_its_beginning(mesh) -> None:
-    """Earlier states are paler, and the fields fan out from one point."""
-    lifts = LIFTS * (0, 0, 1) + mesh.rest_positions
-    fields = [(0, 0, 1e-3), (1e-3, 0, 0), (0, 0, -1e-3)]
-    states = states_of(mesh, positions=lifts, applied_flux_density=fields)
-    drawing = draw(
-        [states], ["one", "two", "three"], None, view_of(states, None), length_unit(0.1), Options(fade=True)
-    )
-    [panel] = drawing.panels
-    sheets = [solid for solid in panel.solids if len(solid.positions) == mesh.n_vertices]
-    lightness = [solid.colors.mean() for solid in sheets]
-    assert lightness[0] > lightness[1] > lightness[2] == pytest.approx(rgb(colors.SERIES[0]).mean())
-    green = [
-        solid for solid in panel.solids if np.argmax(solid.colors[0]) == 1 and len(solid.positions) < 100
-    ]
-    assert len(green) == 3
-    assert [label.text for label in panel.labels] == ["three", "one", "two", "$B$ up to 1 mT"]
-
-
-def test_a_motion_has_its_times_as_titles() -> None:
-    strip = ms.meshes.rectangle(0.05, 0.01, cells=(6, 2))
-    move = lifted_strip(strip)
-    states = states_of(move)
-    assert [state.title for state in states[:2]] == ["0.0 ms", "5.0 ms"]
-    assert [state.time for state in states] == move.times.tolist()
-    assert states[4].flux_density == pytest.approx((0, 0, 2e-3)) and states[4].is_magnetized
-
-
-def test_equilibria_are_states(mesh) -> None:
-    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
-    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
-    both = ms.equilibrium(
-        scene, remanent_magnetization=MAGNETIZATION, applied_flux_density=[(0, 0, 1e-4), (0, 0, 2e-4)]
-    )
-    states = states_of(both)
-    assert [state.flux_density[2] for state in states] == [1e-4, 2e-4] and states[0].is_magnetized
 
 
 @pytest.mark.parametrize(

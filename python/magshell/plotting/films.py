@@ -86,14 +86,17 @@ def _write_gif(path: Path, images: Iterable[np.ndarray], samples: list[np.ndarra
 
 
 def _palette(samples: list[np.ndarray]):
-    """An image with the colours of the samples, where rare ones count as much as common ones."""
+    """An image with the colours of the samples, white among them; a common colour counts little more than a rare one."""
     image = _pillow()
     codes = [each.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32) for each in samples]
-    distinct = np.unique(np.concatenate([np.unique(each) for each in codes]))
-    rgb = np.stack([distinct >> 16, distinct >> 8 & 255, distinct & 255], axis=1).astype(np.uint8)
-    few = image.fromarray(rgb[None]).quantize(COLORS, method=image.Quantize.MEDIANCUT).getpalette()
-    chosen = np.array(few, dtype=np.uint8).reshape(-1, 3)
-    chosen[chosen.min(axis=1) > 244] = 255  # the paper is white
+    distinct, counts = np.unique(np.concatenate(codes, axis=None), return_counts=True)
+    weighed = np.repeat(distinct, 1 + np.log2(counts).astype(np.int64))
+    rgb = np.stack([weighed >> 16, weighed >> 8 & 255, weighed & 255], axis=1).astype(np.uint8)
+    few = image.fromarray(rgb[None]).quantize(COLORS - 1, method=image.Quantize.MEDIANCUT).getpalette()
+    chosen = np.array([255, 255, 255, *few], dtype=np.uint8).reshape(-1, 3)
+    chosen[chosen.min(axis=1) > 240] = (
+        255  # else pillow, which is not exact, might take one of these for white
+    )
     palette = image.new("P", (1, 1))
     palette.putpalette(chosen.ravel().tolist())
     return palette
