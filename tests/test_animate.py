@@ -5,13 +5,13 @@ import sys
 
 import numpy as np
 import pytest
+from motions import lifted_strip
 
 import magshell as ms
 from magshell.plotting import films
 from magshell.plotting.colors import FIELD, rgb
 from magshell.plotting.playing import moments, speed_of, spoken, state_at, with_times
 from magshell.plotting.states import states_of
-from motions import lifted_strip
 
 image = pytest.importorskip("PIL.Image")
 

@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from motions import lifted_strip
 
 import magshell as ms
-from motions import lifted_strip
 
 VOID = {"meta", "input", "br", "link"}
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from motions import lifted_strip
 
 import magshell as ms
 from magshell.plotting import colors
@@ -10,7 +11,6 @@ from magshell.plotting.panels import Options, draw
 from magshell.plotting.states import states_of
 from magshell.plotting.units import length_unit
 from magshell.plotting.view import view_of
-from motions import lifted_strip
 
 MESH = ms.meshes.rectangle(0.1, 0.02, cells=(10, 4))
 

@@ -5,10 +5,10 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from motions import lifted_strip
 
 import magshell as ms
 from magshell import series
-from motions import lifted_strip
 
 pytest.importorskip("meshio")
 
