@@ -93,11 +93,11 @@ def animate(
         state = state_at(states, moment)
         return scenery.drawing(state, _values(scalar, moment), _caption(title, state, states[-1], speed))
 
-    reel = Reel(drawing(shown[-1]), width, painter)
-    some = spread(shown, PALETTE_FRAMES) if path.suffix.lower() == ".gif" else []
-    samples = [reel.image(drawing(moment)) for moment in some]
-    with tqdm(shown, desc="animate", delay=2.0, disable=not progress) as bar:
-        films.write(path, (reel.image(drawing(moment)) for moment in bar), samples, fps)
+    with Reel(drawing(shown[-1]), width, painter) as reel:
+        some = spread(shown, PALETTE_FRAMES) if path.suffix.lower() == ".gif" else []
+        samples = [reel.image(drawing(moment)) for moment in some]
+        with tqdm(shown, desc="animate", delay=2.0, disable=not progress) as bar:
+            films.write(path, (reel.image(drawing(moment)) for moment in bar), samples, fps)
     return path
 
 

@@ -19,7 +19,7 @@ from .panels import (
     size_of,
     sources_key,
 )
-from .picture import paint, paint_panel
+from .picture import paint, paint_panel, screen_of
 from .playing import SAMPLES, spread
 from .solids import arrows
 from .states import State
@@ -108,18 +108,25 @@ class Scenery:
 
 
 class Reel:
-    """Paints drawings, one after the other, into the same layout: that of the first."""
+    """Paints drawings, one after the other, into the same layout: that of the first. A context manager."""
 
     def __init__(self, first: Drawing, width: int, backend: str):
-        self._backend = backend
-        self._figure = paint(first, width, 1, backend, DPI, quick=True).figure
+        self._figure = paint(first, width, 1, backend, DPI).figure
         self._axes = self._figure.axes[0]
         self._window = np.array([*self._axes.get_xlim(), *self._axes.get_ylim()])
+        self._screens = screen_of(self._axes, backend, samples=False)
+
+    def __enter__(self) -> Reel:
+        self._screen = self._screens.__enter__()
+        return self
+
+    def __exit__(self, *error) -> None:
+        self._screens.__exit__(*error)
 
     def image(self, drawing: Drawing) -> np.ndarray:
         """(height, width, 3) uint8, both even, as films want them."""
         self._axes.clear()
-        paint_panel(self._axes, drawing.panels[0], drawing, self._window, self._backend, quick=True)
+        paint_panel(self._axes, drawing.panels[0], drawing, self._window, self._screen)
         self._figure.canvas.draw()
         image = np.asarray(self._figure.canvas.buffer_rgba())[:, :, :3]
         odd = [(0, image.shape[k] % 2) for k in (0, 1)]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -69,9 +71,7 @@ class Picture:
         return f"Picture({width} x {height} pixels, painted by {self.backend})"
 
 
-def paint(
-    drawing: Drawing, width: int, columns: int | None, backend: str, dpi: int = DPI, quick: bool = False
-) -> Picture:
+def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: int = DPI) -> Picture:
     """The drawing, `width` pixels wide, in so many columns (None: those that fill the picture best)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -93,20 +93,34 @@ def paint(
         left = MARGIN + column * panel_width
         bottom = height - MARGIN - (row + 1) * (panel_height + title)
         axes = figure.add_axes((left / inches, bottom / height, panel_width / inches, panel_height / height))
-        paint_panel(axes, panel, drawing, window, backend, quick)
+        with screen_of(axes, backend) as screen:
+            paint_panel(axes, panel, drawing, window, screen)
     strip = figure.add_axes((0.0, 0.0, 1.0, LEGEND / height))
     _legend(strip, drawing, inches, panel_width / (window[1] - window[0]))
     return Picture(figure, backend)
 
 
-def paint_panel(axes, panel: Panel, drawing: Drawing, window, backend: str, quick: bool = False) -> None:
-    """Into axes that have their place in the figure. quick: as a frame of a movie."""
+@contextmanager
+def screen_of(axes, backend: str, samples: bool = True) -> Iterator[vtk.Screen | None]:
+    """What pyvista paints on before it comes into axes that have their place in the figure; matplotlib needs none."""
+    if backend != "pyvista":
+        yield None
+        return
+    box = axes.get_window_extent()
+    screen = vtk.Screen((round(box.width), round(box.height)), samples)
+    try:
+        yield screen
+    finally:
+        screen.close()
+
+
+def paint_panel(axes, panel: Panel, drawing: Drawing, window, screen: vtk.Screen | None) -> None:
+    """Into axes that have their place in the figure, by pyvista if there is a screen."""
     axes.set_axis_off()
     axes.set_xlim(window[0], window[1])
     axes.set_ylim(window[2], window[3])
-    if backend == "pyvista":
-        box = axes.get_window_extent()
-        vtk.paint(axes, panel, drawing.view, window, (round(box.width), round(box.height)), quick)
+    if screen is not None:
+        vtk.paint(axes, panel, drawing.view, window, screen)
     else:
         polygons.paint(axes, panel, drawing.view)
     if panel.title:
