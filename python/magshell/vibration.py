@@ -92,7 +92,9 @@ def vibration_modes(
     model = scene._model
     masses = model.free_weights(inputs.values.shell.vertex_masses)
     if count >= np.count_nonzero(masses):
-        raise ValueError(f"count must be below the {np.count_nonzero(masses)} unknowns with mass, got {count}")
+        raise ValueError(
+            f"count must be below the {np.count_nonzero(masses)} unknowns with mass, got {count}"
+        )
     with inputs.in_core():
         if equilibrium is None:
             stiffness = model.hessian(model.rest_state(), _core.Controls())
@@ -133,7 +135,9 @@ class _Pencil:
         while self._squares_below(self._shift):
             self._shift *= _SHIFT_GROWTH
             if self._shift < -16.0 * stiffest.max():
-                raise NotConverged("the edge rotations are not stable by themselves, so there are no frequencies")
+                raise NotConverged(
+                    "the edge rotations are not stable by themselves, so there are no frequencies"
+                )
 
     def growing(self) -> int:
         """How many squares are negative."""
