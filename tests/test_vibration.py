@@ -149,7 +149,7 @@ def test_an_unstable_equilibrium_says_so(magnetic):
     mirrored = ms.vibration_modes(magnetic, near, count=1).squares[0]
     assert found.squares[0] == pytest.approx(-mirrored, rel=0.1)
     assert found.growth_rates[0] == np.sqrt(-found.squares[0]) and found.growth_rates[1] == 0
-    assert "unstable: 1 modes grow" in repr(found)
+    assert "unstable: 1 mode(s) grow" in repr(found)
 
 
 def test_the_growth_rate_is_that_of_the_motion(magnetic):

@@ -57,7 +57,7 @@ class VibrationModes:
         text = f"VibrationModes: {frequencies} Hz; {self.wall_time:.3g} s"
         if self.unstable:
             rates = ", ".join(f"{each:.4g}" for each in self.growth_rates[: self.unstable])
-            text += f"\n  unstable: {self.unstable} modes grow, at rates of {rates} 1/s"
+            text += f"\n  unstable: {self.unstable} mode(s) grow, at rates of {rates} 1/s"
         return text
 
 
@@ -149,7 +149,7 @@ class _Pencil:
             squares, modes = self._search(count, seed=attempt, space=(2 * count + 20) << attempt)
             # A search may miss one of several equal ones. By Sylvester's law K - s M has as many negative pivots as
             # there are squares below s.
-            below = squares[-1] - _SAME * (squares[-1] - self._shift)
+            below = squares[-1] - max(_SAME * (squares[-1] - self._shift), 2.0 * self._lost)
             if self._squares_below(below) == np.count_nonzero(squares < below):
                 squares[np.abs(squares) <= self._lost] = 0.0
                 return squares, modes
