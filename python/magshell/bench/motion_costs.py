@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
@@ -41,9 +42,9 @@ def drive(scene: ms.Scene, steps: int, **options) -> ms.Trajectory:
 
 
 def budget(scene: ms.Scene, integrator, steps: int, keep: str) -> float:
-    """Bytes that make ms.simulate keep this."""
+    """Bytes that make ms.simulate keep this; checkpoints so many that every step is taken again but once."""
     stages = 8.0 * scene._model.size * len(integrator._times) * steps
-    return {"factors": 1e12, "stages": 1.5 * stages, "checkpoints": min(0.5 * stages, 2e5)}[keep]
+    return {"factors": 1e12, "stages": 1.5 * stages, "checkpoints": min(0.4 * stages, 1e6)}[keep]
 
 
 def measure(rounds: int, quick: bool) -> dict:
@@ -52,7 +53,7 @@ def measure(rounds: int, quick: bool) -> dict:
     return {
         "step": _steps(strip(cells), steps, rounds),
         "gradient": _gradients(strip(cells), steps, rounds),
-        "memory": _memory(KEPT_STEPS[:1] if quick else KEPT_STEPS),
+        "memory": _memory(["checkpoints"], KEPT_STEPS[:1]) if quick else _memory(ALLOWED_SHARE, KEPT_STEPS),
     }
 
 
@@ -124,10 +125,10 @@ def _forward_and_back(scene: ms.Scene, steps: int, integrator, keep: str) -> tup
     return done - began, time.process_time() - done, move.bytes
 
 
-def _memory(counts: tuple[int, ...]) -> dict:
+def _memory(keeps: Iterable[str], counts: Iterable[int]) -> dict:
     """Each run in a process of its own, because only the largest size of a process is told."""
     results, rows = {}, []
-    for keep in ALLOWED_SHARE:
+    for keep in keeps:
         for steps in counts:
             if keep == "factors" and steps > MOST_FACTORS:
                 continue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 from collections.abc import Callable
@@ -40,6 +39,9 @@ def measure(call: Callable[[], object], *, rounds: int = 7, seconds: float = 0.1
 
 def peak_memory() -> int | None:
     """The largest resident set of this process so far, bytes; None where the system does not tell."""
+    own = _status("VmHWM")  # Linux: rusage would count what the process was forked from
+    if own is not None:
+        return own
     try:
         import resource
     except ImportError:
@@ -49,8 +51,13 @@ def peak_memory() -> int | None:
 
 def resident_memory() -> int | None:
     """The resident set of this process now, bytes; None where the system does not tell (Linux does)."""
+    return _status("VmRSS")
+
+
+def _status(name: str) -> int | None:
     try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        lines = Path("/proc/self/status").read_text().splitlines()
     except OSError:
         return None
-    return pages * os.sysconf("SC_PAGE_SIZE")
+    found = [line.split() for line in lines if line.startswith(f"{name}:")]
+    return int(found[0][1]) * 1024 if found else None
