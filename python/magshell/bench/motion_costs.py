@@ -41,10 +41,10 @@ def drive(scene: ms.Scene, steps: int, **options) -> ms.Trajectory:
     return ms.simulate(scene, steps=steps, **{**given, **options})
 
 
-def budget(scene: ms.Scene, integrator, steps: int, keep: str) -> float:
-    """Bytes that make ms.simulate keep this; checkpoints so many that every step is taken again but once."""
+def budget(scene: ms.Scene, integrator, steps: int) -> float:
+    """Bytes with which checkpoints suffice to take every step again but once."""
     stages = 8.0 * scene._model.size * len(integrator._times) * steps
-    return {"factors": 1e12, "stages": 1.5 * stages, "checkpoints": min(0.4 * stages, 1e6)}[keep]
+    return min(0.4 * stages, 1e6)
 
 
 def measure(rounds: int, quick: bool) -> dict:
@@ -116,11 +116,10 @@ def _forward_and_back(scene: ms.Scene, steps: int, integrator, keep: str) -> tup
         integrator=integrator,
         remanent_magnetization=magnetization,
         applied_flux_density=field,
-        memory_budget=budget(scene, integrator, steps, keep),
+        keep=keep,
+        memory_budget=budget(scene, integrator, steps),
     )
     done = time.process_time()
-    if move.keep != keep:
-        raise RuntimeError(f"{keep} were to be kept, but {move.keep} were")
     (move.positions[-1] ** 2).sum().backward()
     return done - began, time.process_time() - done, move.bytes
 
