@@ -155,7 +155,7 @@ void register_model(py::module_& module) {
             [](const Model& m, const Array& of_vertices) {
                 return m.reduction().weights(m.vertex_weights(to_vector(of_vertices)));
             },
-            "Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero for those that are no vertex.")
+            "Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.")
         .def(
             "prescribed_rate",
             [](const Model& m, double progress) { return m.reduction().prescribed_rate(progress); },

@@ -196,7 +196,7 @@ class Model:
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
-        Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero for those that are no vertex.
+        Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.
         """
     def full_vector(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
