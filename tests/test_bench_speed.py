@@ -47,9 +47,9 @@ def test_dynamics(tmp_path, capsys) -> None:
     printed = capsys.readouterr().out
     assert "for comparison" in printed and "A long run of 24 faces" in printed
     results = json.loads(path.read_text())["results"]
-    assert results["energies"]["SDIRK2"]["kept"]["0.001"] > 0.999
+    assert results["energies"]["TR-BDF2"]["kept"]["0.001"] > 0.999
     assert 0 < results["memory"]["checkpoints, 100"]["bytes"] < 1e6
-    assert results["long run"]["SDIRK2"]["steps"] == 200
+    assert results["long run"]["TRBDF2"]["steps"] == 200
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

@@ -10,9 +10,19 @@ from magshell.bench.oscillator import METHODS, vibration
 from magshell.bench.other_integrators import OTHERS, energy_kept
 
 LENGTH, WIDTH = 0.05, 0.01
-INTEGRATORS = {"euler": ms.ImplicitEuler(), "sdirk2": ms.SDIRK2(), "sdirk3": ms.SDIRK3()}
-STEPS = {"euler": (320, 640, 1280), "sdirk2": (80, 160, 320), "sdirk3": (160, 320, 640)}
-ORDERS = {"euler": 1, "sdirk2": 2, "sdirk3": 3}
+INTEGRATORS = {
+    "euler": ms.ImplicitEuler(),
+    "tr_bdf2": ms.TRBDF2(),
+    "sdirk2": ms.SDIRK2(),
+    "sdirk3": ms.SDIRK3(),
+}
+STEPS = {
+    "euler": (320, 640, 1280),
+    "tr_bdf2": (80, 160, 320),
+    "sdirk2": (80, 160, 320),
+    "sdirk3": (160, 320, 640),
+}
+ORDERS = {"euler": 1, "tr_bdf2": 2, "sdirk2": 2, "sdirk3": 3}
 LAWS = ("elastic", "viscous", "maxwell", "stiffness", "clamp")
 
 
@@ -105,17 +115,26 @@ def kept(scene, integrator, amplitude, steps=40, periods=20):
         record_every=steps,
         progress=False,
     )
-    assert (move.energy <= move.energy[0] * (1 + 1e-9)).all()
+    # TR-BDF2's trapezoidal half may gain a little of a large motion's energy before it is lost.
+    gained = 2e-3 if isinstance(integrator, ms.TRBDF2) else 1e-9
+    assert (move.energy <= move.energy[0] * (1 + gained)).all()
     return move.energy[-1] / move.energy[0]
 
 
-@pytest.mark.parametrize("amplitude", [1e-3, 0.02, 0.05])
+@pytest.mark.parametrize("amplitude", [1e-3, 0.1, 0.3])
 def test_energy_over_20_periods(amplitude):
-    assert kept(strip(1e-3, (10, 2)), ms.SDIRK2(), amplitude) > 0.98
+    assert kept(strip(1e-3, (10, 2)), ms.TRBDF2(), amplitude) > 0.98
+
+
+def test_sdirk2_keeps_it_in_small_motions_only():
+    sheet = strip(1e-3, (10, 2))
+    assert kept(sheet, ms.SDIRK2(), 0.05) > 0.98
+    assert kept(sheet, ms.SDIRK2(), 0.1) < 0.97
 
 
 @pytest.mark.parametrize(
-    ("name", "method"), [("euler", "ImplicitEuler"), ("sdirk2", "SDIRK2"), ("sdirk3", "SDIRK3")]
+    ("name", "method"),
+    [("euler", "ImplicitEuler"), ("tr_bdf2", "TR-BDF2"), ("sdirk2", "SDIRK2"), ("sdirk3", "SDIRK3")],
 )
 @pytest.mark.parametrize("steps", [20, 40])
 def test_a_small_vibration_is_the_linear_test_equation(name, method, steps):
@@ -132,7 +151,7 @@ def test_the_other_integrators_are_what_they_are_called(method):
     assert found == pytest.approx(vibration(method, 40, periods=3).energy_kept, rel=5e-3)
 
 
-def test_why_sdirk2():
+def test_why_tr_bdf2():
     """Of those that damp the fastest motions out at once, it keeps most at as many solves."""
     at_40 = {method: vibration(method, 40) for method in METHODS}
     assert at_40["SDIRK2"].energy_kept == pytest.approx(at_40["TR-BDF2"].energy_kept, rel=1e-12)

@@ -19,7 +19,7 @@ from .errors import (
 )
 from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .field_adapters import CustomField, MagpylibField
-from .integrators import SDIRK2, SDIRK3, ImplicitEuler
+from .integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
 from .io import read_fields, read_mesh, write_mesh
 from .linear import LinearResponse, linear_response
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
@@ -44,6 +44,7 @@ from .weld import Weld, weld
 __all__ = [
     "SDIRK2",
     "SDIRK3",
+    "TRBDF2",
     "AppliedField",
     "AreaLoad",
     "Buckling",

@@ -59,7 +59,7 @@ def measure(rounds: int, quick: bool) -> dict:
 
 def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict:
     results, rows = {}, []
-    for integrator in (ms.ImplicitEuler(), ms.SDIRK2(), ms.SDIRK3()):
+    for integrator in (ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()):
         times = []
         for _ in range(rounds):
             began = time.process_time()
@@ -80,7 +80,7 @@ def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict:
 def _gradients(scene: ms.Scene, steps: int, rounds: int) -> dict:
     """By the field of every step and the magnetization."""
     results, rows = {}, []
-    for integrator in (ms.ImplicitEuler(), ms.SDIRK2()):
+    for integrator in (ms.ImplicitEuler(), ms.TRBDF2()):
         for keep, allowed in ALLOWED_SHARE.items():
             runs = [_forward_and_back(scene, steps, integrator, keep) for _ in range(rounds)]
             forward, back = (min(run[k] for run in runs) for k in (0, 1))
@@ -137,7 +137,7 @@ def _memory(keeps: Iterable[str], counts: Iterable[int]) -> dict:
             times = f"{forward:.2f}", f"{back:.2f}", f"{back / forward:.2f}"
             rows.append([keep, f"{steps}", *times, f"{kept / 1e6:.3g}", _megabytes(grown)])
     print_table(
-        f"What is kept for a gradient, {2 * SMALL[0] * SMALL[1]} faces, SDIRK2",
+        f"What is kept for a gradient, {2 * SMALL[0] * SMALL[1]} faces, TRBDF2",
         ["kept", "steps", "motion, s", "gradient, s", "share", "kept, MB", "process grew by, MB"],
         rows,
     )
@@ -147,9 +147,9 @@ def _memory(keeps: Iterable[str], counts: Iterable[int]) -> dict:
 def _grown(steps: int, keep: str) -> tuple[float, float, int, int | None]:
     """Times, bytes kept, and by how much this process grew."""
     scene = strip(SMALL)
-    _forward_and_back(scene, 10, ms.SDIRK2(), "checkpoints")  # what every run needs
+    _forward_and_back(scene, 10, ms.TRBDF2(), "checkpoints")  # what every run needs
     before = peak_memory()
-    forward, back, kept = _forward_and_back(scene, steps, ms.SDIRK2(), keep)
+    forward, back, kept = _forward_and_back(scene, steps, ms.TRBDF2(), keep)
     after = peak_memory()
     return forward, back, kept, None if before is None or after is None else after - before
 
@@ -157,7 +157,7 @@ def _grown(steps: int, keep: str) -> tuple[float, float, int, int | None]:
 def long_run(steps: int, parts: int = 10) -> dict:
     """A small driven strip for so many steps, in parts that go on from one another."""
     results, rows = {}, []
-    for integrator in (ms.ImplicitEuler(), ms.SDIRK2()):
+    for integrator in (ms.ImplicitEuler(), ms.TRBDF2()):
         scene, began = strip(SMALL), time.process_time()
         move, sizes, done, halved = None, [], 0, 0
         for _ in range(parts):
