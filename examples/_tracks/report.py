@@ -21,11 +21,11 @@ def draw_track(axes, strip: Strip, fit: Fit) -> None:
         x, _, z = 1e3 * fit.positions[frame, strip.midline].T
         axes.plot(x, z, color=GREY, lw=1.4, alpha=0.3 + 0.09 * number, solid_capstyle="round")
     curve = 1e3 * fit.task.curve.at(np.linspace(0, 1, 401)).numpy()
-    axes.plot(curve[:, 0], curve[:, 2], color=RED, lw=3.5, alpha=0.5, zorder=3)
+    axes.plot(curve[:, 0], curve[:, 2], color=RED, lw=6, alpha=0.35, zorder=3)
     x, _, z = 1e3 * fit.track.T
     first, blue = fit.task.first, COLORS["ours"]
     axes.plot(x[: first + 1], z[: first + 1], "o", ms=1.6, color=blue, alpha=0.45, zorder=4)
-    axes.plot(x[first:], z[first:], "o", ms=2.6, color=blue, zorder=5)
+    axes.plot(x[first:], z[first:], "o", ms=2.2, color=blue, zorder=5)
     axes.set(xlabel="x [mm]", ylabel="z [mm]", aspect="equal", xlim=(-0.5, 31))
 
 
@@ -62,8 +62,9 @@ def draw_field(axes, fits: dict[str, Fit]) -> None:
     arrival = 1e3 * TIME_STEP * smooth.task.first
     axes.axvline(arrival, color=GREY, lw=0.8, ls=":")
     limit = 1e3 * LIMIT
-    axes.text(arrival, 0.98 * limit, " at the curve's start", color=GREY, va="top", fontsize=8)
-    axes.set(xlabel="time [ms]", ylabel="flux density [mT]", ylim=(-limit, limit))
+    axes.text(arrival, 1.08 * limit, " at the curve's start", color=GREY, va="top", fontsize=8)
+    axes.set(xlabel="time [ms]", ylabel="flux density [mT]", ylim=(-1.1 * limit, 1.1 * limit))
+    axes.set_title(f"faint: {first.method.label}", loc="right", fontsize=8, color=GREY)
     axes.legend(frameon=False, fontsize=8, ncol=3, loc="lower left")
 
 
@@ -101,7 +102,7 @@ def _row(fit: Fit, cost: dict[str, float]) -> str:
 def states(strip: Strip, fit: Fit) -> ms.Picture:
     """In space: at rest, at the curve's start, halfway, at its end."""
     frames = [0, fit.task.first, (fit.task.first + fit.task.steps) // 2, fit.task.steps]
-    times = ("at rest", "at the start", "halfway", "at the end")
+    times = ("at rest", "at the curve's start", "halfway", "at its end")
     return ms.plot(
         strip.scene.mesh,
         positions=fit.positions[frames],
