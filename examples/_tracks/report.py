@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 import magshell as ms
@@ -114,4 +116,21 @@ def states(strip: Strip, fit: Fit) -> ms.Picture:
         view=(16, -72),
         columns=4,
         width=2400,
+    )
+
+
+def movie(strip: Strip, fit: Fit, path: Path) -> Path:
+    """The strip on its way, fifty times slower."""
+    flux_density = fit.field[-fit.task.steps :]
+    return ms.animate(
+        strip.scene.mesh,
+        path,
+        positions=fit.positions,
+        times=TIME_STEP * np.arange(fit.task.steps + 1),
+        remanent_magnetization=strip.remanent_magnetization,
+        applied_flux_density=np.concatenate([flux_density[:1], flux_density]),
+        speed=0.02,
+        view=(16, -72),
+        width=800,
+        progress=False,
     )
