@@ -1,12 +1,13 @@
 """The free end of a strip draws an L and a quarter circle, led by a magnetic field.
 
-[Chen22] 6.1, "Track Fitting" (Figure 7): a strip of 768 faces is clamped at its left end; a uniform field in time,
-within 50 mT a component, leads the middle of its free end along two perpendicular segments, and along a quarter circle.
-The objective has three terms: the distances from the curve's start and from its end at the steps where the tip should
-be there, and from the curve at all steps in between.
+[Chen22] 6.1, "Track Fitting" (Figure 7): a strip of 768 faces is clamped at its left end; a uniform field in
+time, within 50 mT a component, leads the middle of its free end along two perpendicular segments, and along a
+quarter circle. The objective has three terms: the distances from the curve's start and from its end at the
+steps where the tip should be there, and from the curve at all steps in between.
 
-What comes out, after 100 iterations: the weighted sum of squared distances [m2], how far the tip is from the curve at
-most [mm], and, replayed: that sum when the strip moves in the same field and time is resolved finely.
+What comes out, after 100 iterations: the weighted sum of squared distances [m2], how far the tip is from the
+curve at most [mm], and, replayed: that sum when the strip moves in the same field and time is resolved
+finely.
 
                                             L                             C
     a value a step, MMA            5.1e-6   1.13   1.6e-5       1.9e-6   0.23   6.8e-6
@@ -14,18 +15,21 @@ most [mm], and, replayed: that sum when the strip moves in the same field and ti
     spline, L-BFGS, second order   5.5e-7   0.28   5.5e-7       2.5e-8   0.05   4.9e-8
     paper (no unit)                3.8e-5                       2.3e-5
 
-- The first row does as the paper did: implicit Euler, and MMA for the field of every step. Splines of 20 control points
-  need fewer iterations and give fields without jumps. What an L leaves is its corner, which the tip rounds.
-- Implicit Euler damps: the strip that it computes is up to 0.9 mm away from where the same field would take it, far more
-  than these fits leave. With the second-order integrator, at twice the cost, that is 0.06 mm at most, and the track
-  is the strip's own.
-- An iteration takes 0.7 s (C) and 1.2 s (L) of processor time on one core with implicit Euler, twice that with the
-  second-order integrator (the paper: 66 and 95 s on six cores).
-- What the paper says: mesh, Young's modulus, Poisson's ratio, damping and step (Table 1). 768 faces and 417 vertices are
-  24 x 8 cells of four faces, of no other regular grid. Its 0.5 k and 0.3 k unknowns, three a step, are 167 and 100 steps.
-- What it does not say, and is chosen here: a strip of 30 x 10 x 1 mm, 1100 kg/m3, remanence 25 mT, along the strip
-  in the half at the clamp and through its thickness in the other, so that B_z bends the one and B_x the other; the curves
-  (8 mm each way), when the tip starts on them, and the weights (10, 10, 1). Its residuals have no unit.
+- The first row does as the paper did: implicit Euler, and MMA for the field of every step. Splines of 20
+  control points need fewer iterations and give fields without jumps. What an L leaves is its corner, which
+  the tip rounds.
+- Implicit Euler damps: the strip that it computes is up to 0.9 mm away from where the same field would take
+  it, far more than these fits leave. With the second-order integrator, at twice the cost, that is 0.06 mm at
+  most, and the track is the strip's own.
+- An iteration takes 0.7 s (C) and 1.2 s (L) of processor time on one core with implicit Euler, twice that
+  with the second-order integrator (the paper: 66 and 95 s on six cores).
+- What the paper says: mesh, Young's modulus, Poisson's ratio, damping and step (Table 1). 768 faces and 417
+  vertices are 24 x 8 cells of four faces, of no other regular grid. Its 0.5 k and 0.3 k unknowns, three a
+  step, are 167 and 100 steps.
+- What it does not say, and is chosen here: a strip of 30 x 10 x 1 mm, 1100 kg/m3, remanence 25 mT, along the
+  strip in the half at the clamp and through its thickness in the other, so that B_z bends the one and B_x the
+  other; the curves (8 mm each way), when the tip starts on them, and the weights (10, 10, 1). Its residuals
+  have no unit.
 
 Run it: prints a summary and writes pictures and movies into out/.
 """

@@ -46,8 +46,8 @@ METHODS = {
 @dataclass(frozen=True)
 class Fit:
     """What a method found. field: (steps, 3), one a step, or (steps + 1, 3), at the ends of all steps, T.
-    positions: (steps + 1, n_v, 3) m, of the strip in it. track: (steps + 1, 3) m, of the tip. replayed: the track in the
-    same field, by an integrator whose errors are far smaller."""
+    positions: (steps + 1, n_v, 3) m, of the strip in it. track: (steps + 1, 3) m, of the tip. replayed: the track
+    in the same field, by an integrator whose errors are far smaller."""
 
     method: Method
     task: Task

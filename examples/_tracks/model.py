@@ -30,7 +30,7 @@ WEIGHTS = (10.0, 10.0, 1.0)
 
 @dataclass(frozen=True)
 class Strip:
-    """A scene, its magnetization (n_f, 3) [A/m], the vertex in the middle of the free end, and viscous damping [N s/m]."""
+    """A scene, its magnetization (n_f, 3) [A/m], the vertex in the middle of the free end, and damping [N s/m]."""
 
     scene: ms.Scene
     remanent_magnetization: np.ndarray

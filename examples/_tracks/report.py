@@ -72,11 +72,12 @@ def draw_field(axes, fits: dict[str, Fit]) -> None:
 
 def summary(result: dict) -> str:
     lines = [
-        "The paper prints residuals without a unit, nor sizes, weights or the strip's magnetization; here they are the",
-        "weighted sum of squared distances [m2]. ms a step: of processor time, forward + backward. In mm: how far the tip",
-        "is from the curve's start and end when it should be there, from the curve on average and at most; how far the",
-        "track stays from some point of the curve; and the error in time: from the track by the third-order integrator",
-        "with half the step, in the same field, at most.",
+        "The paper prints residuals without a unit, nor sizes, weights or the strip's magnetization; here",
+        "they are the weighted sum of squared distances [m2]. ms a step: of processor time, forward +",
+        "backward. In mm: how far the tip is from the curve's start and end when it should be there, from",
+        "the curve on average and at most; how far the track stays from some point of the curve; and the",
+        "error in time: from the track by the third-order integrator with half the step, in the same field,",
+        "at most.",
     ]
     for name, fits in result["fits"].items():
         paper = PAPER[name]
