@@ -19,7 +19,7 @@ finely.
   control points need fewer iterations and give fields without jumps. What an L leaves is its corner, which
   the tip rounds.
 - Implicit Euler damps: the strip that it computes is up to 0.9 mm away from where the same field would take
-  it, far more than these fits leave. With the second-order integrator, at twice the cost, that is 0.06 mm at
+  it, more than the splines leave. With the second-order integrator, at twice the cost, that is 0.06 mm at
   most, and the track is the strip's own.
 - An iteration takes 0.7 s (C) and 1.2 s (L) of processor time on one core with implicit Euler, twice that
   with the second-order integrator (the paper: 66 and 95 s on six cores).
