@@ -64,7 +64,12 @@ def test_momenta_of_a_free_sheet(integrator):
     def momenta(time_step):
         start = MESH.rest_positions * (1.02, 1.0, 1.0)
         move = simulate(
-            scene, steps=round(0.02 / time_step), time_step=time_step, integrator=integrator, start=start, velocities=turning
+            scene,
+            steps=round(0.02 / time_step),
+            time_step=time_step,
+            integrator=integrator,
+            start=start,
+            velocities=turning,
         )
         linear = (masses * move.velocities).sum(axis=1)
         angular = (masses * np.cross(move.positions, move.velocities)).sum(axis=1)
@@ -132,7 +137,9 @@ def test_a_clamp_that_shakes():
     move = simulate(scene, steps=100, time_step=5e-3, motion_factor=lambda t: np.sin(20 * t))
     held = MESH.vertices_at(x=0.0)
     expected = 1e-3 * np.sin(20 * move.times)
-    np.testing.assert_allclose(move.positions[:, held, 2], np.tile(expected[:, None], (1, len(held))), atol=1e-12)
+    np.testing.assert_allclose(
+        move.positions[:, held, 2], np.tile(expected[:, None], (1, len(held))), atol=1e-12
+    )
     assert np.ptp(move.positions[:, MESH.vertices_at(x=0.05), 2]) > 1e-3
 
 
@@ -173,7 +180,9 @@ def test_what_cannot_be_done_hands_back_the_motion_until_then(strip):
     field = np.zeros((6, 3))
     field[4:, 2] = 1e4
     with pytest.raises(ms.NotConverged, match=r"step 4 of 6, at 0.004 s") as caught:
-        simulate(strip, steps=6, applied_flux_density=field, solver=ms.Newton(max_iterations=1, tolerance=1e-3))
+        simulate(
+            strip, steps=6, applied_flux_density=field, solver=ms.Newton(max_iterations=1, tolerance=1e-3)
+        )
     move = caught.value.last_good
     assert move.steps_done == 4 and len(move) == 5
     np.testing.assert_allclose(move.times, 1e-3 * np.arange(5))

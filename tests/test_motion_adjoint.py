@@ -73,8 +73,6 @@ def test_gradient(differentiated, name):
     np.testing.assert_allclose((gradients[name] * direction).sum(), difference, rtol=2e-5)
 
 
-
-
 @pytest.mark.parametrize(
     "name, value", [("displacement", (-2e-4, 1e-4, 2e-3)), ("rotation", (0.1, 0.3, -0.05))]
 )
@@ -141,7 +139,9 @@ def test_over_200_steps_against_differences():
     np.testing.assert_allclose((gradient * direction).sum(), difference, rtol=1e-5)
 
 
-@pytest.mark.parametrize("extra", [{}, {"maxwell_modulus": 0.5, "maxwell_time": 4e-3, "stiffness_damping": 1e-4}])
+@pytest.mark.parametrize(
+    "extra", [{}, {"maxwell_modulus": 0.5, "maxwell_time": 4e-3, "stiffness_damping": 1e-4}]
+)
 @pytest.mark.parametrize("record_every", [1, 4])
 def test_what_is_kept_does_not_matter(record_every, extra):
     budgets = {"stages": 1.2e6, "checkpoints": 2e4}

@@ -14,7 +14,9 @@ def test_quick_start(tmp_path, monkeypatch) -> None:
     names: dict = {}
     for code in re.findall(r"```python\n(.*?)```", section, re.DOTALL):
         exec(code, names)
-    risen, distance = (float(re.search(rf"{words} ([\d.]+) m", section)[1]) for words in ("has risen:", "rms:"))
+    risen, distance = (
+        float(re.search(rf"{words} ([\d.]+) m", section)[1]) for words in ("has risen:", "rms:")
+    )
     assert names["rest"].positions[:, 2].max() == pytest.approx(risen, abs=5e-5)
     assert names["best"].objective ** 0.5 == pytest.approx(distance, abs=0.05)  # mm
     assert names["move"].steps_done == 200

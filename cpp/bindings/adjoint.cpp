@@ -1,8 +1,7 @@
 // Adjoints to Python: a gradient by positions and edge rotations in, gradients by everything a solve takes
 // out.
-#include "magshell/adjoint/static.h"
-
 #include "bindings/gradients.h"
+#include "magshell/adjoint/static.h"
 
 namespace magshell::bindings {
 namespace {

@@ -106,8 +106,8 @@ Array rotations_of(const Model& model, const MotionResult& motion) {
     return rows;
 }
 
-MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget,
-                 Keep keep, const py::object& progress) {
+MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget, Keep keep,
+                 const py::object& progress) {
     const Watch watch(progress);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
@@ -122,7 +122,9 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     const VectorXd no_rotations = VectorXd::Zero(model.sheet().n_edges());
     const py::ssize_t n_v = model.sheet().n_vertices(), n_e = model.sheet().n_edges();
     for (py::ssize_t k = 0; k < static_cast<py::ssize_t>(motion.recorded.size()); ++k) {
-        const auto rows = [&](const Array& of) { return Rows3(Eigen::Map<const Rows3>(of.data(k, 0, 0), n_v, 3)); };
+        const auto rows = [&](const Array& of) {
+            return Rows3(Eigen::Map<const Rows3>(of.data(k, 0, 0), n_v, 3));
+        };
         const VectorXd rotations = Eigen::Map<const VectorXd>(by_edge_rotations.data(k, 0), n_e);
         by_q.push_back(model.gradient_by_state(rows(by_positions), rotations));
         by_v.push_back(model.gradient_by_state(rows(by_velocities), no_rotations));
@@ -150,7 +152,8 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
 }  // namespace
 
 void register_dynamics(py::module_& module) {
-    py::class_<MotionInput>(module, "MotionInput").def(py::init(&input_of), py::arg("model"), py::arg("given"));
+    py::class_<MotionInput>(module, "MotionInput")
+        .def(py::init(&input_of), py::arg("model"), py::arg("given"));
 
     py::enum_<Keep>(module, "Keep")
         .value("nothing", Keep::nothing)
@@ -164,7 +167,8 @@ void register_dynamics(py::module_& module) {
         .def_readonly("steps_done", &MotionResult::steps_done)
         .def_property_readonly("last_state", [](const MotionResult& r) { return r.last.q; })
         .def_property_readonly("last_velocity", [](const MotionResult& r) { return r.last.v; })
-        .def("last_maxwell_strains", [](const MotionResult& r, const Model& m) { return rows_of(m, r.last.e); })
+        .def("last_maxwell_strains",
+             [](const MotionResult& r, const Model& m) { return rows_of(m, r.last.e); })
         .def_property_readonly("last_memory", [](const MotionResult& r) { return r.last.memory; })
         .def_readonly("kinetic_energy", &MotionResult::kinetic_energy)
         .def_readonly("energies", &MotionResult::energies)

@@ -109,7 +109,10 @@ class MotionInputs:
         given = {"stiffness_damping": ("s", stiffness_damping), "maxwell_modulus": ("1", maxwell_modulus)}
         if maxwell_time is not None:
             given["maxwell_time"] = ("s", maxwell_time)
-        law = {name: float(quantity(name, unit, self.inputs.take(name, value), ())) for name, (unit, value) in given.items()}
+        law = {
+            name: float(quantity(name, unit, self.inputs.take(name, value), ()))
+            for name, (unit, value) in given.items()
+        }
         for name, value in law.items():
             if value < 0 or (name == "maxwell_time" and value == 0):
                 raise ValueError(f"{name} must be positive, got {value:g}")
@@ -156,6 +159,11 @@ class MotionInputs:
 
 
 def _count(name: str, value) -> int:
-    if isinstance(value, bool) or is_tensor(value) or not isinstance(value, Integral) or not 1 <= value < 2**31:
+    if (
+        isinstance(value, bool)
+        or is_tensor(value)
+        or not isinstance(value, Integral)
+        or not 1 <= value < 2**31
+    ):
         raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
     return int(value)

@@ -8,7 +8,9 @@ from ._quantity import quantity
 from ._tensors import detached, is_tensor
 
 
-def scheduled(name: str, unit: str, value, row: tuple[int, ...], steps: int, times: tuple[float, ...], time_step):
+def scheduled(
+    name: str, unit: str, value, row: tuple[int, ...], steps: int, times: tuple[float, ...], time_step
+):
     """The values at all (steps, stages + 1) knots, in one row after another: (steps (stages + 1), *row).
 
     value: constant, row; one a step, (steps, *row); at the ends of the steps, (steps + 1, *row), with straight lines
@@ -28,9 +30,9 @@ def scheduled(name: str, unit: str, value, row: tuple[int, ...], steps: int, tim
     if not is_tensor(value):
         value = np.asarray(value, dtype=np.float64)
     if shape == row:
-        return value.expand(steps * len(shares), *row) if is_tensor(value) else _repeated(value, steps * len(shares))
+        return _same(value, steps * len(shares))
     if len(value) == steps:
-        return value.repeat_interleave(len(shares), 0) if is_tensor(value) else value.repeat(len(shares), axis=0)
+        return _each(value, len(shares))
     column = shares.reshape(1, -1, *(1 for _ in row))
     if is_tensor(value):
         column = value.new_tensor(column)
@@ -45,8 +47,9 @@ def _called(name: str, unit: str, function, row, steps: int, shares: np.ndarray,
     def at(step: int, share: float):
         key = (step + 1, 0.0) if share == 1.0 else (step, share)
         if key not in known:
-            known[key] = function((key[0] + key[1]) * time_step)
-            quantity(f"{name} at {float(detached((key[0] + key[1]) * time_step)):g} s", unit, detached(known[key]), row)
+            moment = (key[0] + key[1]) * time_step
+            known[key] = function(moment)
+            quantity(f"{name} at {float(detached(moment)):g} s", unit, detached(known[key]), row)
         return known[key]
 
     values = [at(step, share) for step in range(steps) for share in shares]
@@ -57,8 +60,15 @@ def _called(name: str, unit: str, function, row, steps: int, shares: np.ndarray,
     return np.array(values, dtype=np.float64)
 
 
-def _repeated(value: np.ndarray, count: int) -> np.ndarray:
-    return np.broadcast_to(value, (count, *value.shape))
+def _same(value, count: int):
+    """One value at all knots."""
+    shape = (count, *value.shape)
+    return value.expand(*shape) if is_tensor(value) else np.broadcast_to(value, shape)
+
+
+def _each(value, count: int):
+    """Every row so many times."""
+    return value.repeat_interleave(count, 0) if is_tensor(value) else value.repeat(count, axis=0)
 
 
 def _shown(row: tuple[int, ...]) -> str:

@@ -92,7 +92,9 @@ def simulate(
     integrator = SDIRK2() if integrator is None else integrator
     solver = MixedNewton() if solver is None else solver
     if not isinstance(integrator, ImplicitEuler | SDIRK2 | SDIRK3):
-        raise ValueError(f"integrator must be ImplicitEuler, SDIRK2 or SDIRK3, got {type(integrator).__name__}")
+        raise ValueError(
+            f"integrator must be ImplicitEuler, SDIRK2 or SDIRK3, got {type(integrator).__name__}"
+        )
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
     if not isinstance(scene, Scene):

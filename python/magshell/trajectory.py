@@ -49,7 +49,9 @@ class MotionState:
                 time, state, velocity, remembered, lengths, strains = (file[name] for name in names)
         except (KeyError, ValueError, EOFError) as error:
             raise ValueError(f"{path} is not a saved MotionState: {error}") from error
-        memory = [part.tolist() for part in np.split(remembered, np.cumsum(lengths)[:-1])] if len(lengths) else []
+        memory = (
+            [part.tolist() for part in np.split(remembered, np.cumsum(lengths)[:-1])] if len(lengths) else []
+        )
         return cls(float(time), state, velocity, memory, strains)
 
 

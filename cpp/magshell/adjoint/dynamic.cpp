@@ -17,7 +17,8 @@ void add(VectorXd& sum, const VectorXd& part) {
 void add(SceneGradient& sum, const SceneGradient& part) {
     for (VectorXd SceneGradient::* each :
          {&SceneGradient::thickness, &SceneGradient::young_modulus, &SceneGradient::poisson_ratio,
-          &SceneGradient::curvature_scale, &SceneGradient::weights, &SceneGradient::loads, &SceneGradient::couples})
+          &SceneGradient::curvature_scale, &SceneGradient::weights, &SceneGradient::loads,
+          &SceneGradient::couples})
         add(sum.*each, part.*each);
     if (sum.remanent_magnetization.rows() == 0)
         sum.remanent_magnetization = part.remanent_magnetization;
@@ -68,7 +69,8 @@ class Backward {
     MotionGradient run() {
         take_in(motion_.steps_done);
         if (motion_.keep == Keep::checkpoints) {
-            Index end = motion_.steps_done, free = motion_.slots - static_cast<Index>(motion_.checkpoints.size()) + 1;
+            Index end = motion_.steps_done,
+                  free = motion_.slots - static_cast<Index>(motion_.checkpoints.size()) + 1;
             for (auto at = motion_.checkpoints.rbegin(); at != motion_.checkpoints.rend(); ++at, ++free) {
                 stretch(at->first, end, at->second, free);
                 end = at->first;
@@ -117,7 +119,8 @@ class Backward {
             repeat_step(stepper_, input_, step, parts_of(motion_.halved, step), state, &stages[step - begin]);
             starts.push_back(std::move(state));
         }
-        for (Index step = end - 1; step >= begin; --step) back(step, starts[step - begin], stages[step - begin]);
+        for (Index step = end - 1; step >= begin; --step)
+            back(step, starts[step - begin], stages[step - begin]);
     }
 
     void back(Index step, MotionState begin, const std::vector<std::vector<StageState>>& stages) {
@@ -207,18 +210,21 @@ class Backward {
     }
 
     // With the Hessian at a stage, by the factorization that was kept from nearby if there is one.
-    VectorXd solve(const StageState& stage, const Controls& controls, const Anchor& anchor, const VectorXd& rhs) {
+    VectorXd solve(const StageState& stage, const Controls& controls, const Anchor& anchor,
+                   const VectorXd& rhs) {
         newton_.watch(0.0);
         if (stage.factor)
-            if (const auto found = newton_.solve_nearby(stage.q, controls, anchor, *stage.factor, rhs)) return *found;
+            if (const auto found = newton_.solve_nearby(stage.q, controls, anchor, *stage.factor, rhs))
+                return *found;
         const FactorReport factor = newton_.factorize_at(stage.q, controls, anchor);
         if (!factor.succeeded) throw InvalidInput("the adjoint of a step: " + factor.reason);
         return newton_.solve_with_factor(rhs);
     }
 
     // lambda of a stage; adds what it says of the scene and of the controls.
-    VectorXd back_through(const StepAlgebra& algebra, const Rates& at, int i, const StageState& stage, Index step,
-                   const std::pair<double, double>& part, VectorXd& by_x, ViscousAdjoint& viscous) {
+    VectorXd back_through(const StepAlgebra& algebra, const Rates& at, int i, const StageState& stage,
+                          Index step, const std::pair<double, double>& part, VectorXd& by_x,
+                          ViscousAdjoint& viscous) {
         const ElasticAfterwards elastic_afterwards(model_);
         const double share = part.first + input_.tableau.time(i) * (part.second - part.first);
         const Controls controls = input_.controls_at(step, share);
@@ -233,7 +239,8 @@ class Backward {
 
         SceneGradient gradient = model_.vjp(stage.q, controls, lambda);
         if (model_.reduction().moves()) {
-            model_.assemble(stage.q, controls, false);  // the factorization has turned the blocks of framed nodes
+            model_.assemble(stage.q, controls,
+                            false);  // the factorization has turned the blocks of framed nodes
             VectorXd reaction(model_.size());
             model_.matrix().multiply(lambda.data(), reaction.data());
             reaction += by_x;
@@ -289,7 +296,8 @@ class Backward {
 MotionGradient pull_back(Model& model, const MotionInput& input, const MotionResult& motion,
                          const std::vector<VectorXd>& by_q, const std::vector<VectorXd>& by_v,
                          const MotionWatch& watch) {
-    if (motion.keep == Keep::nothing) throw InvalidInput("the motion was computed without keeping its states");
+    if (motion.keep == Keep::nothing)
+        throw InvalidInput("the motion was computed without keeping its states");
     const Backward* running = nullptr;
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(running ? running->progress() : 0.0, residual);

@@ -9,8 +9,8 @@ ViscousAdjoint::ViscousAdjoint(Model& model, const Viscosity& law, const StepAlg
     if (!law.any()) return;
     const SheetStrains d_begin = model.strains(begin.q);
     for (std::size_t i = 0; i < stages.size(); ++i) {
-        stages_.push_back(ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], stages_, d_begin,
-                                       begin.e));
+        stages_.push_back(
+            ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], stages_, d_begin, begin.e));
         stages_.back().finish(law, step.stage_time(), model.strains(stages[i].q));
     }
     const std::size_t n = stages.size();

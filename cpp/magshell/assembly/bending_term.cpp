@@ -145,7 +145,8 @@ void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
 double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const {
     double sum = 0.0;
     for (const FoldStencil::Side& side : {fold.left, fold.right})
-        if (side.face >= 0) sum += stress[3 * (side.face / Pack::width) + side.corner][side.face % Pack::width];
+        if (side.face >= 0)
+            sum += stress[3 * (side.face / Pack::width) + side.corner][side.face % Pack::width];
     return fold.weight() * sum;
 }
 

@@ -52,7 +52,8 @@ class BendingTerm final : public ElasticTerm {
     template <class Body>
     void each_pack(const Body& body) const {
         schedule_.each([&](const Part& part) {
-            for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) body(pack);
+            for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack)
+                body(pack);
         });
     }
     Fold folds_at(Index first, Index last, const double* q) const;

@@ -42,7 +42,8 @@ struct SheetStrains {
         double sum = 0.0;
         for (Index f = 0; f < faces; ++f)
             for (int i = 0; i < 3; ++i)
-                sum += a[3 * (f / Pack::width) + i][f % Pack::width] * b[3 * (f / Pack::width) + i][f % Pack::width];
+                sum += a[3 * (f / Pack::width) + i][f % Pack::width] *
+                       b[3 * (f / Pack::width) + i][f % Pack::width];
         return sum;
     }
 };

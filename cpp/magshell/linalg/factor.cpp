@@ -20,6 +20,20 @@ std::unique_ptr<Factor> analyze(const SparsePattern& pattern, const FactorOption
     throw InvalidInput("unknown backend");
 }
 
+VectorXd product(const SparsePattern& pattern, const double* values, const VectorXd& x) {
+    VectorXd y = VectorXd::Zero(pattern.size);
+    for (Index j = 0; j < pattern.size; ++j) {
+        Index k = pattern.column_starts[j];
+        double row_sum = values[k] * x[j];
+        for (++k; k < pattern.column_starts[j + 1]; ++k) {
+            row_sum += values[k] * x[pattern.rows[k]];
+            y[pattern.rows[k]] += values[k] * x[j];
+        }
+        y[j] += row_sum;
+    }
+    return y;
+}
+
 bool is_built(Backend backend) {
 #ifdef MAGSHELL_HAS_CHOLMOD
     (void)backend;

@@ -22,6 +22,9 @@ struct SparsePattern {
     std::vector<Index> column_starts, rows;
 };
 
+/// A x, from the values of the lower triangle of A.
+VectorXd product(const SparsePattern& pattern, const double* values, const VectorXd& x);
+
 enum class Backend {
     supernodal,  // magshell's own multifrontal L D L^T; definite and indefinite at the same speed
     cholmod,     // CHOLMOD's supernodal L L^T; positive definite only

@@ -14,21 +14,6 @@ constexpr double refined_from_growth = 1e4;  // below it at least 12 digits are 
 constexpr int most_refinements = 8;
 constexpr double rounding = 1e-15;
 
-// A x from the lower triangle of A.
-VectorXd multiply(const SparsePattern& pattern, const double* values, const VectorXd& x) {
-    VectorXd result = VectorXd::Zero(pattern.size);
-    for (Index j = 0; j < pattern.size; ++j) {
-        Index k = pattern.column_starts[j];
-        double row_sum = values[k] * x[j];
-        for (++k; k < pattern.column_starts[j + 1]; ++k) {
-            row_sum += values[k] * x[pattern.rows[k]];
-            result[pattern.rows[k]] += values[k] * x[j];
-        }
-        result[j] += row_sum;
-    }
-    return result;
-}
-
 }  // namespace
 
 void SupernodalLdlt::solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const {
@@ -82,14 +67,14 @@ VectorXd SupernodalLdlt::refined_solution(const VectorXd& rhs) const {
     };
     VectorXd solution = rhs;
     solve_factored(solution);
-    VectorXd residual = rhs - multiply(pattern_, values_.data(), solution);
+    VectorXd residual = rhs - product(pattern_, values_.data(), solution);
     double norm = residual_norm(residual);
     for (int step = 0; step < most_refinements; ++step) {
         if (norm <= rounding * (largest_scaled_ * solution_norm(solution) + residual_norm(rhs))) break;
         VectorXd candidate = residual;
         solve_factored(candidate);
         candidate += solution;
-        residual = rhs - multiply(pattern_, values_.data(), candidate);
+        residual = rhs - product(pattern_, values_.data(), candidate);
         const double candidate_norm = residual_norm(residual);
         if (!(candidate_norm < norm)) break;
         std::swap(solution, candidate);
@@ -106,7 +91,7 @@ bool SupernodalLdlt::recovers_known_solution() const {
         const std::uint32_t hash = static_cast<std::uint32_t>(j + 1) * 2654435769u;  // golden-ratio hashing
         known[j] = scale_[j] * (hash / 2147483648.0 - 1.0);
     }
-    const VectorXd found = refined_solution(multiply(pattern_, values_.data(), known));
+    const VectorXd found = refined_solution(product(pattern_, values_.data(), known));
     for (Index j = 0; j < size(); ++j) {
         if (!(std::abs(found[j] - known[j]) <= 1e-3 * scale_[j])) return false;
     }

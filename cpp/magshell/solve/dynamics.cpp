@@ -27,7 +27,8 @@ std::size_t bytes_of(const StageState& stage) {
     return sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->bytes() : 0) + bytes_of(stage.e);
 }
 
-// The start with its edge rotations at rest, if none were given, and the Maxwell branch relaxed, if it is new.
+// The start with its edge rotations at rest, if none were given, and the Maxwell branch relaxed, if it is
+// new.
 MotionState beginning(Model& model, const MotionInput& input) {
     MotionState start = input.start;
     model.set_memory(start.memory);
@@ -117,8 +118,7 @@ class Run {
         if (done.size() > 1) result_.halved[step] = done;
         if (keep) {
             for (const std::vector<StageState>& part : stages)
-                for (const StageState& stage : part)
-                    result_.bytes += bytes_of(stage);
+                for (const StageState& stage : part) result_.bytes += bytes_of(stage);
             result_.stages.push_back(std::move(stages));
         }
         return true;
@@ -171,14 +171,14 @@ Parts parts_of(const std::map<Index, Parts>& halved, Index step) {
     return found == halved.end() ? Parts{{0.0, 1.0}} : found->second;
 }
 
-void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts, MotionState& state,
-                 std::vector<std::vector<StageState>>* kept, bool with_factors) {
+void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts,
+                 MotionState& state, std::vector<std::vector<StageState>>* kept, bool with_factors) {
     for (const std::pair<double, double>& part : parts) {
         std::vector<StageState> stages;
         std::string reason;
         const std::vector<Controls> controls = at_stages(input, step, part);
-        if (!stepper.step(state, (part.second - part.first) * input.time_step, controls, kept ? &stages : nullptr,
-                          with_factors, reason))
+        if (!stepper.step(state, (part.second - part.first) * input.time_step, controls,
+                          kept ? &stages : nullptr, with_factors, reason))
             throw InvalidInput("a step that was taken before cannot be repeated: " + reason);
         if (kept) kept->push_back(std::move(stages));
     }

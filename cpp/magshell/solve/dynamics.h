@@ -44,11 +44,11 @@ struct MotionResult {
     Outcome outcome = Outcome::failed;
     std::string reason;
     Index steps_done = 0;
-    MotionState start, last;                                   // start: as the first step took it
-    std::vector<MotionState> recorded;                         // every record_every steps, the start first
-    std::vector<double> kinetic_energy;                        // [J], of those
-    std::vector<std::vector<double>> energies;                 // [J], of those, term by term
-    std::map<Index, Parts> halved;                             // the steps that were taken in parts
+    MotionState start, last;                    // start: as the first step took it
+    std::vector<MotionState> recorded;          // every record_every steps, the start first
+    std::vector<double> kinetic_energy;         // [J], of those
+    std::vector<std::vector<double>> energies;  // [J], of those, term by term
+    std::map<Index, Parts> halved;              // the steps that were taken in parts
     Keep keep = Keep::nothing;
     std::vector<std::vector<std::vector<StageState>>> stages;  // by step, part, stage
     std::map<Index, MotionState> checkpoints;                  // by the step that begins there
@@ -69,11 +69,11 @@ MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions&
 Parts parts_of(const std::map<Index, Parts>& halved, Index step);
 
 /// Takes one step again exactly as it was taken; `kept` gets the stages of its parts.
-void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts, MotionState& state,
-                 std::vector<std::vector<StageState>>* kept, bool with_factors = false);
+void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts,
+                 MotionState& state, std::vector<std::vector<StageState>>* kept, bool with_factors = false);
 
-/// Where to put the next checkpoint in a stretch of so many steps (Griewank and Walther's revolve): the number
-/// of steps before it, or 0 where the stretch fits at once.
+/// Where to put the next checkpoint in a stretch of so many steps (Griewank and Walther's revolve): the
+/// number of steps before it, or 0 where the stretch fits at once.
 Index next_checkpoint(Index steps, Index leaf, Index slots);
 
 }  // namespace magshell

@@ -27,21 +27,6 @@ constexpr Index most_new_negative_pivots = 10;
 constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
 
-// A x, of the symmetric A whose lower triangle is given.
-VectorXd product(const SparsePattern& pattern, const std::vector<double>& values, const VectorXd& x) {
-    VectorXd y = VectorXd::Zero(x.size());
-    for (Index j = 0; j < pattern.size; ++j) {
-        Index k = pattern.column_starts[j];
-        double sum = values[k] * x[j];
-        for (++k; k < pattern.column_starts[j + 1]; ++k) {
-            sum += values[k] * x[pattern.rows[k]];
-            y[pattern.rows[k]] += values[k] * x[j];
-        }
-        y[j] += sum;
-    }
-    return y;
-}
-
 // Adds the time it lives to a sum.
 class Stopwatch {
   public:
@@ -57,10 +42,7 @@ class Stopwatch {
 }  // namespace
 
 Newton::Newton(Model& model, const NewtonOptions& options, Watch watch)
-    : model_(model),
-      options_(options),
-      watch_(std::move(watch)),
-      factor_(model.new_factor()) {}
+    : model_(model), options_(options), watch_(std::move(watch)), factor_(model.new_factor()) {}
 
 std::shared_ptr<Factor> Newton::release_factor() {
     std::shared_ptr<Factor> released = std::move(factor_);
@@ -130,8 +112,9 @@ FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool
     return factorize_assembled(anchor);
 }
 
-std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
-                                             const Factor& nearby, const VectorXd& rhs) {
+std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& controls,
+                                             const Anchor& anchor, const Factor& nearby,
+                                             const VectorXd& rhs) {
     constexpr int most_refinements = 4;
     constexpr double exact = 1e-13;  // of the right-hand side
     model_.evaluate(q, controls);
@@ -144,7 +127,7 @@ std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& 
         if (left.norm() <= exact * b.norm()) return model_.reduction().expand(solution);
         nearby.solve(left);
         solution += left;
-        left = b - product(model_.reduction().pattern(), values_, solution);
+        left = b - product(model_.reduction().pattern(), values_.data(), solution);
     }
     return std::nullopt;
 }

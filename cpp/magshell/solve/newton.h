@@ -35,8 +35,8 @@ struct NewtonReport {
     std::string reason;         // why not converged
 };
 
-/// A quadratic pull, 1/2 sum w_i (q_i - target_i)^2: the inertia of a time step, or one implicit Euler step of
-/// a gradient flow. Among all unknowns; weights are the same along the three axes of a node.
+/// A quadratic pull, 1/2 sum w_i (q_i - target_i)^2: the inertia of a time step, or one implicit Euler step
+/// of a gradient flow. Among all unknowns; weights are the same along the three axes of a node.
 struct Anchor {
     const VectorXd* weights = nullptr;
     const VectorXd* target = nullptr;
@@ -63,8 +63,8 @@ class Newton {
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
                            const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves);
-    /// K p = rhs with the last evaluated state's own Hessian, by refinement with a factorization from nearby. Empty
-    /// where that does not converge quickly.
+    /// K p = rhs with the last evaluated state's own Hessian, by refinement with a factorization from nearby.
+    /// Empty where that does not converge quickly.
     std::optional<VectorXd> solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
                                          const Factor& nearby, const VectorXd& rhs);
     /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held.

@@ -8,7 +8,8 @@ StepAlgebra::StepAlgebra(const Tableau& tableau, const Inertia& inertia, double 
     : tableau_(tableau), dt_(dt), stage_time_(tableau.diagonal() * dt) {
     const VectorXd by_acceleration = inertia.mass / (stage_time_ * stage_time_);
     weights_ = by_acceleration + inertia.damping / stage_time_;
-    velocity_share_ = (weights_.array() > 0.0).select(stage_time_ * by_acceleration.array() / weights_.array(), 0.0);
+    velocity_share_ =
+        (weights_.array() > 0.0).select(stage_time_ * by_acceleration.array() / weights_.array(), 0.0);
 }
 
 void StepAlgebra::start_of_stage(int i, const MotionState& begin, const std::vector<VectorXd>& v,
@@ -49,10 +50,11 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, 
         step.start_of_stage(i, state, v, w, x_hat, v_hat);
         const VectorXd target = step.target(x_hat, v_hat);
         // As fast as until now; what has no velocity begins where it was.
-        q.head(coordinates) = x_hat.head(coordinates) +
-                              step.stage_time() * (i == 0 ? state.v : v.back()).head(coordinates);
+        q.head(coordinates) =
+            x_hat.head(coordinates) + step.stage_time() * (i == 0 ? state.v : v.back()).head(coordinates);
         if (viscosity_.any()) {
-            viscous.push_back(ViscousStage(viscosity_, step.stage_time(), dt, tableau_.a[i], viscous, at_begin, state.e));
+            viscous.push_back(
+                ViscousStage(viscosity_, step.stage_time(), dt, tableau_.a[i], viscous, at_begin, state.e));
             model.set_history(viscosity_.scale(step.stage_time()), &viscous.back().shift);
         }
         const NewtonReport report = newton_.solve(q, at[i], {&step.weights(), &target});
@@ -67,8 +69,7 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, 
         w.emplace_back((v.back() - v_hat) / step.stage_time());
         if (viscosity_.any()) viscous.back().finish(viscosity_, step.stage_time(), model.strains(q));
         const SheetStrains e = viscosity_.maxwell() ? viscous.back().e : SheetStrains();
-        if (kept)
-            stages.push_back({q, model.memory(), with_factors ? newton_.release_factor() : nullptr, e});
+        if (kept) stages.push_back({q, model.memory(), with_factors ? newton_.release_factor() : nullptr, e});
     }
     state = {std::move(q), std::move(v.back()), model.memory(),
              viscosity_.maxwell() ? std::move(viscous.back().e) : SheetStrains()};

@@ -23,7 +23,9 @@ struct Tableau {
     }
 };
 
-inline Tableau implicit_euler() { return {}; }
+inline Tableau implicit_euler() {
+    return {};
+}
 
 /// Alexander 1977: two stages, second order, L-stable. Its stability function is that of TR-BDF2.
 inline Tableau sdirk2() {

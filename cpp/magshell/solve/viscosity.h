@@ -2,11 +2,13 @@
 //
 //   sigma = C (d + beta d' + g (d - e)),   e' = (d - e)/tau
 //
-// beta [s]: stiffness-proportional damping (Kelvin-Voigt); for small motions the matrix beta K. g and tau [s]:
-// the modulus of a Maxwell branch beside the elastic one, and its relaxation time. With T = a dt and r = T/tau,
+// beta [s]: stiffness-proportional damping (Kelvin-Voigt); for small motions the matrix beta K. g and tau
+// [s]: the modulus of a Maxwell branch beside the elastic one, and its relaxation time. With T = a dt and r =
+// T/tau,
 //
 //   d'_i = (d_i - d^_i)/T,   e_i = (e^_i + r d_i)/(1 + r),
-//   sigma_i = C (scale d_i - shift_i),  scale = 1 + beta/T + g/(1 + r),  shift_i = beta/T d^_i + g/(1 + r) e^_i
+//   sigma_i = C (scale d_i - shift_i),  scale = 1 + beta/T + g/(1 + r),  shift_i = beta/T d^_i + g/(1 + r)
+//   e^_i
 #pragma once
 
 #include "magshell/assembly/model.h"
@@ -14,10 +16,10 @@
 namespace magshell {
 
 struct Viscosity {
-    double stiffness_damping = 0.0;                  // beta [s]
+    double stiffness_damping = 0.0;                    // beta [s]
     double maxwell_modulus = 0.0, maxwell_time = 1.0;  // g, over the elastic one; tau [s]
 
-    bool any() const { return stiffness_damping != 0.0 || maxwell() ; }
+    bool any() const { return stiffness_damping != 0.0 || maxwell(); }
     bool maxwell() const { return maxwell_modulus != 0.0; }
     double ratio(double stage_time) const { return stage_time / maxwell_time; }
     double relaxed(double stage_time) const { return maxwell_modulus / (1.0 + ratio(stage_time)); }

@@ -1,0 +1,68 @@
+"""What positions cannot tell, however well they are measured."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+import magshell as ms
+
+from .inverse import UNIT, Problem
+from .model import FIELDS, NOISE, sheet, true_magnetization
+
+
+def scaled_together(cells, factor: float = 2.0) -> dict:
+    """How far vertices move [m] when modulus and magnetization are both multiplied, without weight and with it."""
+    moved = {}
+    for name, weight in (("weightless", False), ("with weight", True)):
+        whole = sheet(cells, weight=weight)
+        modulus, magnetization = whole.scene.shell.young_modulus, true_magnetization()[whole.regions]
+        shapes = [
+            ms.equilibrium(
+                whole.scene,
+                young_modulus=k * modulus,
+                remanent_magnetization=k * magnetization,
+                applied_flux_density=FIELDS,
+            ).positions
+            for k in (1.0, factor)
+        ]
+        moved[name] = float(np.abs(shapes[1] - shapes[0]).max())
+    return moved
+
+
+def deviations(problem: Problem, p: torch.Tensor) -> dict:
+    """Standard deviations that the noise leaves, to first order and with nothing known beforehand: of log10 Y at each
+    node, of the magnetization [A/m], and of a factor common to Y and M."""
+    sensitivity = problem.sensitivity(p)
+    variances = np.diag(np.linalg.inv(sensitivity.T @ sensitivity))
+    common = torch.cat([torch.ones(problem.n_nodes), np.log(10) * p[problem.n_nodes :]]).numpy()
+    return {
+        "decades": np.sqrt(variances[: problem.n_nodes]),
+        "magnetization": UNIT * np.sqrt(variances[problem.n_nodes :]).reshape(-1, 3),
+        "common factor": float(np.log(10) / np.linalg.norm(sensitivity @ common)),
+    }
+
+
+def of_finer_magnetizations(cells, divisions=((5, 1), (10, 1), (5, 3))) -> list[dict]:
+    """The largest standard deviation [A/m] of a component of M where the sheet is divided into more regions, Young's
+    modulus being known."""
+    rows = []
+    for strips in divisions:
+        whole = sheet(cells, strips=strips)
+        finest = sheet(cells).regions
+        magnetization = np.empty((whole.n_regions, 3))
+        magnetization[whole.regions] = true_magnetization()[finest]
+        controls = {"applied_flux_density": FIELDS}
+        base = ms.equilibrium(whole.scene, remanent_magnetization=magnetization[whole.regions], **controls)
+        columns = []
+        for k in range(magnetization.size):
+            moved = magnetization.copy()
+            moved.flat[k] += 500.0
+            there = ms.equilibrium(
+                whole.scene, remanent_magnetization=moved[whole.regions], start=base, **controls
+            )
+            columns.append((there.positions - base.positions).ravel() / (500.0 * NOISE))
+        sensitivity = np.stack(columns, axis=1)
+        worst = np.sqrt(np.diag(np.linalg.inv(sensitivity.T @ sensitivity))).max()
+        rows.append({"strips": strips, "deviation": float(worst)})
+    return rows

@@ -1,0 +1,93 @@
+"""What tells how good a tower is: bounds, disturbances, the way up, a finer mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+
+import magshell as ms
+
+from .design import FIELD, LIMIT
+from .model import Kirigami, kirigami
+
+
+def checks(sheet: Kirigami, found: dict, trials: int = 30) -> dict:
+    """Of what a search found. Lengths in m, energies in J."""
+    magnetization = found["remanent_magnetization"]
+    rest = solve(sheet, magnetization, start=found["positions"])
+    volumes = sheet.scene.shell.face_volumes
+    lifted = np.linalg.norm(magnetization, axis=1) * np.linalg.norm(FIELD) @ volumes
+    return {
+        "stable": rest.stable,
+        "moved": float(np.abs(rest.positions - found["positions"]).max()),
+        "lowest": float(rest.positions[:, 2].min()),
+        "off_axis": float(np.linalg.norm(rest.positions[sheet.centre, :2])),
+        "largest_magnetization": float(np.linalg.norm(magnetization, axis=1).max()),
+        "way": sheet.longest_way(),
+        "energies": rest.energies,
+        "magnetic_at_most": float(lifted),
+        "switched_on": switched_on(sheet, magnetization),
+        "disturbed": disturbed(sheet, rest, magnetization, trials),
+        "first_order": {
+            "start": to_first_order(sheet, np.zeros_like(magnetization)),
+            "tower": to_first_order(sheet, magnetization, rest),
+        },
+        "finer": finer(sheet, magnetization),
+    }
+
+
+def solve(sheet: Kirigami, magnetization, share: float = 1.0, **options) -> ms.Equilibrium:
+    """At rest in a share of the field."""
+    field = share * np.array(FIELD)
+    return ms.equilibrium(
+        sheet.scene,
+        remanent_magnetization=magnetization,
+        applied_flux_density=field,
+        solver=ms.Newton(),
+        **options,
+    )
+
+
+def switched_on(sheet: Kirigami, magnetization: np.ndarray) -> dict:
+    """The sheet lies on the floor, which carries it while the field grows; then it has to carry itself."""
+    fields, heights, rest = np.linspace(0.0, 1.0, 21), [], None
+    for share in fields:
+        rest = solve(sheet, magnetization, share, gravity_factor=0.0, start=rest)
+        heights.append(float(sheet.height(rest.positions)))
+    rest = solve(sheet, magnetization, start=rest)
+    return {
+        "fields": fields * FIELD[2],
+        "heights": np.array(heights),
+        "height": float(sheet.height(rest.positions)),
+    }
+
+
+def disturbed(
+    sheet: Kirigami, rest, magnetization: np.ndarray, trials: int, size: float = 0.02
+) -> np.ndarray:
+    """(trials,) m: by how much random changes of every magnetization, a share of the limit in size, raise the
+    centre."""
+    rng, gains = np.random.default_rng(4), []
+    for _ in range(trials):
+        moved = magnetization + size * LIMIT * rng.standard_normal(magnetization.shape)
+        within = ms.parametrize.project_to_cap(torch.from_numpy(moved), LIMIT).numpy()
+        there = solve(sheet, within, start=rest)
+        gains.append(float(sheet.height(there.positions) - sheet.height(rest.positions)))
+    return np.array(gains)
+
+
+def to_first_order(sheet: Kirigami, magnetization: np.ndarray, start=None) -> float:
+    """By how much the best magnetization within the limit would raise the centre if its height were linear [m]."""
+    values = torch.from_numpy(magnetization).requires_grad_()
+    sheet.height(solve(sheet, values, start=start).positions).backward()
+    gradient = values.grad.numpy()
+    return float((LIMIT * np.linalg.norm(gradient, axis=1) - (gradient * magnetization).sum(axis=1)).sum())
+
+
+def finer(sheet: Kirigami, magnetization: np.ndarray) -> dict:
+    """The same design on a mesh of four times as many faces."""
+    fine = kirigami(refined=2)
+    nearest = cKDTree(sheet.mesh.face_barycenters).query(fine.mesh.face_barycenters)[1]
+    rest = solve(fine, magnetization[nearest])
+    return {"faces": fine.mesh.n_faces, "height": float(fine.height(rest.positions))}

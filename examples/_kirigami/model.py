@@ -1,0 +1,78 @@
+"""The kirigami: a disc cut into rings that bridges join, its outermost ring glued to the floor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+import magshell as ms
+
+# With these four and the number of faces, about the kirigami of [Chen22] Table 1; its other sizes are not given.
+THICKNESS = 1e-3  # m
+YOUNG_MODULUS, POISSON_RATIO, MASS_DENSITY = 1e5, 0.5, 1e3  # Pa, 1, kg/m3
+RINGS, AROUND = 6, 18  # rings around the disc in the middle, the glued one included; their cells around
+
+RADIUS = 20e-3  # m
+SYMMETRY = 3  # bridges between neighbouring rings; those of the next pair stand half-way between them
+GRAVITY = (0.0, 0.0, -9.81)  # m/s2
+
+
+@dataclass(frozen=True)
+class Kirigami:
+    """rings: (n_f,) the ring of each face, 0 the disc in the middle. centre: the vertex there."""
+
+    scene: ms.Scene
+    rings: np.ndarray
+    centre: int
+
+    @property
+    def mesh(self) -> ms.TriangleMesh:
+        return self.scene.mesh
+
+    def height(self, positions):
+        """Of the centre over the floor, m; positions: (n_v, 3), or (k, n_v, 3)."""
+        return positions[..., self.centre, 2]
+
+    def longest_way(self) -> float:
+        """From the centre to the glued ring along the edges of the mesh, m: no tower can be higher, but for
+        what the sheet stretches and for what shorter ways there are between the edges."""
+        mesh = self.mesh
+        graph = coo_array((mesh.edge_lengths, tuple(mesh.edges.T)), shape=(mesh.n_vertices,) * 2)
+        lengths = dijkstra(graph, directed=False, indices=self.centre)
+        return float(lengths[mesh.faces[self.rings == RINGS]].min())
+
+
+def kirigami(refined: int = 1) -> Kirigami:
+    """The sheet at rest in the plane z = 0, in a uniform field to be given, with its weight.
+
+    refined: into how many parts the cells are divided each way; the cuts stay where they are.
+    """
+    width = RADIUS / (RINGS + 1)
+    cells = (refined * (RINGS + 1), refined * AROUND)
+    disc = ms.meshes.sector(0.0, RADIUS, 2 * np.pi, cells)
+    mesh = ms.meshes.cut(disc, _slits(disc, width))
+    rings = np.floor(np.linalg.norm(mesh.face_barycenters, axis=1) / width).astype(np.int64)
+    shell = ms.Shell(
+        mesh,
+        thickness=THICKNESS,
+        young_modulus=YOUNG_MODULUS,
+        poisson_ratio=POISSON_RATIO,
+        mass_density=MASS_DENSITY,
+    )
+    glued = mesh.edges_between(np.unique(mesh.faces[rings == RINGS]))
+    scene = ms.Scene(shell, supports=[ms.Clamp(glued)], field=ms.UniformField(), gravity=GRAVITY)
+    return Kirigami(scene, rings, mesh.nearest_vertex((0, 0, 0)))
+
+
+def _slits(disc: ms.TriangleMesh, width: float) -> np.ndarray:
+    """The edges between rings, but for one cell of the coarsest mesh at each bridge."""
+    radii = np.linalg.norm(disc.rest_positions[disc.edges], axis=2) / width
+    circle = np.rint(radii[:, 0]).astype(np.int64)
+    on_circle = np.isclose(radii, circle[:, None]).all(axis=1) & (circle > 0) & (circle <= RINGS)
+    x, y, _ = disc.edge_midpoints.T
+    apart = AROUND // SYMMETRY
+    cell = np.mod(np.arctan2(y, x) * AROUND / (2 * np.pi) - (circle % 2) * (apart // 2), apart)
+    return np.flatnonzero(on_circle & (cell > 1))
