@@ -35,11 +35,11 @@ from _bending.strip import CELLS, TIME_STEP, Strip, balance, strip
 
 import magshell as ms
 
-FIELDS = np.array([0.3e-3, 1e-3, 3e-3, 10e-3, 30e-3])  # T
+FIELDS = np.array([0.2e-3, 0.5e-3, 1e-3, 2e-3, 5e-3])  # T
 DIRECTION = np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0)
 RISE, BENDING_STEP = 2.0, 0.1  # s; the first: how long the fields grow
 TURNING_FIELD, TURNS, TURNING = 50e-3, 2, 2.0  # T, 1, s
-SUDDEN_FIELD, SUDDEN_STEPS = 0.3e-3, (1e-2, 5e-3, 2.5e-3)  # T, s
+SUDDEN_FIELD, SUDDEN_STEPS = 0.2e-3, (1e-2, 5e-3, 2.5e-3)  # T, s
 
 
 def main(cells=CELLS, bending_time=60.0, turning_time=6.0, undamped_time=2.0) -> dict:
@@ -134,7 +134,7 @@ def bent_picture(result: dict) -> ms.Picture:
         applied_flux_density=[state["field"] * DIRECTION for state in states],
         color="magnetic_energy",
         titles=[f"{1e3 * state['field']:g} mT" for state in states],
-        view=(8, -80),
+        view=(10, -40),
         columns=3,
         arrows=12,
         width=2000,

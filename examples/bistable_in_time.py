@@ -69,6 +69,9 @@ def main(cells=(96, 16), time_step=2e-3, study_cells=(48, 8)) -> dict:
         "limit": limit[limit["first"]]["field"],
         "measured": measured,
         "ramp": {"motion": pulled, **curve(pulled.times, pulled.displacements)},
+        "plateau": {
+            name: plateau(measured["ramp"], by) for name, by in (("computed", pulled), ("measured", None))
+        },
         "measured_ramp": curve(**_times_and_displacements(measured["ramp"])),
         "step": {"motion": switched, **rings(switched.times, switched.displacements)},
         "measured_step": rings(**_times_and_displacements(measured["step"])),
@@ -87,7 +90,7 @@ def _times_and_displacements(measured: dict) -> dict:
 
 
 def curve(times, displacements) -> dict:
-    """Of a ramp: when it snaps, how far it overshoots and falls back, its plateau."""
+    """Of a ramp: when it snaps, how far it overshoots and falls back."""
     snap = passing(times, displacements)
     after = displacements[(times > snap) & (times < snap + 0.1)]
     peak = int(after.argmax())
@@ -96,8 +99,14 @@ def curve(times, displacements) -> dict:
         "field": RAMP * snap,
         "peak": after[peak],
         "dip": after[peak:].min(),
-        "plateau": last_third(times, displacements),
     }
+
+
+def plateau(measured: dict, motion: Motion | None) -> float:
+    """Mean displacement [m] at the measured times above 10 mT, of a motion or, without one, of the experiment."""
+    times = measured["times"][measured["fields"] > 10e-3]
+    curve = measured if motion is None else vars(motion)
+    return float(np.interp(times, curve["times"], curve["displacements"]).mean())
 
 
 def rings(times, displacements) -> dict:
@@ -150,7 +159,7 @@ def plot(result: dict):
 def picture(result: dict) -> ms.Picture:
     """The beam on its way to the other side."""
     motion: Motion = result["ramp"]["motion"]
-    times = result["ramp"]["snap"] + np.array([-0.96, -0.05, 0.0, 0.015, 0.03, 0.06])
+    times = np.append(0.0, result["ramp"]["snap"] + np.array([-0.05, 0.0, 0.015, 0.03, 0.06]))
     shown = np.clip(np.searchsorted(motion.times, times), 0, len(motion.times) - 1)
     return ms.plot(
         result["sheet"].scene.mesh,
@@ -158,8 +167,9 @@ def picture(result: dict) -> ms.Picture:
         remanent_magnetization=result["sheet"].remanent_magnetization,
         applied_flux_density=[(0, 0, RAMP * time) for time in motion.times[shown]],
         titles=[f"{time:.3f} s, {1e3 * RAMP * time:.2f} mT" for time in motion.times[shown]],
-        view=(14, -86),
+        view=(8, -86),
         columns=2,
+        arrows=24,
     )
 
 
@@ -175,7 +185,8 @@ def movie(result: dict, path, before=0.15, after=0.3) -> Path:
         times=motion.times[shown],
         remanent_magnetization=result["sheet"].remanent_magnetization,
         applied_flux_density=[(0, 0, RAMP * time) for time in motion.times[shown]],
-        view=(14, -86),
+        view=(8, -86),
+        arrows=24,
         width=800,
         progress=False,
     )

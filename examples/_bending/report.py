@@ -10,7 +10,7 @@ BLUE, RED, GREY = "#20639b", "#c8442d", "#777777"
 def draw_alignment(axes, states) -> None:
     fields = [1e3 * state["field"] for state in states]
     axes.axhline(-np.sqrt(0.5), color=GREY, lw=1, ls=":")
-    axes.text(fields[-1], -0.68, "flat", color=GREY, ha="right")
+    axes.text(fields[-1], -0.69, "flat", color=GREY, ha="right")
     axes.plot(fields, [state["alignment_at_rest"] for state in states], "o-", color=BLUE, label="at rest")
     reached = [state["alignment"] for state in states]
     axes.plot(fields, reached, "o", mfc="white", color=RED, label="at the motion's end")
@@ -25,8 +25,8 @@ def draw_turning(axes, twisted: dict, turning: float, turns: int) -> None:
     axes.axvline(turning, color=GREY, lw=1, ls=":")
     axes.text(turning, 0.02, f"  {turns} turns done", color=GREY)
     axes.plot(times, twisted["end"][:, 0] / twisted["end"][0, 0], color=RED)
-    axes.text(times[-1], 0.9, "cosine of magnet and field", color=BLUE, ha="right")
-    axes.text(times[-1], 0.8, "x of the end / length", color=RED, ha="right")
+    axes.text(times[-1], 0.22, "cosine of magnet and field", color=BLUE, ha="right")
+    axes.text(times[-1], 0.12, "x of the end / length", color=RED, ha="right")
     axes.set(xlabel="time [s]", ylim=(0, 1.05))
 
 
@@ -38,7 +38,7 @@ def draw_balance(axes, twisted: dict) -> None:
     rest = balance.received - balance.lost
     axes.plot(times, 1e6 * rest, color="#f0c419", ls=(0, (4, 4)), label="put in less lost")
     axes.set(xlabel="time [s]", ylabel="energy [µJ]")
-    axes.legend(frameon=False, loc="center right")
+    axes.legend(frameon=False, fontsize=8, loc=(0.52, 0.3))
 
 
 def draw_undamped(axes, runs) -> None:

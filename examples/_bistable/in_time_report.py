@@ -22,7 +22,9 @@ def draw_snap(axes, result: dict) -> None:
     _computed(axes, result["ramp"]["motion"])
     limit = result["limit"] / RAMP
     axes.axvline(limit, color=GREY, lw=1, ls=":")
-    axes.text(limit, 9.3, f" limit of statics\n {1e3 * result['limit']:.2f} mT", color=GREY, va="top")
+    axes.text(
+        limit, 9.3, f"limit of statics \n{1e3 * result['limit']:.2f} mT ", color=GREY, va="top", ha="right"
+    )
     axes.set(xlabel="time [s]", ylabel="mid-span displacement [mm]", xlim=(0.75, 1.3), ylim=(0, 9.8))
 
 
@@ -81,11 +83,14 @@ def ramp(result: dict) -> str:
         ("the field then [mT]", "field", 1e3, 3),
         ("overshoots to [mm]", "peak", 1e3, 2),
         ("falls back to [mm]", "dip", 1e3, 2),
-        ("plateau, mean of the last third [mm]", "plateau", 1e3, 2),
     ):
         lines.append(
             f"  {what:<36} {factor * ours[key]:8.{decimals}f}   {factor * theirs[key]:8.{decimals}f}"
         )
+    plateau = {name: 1e3 * value for name, value in result["plateau"].items()}
+    lines.append(
+        f"  {'plateau, mean above 10 mT [mm]':<36} {plateau['computed']:8.2f}   {plateau['measured']:8.2f}"
+    )
     delays = (ours["snap"] - limit / RAMP, theirs["snap"] - limit / RAMP)
     lines.append(f"  {'after the limit of statics by [s]':<36} {delays[0]:8.4f}   {delays[1]:8.4f}")
     lines.append(f"  {'limit of statics on this mesh [mT]':<36} {1e3 * limit:8.3f}")
