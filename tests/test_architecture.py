@@ -37,6 +37,8 @@ OPTIONAL_MODULES = [
     "torch",
     "matplotlib",
     "pyvista",
+    "PIL",
+    "imageio_ffmpeg",
     "meshio",
     "gmsh",
     "magpylib",

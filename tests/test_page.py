@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from motions import lifted_strip
 
 import magshell as ms
 
@@ -117,6 +118,54 @@ def test_varying_fields_surround_the_sheet(mesh, tmp_path) -> None:
     assert "magnetization" not in state and "fluxDensity" not in state
 
 
+def decoded(packed, rows: int) -> np.ndarray:
+    """What the page's script makes of a state's numbers."""
+    if isinstance(packed, str):
+        return numbers(packed, "<f4").reshape(rows, -1)
+    return (packed["low"] + packed["step"] * numbers(packed["u2"], "<u2")).reshape(rows, -1)
+
+
+def test_a_page_plays_a_motion(mesh, tmp_path) -> None:
+    move = lifted_strip(mesh)
+    page = Page(ms.write_page(move, tmp_path / "a.html", color="magnetic_energy").read_text())
+    assert {"play", "slider", "speed"} <= set(page.ids)
+    data = page.data
+    assert data["speed"] == 0.005 and data["recorded"] == 9
+    assert [state["time"] for state in data["states"]] == move.times.tolist()
+    assert data["states"][2]["title"] == "10.0 ms"
+    for k, state in enumerate(data["states"]):
+        assert state["fluxDensity"] == move.applied_flux_density[k].tolist()
+        np.testing.assert_array_equal(
+            decoded(state["positions"], mesh.n_vertices), move.positions[k].astype("<f4")
+        )
+    assert data["states"][4]["fluxDensityLabel"] == "B = 2 mT"
+    assert len(data["scalars"][0]["values"]) == 9
+    still = Page(ms.write_page(mesh, tmp_path / "b.html", positions=move.positions).read_text()).data
+    assert still["speed"] is None and "time" not in still["states"][0]
+    given = Page(
+        ms.write_page(mesh, tmp_path / "c.html", positions=move.positions, times=2 * move.times).read_text()
+    ).data
+    assert given["states"][-1]["time"] == 0.08 and given["speed"] == 0.01
+
+
+def test_long_motions_are_kept_within_a_limit(mesh, tmp_path) -> None:
+    move = lifted_strip(mesh, steps=40)
+    alone = ms.write_page(mesh, tmp_path / "a.html").stat().st_size
+    kept = []
+    for limit in (1e6, 75e3, 20e3):
+        path = ms.write_page(move, tmp_path / "a.html", size_limit=limit)
+        assert path.stat().st_size < alone + limit + 3e3
+        data = Page(path.read_text()).data
+        kept.append(len(data["states"]))
+        assert data["recorded"] == 41 and len(data["scalars"][-1]["values"]) == kept[-1]
+        numbers_of = [round(state["time"] / 1e-3) for state in data["states"]]
+        assert numbers_of[0] == 0 and numbers_of[-1] == 40
+        for k, state in zip(numbers_of, data["states"], strict=True):
+            found = decoded(state["positions"], mesh.n_vertices)
+            assert found == pytest.approx(move.positions[k], abs=0.1 / 65535 if limit < 1e6 else 1e-8)
+    assert kept[0] == kept[1] == 41 and 2 <= kept[2] < 20
+
+
 def test_a_page_needs_no_network(mesh, path_, tmp_path) -> None:
     text = ms.write_page(mesh, tmp_path / "a.html", **path_).read_text()
     assert Page(text).links == []
@@ -149,4 +198,8 @@ def test_bad_input_is_refused(mesh, tmp_path) -> None:
         ms.write_page(mesh, tmp_path / "a.html", titles=["a", "b"])
     with pytest.raises(ValueError, match="color must be"):
         ms.write_page(mesh, tmp_path / "a.html", color="colour")
+    with pytest.raises(ValueError, match=r"size_limit \[bytes\] must be positive"):
+        ms.write_page(mesh, tmp_path / "a.html", size_limit=0)
+    with pytest.raises(ValueError, match="speed must be positive"):
+        ms.write_page(mesh, tmp_path / "a.html", speed=0)
     assert list(tmp_path.iterdir()) == []

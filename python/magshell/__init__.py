@@ -27,9 +27,10 @@ from .mesh import TriangleMesh
 from .minimum import Minimum
 from .multistart import multistart
 from .path import CriticalPoint, Path, follow
-from .plotting import Picture, plot, write_page
+from .plotting import Picture, animate, plot, write_page
 from .sampling import random_starts
 from .scene import Scene
+from .series import write_series
 from .shell import Shell
 from .solvers import MixedNewton, Newton
 from .starts import Multistart
@@ -82,6 +83,7 @@ __all__ = [
     "WarmStart",
     "Weld",
     "__version__",
+    "animate",
     "control",
     "equilibrium",
     "follow",
@@ -105,4 +107,5 @@ __all__ = [
     "weld",
     "write_mesh",
     "write_page",
+    "write_series",
 ]

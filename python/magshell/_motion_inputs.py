@@ -63,7 +63,7 @@ class MotionInputs:
         self._damping = self._checked_damping(inputs.take("damping", damping))
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
         self.start = self._begin(start, velocities)
-        given = {name: self._controls(name, value, time_step) for name, value in controls.items()}
+        self._knots = {name: self._controls(name, value, time_step) for name, value in controls.items()}
         self.core = _core.MotionInput(
             inputs.scene._model,
             {
@@ -78,11 +78,18 @@ class MotionInputs:
                 "integrator": integrator._name,
                 "time_step": self.time_step,
                 "steps": self.steps,
-                "controls": {_CONTROLS[name][2]: array for name, array in given.items()},
+                "controls": {_CONTROLS[name][2]: array for name, array in self._knots.items()},
                 "newton": solver._newton_options(),
                 "record_every": self.record_every,
             },
         )
+
+    def recorded(self, name: str, count: int) -> np.ndarray:
+        """A control at the first `count` recorded states, (count, *row): at the start, then at the ends of steps."""
+        knots = self._knots[name]
+        a_step = len(self.integrator._times) + 1
+        ends = a_step * self.record_every * np.arange(1, count) - 1
+        return knots[np.concatenate([[0], ends])]
 
     def _controls(self, name: str, value, time_step) -> np.ndarray:
         unit, row, _ = _CONTROLS[name]

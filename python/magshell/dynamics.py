@@ -163,6 +163,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         positions=positions,
         velocities=velocities,
         edge_rotations=edge_rotations,
+        remanent_magnetization=asked.inputs.given_magnetization,
+        applied_flux_density=asked.recorded("applied_flux_density", recorded),
         kinetic_energy=np.array(found.kinetic_energy),
         energies={name: by_term[:, k] for k, name in enumerate(names)},
         steps=asked.steps,
@@ -181,6 +183,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         bytes=found.bytes,
         wall_time=wall_time,
         linear_time=found.linear_time,
+        _field_factors=asked.recorded("field_factor", recorded),
     )
 
 

@@ -61,6 +61,7 @@ class Trajectory:
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
     edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J.
+    remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
     steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
     taken}. end: the last state, from which another simulation goes on. bytes: kept for gradients.
     """
@@ -71,6 +72,8 @@ class Trajectory:
     positions: Any
     velocities: Any
     edge_rotations: Any
+    remanent_magnetization: Any
+    applied_flux_density: np.ndarray
     kinetic_energy: np.ndarray
     energies: dict[str, np.ndarray]
     steps: int
@@ -83,6 +86,15 @@ class Trajectory:
     bytes: int
     wall_time: float
     linear_time: float
+    _field_factors: np.ndarray = field(repr=False)
+
+    @property
+    def displacements(self):
+        """(n, n_v, 3) m, from the rest shape."""
+        rest = self.scene.mesh.rest_positions
+        if isinstance(self.positions, np.ndarray):
+            return self.positions - rest
+        return self.positions - self.positions.new_tensor(np.array(rest))
 
     @property
     def energy(self) -> np.ndarray:

@@ -144,6 +144,15 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
 }
 
 NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations) {
+    return iterate(q, controls, anchor, max_iterations, options_.mixed);
+}
+
+NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls) {
+    return iterate(q, controls, {}, options_.max_iterations, false);
+}
+
+NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
+                             bool mixed) {
     NewtonReport report;
     VectorXd move = model_.reduction().prescribed_increment(q, controls.motion);
     bool extrapolated = false;
@@ -167,19 +176,19 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
         if (report.iterations == max_iterations)
             return fail("no convergence in " + std::to_string(max_iterations) + " iterations");
         Eigen::MatrixXd pull = move;
-        const FactorReport factor = factorize(q, controls, options_.mixed && extrapolated, anchor, pull);
+        const FactorReport factor = factorize(q, controls, mixed && extrapolated, anchor, pull);
         report.negative_pivots = factor.negative_pivots;
         if (!factor.succeeded) return fail(factor.reason);
         if (report.iterations == 0) first_negative_pivots = factor.negative_pivots;
         report.lost = factor.negative_pivots > first_negative_pivots + most_new_negative_pivots;
-        if (options_.mixed && report.lost) return fail("the iteration lost its way");
+        if (mixed && report.lost) return fail("the iteration lost its way");
         const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0));
         move.setZero();
         const double length = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
-        if (options_.mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
+        if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())
             return fail("the steps of the iteration do not get shorter");
-        if (options_.mixed) model_.extrapolate(step);
+        if (mixed) model_.extrapolate(step);
         extrapolated = true;
         last_step = length;
         q += step;

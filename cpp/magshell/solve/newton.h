@@ -54,8 +54,9 @@ class Newton {
     /// controls want them, in the first iteration and with its linearization.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
 
-    /// As solve(), with another limit on iterations.
+    /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
+    NewtonReport solve_plain(VectorXd& q, const Controls& controls);
 
     /// Evaluates, assembles with the state's own stresses and factorizes.
     FactorReport factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor = {});
@@ -89,6 +90,8 @@ class Newton {
     }
 
   private:
+    NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
+                         bool mixed);
     void reduce_assembled(const Anchor& anchor);
     FactorReport factorize_assembled(const Anchor& anchor);
     VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;

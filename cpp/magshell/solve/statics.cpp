@@ -48,11 +48,24 @@ class Statics {
             step = (report.lost ? 0.25 : 0.5) * failed_step;
             if (step >= options_.smallest_step * longest_step && options_.start_at_rest) continue;
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
-            if (!descend(longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0))
-                return false;
+            const double end = longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0;
+            if (!plain_steps(end) && !descend(end)) return false;
             step = longest_step;
         }
         return check_stability();
+    }
+
+    // A sheet bent far already may be too much for the mixed steps, and not for plain ones.
+    bool plain_steps(double target) {
+        if (!newton_.options().mixed) return false;
+        VectorXd trial = result_.state;
+        const Controls controls = interpolate(from_, to_, target);
+        const NewtonReport report = newton_.solve_plain(trial, controls);
+        if (report.converged)
+            accept(trial, controls, target, report.residual);
+        else
+            newton_.model().set_memory(result_.memory);
+        return report.converged;
     }
 
     void accept(const VectorXd& state, const Controls& controls, double progress, double residual) {

@@ -96,15 +96,19 @@ def field_glyphs(points: np.ndarray, flux_densities: np.ndarray, size: float, un
     return Glyphs(points[shown] - 0.5 * vectors, vectors, 0.022 * spacing)
 
 
-def sources_glyphs(groups: list[list[State]], size: float) -> tuple[list[Glyphs | None], float]:
-    """Arrows of the fields that vary in space around each group, and the flux density [T] of full length."""
-    sampled = []
-    for group in groups:
-        points = halo(group, size) if group[-1].sources else np.zeros((0, 3))
-        sampled.append((points, group[-1].flux_density_at(points)))
-    magnitudes = np.concatenate([np.linalg.norm(values, axis=1) for _, values in sampled])
-    magnitudes = magnitudes[np.isfinite(magnitudes)]
-    if not magnitudes.any():
-        return [None] * len(groups), 0.0
-    strong = float(np.quantile(magnitudes, 0.9))  # a field next to its source would leave nothing of the rest
-    return [field_glyphs(*one, size, strong) if len(one[0]) else None for one in sampled], strong
+def sources_glyphs(
+    states: list[State], points: list[np.ndarray], size: float, full_length: float | None = None
+) -> tuple[list[Glyphs | None], float]:
+    """Arrows of each state's fields that vary in space, at its points, and the flux density [T] of full length."""
+    sampled = [
+        (at, state.flux_density_at(at)) if state.sources else (at[:0], at[:0])
+        for state, at in zip(states, points, strict=True)
+    ]
+    if full_length is None:
+        magnitudes = np.concatenate([np.linalg.norm(values, axis=1) for _, values in sampled])
+        magnitudes = magnitudes[np.isfinite(magnitudes)]
+        # a field next to its source would leave nothing of the rest
+        full_length = float(np.quantile(magnitudes, 0.9)) if magnitudes.any() else 0.0
+    if not full_length:
+        return [None] * len(states), 0.0
+    return [field_glyphs(*one, size, full_length) if len(one[0]) else None for one in sampled], full_length

@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from .._quantity import quantity
 from . import colors, glyphs
 from .colors import Scalar, scalar_of
 from .panels import outline, size_of
-from .plot import checked_titles
+from .playing import SAMPLES, same_faces, speed_of, spread, with_times
+from .plot import arrow_count, checked_titles
 from .states import State, states_of
-from .units import LengthUnit, length_unit, with_unit
+from .units import LengthUnit, length_unit, prefixed, with_unit
 from .view import view_of
 
 
@@ -25,6 +27,7 @@ def write_page(
     path,
     *,
     positions=None,
+    times=None,
     remanent_magnetization=None,
     applied_flux_density=None,
     field=None,
@@ -35,14 +38,22 @@ def write_page(
     titles=None,
     view=None,
     title: str = "magshell",
+    speed: float | None = None,
+    size_limit: float = 10e6,
 ) -> Path:
     """Writes a page that shows a sheet from every side, with its magnetization and the field, offline.
 
-    Drag to turn, scroll or pinch to zoom, shift-drag to move; several states, as of a path, get a slider. The
-    reader chooses the colours: magnetization, displacement, and what `color` (a name or arrays, as in `plot`)
-    adds. In float32 the file holds about 100 bytes a vertex, and 22 more for each state.
+    Drag to turn, scroll or pinch to zoom, shift-drag to move. Several states, as of a path or a motion, get a slider
+    and play; a motion starts by itself. The reader chooses the colours: magnetization, displacement, and what `color`
+    (a name or arrays, as in `plot`) adds.
 
     what: as in `plot`, but all states on one mesh. titles: one a state. title: of the page.
+    times: s, one a state, where positions (n, n_v, 3) of a mesh are given.
+    speed: seconds of the motion that one second of playing shows, which the reader can change; by default as in
+        `animate`. States without times are shown ten a second.
+    size_limit: bytes for the states. They are kept in float32 (16 bytes a vertex for the positions, 6 for a scalar that
+        changes) if they fit, else in 16 bits (half of it, to 1/65000 of the sheet's size), else as many as fit, evenly
+        spread; the page says how many there were. The mesh takes about 85 bytes a vertex, the viewer 25 kB.
 
     Raises ValueError on bad input, FileNotFoundError without the folder.
     """
@@ -59,10 +70,20 @@ def write_page(
         field=field,
     )
     mesh = states[0].mesh
-    if any(not np.array_equal(state.mesh.faces, mesh.faces) for state in states):
-        raise ValueError("a page shows the states of one mesh, but these have different faces")
+    same_faces(states, "a page")
+    if not quantity("size_limit", "bytes", size_limit, ()) > 0:
+        raise ValueError(f"size_limit [bytes] must be positive, got {size_limit}")
+    states = with_times(states, times)
+    speed = speed_of(states, speed)
     size = size_of(states)
     unit = length_unit(size)
+    scalars = _scalars(states, color, color_label, color_range, unit)
+    titles = checked_titles(titles, states)
+    fields = _sources(states, size)
+    count = arrow_count(arrows)
+    numbers = 3 * mesh.n_vertices + 6 * count + sum(len(s.values[0]) for s in scalars if not _is_constant(s))
+    numbers += max((6 * len(field.starts) for field in fields[0] if field is not None), default=0)
+    dtype, kept = _that_fit(len(states), numbers, size_limit)
     data = {
         "view": [view_of(states, view).elevation, view_of(states, view).azimuth],
         "size": size,
@@ -72,10 +93,10 @@ def write_page(
         "outline": _packed(outline(mesh), "<u4"),
         "edges": _packed(mesh.edges, "<u4"),
         "rest": _packed(mesh.rest_positions, "<f4"),
-        "scalars": [_scalar(s) for s in _scalars(states, color, color_label, color_range, unit)],
-        "states": _states(
-            states, checked_titles(titles, states), int(arrows) if arrows is not True else glyphs.ARROWS
-        ),
+        "scalars": [_scalar(s, kept, dtype) for s in scalars],
+        "states": _states(states, kept, titles, fields, count, dtype),
+        "recorded": len(states),
+        "speed": None if states[0].time is None else speed,
     }
     template = files(__package__).joinpath("page.html").read_text(encoding="utf-8")
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
@@ -94,45 +115,82 @@ def _scalars(states: list[State], color, label, limits, unit: LengthUnit) -> lis
     return list({scalar.label: scalar for scalar in chosen if scalar is not None}.values())
 
 
-def _scalar(scalar: Scalar) -> dict:
+def _is_constant(scalar: Scalar) -> bool:
+    return all(np.array_equal(value, scalar.values[0], equal_nan=True) for value in scalar.values)
+
+
+def _scalar(scalar: Scalar, kept: list[int], dtype: str) -> dict:
     """One array if it is the same in all states, else one a state."""
-    values = scalar.values
-    if all(np.array_equal(value, values[0], equal_nan=True) for value in values):
-        values = values[:1]
+    values = scalar.values[:1] if _is_constant(scalar) else [scalar.values[k] for k in kept]
     return {
         "label": _plain(scalar.label),
         "limits": list(scalar.limits),
         "anchors": list(colors.SCALES[scalar.scale]),
-        "values": [_packed(value, "<f4") for value in values],
+        "values": [_packed(value, dtype) for value in values],
     }
 
 
-def _states(states: list[State], titles: list[str], count: int) -> list[dict]:
-    size, strongest = size_of(states), glyphs.largest(states)
-    around, full_length = glyphs.sources_glyphs([[state] for state in states], size)
+def _that_fit(count: int, numbers: int, size_limit: float) -> tuple[str, list[int]]:
+    """How the numbers of a state are kept, and the states that are, so that all takes no more bytes."""
+    for dtype, each in (("<f4", 4), ("<u2", 2)):
+        a_state = each * numbers * 4 / 3 + 300  # base64, and what is said about it
+        if count * a_state <= size_limit:
+            return dtype, list(range(count))
+    return "<u2", spread(list(range(count)), max(2, int(size_limit / a_state)))
+
+
+def _sources(states: list[State], size: float) -> tuple[list[glyphs.Glyphs | None], float]:
+    """Fields that vary in space, around each state; around a motion at places that stay."""
+    if not any(state.sources for state in states):
+        return [None] * len(states), 0.0
+    if states[0].time is None:
+        points = [glyphs.halo([state], size) for state in states]
+    else:
+        points = [glyphs.halo(spread(states, SAMPLES), size)] * len(states)
+    return glyphs.sources_glyphs(states, points, size)
+
+
+def _states(
+    states: list[State], kept: list[int], titles: list[str], fields, count: int, dtype: str
+) -> list[dict]:
+    strongest, (around, full_length) = glyphs.largest(states), fields
+    magnitude = max(
+        (np.linalg.norm(s.flux_density) for s in states if s.flux_density is not None), default=0.0
+    )
+    factor, unit = prefixed(float(magnitude), "T")
     packed = []
-    for state, title, field in zip(states, titles, around, strict=True):
-        one: dict[str, Any] = {"title": title, "positions": _packed(state.positions, "<f4")}
+    for k in kept:
+        state, field = states[k], around[k]
+        one: dict[str, Any] = {"title": titles[k], "positions": _packed(state.positions, dtype)}
+        if state.time is not None:
+            one["time"] = state.time
         if count and state.is_magnetized:
-            one["magnetization"] = _arrows(glyphs.magnetization_glyphs(state, count, strongest))
+            one["magnetization"] = _arrows(glyphs.magnetization_glyphs(state, count, strongest), dtype)
             one["magnetizationLabel"] = f"magnetization, up to {with_unit(strongest, 'A/m')}"
         if state.flux_density is not None:
             one["fluxDensity"] = state.flux_density.tolist()
-            one["fluxDensityLabel"] = f"B = {with_unit(float(np.linalg.norm(state.flux_density)), 'T')}"
+            one["fluxDensityLabel"] = f"B = {np.linalg.norm(state.flux_density) / factor:.3g} {unit}"
         if field is not None:
-            one["field"] = _arrows(field)
+            one["field"] = _arrows(field, dtype)
             one["fieldLabel"] = f"field, full length at {with_unit(full_length, 'T')}"
         packed.append(one)
     return packed
 
 
-def _arrows(chosen: glyphs.Glyphs) -> dict:
+def _arrows(chosen: glyphs.Glyphs, dtype: str) -> dict:
     """Six numbers an arrow: start, vector."""
-    return {"radius": chosen.radius, "arrows": _packed(np.hstack([chosen.starts, chosen.vectors]), "<f4")}
+    return {"radius": chosen.radius, "arrows": _packed(np.hstack([chosen.starts, chosen.vectors]), dtype)}
 
 
-def _packed(array: np.ndarray, dtype: str) -> str:
-    return base64.b64encode(np.ascontiguousarray(array, dtype=dtype).tobytes()).decode("ascii")
+def _packed(array: np.ndarray, dtype: str) -> str | dict:
+    """Base64; for "<u2" with the numbers that 0 and a step of 1 stand for, unless an entry is NaN."""
+    if dtype != "<u2":
+        return base64.b64encode(np.ascontiguousarray(array, dtype=dtype).tobytes()).decode("ascii")
+    if not array.size or not np.isfinite(array).all():
+        return _packed(array, "<f4")
+    low = float(array.min())
+    step = float(np.ptp(array)) / 65535 or 1.0
+    return {"low": low, "step": step, "u2": _packed(np.round((array - low) / step), "<H")}
 
 
 def _plain(label: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,6 +17,8 @@ from .view import View
 
 CREASE = np.cos(np.radians(40.0))  # rest edges that turn by more are drawn as lines
 LINE = 0.0022  # width, in sizes of the drawing
+LONGEST_FIELD = 0.2  # arrow of a uniform field, in sizes of the drawing
+PALEST = 0.8  # the way to white of the first of many states that fade
 
 
 @dataclass(frozen=True)
@@ -38,18 +40,24 @@ class Panel:
 
 @dataclass(frozen=True)
 class Drawing:
-    """All that a painter and the layout need. `arrows`: what the legend says about arrows: (text, colour)."""
+    """All that a painter and the layout need. `arrows`: what the legend says about arrows: (text, colour).
+
+    hold: points (n, 3), m, that the window holds beside the solids.
+    """
 
     panels: list[Panel]
     view: View
     unit: LengthUnit
     scalar: Scalar | None
     arrows: list[tuple[str, str]]
+    hold: np.ndarray | None = None
 
     @property
     def window(self) -> np.ndarray:
         """(left, right, bottom, top), m, on the screen: holds every panel."""
-        points = [self.view.project(s.positions)[:, :2] for panel in self.panels for s in panel.solids]
+        held = [] if self.hold is None else [self.hold]
+        held += [solid.positions for panel in self.panels for solid in panel.solids]
+        points = [self.view.project(each)[:, :2] for each in held]
         low, high = (
             np.min([p.min(axis=0) for p in points], axis=0),
             np.max([p.max(axis=0) for p in points], axis=0),
@@ -66,6 +74,7 @@ class Options:
     field: bool = True
     rest: bool = False
     mesh_lines: bool = False
+    fade: bool = False  # of the states in one panel, the earlier ones are paler
 
 
 def draw(
@@ -84,21 +93,23 @@ def draw(
     for number, group in enumerate(groups):
         panel = Panel(titles[number] if len(groups) > 1 or len(group) == 1 else "")
         first = sum(map(len, groups[:number]))
-        for index, state in enumerate(group):
-            plain = colors.SERIES[index % len(colors.SERIES)] if len(group) > 1 else colors.SHEET
+        for index, (state, paleness) in enumerate(zip(group, _paleness(len(group), options), strict=True)):
+            series = 0 if options.fade else index % len(colors.SERIES)
+            plain = colors.SERIES[series] if len(group) > 1 else colors.SHEET
             shades = rgb(plain) if scalar is None else scalar.colors(first + index)
-            panel.solids += _sheet(state, shades, view, size, options)
+            panel.solids += _pale(sheet_solids(state, shades, view, size, options), paleness)
         if len(group) > 1:
-            panel.labels += _series_labels(group, titles, view)
+            labels = _series_labels(group, titles, view)
+            panel.labels += _apart(labels, view, 0.1 * size) if options.fade else labels
         panels.append(panel)
     if options.arrows and any(state.is_magnetized for state in states):
         strongest = glyphs.largest(states)
         for panel, group in zip(panels, groups, strict=True):
-            for state in group:
-                panel.solids += _magnetization(state, strongest, options.arrows)
-        legend.append((f"$M_r$, up to {with_unit(strongest, 'A/m')}", colors.MAGNETIZATION))
+            for state, paleness in zip(group, _paleness(len(group), options), strict=True):
+                panel.solids += _pale(magnetization_solids(state, strongest, options.arrows), paleness)
+        legend.append(magnetization_key(strongest))
     if options.field:
-        _uniform_fields(panels, groups, view, size)
+        _uniform_fields(panels, groups, view, size, options)
         legend += _sources(panels, groups, size)
     return Drawing(panels, view, unit, scalar, legend)
 
@@ -117,7 +128,7 @@ def outline(mesh: TriangleMesh) -> np.ndarray:
     return mesh.edges[np.sort(np.concatenate([mesh.boundary_edges, interior[turn < CREASE]]))]
 
 
-def _sheet(state: State, shades: np.ndarray, view: View, size: float, options: Options) -> list[Solid]:
+def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, options: Options) -> list[Solid]:
     mesh, eye = state.mesh, view.axes[2]
     step = float(mesh.edge_lengths.mean())
     solids = [sheet(state.positions, mesh.faces, shades)]
@@ -134,43 +145,74 @@ def _sheet(state: State, shades: np.ndarray, view: View, size: float, options: O
     return solids
 
 
-def _magnetization(state: State, strongest: float, count: int) -> list[Solid]:
+def magnetization_solids(state: State, strongest: float, count: int) -> list[Solid]:
     if not state.is_magnetized:
         return []
     chosen = glyphs.magnetization_glyphs(state, count, strongest)
     return [arrows(chosen.starts, chosen.vectors, chosen.radius, colors.MAGNETIZATION, chosen.lift)]
 
 
-def _uniform_fields(panels: list[Panel], groups: list[list[State]], view: View, size: float) -> None:
+def _paleness(count: int, options: Options) -> list[float]:
+    """Of the states in one panel."""
+    fading = options.fade and count > 1
+    return [PALEST * (1.0 - k / (count - 1)) if fading else 0.0 for k in range(count)]
+
+
+def _pale(solids: list[Solid], paleness: float) -> list[Solid]:
+    return [replace(solid, colors=paleness + (1.0 - paleness) * solid.colors) for solid in solids]
+
+
+def _uniform_fields(
+    panels: list[Panel], groups: list[list[State]], view: View, size: float, options: Options
+) -> None:
     """An arrow to the left of the sheets of each panel, as long as the field is strong, and its magnitude."""
     strongest = max((_magnitude(state) for group in groups for state in group), default=0.0)
     if strongest == 0.0:
         return
-    longest = 0.2 * size
+    scale = LONGEST_FIELD * size / strongest
     right, up, eye = view.axes
     points = np.concatenate([view.project(s.positions) for panel in panels for s in panel.solids])
     left, middle = points[:, 0].min(), (points.min(axis=0) + points.max(axis=0)) / 2.0
     for panel, group in zip(panels, groups, strict=True):
         fields = _distinct([s.flux_density for s in group if s.flux_density is not None])
         place = left - 0.07 * size
+        if options.fade and len(fields) > 1:
+            _fan(panel, np.array(fields), scale, place * right + middle[1] * up + middle[2] * eye, view, size)
+            fields = []
         for flux_density in fields:
-            vector = flux_density * (longest / strongest)
+            vector = scale * flux_density
             width = abs(vector @ right)
             center = (place - 0.5 * width) * right + middle[1] * up + middle[2] * eye
+            panel.solids += field_arrow(center, vector, size)
             low = center - (0.5 * abs(vector @ up) + 0.015 * size) * up
-            panel.labels.append(
-                Label(
-                    low,
-                    f"$B$ = {with_unit(float(np.linalg.norm(flux_density)), 'T')}",
-                    colors.FIELD,
-                    (0.0, -1.0),
-                )
-            )
-            if vector.any():
-                panel.solids.append(
-                    arrows(center[None] - vector / 2, vector[None], 0.0065 * size, colors.FIELD)
-                )
+            panel.labels.append(field_label(low, with_unit(float(np.linalg.norm(flux_density)), "T")))
             place -= width + 0.12 * size
+
+
+def _fan(panel: Panel, fields: np.ndarray, scale: float, place: np.ndarray, view: View, size: float) -> None:
+    """Uniform fields (n, 3) that follow each other, as arrows from one tail, to the left of a place (3,), m."""
+    right, up, _ = view.axes
+    vectors = scale * fields
+    reach = np.vstack([view.project(vectors), np.zeros(3)])
+    low, high = reach.min(axis=0), reach.max(axis=0)
+    tail = place - high[0] * right - 0.5 * (low[1] + high[1]) * up
+    for vector, paleness in zip(vectors, _paleness(len(vectors), Options(fade=True)), strict=True):
+        panel.solids += _pale(field_arrow(tail + 0.5 * vector, vector, size), paleness)
+    middle = tail + 0.5 * (low[0] + high[0]) * right + (low[1] - 0.015 * size) * up
+    strongest = with_unit(float(np.linalg.norm(fields, axis=1).max()), "T")
+    panel.labels.append(Label(middle, f"$B$ up to {strongest}", colors.FIELD, (0.0, -1.0)))
+
+
+def field_label(point: np.ndarray, magnitude: str) -> Label:
+    """What stands under the arrow of a uniform field."""
+    return Label(point, f"$B$ = {magnitude}", colors.FIELD, (0.0, -1.0))
+
+
+def field_arrow(center: np.ndarray, vector: np.ndarray, size: float) -> list[Solid]:
+    """A uniform field as an arrow (3,), m, about its center (3,), m; none if it is zero."""
+    if not vector.any():
+        return []
+    return [arrows(center[None] - vector / 2, vector[None], 0.0065 * size, colors.FIELD)]
 
 
 def _magnitude(state: State) -> float:
@@ -183,11 +225,22 @@ def _distinct(vectors: list[np.ndarray]) -> list[np.ndarray]:
 
 def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> list[tuple[str, str]]:
     """Arrows of the fields that vary in space, and what the legend says."""
-    around, strong = glyphs.sources_glyphs(groups, size)
+    points = [glyphs.halo(group, size) if group[-1].sources else np.zeros((0, 3)) for group in groups]
+    around, strong = glyphs.sources_glyphs([group[-1] for group in groups], points, size)
     for panel, chosen in zip(panels, around, strict=True):
         if chosen is not None:
             panel.solids.append(arrows(chosen.starts, chosen.vectors, chosen.radius, colors.FIELD))
-    return [(f"$B$, full length at {with_unit(strong, 'T')}", colors.FIELD)] if strong else []
+    return [sources_key(strong)] if strong else []
+
+
+def magnetization_key(strongest: float) -> tuple[str, str]:
+    """What the legend says about arrows of magnetization."""
+    return f"$M_r$, up to {with_unit(strongest, 'A/m')}", colors.MAGNETIZATION
+
+
+def sources_key(full_length: float) -> tuple[str, str]:
+    """What the legend says about arrows of fields that vary in space."""
+    return f"$B$, full length at {with_unit(full_length, 'T')}", colors.FIELD
 
 
 def _series_labels(group: list[State], titles: list[str], view: View) -> list[Label]:
@@ -204,3 +257,13 @@ def _series_labels(group: list[State], titles: list[str], view: View) -> list[La
                 Label(state.positions[vertex], title, colors.OUTLINE, (float(away[0]), float(away[1])))
             )
     return labels
+
+
+def _apart(labels: list[Label], view: View, distance: float) -> list[Label]:
+    """Those, the last and the first before the others, that are a distance [m] from each other on the screen."""
+    kept: list[Label] = []
+    for label in [*labels[-1:], *labels[:-1]]:
+        gaps = [np.linalg.norm(view.project(label.point - other.point)[:2]) for other in kept]
+        if min(gaps, default=np.inf) >= distance:
+            kept.append(label)
+    return kept

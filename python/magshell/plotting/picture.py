@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +63,7 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
-        self.figure.savefig(buffer, format="png", dpi=DPI)
+        self.figure.savefig(buffer, format="png", dpi=self.figure.dpi)
         return buffer.getvalue()
 
     def __repr__(self) -> str:
@@ -69,7 +71,7 @@ class Picture:
         return f"Picture({width} x {height} pixels, painted by {self.backend})"
 
 
-def paint(drawing: Drawing, width: int, columns: int | None, backend: str) -> Picture:
+def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: int = DPI) -> Picture:
     """The drawing, `width` pixels wide, in so many columns (None: those that fill the picture best)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -77,13 +79,13 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str) -> Pi
     count = len(drawing.panels)
     columns = columns or _best_columns(count, drawing.window)
     rows = -(-count // columns)
-    inches = width / DPI
+    inches = width / dpi
     window = _with_room(drawing, (inches - 2 * MARGIN) / columns)
     panel_width = (inches - 2 * MARGIN) / columns
     panel_height = panel_width * (window[3] - window[2]) / (window[1] - window[0])
     title = TITLE if any(panel.title for panel in drawing.panels) else 0.0
     height = rows * (panel_height + title) + LEGEND + 2 * MARGIN
-    figure = Figure(figsize=(inches, height), dpi=DPI, facecolor="white")
+    figure = Figure(figsize=(inches, height), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
 
     for number, panel in enumerate(drawing.panels):
@@ -91,20 +93,34 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str) -> Pi
         left = MARGIN + column * panel_width
         bottom = height - MARGIN - (row + 1) * (panel_height + title)
         axes = figure.add_axes((left / inches, bottom / height, panel_width / inches, panel_height / height))
-        _paint_panel(axes, panel, drawing, window, (panel_width, panel_height), backend)
+        with screen_of(axes, backend) as screen:
+            paint_panel(axes, panel, drawing, window, screen)
     strip = figure.add_axes((0.0, 0.0, 1.0, LEGEND / height))
     _legend(strip, drawing, inches, panel_width / (window[1] - window[0]))
     return Picture(figure, backend)
 
 
-def _paint_panel(
-    axes, panel: Panel, drawing: Drawing, window, inches: tuple[float, float], backend: str
-) -> None:
+@contextmanager
+def screen_of(axes, backend: str, samples: bool = True) -> Iterator[vtk.Screen | None]:
+    """What pyvista paints on before it comes into axes that have their place in the figure; matplotlib needs none."""
+    if backend != "pyvista":
+        yield None
+        return
+    box = axes.get_window_extent()
+    screen = vtk.Screen((round(box.width), round(box.height)), samples)
+    try:
+        yield screen
+    finally:
+        screen.close()
+
+
+def paint_panel(axes, panel: Panel, drawing: Drawing, window, screen: vtk.Screen | None) -> None:
+    """Into axes that have their place in the figure, by pyvista if there is a screen."""
     axes.set_axis_off()
     axes.set_xlim(window[0], window[1])
     axes.set_ylim(window[2], window[3])
-    if backend == "pyvista":
-        vtk.paint(axes, panel, drawing.view, window, (round(DPI * inches[0]), round(DPI * inches[1])))
+    if screen is not None:
+        vtk.paint(axes, panel, drawing.view, window, screen)
     else:
         polygons.paint(axes, panel, drawing.view)
     if panel.title:

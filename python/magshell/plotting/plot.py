@@ -10,6 +10,7 @@ from .colors import scalar_of
 from .glyphs import ARROWS
 from .panels import Options, draw, size_of
 from .picture import Picture, paint
+from .playing import spread
 from .states import State, states_of
 from .units import length_unit
 from .view import view_of
@@ -34,6 +35,7 @@ def plot(
     mesh_lines: bool = False,
     titles=None,
     overlay: bool = False,
+    fade: bool = False,
     columns: int | None = None,
     view=None,
     width: int = 1600,
@@ -44,7 +46,7 @@ def plot(
     what: a mesh, a Shell, a Scene, a result, or a list of those.
     positions, remanent_magnetization, applied_flux_density, field: (n_v, 3) m, (n_f, 3) A/m, (3,) T and
         fields that vary in space: for a mesh, which has none, or instead of a result's own.
-    states: numbers of those to draw, of a path; by default all, or nine evenly spread ones.
+    states: numbers of those to draw, of a path or a motion; by default all, or nine evenly spread ones.
     color: "magnetization" (the component of M_r along the axis that all of it shares, else its angle or
         magnitude), "displacement", "magnetic_energy" (a rest volume), an array with a number a face or a
         vertex, a list of such arrays, one a state, or None for plain sheets. "auto": magnetization if it
@@ -53,7 +55,8 @@ def plot(
     arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
     show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it.
     rest: the rest shape as a faint outline. mesh_lines: the edges of the mesh.
-    titles: one a state. overlay: all states in one panel. columns: of panels, by default what fits best.
+    titles: one a state. overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light
+        shows a motion. columns: of panels, by default what fits best.
     view: (elevation, azimuth) in degrees of the eye, as in matplotlib; by default what suits the sheet.
     width: pixels.
     backend: "pyvista" or "matplotlib"; by default the environment variable MAGSHELL_PLOT, else pyvista where
@@ -77,17 +80,22 @@ def plot(
     titles = checked_titles(titles, drawn)
     unit = length_unit(size_of(drawn))
     scalar = scalar_of(drawn, color, color_label, color_range, unit)
-    count = ARROWS if arrows is True else int(arrows)
-    if count < 0:
-        raise ValueError(f"arrows must be True, False or a count, got {arrows}")
     if width < 400 or (columns is not None and columns < 1):
         raise ValueError(
             f"width must be at least 400 pixels and columns at least 1, got {width} and {columns}"
         )
-    groups = [drawn] if overlay else [[state] for state in drawn]
-    options = Options(count, show_field, rest, mesh_lines)
+    groups = [drawn] if overlay or fade else [[state] for state in drawn]
+    options = Options(arrow_count(arrows), show_field, rest, mesh_lines, fade)
     drawing = draw(groups, titles, scalar, view_of(drawn, view), unit, options)
     return paint(drawing, width, columns, painter)
+
+
+def arrow_count(arrows: bool | int) -> int:
+    """About how many arrows are on a sheet."""
+    count = ARROWS if arrows is True else int(arrows)
+    if count < 0:
+        raise ValueError(f"arrows must be True, False or a count, got {arrows}")
+    return count
 
 
 def checked_titles(titles, states: list[State]) -> list[str]:
@@ -103,8 +111,7 @@ def checked_titles(titles, states: list[State]) -> list[str]:
 def _chosen(states: list[State], chosen) -> list[State]:
     """The states of the given numbers; by default all, and of many some evenly spread ones."""
     if chosen is None:
-        some = np.round(np.linspace(0, len(states) - 1, min(len(states), MOST_STATES))).astype(np.int64)
-        return [states[k] for k in some]
+        return spread(states, MOST_STATES)
     numbers = np.atleast_1d(index_array("states", chosen))
     if not numbers.size or numbers.min() < -len(states) or numbers.max() >= len(states):
         raise ValueError(f"states must be numbers of the {len(states)} states, got {numbers.tolist()}")

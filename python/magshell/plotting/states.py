@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from .._quantity import quantity
+from ..equilibria import Equilibria
 from ..field import UniformField
 from ..mesh import TriangleMesh
 from ..path import Path
 from ..scene import Scene
 from ..shell import Shell
+from ..trajectory import Trajectory
+from .units import clock
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,7 @@ class State:
     positions: (n_v, 3), m. remanent_magnetization: (n_f, 3), A/m, at rest, or None.
     flux_density: (3,), T, the uniform field, or None without one.
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
-    title: what the result calls it.
+    title: what the result calls it. time: s, of a motion, or None.
     """
 
     mesh: TriangleMesh
@@ -32,6 +35,7 @@ class State:
     flux_density: np.ndarray | None = None
     sources: Callable[[np.ndarray], np.ndarray] | None = None
     title: str = ""
+    time: float | None = None
 
     @property
     def magnetization(self) -> np.ndarray:
@@ -86,10 +90,13 @@ def states_of(
         return _states(what.mesh, given)
     if isinstance(what, Scene):
         return _states(what.mesh, given, what.fields)
-    if isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions"):
+    is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
+    if is_result and not isinstance(what, Equilibria):
         own = _held_by(what)
         merged = {name: own[name] if value is None else value for name, value in given.items()}
-        return _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
+        states = _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
+        own_times = isinstance(what, Trajectory) and len(states) == len(what)
+        return timed(states, what.times) if own_times else states
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
         states = [state for item in what for state in states_of(item, **given)]
         if states:
@@ -97,6 +104,22 @@ def states_of(
         raise ValueError("there is nothing to draw: the list is empty")
     kinds = "a mesh, a Shell, a Scene, a result, or a list of them"
     raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
+
+
+def timed(states: list[State], times) -> list[State]:
+    """The states at these times, (n,), s, which are their titles too. Raises ValueError unless there is one a state
+    and none falls."""
+    array = quantity("times", "s", _detached(times), ("n",))
+    if len(array) != len(states):
+        raise ValueError(f"times [s] must be {len(states)} numbers, one a state, got {len(array)}")
+    if (np.diff(array) < 0).any():
+        first = int(np.argmax(np.diff(array) < 0))
+        raise ValueError(f"times [s] must not fall, but {array[first]:g} is followed by {array[first + 1]:g}")
+    written = clock(float(np.abs(array).max()))
+    return [
+        replace(state, time=time, title=written(time))
+        for state, time in zip(states, array.tolist(), strict=True)
+    ]
 
 
 def _held_by(result) -> dict[str, Any]:
@@ -107,6 +130,10 @@ def _held_by(result) -> dict[str, Any]:
         flux_densities = (1 - along) * np.array(start.flux_density) + along * np.array(end.flux_density)
         strengths = ((1 - along) * start.field + along * end.field)[:, 0].tolist()
         titles = [f"parameter {parameter:.4g}" for parameter in result.parameters]
+    elif isinstance(result, Trajectory):
+        flux_densities = result.applied_flux_density
+        strengths = result._field_factors.tolist()
+        titles = [""]
     else:
         flux_densities = getattr(result, "applied_flux_density", None)
         strengths = [getattr(getattr(result, "_controls", None), "field", 1.0)]

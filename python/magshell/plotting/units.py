@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,17 @@ def with_unit(value: float, unit: str) -> str:
     """
     factor, name = prefixed(value, unit)
     return f"{value / factor:.3g} {name}"
+
+
+def clock(duration: float) -> Callable[[float], str]:
+    """Writes the times of a motion that takes so long [s], all with the same unit and decimals.
+
+    >>> clock(0.8)(0.25), clock(2.0)(0.25)
+    ('250 ms', '0.25 s')
+    """
+    factor, unit = prefixed(duration, "s")
+    decimals = max(0, 2 - int(np.floor(np.log10(duration / factor)))) if duration > 0 else 2
+    return lambda time: f"{time / factor:.{decimals}f} {unit}"
 
 
 def round_below(value: float) -> float:

@@ -14,16 +14,36 @@ from .view import View
 OVERSAMPLING = 2
 
 
-def paint(axes, panel: Panel, view: View, window: np.ndarray, pixels: tuple[int, int]) -> None:
+class Screen:
+    """What VTK paints on: one for a picture, or one for all frames of a movie, since it takes long to make."""
+
+    def __init__(self, pixels: tuple[int, int], samples: bool = True):
+        import pyvista
+
+        _quiet_without_a_screen()
+        self.pixels = pixels
+        size = tuple(OVERSAMPLING * each for each in pixels)
+        self.plotter = pyvista.Plotter(off_screen=True, window_size=size, lighting="none")
+        self.plotter.set_background("white")
+        if not samples:
+            self.plotter.render_window.SetMultiSamples(0)
+
+    def close(self) -> None:
+        self.plotter.close()
+
+
+def paint(axes, panel: Panel, view: View, window: np.ndarray, screen: Screen) -> None:
     """Adds the image of a panel to matplotlib axes whose coordinates are metres on the screen.
 
-    window: (left, right, bottom, top), m. pixels: (width, height) of the image.
+    window: (left, right, bottom, top), m.
     """
-    image = render(panel.solids, view, window, (OVERSAMPLING * pixels[0], OVERSAMPLING * pixels[1]))
-    blocks = image.reshape(pixels[1], OVERSAMPLING, pixels[0], OVERSAMPLING, 3)
-    axes.imshow(
-        blocks.mean(axis=(1, 3)) / 255.0, extent=window, interpolation="none", aspect="auto", zorder=0
+    fine = render(panel.solids, view, window, screen)
+    image = sum(
+        fine[i::OVERSAMPLING, j::OVERSAMPLING] / 255.0
+        for i in range(OVERSAMPLING)
+        for j in range(OVERSAMPLING)
     )
+    axes.imshow(image / OVERSAMPLING**2, extent=window, interpolation="none", aspect="auto", zorder=0)
 
 
 def _quiet_without_a_screen() -> None:
@@ -34,32 +54,32 @@ def _quiet_without_a_screen() -> None:
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
 
 
-def render(solids: list[Solid], view: View, window: np.ndarray, pixels: tuple[int, int]) -> np.ndarray:
-    """(height, width, 3), 0 to 255."""
+def render(solids: list[Solid], view: View, window: np.ndarray, screen: Screen) -> np.ndarray:
+    """(height, width, 3), 0 to 255, OVERSAMPLING times as fine as the screen's pixels."""
     import pyvista
 
-    _quiet_without_a_screen()
     right, up, eye = view.axes
     depths = np.concatenate([view.project(solid.positions)[:, 2] for solid in solids])
     reach = np.ptp(depths) + window[1] - window[0]
     center = (window[0] + window[1]) / 2 * right + (window[2] + window[3]) / 2 * up + depths.mean() * eye
-    plotter = pyvista.Plotter(off_screen=True, window_size=pixels, lighting="none")
-    try:
-        plotter.set_background("white")
-        plotter.add_light(
-            pyvista.Light(position=tuple(LIGHT @ view.axes), light_type="scene light", intensity=1.0)
-        )
-        for solid in solids:
-            _add(plotter, solid, eye)
-        plotter.camera.position = tuple(center + 4 * reach * eye)
-        plotter.camera.focal_point = tuple(center)
-        plotter.camera.up = tuple(up)
-        plotter.enable_parallel_projection()
-        plotter.camera.parallel_scale = (window[3] - window[2]) / 2
-        plotter.camera.clipping_range = (reach, 8 * reach)
-        return np.array(plotter.screenshot(return_img=True))[:, :, :3]
-    finally:
-        plotter.close()
+    plotter = screen.plotter
+    plotter.suppress_rendering = True  # until all is in its place
+    plotter.clear_actors()
+    plotter.remove_all_lights()
+    plotter.add_light(
+        pyvista.Light(position=tuple(LIGHT @ view.axes), light_type="scene light", intensity=1.0)
+    )
+    for solid in solids:
+        _add(plotter, solid, eye)
+    plotter.camera.position = tuple(center + 4 * reach * eye)
+    plotter.camera.focal_point = tuple(center)
+    plotter.camera.up = tuple(up)
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = (window[3] - window[2]) / 2
+    plotter.camera.clipping_range = (reach, 8 * reach)
+    plotter.suppress_rendering = False
+    plotter.render()
+    return np.array(plotter.screenshot(return_img=True))[:, :, :3]
 
 
 def _add(plotter, solid: Solid, eye: np.ndarray) -> None:
