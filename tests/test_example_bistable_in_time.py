@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from test_examples import load
 
 example = load("bistable_in_time")
@@ -16,7 +17,7 @@ def result() -> dict:
 def test_measured_curves_are_the_published_ones(result) -> None:
     assert result["measured_ramp"]["snap"] == pytest.approx(0.9625, abs=5e-4)
     assert result["measured_ramp"]["field"] == pytest.approx(6.26e-3, abs=5e-6)
-    assert result["plateau"]["measured"] == pytest.approx(8.35e-3, rel=0.005)
+    assert result["plateau"]["measured"] == pytest.approx(8.35e-3, rel=0.015)  # of all 98 points
     assert result["measured_step"]["last_third"] == pytest.approx(0.51e-3, abs=0.01e-3)
 
 
@@ -66,7 +67,8 @@ def test_one_other_shortening_explains_the_step(result) -> None:
     assert 1.3 < other["shortening"] / model.SHORTENING < 1.45
     assert other["last_third"] == pytest.approx(measured["last_third"], rel=0.02)
     assert other["peak"] == pytest.approx(measured["peak"], rel=0.25)
-    assert other["ringing"].frequency == pytest.approx(measured["ringing"].frequency, rel=0.12)
+    assert other["ringing"].frequency == pytest.approx(measured["ringing"].frequency, rel=0.15)
+    assert result["step"]["ringing"].frequency < 0.6 * measured["ringing"].frequency
     assert other["ramp_field"] > 10e-3
 
 
@@ -76,14 +78,17 @@ def test_ringing_about_the_buckled_state(result) -> None:
     assert elastic.frequency == pytest.approx(result["frequency"], rel=0.01)
     assert elastic.decay < 0.05
     assert elastic.frequency < viscous.frequency < 16.5
-    assert viscous.decay == pytest.approx(maxwell_decay(elastic.frequency), rel=0.3)
+    share = brentq(lambda g: maxwell_oscillator(elastic.frequency, g)[0] - viscous.frequency, 0.01, 2.0)
+    assert share > motion.MAXWELL_MODULUS  # compression softens the beam, but not the branch
+    assert viscous.decay == pytest.approx(maxwell_oscillator(elastic.frequency, share)[1], rel=0.05)
 
 
-def maxwell_decay(frequency) -> float:
-    """1/s, of an oscillator whose spring has the branch beside it: k (1 + g i w t / (1 + i w t)) - m w^2 = 0."""
-    first, g, t = 2 * np.pi * frequency, motion.MAXWELL_MODULUS, motion.MAXWELL_TIME
-    roots = np.roots([t, 1.0, first**2 * t * (1 + g), first**2])
-    return float(-roots[np.argmax(roots.imag)].real)
+def maxwell_oscillator(frequency, share) -> tuple[float, float]:
+    """Hz and 1/s of a mass on a spring with a branch beside it: w0^2 (1 + share s t / (1 + s t)) + s^2 = 0."""
+    w, t = 2 * np.pi * frequency, motion.MAXWELL_TIME
+    roots = np.roots([t, 1.0, w**2 * t * (1 + share), w**2])
+    root = roots[np.argmax(roots.imag)]
+    return root.imag / (2 * np.pi), -root.real
 
 
 def test_ringing_of_a_known_curve() -> None:

@@ -25,7 +25,7 @@ def draw_snap(axes, result: dict) -> None:
     axes.text(
         limit, 9.3, f"limit of statics \n{1e3 * result['limit']:.2f} mT ", color=GREY, va="top", ha="right"
     )
-    axes.set(xlabel="time [s]", ylabel="mid-span displacement [mm]", xlim=(0.75, 1.3), ylim=(0, 9.8))
+    axes.set(xlabel="time [s]", ylabel="mid-span displacement [mm]", xlim=(0.65, 1.3), ylim=(0, 9.8))
 
 
 def draw_step(axes, result: dict) -> None:

@@ -122,9 +122,9 @@ def variations(cells, time_step) -> list[tuple[str, float]]:
         ("as given", given, {}),
         ("without the Maxwell branch", given, {"viscous": False}),
         ("shortening 1 % larger", longer, {}),
-        ("magnets change 2.5 mm off the middle", given, {"remanent_magnetization": shifted(given)}),
-        ("drag of 0.2 of the mass a second", given, {"damping": drag(given, 0.2)}),
-        ("drag of 3 of the mass a second", given, {"damping": drag(given, 3.0)}),
+        ("halves of unequal length, by 5 mm", given, {"remanent_magnetization": shifted(given)}),
+        ("drag, 0.2 of the momentum a second", given, {"damping": drag(given, 0.2)}),
+        ("drag, 3 times the momentum a second", given, {"damping": drag(given, 3.0)}),
     ]
     return [(what, ramp(sheet, time_step, 1.15, **options).snap) for what, sheet, options in rows]
 
