@@ -37,6 +37,7 @@ from .starts import Multistart
 from .statics import equilibrium
 from .supports import Clamp, Pin, SymmetryPlane
 from .trajectory import MotionState, Trajectory
+from .vibration import VibrationModes, vibration_modes
 from .warm_start import WarmStart
 from .weld import Weld, weld
 
@@ -80,6 +81,7 @@ __all__ = [
     "Trajectory",
     "TriangleMesh",
     "UniformField",
+    "VibrationModes",
     "WarmStart",
     "Weld",
     "__version__",
@@ -104,6 +106,7 @@ __all__ = [
     "set_num_threads",
     "show_config",
     "simulate",
+    "vibration_modes",
     "weld",
     "write_mesh",
     "write_page",

@@ -192,6 +192,12 @@ class Model:
     def expand(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def free_weights(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.
+        """
     def full_vector(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:

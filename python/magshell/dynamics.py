@@ -92,9 +92,8 @@ def simulate(
     integrator = SDIRK2() if integrator is None else integrator
     solver = MixedNewton() if solver is None else solver
     if not isinstance(integrator, ImplicitEuler | SDIRK2 | SDIRK3):
-        raise ValueError(
-            f"integrator must be ImplicitEuler, SDIRK2 or SDIRK3, got {type(integrator).__name__}"
-        )
+        what = f"the class {integrator.__name__}: call it" if isinstance(integrator, type) else repr(integrator)
+        raise ValueError(f"integrator must be ms.ImplicitEuler(), ms.SDIRK2() or ms.SDIRK3(), got {what}")
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
     if not isinstance(scene, Scene):
