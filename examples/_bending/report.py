@@ -15,6 +15,8 @@ def draw_alignment(axes, states) -> None:
     reached = [state["alignment"] for state in states]
     axes.plot(fields, reached, "o", mfc="white", color=RED, label="at the motion's end")
     axes.set(xlabel="flux density along [1, 0, -1] [mT]", ylabel="cosine of magnet and field", xscale="log")
+    axes.set_xticks(fields, [f"{field:g}" for field in fields])
+    axes.minorticks_off()
     axes.set_ylim(-0.8, 1.08)
     axes.legend(frameon=False, loc="center right")
 
@@ -70,7 +72,7 @@ def twisting(twisted: dict) -> str:
     return f"""Twisted by a field that turns twice
   least cosine of magnet and field     {alignment[lowest]:.4f}, at {motion.times[lowest]:.2f} s
   end's x at the least                 {1e3 * twisted["end"][:, 0].min():.1f} mm
-  left of the twist at {motion.times[-1]:.1f} s           {1e3 * twisted["left_over"]:.2f} mm
+  from flat at {motion.times[-1]:.1f} s                 {1e3 * twisted["left_over"]:.2f} mm
   put in by the field, lost            {1e6 * balance.received[-1]:.1f} and {1e6 * balance.lost[-1]:.1f} µJ
   energy's gap                         {balance.error:.1e} of what is turned over
   a step                               {milliseconds:.0f} ms"""
