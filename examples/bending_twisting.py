@@ -161,7 +161,7 @@ def twisted_picture(result: dict, moments=(0.0, 0.5, 1.0, 1.5, 2.0, 2.2, 2.5, 3.
     )
 
 
-def movie(result: dict, path, every=4) -> Path:
+def movie(result: dict, path, every=4, fps=25) -> Path:
     """The twisting, and how it comes undone."""
     sheet, motion, fields = result["strip"], result["twisted"]["motion"], result["twisted"]["fields"]
     return ms.animate(
@@ -174,6 +174,7 @@ def movie(result: dict, path, every=4) -> Path:
         color="magnetic_energy",
         view=(22, -60),
         width=800,
+        fps=fps,
         progress=False,
     )
 

@@ -181,7 +181,7 @@ def picture(result: dict) -> ms.Picture:
     )
 
 
-def movie(result: dict, path, before=0.15, after=0.3) -> Path:
+def movie(result: dict, path, before=0.15, after=0.3, fps=25) -> Path:
     """The snap, slowed down."""
     motion: Motion = result["ramp"]["motion"]
     snap = result["ramp"]["snap"]
@@ -196,6 +196,7 @@ def movie(result: dict, path, before=0.15, after=0.3) -> Path:
         view=(10, -86),
         arrows=False,
         width=800,
+        fps=fps,
         progress=False,
     )
 

@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 from test_examples import load
 
-import magshell as ms
-
 example = load("bending_twisting")
 model = load("_bending.strip")
 
 
 @pytest.fixture(scope="module")
 def result() -> dict:
-    return example.main(cells=(24, 4), bending_time=20.0, turning_time=5.0, undamped_time=1.0)
+    return example.main(cells=(24, 4), bending_time=12.0, turning_time=5.0, undamped_time=0.6)
 
 
 def test_mesh_has_the_papers_faces_and_vertices() -> None:
@@ -82,8 +80,7 @@ def test_pictures_and_movie(result, tmp_path) -> None:
     example.plot(result).savefig(tmp_path / "figure.png")
     example.bent_picture(result).save(tmp_path / "bent.png")
     example.twisted_picture(result).save(tmp_path / "twisted.png")
-    example.movie(result, tmp_path / "twisting.gif", every=50)
+    example.movie(result, tmp_path / "twisting.gif", fps=2)
     for name in ("figure.png", "bent.png", "twisted.png", "twisting.gif"):
         assert (tmp_path / name).stat().st_size > 20_000
     assert "turned over" in example.summary(result)
-    assert isinstance(example.bent_picture(result), ms.Picture)

@@ -111,7 +111,7 @@ def test_variations(result) -> None:
 def test_pictures_and_movie(result, tmp_path) -> None:
     example.plot(result).savefig(tmp_path / "figure.png")
     example.picture(result).save(tmp_path / "states.png")
-    example.movie(result, tmp_path / "snap.gif", before=0.02, after=0.02)
+    example.movie(result, tmp_path / "snap.gif", fps=1)
     for name in ("figure.png", "states.png", "snap.gif"):
         assert (tmp_path / name).stat().st_size > 20_000
     assert "limit of statics" in example.summary(result)
