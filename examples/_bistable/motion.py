@@ -112,7 +112,7 @@ def ringing(times, displacements, guess=16.0) -> Ringing:
         key=lambda found: found.cost,
     )
     (_, *wave), residual = parts(best.x)
-    return Ringing(float(best.x[0]), float(best.x[1]), float(np.std(residual) / np.hypot(*wave)))
+    return Ringing(abs(float(best.x[0])), float(best.x[1]), float(np.std(residual) / np.hypot(*wave)))
 
 
 def variations(cells, time_step) -> list[tuple[str, float]]:
