@@ -27,6 +27,8 @@ def draw_integrators(errors: dict[str, dict], path: Path) -> None:
     for name, rows in errors.items():
         by_steps.loglog(rows["steps"], rows["error"], marker="o", label=f"{name}, order {rows['order']:.2f}")
         by_time.loglog(rows["time"], rows["error"], marker="o")
+    by_steps.set_xticks(rows["steps"], [str(count) for count in rows["steps"]])
+    by_steps.minorticks_off()
     by_steps.set(xlabel="steps a period", ylabel="error of the positions / length of the strip")
     by_time.set(xlabel="time of the motion / s")
     _finish(figure, path)
