@@ -7,8 +7,8 @@ from test_examples import load
 
 @pytest.fixture(scope="module")
 def reaching() -> dict:
-    """Two targets, each active for 0.8 s and counting after 0.5 s."""
-    return load("kirigami_reaching").main(targets=2, each=0.8, delay=0.5, iterations=6)
+    """Two targets, each active for 0.6 s and counting after 0.4 s."""
+    return load("kirigami_reaching").main(targets=2, each=0.6, delay=0.4, iterations=6)
 
 
 def test_it_comes_near_each_target(reaching) -> None:
@@ -36,17 +36,17 @@ def test_shorter_steps_lead_as_near(reaching) -> None:
 
 def test_a_field_that_points_to_the_target_does_so(reaching) -> None:
     times = reaching["times"][1:]
-    settled = (times % reaching["each"]) > 0.6
+    settled = (times % reaching["each"]) > 0.45
     assert np.degrees(reaching["start"]["angles"][settled]).max() < 5.0
 
 
 def test_an_iteration_is_quick(reaching) -> None:
     assert reaching["seconds"] / reaching["iterations"] < 5.0  # 0.4 s on a machine of its own
-    assert reaching["variables"] == 3 * 17
+    assert reaching["variables"] == 3 * 13
 
 
 def test_pictures_and_summary(reaching, tmp_path) -> None:
     example = load("kirigami_reaching")
     example.plot(reaching).savefig(tmp_path / "reaching.png")
     assert (tmp_path / "reaching.png").stat().st_size > 100_000
-    assert "rms" in example.summary(reaching)
+    assert "iterations" in example.summary(reaching)

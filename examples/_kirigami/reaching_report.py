@@ -42,7 +42,7 @@ def draw_distances(axes, result: dict) -> None:
             va="top",
         )
     axes.set(ylabel="distance [mm]", xlim=(0, times[-1]))
-    axes.legend(frameon=False, loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.18))
+    axes.legend(frameon=False, loc="lower right", ncols=2, bbox_to_anchor=(1.0, 1.08))
 
 
 def draw_angles(axes, result: dict) -> None:
