@@ -35,7 +35,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from _bistable.model import HIGHEST_FIELD, RAMP, Beam, beam, buckled
+from _bistable.measurements import measured_ramp
+from _bistable.model import HIGHEST_FIELD, Beam, beam, buckled
 from _bistable.report import draw_convergence, draw_path, summary
 from _bistable.studies import MESHES, convergence, differences
 
@@ -97,14 +98,6 @@ def sections(sheet: Beam, path: ms.Path, field: float, height: float) -> list[di
         {"fields": fields[k], "displacements": displacements[k], "stable": stable}
         for k, stable in enumerate((True, False, True))
     ]
-
-
-def measured_ramp() -> dict:
-    """Field [T] and displacement [m] of the experiment's ramp."""
-    seconds, millimeters = np.loadtxt(
-        Path(__file__).with_suffix("").as_posix() + "_ramp.csv", delimiter=","
-    ).T
-    return {"fields": RAMP * seconds, "displacements": 1e-3 * millimeters}
 
 
 def plot(result: dict):

@@ -38,8 +38,29 @@ def test_gradients(tmp_path, capsys) -> None:
     assert all(cost["share"] == cost["gradient"] / cost["equilibrium"] for cost in results.values())
 
 
+def test_dynamics(tmp_path, capsys) -> None:
+    pytest.importorskip("torch")
+    pytest.importorskip("matplotlib")
+    path, picture = tmp_path / "dynamics.json", tmp_path / "dynamics.png"
+    quick = ["dynamics", "--quick", "--rounds", "1", "--long", "200", "--figure", str(picture)]
+    assert main([*quick, "--json", str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert "for comparison" in printed and "A long run of 24 faces" in printed
+    results = json.loads(path.read_text())["results"]
+    assert results["energies"]["TR-BDF2"]["kept"]["0.001"] > 0.999
+    assert 0 < results["memory"]["checkpoints, 100"]["bytes"] < 1e6
+    assert results["long run"]["TRBDF2"]["steps"] == 200
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize(
-    "arguments", [["kernels", "--faces", "1"], ["statics", "--rounds", "0"], ["gradients", "--faces", "0"]]
+    "arguments",
+    [
+        ["kernels", "--faces", "1"],
+        ["statics", "--rounds", "0"],
+        ["gradients", "--faces", "0"],
+        ["dynamics", "--rounds", "0"],
+    ],
 )
 def test_sizes_that_make_no_sense(arguments) -> None:
     with pytest.raises(SystemExit, match="must be at least"):

@@ -8,6 +8,7 @@ namespace magshell::bindings {
 namespace {
 
 Tableau tableau_of(const std::string& name) {
+    if (name == "tr_bdf2") return tr_bdf2();
     if (name == "sdirk3") return sdirk3();
     return name == "sdirk2" ? sdirk2() : implicit_euler();
 }
@@ -76,6 +77,12 @@ MotionInput input_of(const Model& model, const py::dict& given) {
     input.inertia = {model.vertex_weights(to_vector(array("mass"))),
                      model.vertex_weights(to_vector(array("damping")))};
     input.start.e = strains_of(model, given["maxwell_strains"].cast<Array>());
+    input.start.rates.w = to_vector(array("acceleration"));
+    if (input.start.rates.w.size() > 0) {
+        input.start.rates.v = input.start.v;
+        input.start.rates.d = strains_of(model, given["strain_rates"].cast<Array>());
+        input.start.rates.e = strains_of(model, given["maxwell_strain_rates"].cast<Array>());
+    }
     input.rotations_given = given["rotations_given"].cast<bool>();
     input.viscosity = {given["stiffness_damping"].cast<double>(), given["maxwell_modulus"].cast<double>(),
                        given["maxwell_time"].cast<double>()};
@@ -167,8 +174,13 @@ void register_dynamics(py::module_& module) {
         .def_readonly("steps_done", &MotionResult::steps_done)
         .def_property_readonly("last_state", [](const MotionResult& r) { return r.last.q; })
         .def_property_readonly("last_velocity", [](const MotionResult& r) { return r.last.v; })
+        .def_property_readonly("last_acceleration", [](const MotionResult& r) { return r.last.rates.w; })
         .def("last_maxwell_strains",
              [](const MotionResult& r, const Model& m) { return rows_of(m, r.last.e); })
+        .def("last_strain_rates",
+             [](const MotionResult& r, const Model& m) { return rows_of(m, r.last.rates.d); })
+        .def("last_maxwell_strain_rates",
+             [](const MotionResult& r, const Model& m) { return rows_of(m, r.last.rates.e); })
         .def_property_readonly("last_memory", [](const MotionResult& r) { return r.last.memory; })
         .def_readonly("kinetic_energy", &MotionResult::kinetic_energy)
         .def_readonly("energies", &MotionResult::energies)

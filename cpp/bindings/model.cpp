@@ -151,6 +151,12 @@ void register_model(py::module_& module) {
         .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })
         .def("reduce", [](const Model& m, const VectorXd& full) { return m.reduction().vector(full); })
         .def(
+            "free_weights",
+            [](const Model& m, const Array& of_vertices) {
+                return m.reduction().weights(m.vertex_weights(to_vector(of_vertices)));
+            },
+            "Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.")
+        .def(
             "prescribed_rate",
             [](const Model& m, double progress) { return m.reduction().prescribed_rate(progress); },
             "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")

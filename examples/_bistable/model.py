@@ -14,6 +14,7 @@ SHORTENING = 0.47e-3  # m
 SHEAR_MODULUS = 1.4e6  # Pa
 YOUNG_MODULUS = 3.0 * SHEAR_MODULUS
 RESIDUAL_FLUX_DENSITY = 67.5e-3  # T
+MASS_DENSITY = 2000.0  # kg/m^3
 RAMP = 6.5e-3  # T/s
 HIGHEST_FIELD = 16.25e-3  # T
 MEASURED_SNAP = 6.26e-3  # T, where the ramp passes 4 mm
@@ -46,7 +47,13 @@ class Beam:
 def beam(cells, *, width=WIDTH, thickness=THICKNESS, shortening=SHORTENING, poisson_ratio=0.5) -> Beam:
     """The beam between clamps that share the shortening, with an even number of cells each way."""
     mesh = ms.meshes.rectangle(LENGTH, width, cells=cells)
-    sheet = ms.Shell(mesh, thickness=thickness, young_modulus=YOUNG_MODULUS, poisson_ratio=poisson_ratio)
+    sheet = ms.Shell(
+        mesh,
+        thickness=thickness,
+        young_modulus=YOUNG_MODULUS,
+        poisson_ratio=poisson_ratio,
+        mass_density=MASS_DENSITY,
+    )
     clamps = [
         ms.Clamp(mesh.edges_at(x=0.0), displacement=(shortening / 2, 0, 0)),
         ms.Clamp(mesh.edges_at(x=LENGTH), displacement=(-shortening / 2, 0, 0)),

@@ -19,7 +19,7 @@ from .errors import (
 )
 from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .field_adapters import CustomField, MagpylibField
-from .integrators import SDIRK2, SDIRK3, ImplicitEuler
+from .integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
 from .io import read_fields, read_mesh, write_mesh
 from .linear import LinearResponse, linear_response
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
@@ -37,12 +37,14 @@ from .starts import Multistart
 from .statics import equilibrium
 from .supports import Clamp, Pin, SymmetryPlane
 from .trajectory import MotionState, Trajectory
+from .vibration import VibrationModes, vibration_modes
 from .warm_start import WarmStart
 from .weld import Weld, weld
 
 __all__ = [
     "SDIRK2",
     "SDIRK3",
+    "TRBDF2",
     "AppliedField",
     "AreaLoad",
     "Buckling",
@@ -80,6 +82,7 @@ __all__ = [
     "Trajectory",
     "TriangleMesh",
     "UniformField",
+    "VibrationModes",
     "WarmStart",
     "Weld",
     "__version__",
@@ -104,6 +107,7 @@ __all__ = [
     "set_num_threads",
     "show_config",
     "simulate",
+    "vibration_modes",
     "weld",
     "write_mesh",
     "write_page",

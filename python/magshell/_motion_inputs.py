@@ -70,7 +70,7 @@ class MotionInputs:
                 "state": self.start.state,
                 "velocity": self.start.velocity,
                 "memory": self.start.memory,
-                "maxwell_strains": self.start.maxwell_strains if law["maxwell_modulus"] else np.zeros(0),
+                **self._history(law),
                 "rotations_given": start is None or isinstance(start, Equilibrium | Trajectory | MotionState),
                 **law,
                 "mass": self._mass,
@@ -112,6 +112,20 @@ class MotionInputs:
             raise ValueError(f"damping [N s/m] must not be negative, but the smallest is {np.min(damping):g}")
         return np.broadcast_to(damping, (n_v,))
 
+    def _history(self, law: dict[str, float]) -> dict[str, np.ndarray]:
+        """What the start remembers of the motion that led to it, as far as this one can use it."""
+        start, nothing = self.start, np.zeros(0)
+        maxwell = law["maxwell_modulus"] > 0
+        viscous = maxwell or law["stiffness_damping"] > 0
+        rates_known = start.strain_rates.size > 0 or not viscous
+        known = rates_known and (start.maxwell_strain_rates.size > 0 or not maxwell)
+        return {
+            "maxwell_strains": start.maxwell_strains if maxwell else nothing,
+            "acceleration": start.acceleration if known else nothing,
+            "strain_rates": start.strain_rates,
+            "maxwell_strain_rates": start.maxwell_strain_rates,
+        }
+
     def _viscosity(self, stiffness_damping, maxwell_modulus, maxwell_time) -> dict[str, float]:
         given = {"stiffness_damping": ("s", stiffness_damping), "maxwell_modulus": ("1", maxwell_modulus)}
         if maxwell_time is not None:
@@ -130,17 +144,19 @@ class MotionInputs:
     def _begin(self, start, velocities) -> MotionState:
         inputs, model = self.inputs, self.inputs.scene._model
         origin = self._origin(start)
-        velocity = origin.velocity
-        if velocities is not None:
-            n_v = inputs.scene.mesh.n_vertices
-            given = inputs.take("velocities", velocities)
-            if np.shape(given) not in ((3,), (n_v, 3)):
-                raise ValueError(
-                    f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {np.shape(given)}"
-                )
-            rows = np.broadcast_to(quantity("velocities", "m/s", given, np.shape(given)), (n_v, 3))
-            velocity = model.full_vector(np.ascontiguousarray(rows))
-        return MotionState(origin.time, origin.state, velocity, origin.memory, origin.maxwell_strains)
+        if velocities is None:
+            return origin
+        n_v = inputs.scene.mesh.n_vertices
+        given = inputs.take("velocities", velocities)
+        if np.shape(given) not in ((3,), (n_v, 3)):
+            raise ValueError(
+                f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {np.shape(given)}"
+            )
+        rows = np.broadcast_to(quantity("velocities", "m/s", given, np.shape(given)), (n_v, 3))
+        velocity = model.full_vector(np.ascontiguousarray(rows))
+        return MotionState(
+            origin.time, origin.state, velocity, origin.memory, maxwell_strains=origin.maxwell_strains
+        )
 
     def _origin(self, start) -> MotionState:
         inputs, model, mesh = self.inputs, self.inputs.scene._model, self.inputs.scene.mesh

@@ -10,6 +10,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from . import _core
 from ._inputs import Inputs
+from ._mode_shapes import mode_shapes
 from ._rest import RestStiffness
 from .errors import NotConverged
 from .scene import Scene
@@ -98,12 +99,12 @@ def linear_buckling(
     factors, vectors = _lowest(
         stiffness, change, modes, _LARGEST_DISPLACEMENT * scene.mesh.size, displacement
     )
-    shapes = [_normalized(model, vector) for vector in vectors.T]
+    shapes, edge_rotations = mode_shapes(model, vectors)
     return Buckling(
         scene=scene,
         factors=factors,
-        modes=np.array([model.positions(shape) for shape in shapes]),
-        edge_rotations=np.array([model.edge_rotations(shape) for shape in shapes]),
+        modes=shapes,
+        edge_rotations=edge_rotations,
         factorizations=2,
         wall_time=time.perf_counter() - began,
     )
@@ -155,10 +156,3 @@ def _lowest(
         raise NotConverged(f"the buckling modes did not converge: {error}. Ask for fewer modes.") from error
     order = np.argsort(-inverses)
     return 1.0 / inverses[order], vectors[:, order]
-
-
-def _normalized(model, vector: np.ndarray) -> np.ndarray:
-    """All unknowns of a mode, its largest component of a displacement 1."""
-    shape = model.expand(vector)
-    displacements = model.positions(shape)
-    return shape / displacements.ravel()[np.argmax(np.abs(displacements))]

@@ -14,7 +14,7 @@ from ._progress import progress_bar
 from ._replacements import requested
 from ._tensors import like
 from .errors import Interrupted, NotConverged
-from .integrators import SDIRK2, SDIRK3, ImplicitEuler, Integrator
+from .integrators import TRBDF2, Integrator
 from .scene import Scene
 from .solvers import MixedNewton, Newton
 from .trajectory import MotionState, Trajectory
@@ -66,7 +66,7 @@ def simulate(
         bits. By default the rest shape.
     velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
     remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density.
-    integrator: SDIRK2() by default; ImplicitEuler() or SDIRK3().
+    integrator: TRBDF2() by default; ImplicitEuler(), SDIRK2() or SDIRK3().
     record_every: steps between the states that come back, the start first.
     memory_budget: bytes that may be kept for gradients: all states if they fit; else checkpoints, between which the
         steps are taken again on the way back, some of them several times.
@@ -89,12 +89,13 @@ def simulate(
     >>> move.positions.shape, bool(move.positions[-1, :, 2].max() > 1e-4)
     ((21, 33, 3), True)
     """
-    integrator = SDIRK2() if integrator is None else integrator
+    integrator = TRBDF2() if integrator is None else integrator
     solver = MixedNewton() if solver is None else solver
-    if not isinstance(integrator, ImplicitEuler | SDIRK2 | SDIRK3):
-        raise ValueError(
-            f"integrator must be ImplicitEuler, SDIRK2 or SDIRK3, got {type(integrator).__name__}"
+    if not isinstance(integrator, Integrator):
+        what = (
+            f"the class {integrator.__name__}: call it" if isinstance(integrator, type) else repr(integrator)
         )
+        raise ValueError(f"integrator must be ms.TRBDF2(), ImplicitEuler(), SDIRK2() or SDIRK3(), got {what}")
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
     if not isinstance(scene, Scene):
@@ -175,7 +176,10 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
             found.last_state,
             found.last_velocity,
             found.last_memory,
+            found.last_acceleration,
+            found.last_strain_rates(model),
             found.last_maxwell_strains(model),
+            found.last_maxwell_strain_rates(model),
         ),
         iterations=found.iterations,
         factorizations=found.factorizations,

@@ -15,11 +15,27 @@ class ImplicitEuler:
 
 
 @dataclass(frozen=True)
-class SDIRK2:
-    """Second order, two solves a step, L-stable: R. Alexander, SIAM J. Numer. Anal. 14 (1977). The default.
+class TRBDF2:
+    """Second order, two solves a step, L-stable: the trapezoidal rule, then BDF2. The default.
 
-    Its stability function is that of TR-BDF2: at 40 steps a period, 0.36 % of the energy is lost over 20 periods.
-    Unlike that method it needs nothing but positions and velocities of the step before, so that fields may jump.
+    At 40 steps a period, a vibration loses 0.36 % of its energy over 20 periods if it is small, about 1 % if it bends
+    a strip by a third of its length. A field that jumps between two steps is felt half over the first 0.59 of the step
+    after it. The first step is one of SDIRK2.
+    R. E. Bank et al., IEEE Trans. Electron Devices 32 (1985); M. E. Hosea and L. F. Shampine, Appl. Numer. Math. 20 (1996).
+    """
+
+    _name = "tr_bdf2"
+    _times = (2.0 - 2.0**0.5, 1.0)
+
+
+@dataclass(frozen=True)
+class SDIRK2:
+    """Second order, two solves a step, L-stable: R. Alexander, SIAM J. Numer. Anal. 14 (1977).
+
+    Small vibrations go as with TRBDF2, of which it has the stability function. One that bends a thin strip by a tenth
+    of its length loses 5 to 8 % of its energy over 20 periods of 40 steps, four times less with half the step: along a
+    curved motion its stages stretch the sheet, and that is damped. It needs nothing but positions and velocities of the
+    step before: for fields that jump often.
     """
 
     _name = "sdirk2"
@@ -28,10 +44,14 @@ class SDIRK2:
 
 @dataclass(frozen=True)
 class SDIRK3:
-    """Third order, three solves a step, L-stable; same source as SDIRK2."""
+    """Third order, three solves a step, L-stable; same source as SDIRK2.
+
+    The order shows in small motions, and where steps resolve the waves of the membrane. Thin sheets that move far get
+    second order from it, as they do under stiffness-proportional damping.
+    """
 
     _name = "sdirk3"
     _times = (0.43586652150845899942, 0.5 * (1.0 + 0.43586652150845899942), 1.0)
 
 
-Integrator = ImplicitEuler | SDIRK2 | SDIRK3
+Integrator = ImplicitEuler | TRBDF2 | SDIRK2 | SDIRK3

@@ -12,47 +12,49 @@ from .integrators import Integrator
 from .scene import Scene
 
 
+def _no_strains() -> np.ndarray:
+    return np.zeros((2, 0, 3))
+
+
 @dataclass(frozen=True)
 class MotionState:
     """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits.
 
-    time: s, since the start of the motion that led here.
+    time: s, since the start of the motion that led here. Everything else is in the core's order of unknowns and faces;
+    what the motion had no need of is empty: accelerations and strain rates (TRBDF2), strains of a Maxwell branch.
     """
 
     time: float
     state: np.ndarray = field(repr=False)
     velocity: np.ndarray = field(repr=False)
-    memory: list = field(repr=False)
-    maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros((2, 0, 3)))
+    memory: list = field(repr=False, default_factory=list)
+    acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    strain_rates: np.ndarray = field(repr=False, default_factory=_no_strains)
+    maxwell_strains: np.ndarray = field(repr=False, default_factory=_no_strains)
+    maxwell_strain_rates: np.ndarray = field(repr=False, default_factory=_no_strains)
 
     def save(self, path: str | Path) -> None:
         """Writes an .npz file."""
         lengths = np.array([len(each) for each in self.memory], dtype=np.int64)
         remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.memory)])
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
         with open(path, "wb") as file:
-            np.savez(
-                file,
-                time=self.time,
-                state=self.state,
-                velocity=self.velocity,
-                memory=remembered,
-                memory_lengths=lengths,
-                maxwell_strains=self.maxwell_strains,
-            )
+            np.savez(file, time=self.time, memory=remembered, memory_lengths=lengths, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> MotionState:
         """Reads what `save` wrote. Raises ValueError if it is something else."""
-        names = ("time", "state", "velocity", "memory", "memory_lengths", "maxwell_strains")
         try:
             with np.load(path, allow_pickle=False) as file:
-                time, state, velocity, remembered, lengths, strains = (file[name] for name in names)
+                time, remembered, lengths = (file[name] for name in ("time", "memory", "memory_lengths"))
+                arrays = {name: file[name] for name in _ARRAYS}
         except (KeyError, ValueError, EOFError) as error:
             raise ValueError(f"{path} is not a saved MotionState: {error}") from error
-        memory = (
-            [part.tolist() for part in np.split(remembered, np.cumsum(lengths)[:-1])] if len(lengths) else []
-        )
-        return cls(float(time), state, velocity, memory, strains)
+        parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
+        return cls(float(time), memory=[part.tolist() for part in parts], **arrays)
+
+
+_ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
 
 
 @dataclass(frozen=True, repr=False)

@@ -35,18 +35,16 @@ void add(SceneGradient& sum, const SceneGradient& part) {
         add(sum.field_sources[k], part.field_sources[k]);
 }
 
-// The rates of all stages of a step, from their states.
+// The rates of a step, from its states: those it began with, and those of its stages.
 struct Rates {
-    std::vector<VectorXd> x_hat, v_hat, v, w;
+    std::vector<VectorXd> x_hat, v_hat;
+    std::vector<StageRates> all;
 
-    Rates(const StepAlgebra& step, const MotionState& begin, const std::vector<StageState>& stages,
-          Index coordinates)
-        : x_hat(stages.size()), v_hat(stages.size()) {
-        for (int i = 0; i < static_cast<int>(stages.size()); ++i) {
-            step.start_of_stage(i, begin, v, w, x_hat[i], v_hat[i]);
-            v.emplace_back(VectorXd::Zero(begin.q.size()));
-            v.back().head(coordinates) = (stages[i].q - x_hat[i]).head(coordinates) / step.stage_time();
-            w.emplace_back((v.back() - v_hat[i]) / step.stage_time());
+    Rates(const StepAlgebra& step, const PartRecord& part, Index coordinates)
+        : x_hat(part.stages.size()), v_hat(part.stages.size()), all(first_rates(step.tableau(), part.begin)) {
+        for (int i = 0; i < static_cast<int>(part.stages.size()); ++i) {
+            step.start_of_stage(i, part.begin, all, x_hat[i], v_hat[i]);
+            step.finish_stage(part.stages[i].q, x_hat[i], v_hat[i], coordinates, all.emplace_back());
         }
     }
 };
@@ -76,8 +74,7 @@ class Backward {
                 end = at->first;
             }
         } else {
-            for (Index step = motion_.steps_done - 1; step >= 0; --step)
-                back(step, beginning(step), motion_.stages[step]);
+            for (Index step = motion_.steps_done - 1; step >= 0; --step) back(step, motion_.steps[step]);
         }
         back_to_start();
         return std::move(g_);
@@ -111,76 +108,48 @@ class Backward {
             repeat_step(stepper_, input_, step, parts_of(motion_.halved, step), state, nullptr);
     }
 
-    void leaf(Index begin, Index end, const MotionState& at_begin) {
-        std::vector<MotionState> starts = {at_begin};
-        std::vector<std::vector<std::vector<StageState>>> stages(end - begin);
-        for (Index step = begin; step < end; ++step) {
-            MotionState state = starts.back();
-            repeat_step(stepper_, input_, step, parts_of(motion_.halved, step), state, &stages[step - begin]);
-            starts.push_back(std::move(state));
-        }
-        for (Index step = end - 1; step >= begin; --step)
-            back(step, starts[step - begin], stages[step - begin]);
+    void leaf(Index begin, Index end, MotionState state) {
+        std::vector<std::vector<PartRecord>> steps(end - begin);
+        for (Index step = begin; step < end; ++step)
+            repeat_step(stepper_, input_, step, parts_of(motion_.halved, step), state, &steps[step - begin]);
+        for (Index step = end - 1; step >= begin; --step) back(step, steps[step - begin]);
     }
 
-    void back(Index step, MotionState begin, const std::vector<std::vector<StageState>>& stages) {
+    void back(Index step, const std::vector<PartRecord>& records) {
         progress_ = 1.0 - static_cast<double>(step + 1) / static_cast<double>(motion_.steps_done);
         const Parts parts = parts_of(motion_.halved, step);
-        std::vector<MotionState> starts = {std::move(begin)};
-        for (std::size_t k = 0; k + 1 < parts.size(); ++k)
-            starts.push_back(end_of(parts[k], starts.back().q, stages[k]));
-        for (std::size_t k = parts.size(); k-- > 0;) back(step, parts[k], starts[k], stages[k]);
+        for (std::size_t k = parts.size(); k-- > 0;) back(step, parts[k], records[k]);
         take_in(step);
     }
 
-    // The state in which a step began, where all stages are kept.
-    MotionState beginning(Index step) {
-        if (step == 0) return motion_.start;
-        const auto& stages = motion_.stages[step - 1];
-        const Parts parts = parts_of(motion_.halved, step - 1);
-        const VectorXd& q = stages.size() > 1 ? stages[stages.size() - 2].back().q
-                            : step > 1        ? motion_.stages[step - 2].back().back().q
-                                              : motion_.start.q;
-        return end_of(parts.back(), q, stages.back());
-    }
-
-    // Velocities follow from the positions of the stages alone.
-    MotionState end_of(const std::pair<double, double>& part, const VectorXd& q_begin,
-                       const std::vector<StageState>& stages) {
-        const StepAlgebra& step = stepper_.algebra((part.second - part.first) * input_.time_step);
-        const MotionState begin{q_begin, VectorXd::Zero(q_begin.size()), {}, {}};
-        Rates rates(step, begin, stages, 3 * model_.sheet().n_vertices());
-        return {stages.back().q, std::move(rates.v.back()), stages.back().memory, stages.back().e};
-    }
-
-    void back(Index step, const std::pair<double, double>& part, const MotionState& begin,
-              const std::vector<StageState>& stages) {
+    void back(Index step, const std::pair<double, double>& part, const PartRecord& record) {
         const double share = part.second - part.first;
-        const StepAlgebra algebra = stepper_.algebra(share * input_.time_step);
-        const Tableau& tableau = input_.tableau;
-        const int n = tableau.stages;
+        const StepAlgebra algebra =
+            stepper_.algebra(share * input_.time_step, stepper_.tableau_from(record.begin));
+        const Tableau& tableau = algebra.tableau();
+        const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
         const double dt = algebra.dt(), adt = algebra.stage_time();
         const VectorXd &mass = input_.inertia.mass, &damping = input_.inertia.damping;
         const Index coordinates = 3 * model_.sheet().n_vertices();
-        const Rates at(algebra, begin, stages, coordinates);
+        const Rates at(algebra, record, coordinates);
 
-        std::vector<VectorXd> by_v(n, VectorXd::Zero(model_.size())), by_w = by_v;
+        std::vector<VectorXd> by_v(first + n, VectorXd::Zero(model_.size())), by_w = by_v;
         VectorXd by_x = std::move(g_.positions);
         by_v.back() = std::move(g_.velocities);
+        if (by_w_.size() > 0) by_w.back() = std::move(by_w_);
         g_.positions = g_.velocities = VectorXd::Zero(model_.size());
-        ViscousAdjoint viscous(model_, input_.viscosity, algebra, begin, stages, by_e_);
+        ViscousAdjoint viscous(model_, input_.viscosity, algebra, record, by_strains_);
         double by_dt = 0.0;
         for (int i = n - 1; i >= 0; --i) {
-            by_dt -= by_w[i].dot(at.w[i]) / dt;
-            by_v[i] += by_w[i] / adt;
-            VectorXd by_v_hat = -by_w[i] / adt;
-            by_dt -= by_v[i].dot(at.v[i]) / dt;
-            by_x.head(coordinates) += by_v[i].head(coordinates) / adt;
-            VectorXd by_x_hat = VectorXd::Zero(model_.size());
-            by_x_hat.head(coordinates) = -by_v[i].head(coordinates) / adt;
+            const VectorXd &v = at.all[first + i].v, &w = at.all[first + i].w;
+            const VectorXd &by_vi = by_v[first + i] += by_w[first + i] / adt, &by_wi = by_w[first + i];
+            by_dt -= (by_wi.dot(w) + by_vi.dot(v)) / dt;
+            VectorXd by_v_hat = -by_wi / adt, by_x_hat = VectorXd::Zero(model_.size());
+            by_x.head(coordinates) += by_vi.head(coordinates) / adt;
+            by_x_hat.head(coordinates) = -by_vi.head(coordinates) / adt;
 
-            const VectorXd lambda = back_through(algebra, at, i, stages[i], step, part, by_x, viscous);
-            const VectorXd accelerated = lambda.cwiseProduct(at.w[i]), moved = lambda.cwiseProduct(at.v[i]);
+            const VectorXd lambda = back_through(algebra, at, i, record.stages[i], step, part, by_x, viscous);
+            const VectorXd accelerated = lambda.cwiseProduct(w), moved = lambda.cwiseProduct(v);
             g_.mass += accelerated;
             g_.damping += moved;
             // d/dt of M (x - x^ - a dt v^)/(a dt)^2 + Gamma (x - x^)/(a dt), with x^ and v^ fixed
@@ -190,17 +159,23 @@ class Backward {
 
             g_.positions += by_x_hat;
             g_.velocities += by_v_hat;
-            for (int j = 0; j < i; ++j) {
-                by_v[j] += (dt * tableau.a[i][j]) * by_x_hat;
-                by_w[j] += (dt * tableau.a[i][j]) * by_v_hat;
-                by_dt += tableau.a[i][j] * (at.v[j].dot(by_x_hat) + at.w[j].dot(by_v_hat));
+            for (int j = 0; j < first + i; ++j) {
+                const double a = tableau.a[i][j];
+                by_v[j] += (dt * a) * by_x_hat;
+                by_w[j] += (dt * a) * by_v_hat;
+                by_dt += a * (at.all[j].v.dot(by_x_hat) + at.all[j].w.dot(by_v_hat));
             }
             by_x.setZero(model_.size());
         }
+        by_w_ = VectorXd();
+        if (tableau.begins_explicitly) {
+            g_.velocities += by_v.front();
+            by_w_ = std::move(by_w.front());
+        }
         if (input_.viscosity.any()) {
-            model_.evaluate(begin.q, {});
+            model_.evaluate(record.begin.q, {});
             g_.positions += model_.strain_forces(viscous.by_d_begin);
-            by_e_ = std::move(viscous.by_e_begin);
+            by_strains_ = std::move(viscous.by_begin);
             by_dt += viscous.by_dt;
             g_.viscosity.stiffness_damping += viscous.by_law.stiffness_damping;
             g_.viscosity.maxwell_modulus += viscous.by_law.maxwell_modulus;
@@ -226,7 +201,7 @@ class Backward {
                           Index step, const std::pair<double, double>& part, VectorXd& by_x,
                           ViscousAdjoint& viscous) {
         const ElasticAfterwards elastic_afterwards(model_);
-        const double share = part.first + input_.tableau.time(i) * (part.second - part.first);
+        const double share = part.first + algebra.tableau().time(i) * (part.second - part.first);
         const Controls controls = input_.controls_at(step, share);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         model_.set_memory(stage.memory);
@@ -258,7 +233,7 @@ class Backward {
         const VectorXd& q = motion_.start.q;
         if (input_.viscosity.maxwell() && input_.start.e.empty()) {
             model_.evaluate(q, input_.controls_at(0, 0.0));
-            g_.positions += model_.strain_forces(by_e_);
+            g_.positions += model_.strain_forces(by_strains_.e);
         }
         if (input_.rotations_given) return;
         model_.set_memory(input_.start.memory);
@@ -287,7 +262,9 @@ class Backward {
     const MotionResult& motion_;
     const std::vector<VectorXd>&by_q_, &by_v_;
     Stepper stepper_;
-    SheetStrains by_e_;  // of the Maxwell branch, at the beginning of the last step taken back
+    // By the rates, and by the Maxwell branch, at the beginning of the last step taken back.
+    VectorXd by_w_;
+    ViscousGradient by_strains_;
     double progress_ = 0.0;
 };
 

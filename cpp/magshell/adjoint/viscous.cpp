@@ -3,27 +3,29 @@
 namespace magshell {
 
 ViscousAdjoint::ViscousAdjoint(Model& model, const Viscosity& law, const StepAlgebra& step,
-                               const MotionState& begin, const std::vector<StageState>& stages,
-                               const SheetStrains& by_e)
+                               const PartRecord& part, const ViscousGradient& by_end)
     : model_(model), law_(law), step_(step) {
     if (!law.any()) return;
-    const SheetStrains d_begin = model.strains(begin.q);
-    for (std::size_t i = 0; i < stages.size(); ++i) {
-        stages_.push_back(
-            ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], stages_, d_begin, begin.e));
-        stages_.back().finish(law, step.stage_time(), model.strains(stages[i].q));
+    const SheetStrains d_begin = model.strains(part.begin.q), zero = d_begin.times(0.0);
+    rates_ = first_rates(step.tableau(), part.begin);
+    first_ = rates_.size();
+    for (std::size_t i = 0; i < part.stages.size(); ++i) {
+        stages_.push_back(ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], rates_,
+                                       d_begin, part.begin.e));
+        stages_.back().finish(law, step.stage_time(), model.strains(part.stages[i].q), rates_.emplace_back());
     }
-    const std::size_t n = stages.size();
-    const SheetStrains zero = d_begin.times(0.0);
-    by_d_rate_.assign(n, zero);
+    const std::size_t n = part.stages.size();
     by_d_hat_.assign(n, zero);
     by_e_.assign(n, zero);
-    by_e_rate_.assign(n, zero);
     by_e_hat_.assign(n, zero);
+    by_d_rate_.assign(rates_.size(), zero);
+    by_e_rate_.assign(rates_.size(), zero);
     by_ratio_.assign(n, 0.0);
     by_stage_time_.assign(n, 0.0);
-    if (!by_e.empty()) by_e_.back() = by_e;
-    by_d_begin = by_e_begin = zero;
+    if (!by_end.e.empty()) by_e_.back() = by_end.e;
+    if (!by_end.d_rate.empty()) by_d_rate_.back() = by_end.d_rate;
+    if (!by_end.e_rate.empty()) by_e_rate_.back() = by_end.e_rate;
+    by_d_begin = by_begin.e = zero;
 }
 
 double ViscousAdjoint::dot(const SheetStrains& a, const SheetStrains& b) const {
@@ -37,15 +39,17 @@ void ViscousAdjoint::set_history(int i) const {
 void ViscousAdjoint::before_solve(int i, VectorXd& by_q) {
     if (!law_.any()) return;
     const ViscousStage& stage = stages_[i];
+    const StageRates& rates = rates_[first_ + i];
+    const SheetStrains &by_d_rate = by_d_rate_[first_ + i], &by_e_rate = by_e_rate_[first_ + i];
     const double T = step_.stage_time();
-    SheetStrains by_d = by_d_rate_[i].times(1.0 / T);  // d' = (d - d^)/T
-    by_d_hat_[i].add(-1.0 / T, by_d_rate_[i]);
-    by_stage_time_[i] -= dot(by_d_rate_[i], stage.d_rate) / T;
+    SheetStrains by_d = by_d_rate.times(1.0 / T);  // d' = (d - d^)/T
+    by_d_hat_[i].add(-1.0 / T, by_d_rate);
+    by_stage_time_[i] -= dot(by_d_rate, rates.d) / T;
     if (law_.maxwell()) {
         const double tau = law_.maxwell_time, r = law_.ratio(T);
-        by_d.add(1.0 / tau, by_e_rate_[i]);  // e' = (d - e)/tau
-        by_e_[i].add(-1.0 / tau, by_e_rate_[i]);
-        by_law.maxwell_time -= dot(by_e_rate_[i], stage.e_rate) / tau;
+        by_d.add(1.0 / tau, by_e_rate);  // e' = (d - e)/tau
+        by_e_[i].add(-1.0 / tau, by_e_rate);
+        by_law.maxwell_time -= dot(by_e_rate, rates.e) / tau;
         by_e_hat_[i].add(1.0 / (1.0 + r), by_e_[i]);  // e = (e^ + r d)/(1 + r)
         by_d.add(r / (1.0 + r), by_e_[i]);
         by_ratio_[i] += (dot(by_e_[i], stage.d) - dot(by_e_[i], stage.e_hat)) / ((1.0 + r) * (1.0 + r));
@@ -72,22 +76,26 @@ void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {
         by_stage_time_[i] += by_ratio_[i] / law_.maxwell_time;
         by_law.maxwell_time -= by_ratio_[i] * r / law_.maxwell_time;
     }
-    by_dt += step_.tableau().diagonal() * by_stage_time_[i];
-    pass_on(i, by_d_hat_[i], by_e_hat_[i]);
+    by_dt += step_.tableau().diagonal * by_stage_time_[i];
+    pass_on(i);
 }
 
-// d^_i = d + dt sum a_ij d'_j, and e^_i alike.
-void ViscousAdjoint::pass_on(int i, const SheetStrains& by_d_hat, const SheetStrains& by_e_hat) {
-    by_d_begin.add(1.0, by_d_hat);
-    if (law_.maxwell()) by_e_begin.add(1.0, by_e_hat);
-    for (int j = 0; j < i; ++j) {
+// d^_i = d + dt sum a_ij d'_j, and e^_i alike. What the step began with is passed on once all stages are
+// done.
+void ViscousAdjoint::pass_on(int i) {
+    by_d_begin.add(1.0, by_d_hat_[i]);
+    by_begin.e.add(1.0, by_e_hat_[i]);
+    for (std::size_t j = 0; j < first_ + i; ++j) {
         const double a = step_.tableau().a[i][j];
-        by_d_rate_[j].add(a * step_.dt(), by_d_hat);
-        by_dt += a * dot(stages_[j].d_rate, by_d_hat);
+        by_d_rate_[j].add(a * step_.dt(), by_d_hat_[i]);
+        by_dt += a * dot(rates_[j].d, by_d_hat_[i]);
         if (!law_.maxwell()) continue;
-        by_e_rate_[j].add(a * step_.dt(), by_e_hat);
-        by_dt += a * dot(stages_[j].e_rate, by_e_hat);
+        by_e_rate_[j].add(a * step_.dt(), by_e_hat_[i]);
+        by_dt += a * dot(rates_[j].e, by_e_hat_[i]);
     }
+    if (i > 0 || first_ == 0) return;
+    by_begin.d_rate = by_d_rate_.front();
+    by_begin.e_rate = by_e_rate_.front();
 }
 
 }  // namespace magshell

@@ -5,11 +5,16 @@
 
 namespace magshell {
 
+/// By the Maxwell strains between two steps, and by the rates of the strains there; empty where nothing asks.
+struct ViscousGradient {
+    SheetStrains e, d_rate, e_rate;
+};
+
 class ViscousAdjoint {
   public:
-    /// Finds the strains of the stages again. by_e: by the Maxwell strains at the end of the step.
-    ViscousAdjoint(Model& model, const Viscosity& law, const StepAlgebra& step, const MotionState& begin,
-                   const std::vector<StageState>& stages, const SheetStrains& by_e);
+    /// Finds the strains of the stages again. by_end: what later steps say of the end of this one.
+    ViscousAdjoint(Model& model, const Viscosity& law, const StepAlgebra& step, const PartRecord& part,
+                   const ViscousGradient& by_end);
 
     /// The stresses of stage i have their history from now on.
     void set_history(int i) const;
@@ -18,19 +23,23 @@ class ViscousAdjoint {
     /// At the evaluated stage: what lambda says of the history and of the law.
     void after_solve(int i, const VectorXd& lambda);
 
-    SheetStrains by_d_begin, by_e_begin;
+    SheetStrains by_d_begin;
+    ViscousGradient by_begin;
     Viscosity by_law{0.0, 0.0, 0.0};
     double by_dt = 0.0;
 
   private:
     double dot(const SheetStrains& a, const SheetStrains& b) const;
-    void pass_on(int i, const SheetStrains& by_d_hat, const SheetStrains& by_e_hat);
+    void pass_on(int i);
 
     Model& model_;
     const Viscosity& law_;
     const StepAlgebra& step_;
+    std::size_t first_ = 0;  // stage among all rates
     std::vector<ViscousStage> stages_;
-    std::vector<SheetStrains> by_e_, by_d_rate_, by_e_rate_, by_d_hat_, by_e_hat_;
+    std::vector<StageRates> rates_;
+    std::vector<SheetStrains> by_e_, by_d_hat_, by_e_hat_;  // by stage
+    std::vector<SheetStrains> by_d_rate_, by_e_rate_;       // by rate
     std::vector<double> by_ratio_, by_stage_time_;
 };
 

@@ -11,11 +11,12 @@ namespace {
 
 constexpr double smallest_part = 1.0 / 64.0;  // of a step
 
-std::vector<Controls> at_stages(const MotionInput& input, Index step, std::pair<double, double> part) {
+std::vector<Controls> at_stages(const MotionInput& input, const Tableau& tableau, Index step,
+                                std::pair<double, double> part) {
     std::vector<Controls> controls;
-    for (int i = 0; i < input.tableau.stages; ++i)
+    for (int i = 0; i < tableau.stages; ++i)
         controls.push_back(
-            input.controls_at(step, part.first + input.tableau.time(i) * (part.second - part.first)));
+            input.controls_at(step, part.first + tableau.time(i) * (part.second - part.first)));
     return controls;
 }
 
@@ -23,8 +24,16 @@ std::size_t bytes_of(const SheetStrains& strains) {
     return (strains.membrane.size() + strains.bending.size()) * sizeof(Pack);
 }
 
-std::size_t bytes_of(const StageState& stage) {
-    return sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->bytes() : 0) + bytes_of(stage.e);
+std::size_t bytes_of(const MotionState& state) {
+    return sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() + state.rates.w.size()) +
+           bytes_of(state.e) + bytes_of(state.rates.d) + bytes_of(state.rates.e);
+}
+
+std::size_t bytes_of(const PartRecord& part) {
+    std::size_t bytes = bytes_of(part.begin);
+    for (const StageState& stage : part.stages)
+        bytes += sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->bytes() : 0);
+    return bytes;
 }
 
 // The start with its edge rotations at rest, if none were given, and the Maxwell branch relaxed, if it is
@@ -68,15 +77,18 @@ class Run {
     // All stages, if the budget allows it; else as many at a time as half of it holds, and checkpoints in the
     // rest. Factorizations only on demand: fresh memory for each costs more than the way back saves.
     void plan(const KeepOptions& keep) {
+        const bool explicit_first = input_.tableau.begins_explicitly;
         const std::size_t vector = sizeof(double) * model_.size();
-        const std::size_t strains =
-            input_.viscosity.maxwell() ? 6 * sizeof(double) * model_.sheet().n_faces() : 0;
-        const std::size_t stages = input_.tableau.stages * (vector + strains);
-        const bool fits = stages * static_cast<std::size_t>(input_.steps) <= keep.budget;
+        const std::size_t strains = 6 * sizeof(double) * model_.sheet().n_faces();
+        std::size_t state = (explicit_first ? 4 : 2) * vector;
+        if (input_.viscosity.maxwell()) state += strains;
+        if (explicit_first && input_.viscosity.any()) state += (input_.viscosity.maxwell() ? 2 : 1) * strains;
+        const std::size_t step = state + input_.tableau.stages * vector;
+        const bool fits = step * static_cast<std::size_t>(input_.steps) <= keep.budget;
         result_.keep = keep.wanted != Keep::nothing ? keep.wanted : fits ? Keep::stages : Keep::checkpoints;
         if (result_.keep != Keep::checkpoints) return;
-        result_.leaf = std::max<Index>(1, static_cast<Index>(keep.budget / 2 / stages));
-        result_.slots = std::max<Index>(1, static_cast<Index>(keep.budget / 2 / (2 * vector + strains)));
+        result_.leaf = std::max<Index>(1, static_cast<Index>(keep.budget / 2 / step));
+        result_.slots = std::max<Index>(1, static_cast<Index>(keep.budget / 2 / state));
         slots_left_ = result_.slots;
         aim(0);
     }
@@ -88,7 +100,7 @@ class Run {
 
     void keep_checkpoint(Index step) {
         result_.checkpoints[step] = result_.last;
-        result_.bytes += 2 * sizeof(double) * model_.size() + bytes_of(result_.last.e);
+        result_.bytes += bytes_of(result_.last);
         --slots_left_;
         aim(step);
     }
@@ -96,18 +108,19 @@ class Run {
     // In parts where the whole fails.
     bool take(Index step, MotionState& state) {
         const bool keep = result_.keep == Keep::stages || result_.keep == Keep::factors;
-        std::vector<std::vector<StageState>> stages;
+        std::vector<PartRecord> records;
         Parts done, ahead = {{0.0, 1.0}};
         while (!ahead.empty()) {
             const std::pair<double, double> part = ahead.back();
             ahead.pop_back();
-            std::vector<StageState> of_part;
-            const std::vector<Controls> controls = at_stages(input_, step, part);
+            PartRecord record;
+            const std::vector<Controls> controls =
+                at_stages(input_, stepper_.tableau_from(state), step, part);
             const double share = part.second - part.first;
-            if (stepper_.step(state, share * input_.time_step, controls, keep ? &of_part : nullptr,
+            if (stepper_.step(state, share * input_.time_step, controls, keep ? &record : nullptr,
                               result_.keep == Keep::factors, result_.reason)) {
                 done.push_back(part);
-                if (keep) stages.push_back(std::move(of_part));
+                if (keep) records.push_back(std::move(record));
                 continue;
             }
             if (share <= smallest_part) return false;
@@ -117,16 +130,15 @@ class Run {
         }
         if (done.size() > 1) result_.halved[step] = done;
         if (keep) {
-            for (const std::vector<StageState>& part : stages)
-                for (const StageState& stage : part) result_.bytes += bytes_of(stage);
-            result_.stages.push_back(std::move(stages));
+            for (const PartRecord& part : records) result_.bytes += bytes_of(part);
+            result_.steps.push_back(std::move(records));
         }
         return true;
     }
 
     void record() {
         const MotionState& state = result_.last;
-        result_.recorded.push_back(state);
+        result_.recorded.push_back({state.q, state.v, state.memory, {}, {}});
         result_.kinetic_energy.push_back(0.5 * state.v.dot(input_.inertia.mass.cwiseProduct(state.v)));
         const Index step = result_.recorded.size() == 1 ? 0 : result_.steps_done;
         const Controls now = input_.controls_at(step, result_.recorded.size() == 1 ? 0.0 : 1.0);
@@ -172,15 +184,15 @@ Parts parts_of(const std::map<Index, Parts>& halved, Index step) {
 }
 
 void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts,
-                 MotionState& state, std::vector<std::vector<StageState>>* kept, bool with_factors) {
+                 MotionState& state, std::vector<PartRecord>* kept) {
     for (const std::pair<double, double>& part : parts) {
-        std::vector<StageState> stages;
+        PartRecord record;
         std::string reason;
-        const std::vector<Controls> controls = at_stages(input, step, part);
+        const std::vector<Controls> controls = at_stages(input, stepper.tableau_from(state), step, part);
         if (!stepper.step(state, (part.second - part.first) * input.time_step, controls,
-                          kept ? &stages : nullptr, with_factors, reason))
+                          kept ? &record : nullptr, false, reason))
             throw InvalidInput("a step that was taken before cannot be repeated: " + reason);
-        if (kept) kept->push_back(std::move(stages));
+        if (kept) kept->push_back(std::move(record));
     }
 }
 

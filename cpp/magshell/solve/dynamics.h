@@ -50,9 +50,9 @@ struct MotionResult {
     std::vector<std::vector<double>> energies;  // [J], of those, term by term
     std::map<Index, Parts> halved;              // the steps that were taken in parts
     Keep keep = Keep::nothing;
-    std::vector<std::vector<std::vector<StageState>>> stages;  // by step, part, stage
-    std::map<Index, MotionState> checkpoints;                  // by the step that begins there
-    Index leaf = 0, slots = 0;                                 // steps that fit at once; checkpoints that do
+    std::vector<std::vector<PartRecord>> steps;  // where stages are kept
+    std::map<Index, MotionState> checkpoints;    // by the step that begins there
+    Index leaf = 0, slots = 0;                   // steps that fit at once; checkpoints that do
     int iterations = 0, factorizations = 0;
     double linear_time = 0.0;
     std::size_t bytes = 0;  // of what is kept for gradients
@@ -68,9 +68,9 @@ MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions&
 /// The parts in which a step was taken.
 Parts parts_of(const std::map<Index, Parts>& halved, Index step);
 
-/// Takes one step again exactly as it was taken; `kept` gets the stages of its parts.
+/// Takes one step again exactly as it was taken; `kept` gets its parts.
 void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts,
-                 MotionState& state, std::vector<std::vector<StageState>>* kept, bool with_factors = false);
+                 MotionState& state, std::vector<PartRecord>* kept);
 
 /// Where to put the next checkpoint in a stretch of so many steps (Griewank and Walther's revolve): the
 /// number of steps before it, or 0 where the stretch fits at once.

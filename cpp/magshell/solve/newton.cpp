@@ -63,7 +63,9 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const 
     const Index nodes = 3 * model_.sheet().n_nodes(), rotations = model_.sheet().n_rotations();
     VectorXd magnitude = model_.residual().magnitude;
     if (anchor.weights) magnitude += anchor.weights->cwiseProduct(q - *anchor.target).cwiseAbs();
-    const VectorXd cancelling = model_.cancelling_forces();
+    VectorXd cancelling = model_.cancelling_forces();
+    // In the inertia of a short step, positions cancel.
+    if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q.cwiseAbs());
     return std::max(
         relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
         relative(free.tail(rotations), magnitude.tail(rotations), cancelling.tail(rotations),

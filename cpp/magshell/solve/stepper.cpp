@@ -5,21 +5,28 @@
 namespace magshell {
 
 StepAlgebra::StepAlgebra(const Tableau& tableau, const Inertia& inertia, double dt)
-    : tableau_(tableau), dt_(dt), stage_time_(tableau.diagonal() * dt) {
+    : tableau_(tableau), dt_(dt), stage_time_(tableau.diagonal * dt) {
     const VectorXd by_acceleration = inertia.mass / (stage_time_ * stage_time_);
     weights_ = by_acceleration + inertia.damping / stage_time_;
     velocity_share_ =
         (weights_.array() > 0.0).select(stage_time_ * by_acceleration.array() / weights_.array(), 0.0);
 }
 
-void StepAlgebra::start_of_stage(int i, const MotionState& begin, const std::vector<VectorXd>& v,
-                                 const std::vector<VectorXd>& w, VectorXd& x_hat, VectorXd& v_hat) const {
+void StepAlgebra::start_of_stage(int i, const MotionState& begin, const std::vector<StageRates>& rates,
+                                 VectorXd& x_hat, VectorXd& v_hat) const {
     x_hat = begin.q;
     v_hat = begin.v;
-    for (int j = 0; j < i; ++j) {
-        x_hat += (dt_ * tableau_.a[i][j]) * v[j];
-        v_hat += (dt_ * tableau_.a[i][j]) * w[j];
+    for (std::size_t j = 0; j < rates.size(); ++j) {
+        x_hat += (dt_ * tableau_.a[i][j]) * rates[j].v;
+        v_hat += (dt_ * tableau_.a[i][j]) * rates[j].w;
     }
+}
+
+void StepAlgebra::finish_stage(const VectorXd& q, const VectorXd& x_hat, const VectorXd& v_hat,
+                               Index coordinates, StageRates& rates) const {
+    rates.v = VectorXd::Zero(q.size());
+    rates.v.head(coordinates) = (q - x_hat).head(coordinates) / stage_time_;
+    rates.w = (rates.v - v_hat) / stage_time_;
 }
 
 VectorXd StepAlgebra::target(const VectorXd& x_hat, const VectorXd& v_hat) const {
@@ -29,33 +36,45 @@ VectorXd StepAlgebra::target(const VectorXd& x_hat, const VectorXd& v_hat) const
 Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity)
     : newton_(newton), tableau_(tableau), inertia_(std::move(inertia)), viscosity_(viscosity) {}
 
-const StepAlgebra& Stepper::algebra(double dt) {
-    if (!algebra_ || algebra_->dt() != dt) algebra_ = std::make_unique<StepAlgebra>(tableau_, inertia_, dt);
+const Tableau& Stepper::tableau_from(const MotionState& state) const {
+    return tableau_.begins_explicitly && state.rates.empty() ? starter_ : tableau_;
+}
+
+const StepAlgebra& Stepper::algebra(double dt, const Tableau& tableau) {
+    if (!algebra_ || algebra_->dt() != dt ||
+        algebra_->tableau().begins_explicitly != tableau.begins_explicitly)
+        algebra_ = std::make_unique<StepAlgebra>(tableau, inertia_, dt);
     return *algebra_;
 }
 
-bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, std::vector<StageState>* kept,
+std::vector<StageRates> first_rates(const Tableau& tableau, const MotionState& state) {
+    if (!tableau.begins_explicitly) return {};
+    return {state.rates};
+}
+
+bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, PartRecord* kept,
                    bool with_factors, std::string& reason) {
-    const StepAlgebra& step = algebra(dt);
+    const StepAlgebra& step = algebra(dt, tableau_from(state));
+    const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
     const Index coordinates = 3 * model.sheet().n_vertices();
     model.set_memory(state.memory);
     const ElasticAfterwards elastic_afterwards(model);
     const SheetStrains at_begin = viscosity_.any() ? model.strains(state.q) : SheetStrains();
-    std::vector<ViscousStage> viscous;
-    std::vector<VectorXd> v, w;
+    std::vector<StageRates> rates = first_rates(tableau, state);
     std::vector<StageState> stages;
     VectorXd q = state.q, x_hat, v_hat;
-    for (int i = 0; i < tableau_.stages; ++i) {
-        step.start_of_stage(i, state, v, w, x_hat, v_hat);
+    SheetStrains e;
+    for (int i = 0; i < tableau.stages; ++i) {
+        step.start_of_stage(i, state, rates, x_hat, v_hat);
         const VectorXd target = step.target(x_hat, v_hat);
         // As fast as until now; what has no velocity begins where it was.
-        q.head(coordinates) =
-            x_hat.head(coordinates) + step.stage_time() * (i == 0 ? state.v : v.back()).head(coordinates);
+        q.head(coordinates) = x_hat.head(coordinates) +
+                              step.stage_time() * (i == 0 ? state.v : rates.back().v).head(coordinates);
+        ViscousStage viscous;
         if (viscosity_.any()) {
-            viscous.push_back(
-                ViscousStage(viscosity_, step.stage_time(), dt, tableau_.a[i], viscous, at_begin, state.e));
-            model.set_history(viscosity_.scale(step.stage_time()), &viscous.back().shift);
+            viscous = ViscousStage(viscosity_, step.stage_time(), dt, tableau.a[i], rates, at_begin, state.e);
+            model.set_history(viscosity_.scale(step.stage_time()), &viscous.shift);
         }
         const NewtonReport report = newton_.solve(q, at[i], {&step.weights(), &target});
         if (!report.converged) {
@@ -64,16 +83,21 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, 
             model.set_memory(state.memory);
             return false;
         }
-        v.emplace_back(VectorXd::Zero(q.size()));
-        v.back().head(coordinates) = (q - x_hat).head(coordinates) / step.stage_time();
-        w.emplace_back((v.back() - v_hat) / step.stage_time());
-        if (viscosity_.any()) viscous.back().finish(viscosity_, step.stage_time(), model.strains(q));
-        const SheetStrains e = viscosity_.maxwell() ? viscous.back().e : SheetStrains();
-        if (kept) stages.push_back({q, model.memory(), with_factors ? newton_.release_factor() : nullptr, e});
+        StageRates& now = rates.emplace_back();
+        step.finish_stage(q, x_hat, v_hat, coordinates, now);
+        if (viscosity_.any()) {
+            viscous.finish(viscosity_, step.stage_time(), model.strains(q), now);
+            e = std::move(viscous.e);
+        }
+        if (kept) {
+            const bool factorized = with_factors && report.iterations > 0;
+            stages.push_back({q, model.memory(), factorized ? newton_.release_factor() : nullptr});
+        }
     }
-    state = {std::move(q), std::move(v.back()), model.memory(),
-             viscosity_.maxwell() ? std::move(viscous.back().e) : SheetStrains()};
-    if (kept) *kept = std::move(stages);
+    MotionState end{std::move(q), rates.back().v, model.memory(), std::move(e), {}};
+    if (tableau_.begins_explicitly) end.rates = std::move(rates.back());
+    std::swap(state, end);
+    if (kept) *kept = {std::move(end), std::move(stages)};
     return true;
 }
 

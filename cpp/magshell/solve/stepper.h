@@ -14,11 +14,12 @@
 
 namespace magshell {
 
-/// Where a sheet is and how fast it moves; v is zero for unknowns that are no vertex.
+/// Where a sheet is and how fast it moves; v and w are zero for unknowns that are no vertex.
 struct MotionState {
     VectorXd q, v;
     Model::Memory memory;
-    SheetStrains e;  // of the Maxwell branch; empty without one
+    SheetStrains e;    // of the Maxwell branch; empty without one
+    StageRates rates;  // at the end of the step that led here, for a method that begins with them; else empty
 };
 
 /// Of all unknowns: masses [kg] and viscous damping [N s/m], zero for those that are no vertex.
@@ -31,7 +32,12 @@ struct StageState {
     VectorXd q;
     Model::Memory memory;
     std::shared_ptr<const Factor> factor;  // of Newton's last step, if it was to be kept
-    SheetStrains e;                        // of the Maxwell branch
+};
+
+/// A step, or a part of one: all that its adjoint needs.
+struct PartRecord {
+    MotionState begin;
+    std::vector<StageState> stages;
 };
 
 /// The linear algebra around a stage, the same forwards and backwards.
@@ -39,9 +45,12 @@ class StepAlgebra {
   public:
     StepAlgebra(const Tableau& tableau, const Inertia& inertia, double dt);
 
-    /// What stage i starts from, given the rates of the stages before it.
-    void start_of_stage(int i, const MotionState& begin, const std::vector<VectorXd>& v,
-                        const std::vector<VectorXd>& w, VectorXd& x_hat, VectorXd& v_hat) const;
+    /// What stage i starts from, given all rates until then.
+    void start_of_stage(int i, const MotionState& begin, const std::vector<StageRates>& rates,
+                        VectorXd& x_hat, VectorXd& v_hat) const;
+    /// v and w of a stage, from where it ended.
+    void finish_stage(const VectorXd& q, const VectorXd& x_hat, const VectorXd& v_hat, Index coordinates,
+                      StageRates& rates) const;
     VectorXd target(const VectorXd& x_hat, const VectorXd& v_hat) const;
     const VectorXd& weights() const { return weights_; }
     /// a dt [s]
@@ -60,18 +69,23 @@ class Stepper {
     Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity);
 
     /// Takes the state over a step with these controls at its stages. On failure the state stays, and the
-    /// reason tells why. `kept`, if given, gets the stages; with_factors: Newton's last factorizations too.
-    bool step(MotionState& state, double dt, std::span<const Controls> at, std::vector<StageState>* kept,
+    /// reason tells why. `kept`, if given, gets the step; with_factors: Newton's last factorizations too.
+    bool step(MotionState& state, double dt, std::span<const Controls> at, PartRecord* kept,
               bool with_factors, std::string& reason);
 
-    const StepAlgebra& algebra(double dt);
+    /// The method of a step from this state: SDIRK2 where there are no rates to begin with.
+    const Tableau& tableau_from(const MotionState& state) const;
+    const StepAlgebra& algebra(double dt, const Tableau& tableau);
 
   private:
     Newton& newton_;
-    Tableau tableau_;
+    Tableau tableau_, starter_ = sdirk2();
     Inertia inertia_;
     Viscosity viscosity_;
-    std::unique_ptr<StepAlgebra> algebra_;  // of the last dt
+    std::unique_ptr<StepAlgebra> algebra_;  // of the last step
 };
+
+/// The rates that a step begins with: those of the state, if the method takes them.
+std::vector<StageRates> first_rates(const Tableau& tableau, const MotionState& state);
 
 }  // namespace magshell

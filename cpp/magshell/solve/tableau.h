@@ -3,7 +3,9 @@
 //
 //   x_i = x + dt sum_j a_ij v_j,   v_i = v + dt sum_j a_ij w_j,   M w_i = f(x_i, v_i, t + c_i dt)     j <= i
 //
-// so that unknowns without mass, edge rotations, are at rest in every stage and at the end.
+// so that unknowns without mass, edge rotations, are at rest in every stage and at the end. A method that
+// begins explicitly has the rates at the end of the step before as its first column; it needs another one to
+// start.
 #pragma once
 
 namespace magshell {
@@ -11,14 +13,15 @@ namespace magshell {
 struct Tableau {
     static constexpr int most_stages = 3;
 
-    int stages = 1;
-    double a[most_stages][most_stages] = {{1.0}};
+    int stages = 1;  // implicit ones
+    double diagonal = 1.0;
+    bool begins_explicitly = false;
+    double a[most_stages][most_stages + 1] = {{1.0}};
 
-    double diagonal() const { return a[0][0]; }
     /// When stage i is, as a share of the step.
     double time(int i) const {
         double c = 0.0;
-        for (int j = 0; j <= i; ++j) c += a[i][j];
+        for (int j = 0; j <= i + (begins_explicitly ? 1 : 0); ++j) c += a[i][j];
         return i + 1 == stages ? 1.0 : c;
     }
 };
@@ -27,19 +30,28 @@ inline Tableau implicit_euler() {
     return {};
 }
 
-/// Alexander 1977: two stages, second order, L-stable. Its stability function is that of TR-BDF2.
+/// Alexander 1977: two stages, second order, L-stable.
 inline Tableau sdirk2() {
     constexpr double g = 0.29289321881345247560;  // 1 - 1/sqrt(2)
-    return {2, {{g}, {1.0 - g, g}}};
+    return {2, g, false, {{g}, {1.0 - g, g}}};
 }
 
 /// Alexander 1977: three stages, third order, L-stable.
 inline Tableau sdirk3() {
     constexpr double g = 0.43586652150845899942;  // g^3 - 3 g^2 + 3/2 g - 1/6 = 0
     return {3,
+            g,
+            false,
             {{g},
              {0.5 * (1.0 - g), g},
              {-0.25 * (6.0 * g * g - 16.0 * g + 1.0), 0.25 * (6.0 * g * g - 20.0 * g + 5.0), g}}};
+}
+
+/// Bank et al. 1985, as in Hosea and Shampine 1996: the trapezoidal rule to 2 - sqrt(2) of the step, then
+/// BDF2. Second order, L-stable, and every stage is of second order too.
+inline Tableau tr_bdf2() {
+    constexpr double g = 0.29289321881345247560, w = 0.35355339059327376220;  // 1 - 1/sqrt(2), sqrt(2)/4
+    return {2, g, true, {{g, g}, {w, w, g}}};
 }
 
 }  // namespace magshell

@@ -5,27 +5,27 @@
 namespace magshell {
 
 ViscousStage::ViscousStage(const Viscosity& law, double stage_time, double dt, const double* a,
-                           const std::vector<ViscousStage>& before, const SheetStrains& d_begin,
+                           const std::vector<StageRates>& rates, const SheetStrains& d_begin,
                            const SheetStrains& e_begin)
     : d_hat(d_begin), e_hat(e_begin) {
-    for (std::size_t j = 0; j < before.size(); ++j) {
-        d_hat.add(dt * a[j], before[j].d_rate);
-        if (law.maxwell()) e_hat.add(dt * a[j], before[j].e_rate);
+    for (std::size_t j = 0; j < rates.size(); ++j) {
+        d_hat.add(dt * a[j], rates[j].d);
+        if (law.maxwell()) e_hat.add(dt * a[j], rates[j].e);
     }
     shift = d_hat.times(law.stiffness_damping / stage_time);
     if (law.maxwell()) shift.add(law.relaxed(stage_time), e_hat);
 }
 
-void ViscousStage::finish(const Viscosity& law, double stage_time, SheetStrains strains) {
+void ViscousStage::finish(const Viscosity& law, double stage_time, SheetStrains strains, StageRates& rates) {
     d = std::move(strains);
-    d_rate = d.times(1.0 / stage_time);
-    d_rate.add(-1.0 / stage_time, d_hat);
+    rates.d = d.times(1.0 / stage_time);
+    rates.d.add(-1.0 / stage_time, d_hat);
     if (!law.maxwell()) return;
     const double r = law.ratio(stage_time);
     e = e_hat.times(1.0 / (1.0 + r));
     e.add(r / (1.0 + r), d);
-    e_rate = d.times(1.0 / law.maxwell_time);
-    e_rate.add(-1.0 / law.maxwell_time, e);
+    rates.e = d.times(1.0 / law.maxwell_time);
+    rates.e.add(-1.0 / law.maxwell_time, e);
 }
 
 }  // namespace magshell

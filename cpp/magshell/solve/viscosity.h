@@ -28,17 +28,26 @@ struct Viscosity {
     }
 };
 
+/// How fast things change in a stage: positions, velocities, strains, and strains of the Maxwell branch.
+struct StageRates {
+    VectorXd v, w;
+    SheetStrains d, e;
+
+    bool empty() const { return v.size() == 0; }
+};
+
 /// The strains of one stage: what it starts from, and what comes out.
 struct ViscousStage {
     SheetStrains d_hat, e_hat, shift;
-    SheetStrains d, d_rate, e, e_rate;
+    SheetStrains d, e;
 
-    /// From the strains at the beginning of the step and the rates of the stages before.
+    ViscousStage() = default;
+    /// From the strains at the beginning of the step and all rates until then.
     ViscousStage(const Viscosity& law, double stage_time, double dt, const double* a,
-                 const std::vector<ViscousStage>& before, const SheetStrains& d_begin,
+                 const std::vector<StageRates>& rates, const SheetStrains& d_begin,
                  const SheetStrains& e_begin);
-    /// Once the stage is solved.
-    void finish(const Viscosity& law, double stage_time, SheetStrains strains);
+    /// Once the stage is solved: the rates of its strains too.
+    void finish(const Viscosity& law, double stage_time, SheetStrains strains, StageRates& rates);
 };
 
 /// Elastic again when it goes.

@@ -14,6 +14,10 @@ from .report import add_common_arguments, set_threads, write_json
 # Name: module, one line for the list.
 PARTS = {
     "accuracy": ("magshell.bench.accuracy", "errors against references, and the order of convergence"),
+    "dynamics": (
+        "magshell.bench.dynamics",
+        "integrators: error, time, energy; gradients and memory of motions",
+    ),
     "kernels": ("magshell.bench.kernels", "gradient and Hessian, a face, and what each part of a scene adds"),
     "gradients": ("magshell.bench.gradients", "the cost of a gradient over that of its equilibrium"),
     "statics": (

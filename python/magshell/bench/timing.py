@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import magshell as ms
@@ -38,8 +39,25 @@ def measure(call: Callable[[], object], *, rounds: int = 7, seconds: float = 0.1
 
 def peak_memory() -> int | None:
     """The largest resident set of this process so far, bytes; None where the system does not tell."""
+    own = _status("VmHWM")  # Linux: rusage would count what the process was forked from
+    if own is not None:
+        return own
     try:
         import resource
     except ImportError:
         return None
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def resident_memory() -> int | None:
+    """The resident set of this process now, bytes; None where the system does not tell (Linux does)."""
+    return _status("VmRSS")
+
+
+def _status(name: str) -> int | None:
+    try:
+        lines = Path("/proc/self/status").read_text().splitlines()
+    except OSError:
+        return None
+    found = [line.split() for line in lines if line.startswith(f"{name}:")]
+    return int(found[0][1]) * 1024 if found else None

@@ -1,0 +1,1 @@
+"""What examples/bending_twisting.py is made of: the strip, its energy's balance, the report."""
