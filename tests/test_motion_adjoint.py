@@ -8,7 +8,12 @@ import magshell as ms
 
 torch = pytest.importorskip("torch")
 
-INTEGRATORS = {"euler": ms.ImplicitEuler(), "tr_bdf2": ms.TRBDF2(), "sdirk2": ms.SDIRK2(), "sdirk3": ms.SDIRK3()}
+INTEGRATORS = {
+    "euler": ms.ImplicitEuler(),
+    "tr_bdf2": ms.TRBDF2(),
+    "sdirk2": ms.SDIRK2(),
+    "sdirk3": ms.SDIRK3(),
+}
 STEPS = 4
 EXACT = ms.MixedNewton(tolerance=1e-13)
 INPUTS = {

@@ -1,5 +1,7 @@
 #include "magshell/adjoint/dynamic.h"
 
+#include <algorithm>
+
 #include "magshell/adjoint/viscous.h"
 #include "magshell/core/errors.h"
 #include "magshell/solve/rotations.h"
@@ -66,15 +68,12 @@ class Backward {
 
     MotionGradient run() {
         take_in(motion_.steps_done);
-        if (motion_.keep == Keep::checkpoints) {
-            Index end = motion_.steps_done,
-                  free = motion_.slots - static_cast<Index>(motion_.checkpoints.size()) + 1;
-            for (auto at = motion_.checkpoints.rbegin(); at != motion_.checkpoints.rend(); ++at, ++free) {
-                stretch(at->first, end, at->second, free);
-                end = at->first;
-            }
-        } else {
-            for (Index step = motion_.steps_done - 1; step >= 0; --step) back(step, motion_.steps[step]);
+        Index end = motion_.steps_done;
+        for (std::size_t k = motion_.steps.size(); k-- > 0;) back(--end, motion_.steps[k]);
+        Index free = motion_.slots - static_cast<Index>(motion_.checkpoints.size()) + 1;
+        for (auto at = motion_.checkpoints.rbegin(); at != motion_.checkpoints.rend(); ++at, ++free) {
+            stretch(at->first, end, at->second, free);
+            end = std::min(end, at->first);
         }
         back_to_start();
         return std::move(g_);

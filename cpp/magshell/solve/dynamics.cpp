@@ -74,8 +74,9 @@ class Run {
     }
 
   private:
-    // All stages, if the budget allows it; else as many at a time as half of it holds, and checkpoints in the
-    // rest. Factorizations only on demand: fresh memory for each costs more than the way back saves.
+    // All stages, if the budget allows it; else those of the last steps in a third of it, checkpoints in
+    // another third, and the last third for the steps that are taken again. Factorizations only on demand:
+    // fresh memory for each costs more than the way back saves.
     void plan(const KeepOptions& keep) {
         const bool explicit_first = input_.tableau.begins_explicitly;
         const std::size_t vector = sizeof(double) * model_.size();
@@ -87,14 +88,14 @@ class Run {
         const bool fits = step * static_cast<std::size_t>(input_.steps) <= keep.budget;
         result_.keep = keep.wanted != Keep::nothing ? keep.wanted : fits ? Keep::stages : Keep::checkpoints;
         if (result_.keep != Keep::checkpoints) return;
-        result_.leaf = std::max<Index>(1, static_cast<Index>(keep.budget / 2 / step));
-        result_.slots = std::max<Index>(1, static_cast<Index>(keep.budget / 2 / state));
+        result_.leaf = std::max<Index>(1, static_cast<Index>(keep.budget / 3 / step));
+        result_.slots = std::max<Index>(1, static_cast<Index>(keep.budget / 3 / state));
         slots_left_ = result_.slots;
         aim(0);
     }
 
     void aim(Index step) {
-        const Index ahead = next_checkpoint(input_.steps - step, result_.leaf, slots_left_);
+        const Index ahead = next_checkpoint(input_.steps - result_.leaf - step, result_.leaf, slots_left_);
         next_checkpoint_ = ahead > 0 ? step + ahead : -1;
     }
 
@@ -107,7 +108,9 @@ class Run {
 
     // In parts where the whole fails.
     bool take(Index step, MotionState& state) {
-        const bool keep = result_.keep == Keep::stages || result_.keep == Keep::factors;
+        const bool last = step >= input_.steps - result_.leaf;
+        const bool keep = result_.keep == Keep::stages || result_.keep == Keep::factors ||
+                          (result_.keep == Keep::checkpoints && last);
         std::vector<PartRecord> records;
         Parts done, ahead = {{0.0, 1.0}};
         while (!ahead.empty()) {

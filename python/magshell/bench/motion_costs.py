@@ -45,7 +45,7 @@ def budget(scene: ms.Scene, integrator, steps: int) -> float:
     """Bytes with which checkpoints suffice to take every step again but once."""
     of_a_state = 4 if isinstance(integrator, ms.TRBDF2) else 2  # vectors, beside one a stage
     record = 8.0 * scene._model.size * (of_a_state + len(integrator._times))
-    return min(0.6 * record * steps, 1e6)
+    return min(0.6 * record * steps, 4e6)
 
 
 def measure(rounds: int, quick: bool) -> dict:
