@@ -161,6 +161,28 @@ def test_line_search_stops_at_the_end_of_the_interval():
     assert found.length == 3.0
 
 
+@pytest.mark.parametrize("most", [1, 3, 20])
+def test_a_line_search_asks_no_more_often_than_it_may(most):
+    """A kink has no length that meets the curvature condition: the search would go on."""
+    x = torch.tensor([3.0, -2.0], dtype=torch.float64, requires_grad=True)
+    optimizer = ms.optim.LBFGS([x], scale=1.0, max_evaluations=most)
+    asked = []
+
+    def kinked():
+        asked.append(1)
+        return 10 * (x[0] - 0.3).abs() + (x[1] + 0.1).abs() + 0.01 * x.square().sum()
+
+    before = optimizer.evaluate(kinked).objective
+    for _ in range(6):
+        asked.clear()
+        after = optimizer.step(kinked)
+        assert len(asked) <= 2 * most  # once more along the gradient where the model is stale
+        assert after <= before
+        before = after
+    with pytest.raises(ValueError, match="max_evaluations must be a positive integer"):
+        ms.optim.LBFGS([x], max_evaluations=0)
+
+
 def test_stopped_and_resumed_gives_the_same_bits():
     def run(stops):
         x = torch.linspace(-1, 0.7, 6, dtype=torch.float64).requires_grad_()

@@ -28,6 +28,8 @@ class LBFGS(BoxOptimizer):
     variables whose sizes were guessed badly still move together.
     first_step: how far the steepest variable is tried to move at first, in sizes. Less costs a few iterations more;
     where an objective is dear and known only nearby, 0.1 is safer.
+    max_evaluations: of the closure in one line search; the lowest design of a search cut short is taken. Where each is dear
+    and the objective kinked, as of a sheet near a snap, 5 will do.
     max_shortenings: how often a line search may meet a design that the closure rejects; it counts as higher than any.
 
     R. H. Byrd, P. Lu, J. Nocedal, C. Zhu, A limited memory algorithm for bound constrained optimization,
@@ -39,7 +41,7 @@ class LBFGS(BoxOptimizer):
     0.75
     """
 
-    _copied = (*BoxOptimizer._copied, "memory", "first_step")
+    _copied = (*BoxOptimizer._copied, "memory", "first_step", "max_evaluations")
 
     def __init__(
         self,
@@ -50,13 +52,15 @@ class LBFGS(BoxOptimizer):
         scale=None,
         memory: int = 10,
         first_step: float = 1.0,
+        max_evaluations: int = 20,
         max_shortenings: int = 6,
     ):
-        if not (isinstance(memory, int) and memory > 0):
-            raise ValueError(f"memory must be a positive integer, got {memory!r}")
+        for name, count in (("memory", memory), ("max_evaluations", max_evaluations)):
+            if isinstance(count, bool) or not (isinstance(count, int) and count > 0):
+                raise ValueError(f"{name} must be a positive integer, got {count!r}")
         if not (isinstance(first_step, int | float) and 0 < first_step < math.inf):
             raise ValueError(f"first_step must be a positive number, got {first_step!r}")
-        self.memory, self.first_step = memory, float(first_step)
+        self.memory, self.first_step, self.max_evaluations = memory, float(first_step), max_evaluations
         super().__init__(params, {"lower": lower, "upper": upper, "scale": scale}, max_shortenings)
 
     def _check_sample(self, sample: Sample) -> None:
@@ -121,7 +125,8 @@ class LBFGS(BoxOptimizer):
             return Probe(length, sample.objective, slope, (moved, sample))
 
         start = Probe(0.0, objective, line.slope)
-        best = strong_wolfe(probe, start, 1.0, line.longest, max_rejected=self.max_shortenings)
+        limits = {"limit": self.max_evaluations - 1, "max_rejected": self.max_shortenings}  # beside the first
+        best = strong_wolfe(probe, start, 1.0, line.longest, **limits)
         if best is None and len(rejections) > self.max_shortenings:
             raise rejections[-1]
         return None if best is None else best.found
