@@ -63,10 +63,7 @@ def test_a_gif_keeps_white_and_many_colors_apart(tmp_path) -> None:
 
 
 def test_an_mp4_is_a_video(move, tmp_path) -> None:
-    try:
-        program = films.ffmpeg()
-    except ImportError as error:
-        pytest.skip(str(error))
+    program = films.ffmpeg()
     path = ms.animate(move, tmp_path / "a.mp4", speed=0.04, fps=30, **SMALL)
     said = subprocess.run(
         [program, "-i", str(path), "-f", "null", "-"], capture_output=True, text=True
@@ -129,11 +126,6 @@ class Stop(Exception):
 @pytest.mark.parametrize("ending", ["gif", "mp4"])
 @pytest.mark.parametrize("reason", [KeyboardInterrupt, Stop])
 def test_what_stops_a_movie_leaves_the_older_one(tmp_path, monkeypatch, ending, reason) -> None:
-    if ending == "mp4":
-        try:
-            films.ffmpeg()
-        except ImportError as error:
-            pytest.skip(str(error))
     path = tmp_path / f"a.{ending}"
     path.write_bytes(b"the older one")
     images = iter([np.zeros((64, 64, 3), np.uint8)] * 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 import numpy as np
@@ -13,7 +14,7 @@ from .iterate import Iterate, Restoring, as_array, as_tensor
 from .sample import Sample
 
 
-class BoxOptimizer(Iterate, torch.optim.Optimizer):
+class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
     """A torch optimizer whose groups have bounds. `step(closure)` moves the parameters and returns the new objective.
 
     The closure returns the objective (or the objective and constraints) of the parameters as they stand and does
@@ -97,13 +98,13 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer):
         kept = {name: getattr(self, name) for name in self._copied}
         return {**super().__getstate__(), **kept, "_closure": None}
 
+    @abstractmethod
     def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         """One step from the design x."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _leap(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         """The first step that `_advance` would try, and no other."""
-        raise NotImplementedError
 
     def _check_group(self, group: dict, box: Box) -> None:
         """What a method asks of a group's options beyond its bounds."""
