@@ -18,6 +18,7 @@ FLOORS = {
     "magshell/linalg": 1,
     "magshell/strain": 2,
     "magshell/field": 2,
+    "magshell/obstacle": 2,
     "magshell/energy": 3,
     "magshell/force": 3,
     "magshell/assembly": 4,
