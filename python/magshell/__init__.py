@@ -98,6 +98,7 @@ __all__ = [
     "multistart",
     "num_threads",
     "objectives",
+    "obstacles",
     "optim",
     "parametrize",
     "plot",
