@@ -72,15 +72,15 @@ void HeightField::build_blocks() {
     const Index nx = samples_[0] + 2 * settled, ny = samples_[1] + 2 * settled;
     for (Index i = 0; i < nx; ++i)
         for (Index j = 0; j < ny; ++j) knots_.push_back(ground(Pair(knot(0, i), knot(1, j))).height);
+    const auto height = [&](Index i, Index j) { return knots_[static_cast<std::size_t>(i) * ny + j]; };
     for (Index i = 0; i < nx - 1; i += side) {
         for (Index j = 0; j < ny - 1; j += side) {
-            Block block{
-                {i, j}, {std::min(i + side, nx - 1), std::min(j + side, ny - 1)}, knots_[i * ny + j], 0.0};
+            Block block{{i, j}, {std::min(i + side, nx - 1), std::min(j + side, ny - 1)}, height(i, j), 0.0};
             block.high = block.low;
             for (Index k = i; k <= block.last[0]; ++k) {
                 for (Index l = j; l <= block.last[1]; ++l) {
-                    block.low = std::min(block.low, knots_[k * ny + l]);
-                    block.high = std::max(block.high, knots_[k * ny + l]);
+                    block.low = std::min(block.low, height(k, l));
+                    block.high = std::max(block.high, height(k, l));
                 }
             }
             blocks_.push_back(block);
@@ -117,32 +117,45 @@ HeightField::Range HeightField::range(int axis, Index first, Index last) const {
             last == samples_[axis] + 2 * settled - 1 ? endless : knot(axis, last)};
 }
 
-// Where the ground comes nearest to the point, if each cell is looked at in one place only, the one below it
-// or the nearest to that. `start` if that is nearer still.
-HeightField::Pair HeightField::scan(const Vec3& point, const Pair& start) const {
-    const double gap = point.z() - ground(start).height;
-    double least = (start - point.head<2>()).squaredNorm() + gap * gap;
-    Pair best = start;
+double HeightField::squared_bound(const Block& block, const Vec3& point) const {
+    const double x = range(0, block.first[0], block.last[0]).clamp(point.x()) - point.x();
+    const double y = range(1, block.first[1], block.last[1]).clamp(point.y()) - point.y();
+    const double z = std::clamp(point.z(), block.low, block.high) - point.z();
+    return x * x + y * y + z * z;
+}
+
+void HeightField::scan_block(const Block& block, const Vec3& point, double& least, Pair& best) const {
     const Index ny = samples_[1] + 2 * settled;
-    for (const Block& block : blocks_) {
-        const double x = range(0, block.first[0], block.last[0]).clamp(point.x()) - point.x();
-        const double y = range(1, block.first[1], block.last[1]).clamp(point.y()) - point.y();
-        const double z = std::clamp(point.z(), block.low, block.high) - point.z();
-        if (x * x + y * y + z * z >= least) continue;
-        for (Index i = block.first[0]; i < block.last[0]; ++i) {
-            const double at_x = range(0, i, i + 1).clamp(point.x());
-            const double s = std::clamp((at_x - knot(0, i)) / spacing_.x(), 0.0, 1.0);
-            for (Index j = block.first[1]; j < block.last[1]; ++j) {
-                const double at_y = range(1, j, j + 1).clamp(point.y());
-                const double t = std::clamp((at_y - knot(1, j)) / spacing_.y(), 0.0, 1.0);
-                const double* corner = knots_.data() + i * ny + j;
-                const double height = (1.0 - s) * ((1.0 - t) * corner[0] + t * corner[1]) +
-                                      s * ((1.0 - t) * corner[ny] + t * corner[ny + 1]);
-                const double squared = (Vec3(at_x, at_y, height) - point).squaredNorm();
-                if (squared < least) least = squared, best = Pair(at_x, at_y);
-            }
+    for (Index i = block.first[0]; i < block.last[0]; ++i) {
+        const double x = range(0, i, i + 1).clamp(point.x());
+        const double s = std::clamp((x - knot(0, i)) / spacing_.x(), 0.0, 1.0);
+        for (Index j = block.first[1]; j < block.last[1]; ++j) {
+            const double y = range(1, j, j + 1).clamp(point.y());
+            const double t = std::clamp((y - knot(1, j)) / spacing_.y(), 0.0, 1.0);
+            const double* corner = knots_.data() + static_cast<std::size_t>(i) * ny + j;
+            const double height = (1.0 - s) * ((1.0 - t) * corner[0] + t * corner[1]) +
+                                  s * ((1.0 - t) * corner[ny] + t * corner[ny + 1]);
+            const double squared = (Vec3(x, y, height) - point).squaredNorm();
+            if (squared < least) least = squared, best = Pair(x, y);
         }
     }
+}
+
+// Where the ground comes nearest to the point, if each cell is looked at in one place only, the one below it
+// or the nearest to that. `start` if that is nearer still.
+HeightField::Pair HeightField::scan(const Vec3& point, const Pair& start, double gap) const {
+    double least = (start - point.head<2>()).squaredNorm() + gap * gap;
+    Pair best = start;
+    const Block* first = nullptr;  // the most promising one: it leaves little for the others
+    double lowest = least;
+    for (const Block& block : blocks_) {
+        const double bound = squared_bound(block, point);
+        if (bound < lowest) lowest = bound, first = &block;
+    }
+    if (!first) return best;
+    scan_block(*first, point, least, best);
+    for (const Block& block : blocks_)
+        if (&block != first && squared_bound(block, point) < least) scan_block(block, point, least, best);
     return best;
 }
 
@@ -190,7 +203,7 @@ Distance HeightField::distance(const Vec3& point) const {
     const double gap = point.z() - below.height;
     // The nearest point is at most |gap| away. Where D is convex as far as that, there is no other minimum.
     const bool convex = std::abs(gap) * (1.0 + steepest_) * sharpest_ < 1.0;
-    if (!convex) start = scan(point, start);
+    if (!convex) start = scan(point, start, gap);
 
     const Pair foot = nearest(point, start);
     const Ground g = ground(foot);

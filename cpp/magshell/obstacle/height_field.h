@@ -34,7 +34,6 @@ class HeightField final : public Obstacle {
 
     void bound_derivatives();
     void build_blocks();
-    Pair scan(const Vec3& point, const Pair& start) const;
     Pair nearest(const Vec3& point, Pair at) const;
 
     Pair origin_, spacing_;
@@ -55,6 +54,9 @@ class HeightField final : public Obstacle {
     double knot(int axis, Index i) const;
     Range range(int axis, Index first,
                 Index last) const;  // of a coordinate between knots; without end at the border
+    double squared_bound(const Block& block, const Vec3& point) const;  // of the distance to a block
+    void scan_block(const Block& block, const Vec3& point, double& least, Pair& best) const;
+    Pair scan(const Vec3& point, const Pair& start, double gap) const;
     std::vector<double> knots_;
     std::vector<Block> blocks_;
 };
