@@ -11,8 +11,8 @@ from magshell import _core
 RHO = 1000.0  # kg/m3
 
 # phi [deg], C of [Chen22] (44), drag and thrust over rho A |v|^2, then C_d and C_t of DiffPD.
-# Du et al., ACM TOG 41(2) 13, 2021: the starfish of github.com/mit-gfx/diff_pd_public, whose control values make cubic
-# Bezier curves of phi; C_d of Min et al., ACM TOG 38(6) 208, 2019, in github.com/seiing/SoftCon is sin^2, half of (44).
+# C_d and C_t: python/example/starfish_ada.py of github.com/mit-gfx/diff_pd_public @1594aa07, cubic Bezier curves of phi.
+# Min et al., ACM TOG 38(6) 208, 2019, have C_d = sin^2, half of (44): github.com/seiing/SoftCon @7856692e.
 G1 = np.array(
     [
         (0, 0.0, 0.0, 0.0, 0.05, 0.06250000000000003),
