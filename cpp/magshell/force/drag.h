@@ -56,8 +56,16 @@ class Drag {
 
     /// Of the product of a vector with the force, by what describes the water.
     struct Gradient {
-        double fluid_density, drag_coefficient, thrust_coefficient, added_mass;
-        Vec3 velocity;
+        double fluid_density = 0.0, drag_coefficient = 0.0, thrust_coefficient = 0.0, added_mass = 0.0;
+        Vec3 velocity = Vec3::Zero();
+
+        void add(const Gradient& other, double factor) {
+            fluid_density += factor * other.fluid_density;
+            drag_coefficient += factor * other.drag_coefficient;
+            thrust_coefficient += factor * other.thrust_coefficient;
+            added_mass += factor * other.added_mass;
+            velocity += factor * other.velocity;
+        }
     };
 
     Drag(const Water& water, const Corners& positions, const Corners& velocities,
