@@ -78,7 +78,13 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             model.set_history(viscosity_.scale(step.stage_time()), &viscous.shift);
         }
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
-        const NewtonReport report = newton_.solve(q, controls[i + 1], {&step.weights(), &target, &motion});
+        const Anchor anchor{&step.weights(), &target, &motion};
+        const VectorXd predicted = q;
+        NewtonReport report = newton_.solve(q, controls[i + 1], anchor);
+        if (!report.converged && model.has_contact()) {
+            q = predicted;
+            report = newton_.solve_damped(q, controls[i + 1], anchor);
+        }
         if (!report.converged) {
             reason = model.not_finite(q, controls[i + 1]);
             if (reason.empty()) reason = report.reason;
@@ -95,6 +101,11 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             const bool factorized = with_factors && report.iterations > 0;
             stages.push_back({q, model.memory(), factorized ? newton_.release_factor() : nullptr});
         }
+    }
+    reason = model.blocked(state.q, controls.front(), q, controls.back());
+    if (!reason.empty()) {
+        model.set_memory(state.memory);
+        return false;
     }
     MotionState end{std::move(q), rates.back().v, model.memory(), std::move(e), {}};
     if (tableau_.begins_explicitly) end.rates = std::move(rates.back());
