@@ -31,8 +31,14 @@ constexpr double shrinking = 0.7;
 // A residual that shrinks less makes the next step a cautious one.
 constexpr double contracting = 0.5;
 
-// Of linear solves with forces that make the matrix unsymmetric: within Newton's iteration, and for gradients.
-constexpr double inexact_solve = 1e-9, exact_solve = 1e-13;
+// How exactly to solve for a Newton step with an unsymmetric matrix: what its quadratic convergence deserves, and no
+// more than the end needs.
+double deserved(double residual, double tolerance) {
+    return std::max(0.1 * tolerance / residual, std::min(1e-2, residual));
+}
+
+// Of solves with an unsymmetric matrix for gradients.
+constexpr double exact_solve = 1e-13;
 constexpr int few_vectors = 30, many_vectors = 300;
 
 // Adds the time it lives to a sum.
@@ -162,11 +168,11 @@ std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& 
     return std::nullopt;
 }
 
-VectorXd Newton::solve_with_factor(const VectorXd& rhs) const {
+VectorXd Newton::solve_with_factor(const VectorXd& rhs, double tolerance) const {
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
     if (unsymmetric_)
-        solve_unsymmetric(*factor_, false, {inexact_solve, many_vectors}, reduced);
+        solve_unsymmetric(*factor_, false, {tolerance, many_vectors}, reduced);
     else
         factor_->solve(reduced);
     return model_.reduction().expand(reduced);
@@ -279,7 +285,8 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (report.iterations == 0) first_negative_pivots = factor.negative_pivots;
         report.lost = factor.negative_pivots > first_negative_pivots + most_new_negative_pivots;
         if (mixed && report.lost) return fail("the iteration lost its way");
-        const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0));
+        const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
+                                                      deserved(report.residual, options_.tolerance));
         move.setZero();
         const double length = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&

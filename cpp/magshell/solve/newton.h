@@ -75,8 +75,9 @@ class Newton {
     /// not converge quickly.
     std::optional<VectorXd> solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
                                          const Factor& nearby, const VectorXd& rhs);
-    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held.
-    VectorXd solve_with_factor(const VectorXd& rhs) const;
+    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held. Only where forces make
+    /// K unsymmetric the tolerance counts: of the residual, over the norm of rhs.
+    VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
     /// K^T p = rhs likewise, to round-off. Throws InvalidInput where forces make K too unsymmetric for that.
     VectorXd solve_transposed(const VectorXd& rhs) const;
 
