@@ -1,9 +1,10 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
-from . import control, meshes, objectives, optim, parametrize
+from . import control, meshes, objectives, obstacles, optim, parametrize
 from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
+from .contact import Contact
 from .design import minimize
 from .dynamics import simulate
 from .equilibria import Equilibria
