@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._quantity import real_numbers
+
 
 def index_array(name: str, values) -> np.ndarray:
     """An int64 copy. Numbers that are not integers are refused rather than truncated."""
@@ -18,7 +20,10 @@ def index_array(name: str, values) -> np.ndarray:
 
 def positive(name: str, value) -> float:
     """A positive finite float, or a ValueError that says the name."""
-    number = float(value)
+    array = real_numbers(name, value)
+    if array.ndim != 0:
+        raise ValueError(f"{name} must be a number, got shape {array.shape}")
+    number = float(array)
     if not (np.isfinite(number) and number > 0):
         raise ValueError(f"{name} must be positive and finite, got {value}")
     return number

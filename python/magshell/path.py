@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -63,6 +64,7 @@ class Path:
 
     def equilibrium(self, index: int) -> Equilibrium:
         """One of the points, stable or not, as an Equilibrium: to look at, or to start another solve from."""
+        index = operator.index(index)
         controls = self._from.towards(self._to, self.parameters[index])
         options = MixedNewton()._options()
         options.require_stable = False
