@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from answers import at_rest, both, near, refused
+from answers import Answer, at_rest, both, near, refused
+from cases_slivers import cut_inside
+from model_access import Problem
 from registry import case
 from sheets import LENGTH, cantilever, end_position, force_for, shell, strip
+from theory import stretch
 
 import magshell as ms
+from magshell._core import Controls
 
 
 def moebius_strip(cells: int = 24) -> tuple[np.ndarray, np.ndarray]:
@@ -88,17 +92,42 @@ def three_points(mesh: ms.TriangleMesh) -> list[ms.Pin]:
     return [ms.Pin([top, bottom], "xy"), ms.Pin([side], "yz")]
 
 
-@case("closed: a sphere's buckling pressure")
+@case("an eighth of a closed sphere with three symmetry planes: its buckling pressure")
 def sphere_buckles():
-    """2 E (h / R)^2 / sqrt(3 (1 - nu^2)), Zoelly 1915."""
-    thickness = 0.04
-    mesh = ms.meshes.spherical_cap(1.0, 0.0, np.pi, cells=(48, 32))
+    """2 E (h / R)^2 / sqrt(3 (1 - nu^2)), Zoelly 1915; many modes close together."""
+    thickness = 0.05
+    mesh = ms.meshes.spherical_cap(1.0, 0.0, np.pi / 2, np.pi / 2, cells=(24, 24))
     sheet = shell(mesh, thickness=thickness, poisson_ratio=0.3)
     classical = 2e6 * thickness**2 / np.sqrt(3.0 * (1.0 - 0.3**2))
-    scene = ms.Scene(
-        sheet, supports=three_points(mesh), loads=[ms.AreaLoad(-classical * mesh.face_normals)]
-    )
+    planes = [ms.SymmetryPlane(normal) for normal in np.eye(3)]
+    scene = ms.Scene(sheet, supports=planes, loads=[ms.AreaLoad(-classical * mesh.face_normals)])
     return near("pressure over the classical one", ms.linear_buckling(scene).factors[0], 1.0, rel=6e-2)
+
+
+@case("vertices of three faces: two neighbours of a face meet in one vertex")
+def vertices_of_three_faces():
+    """Every face cut into three at its middle; the Hessian must be the derivative of the forces all the same."""
+    mesh = cut_inside(strip((6, 2)), np.full(3, 1 / 3))
+    return hessian_is_right(mesh)
+
+
+@case("a tetrahedron: all three neighbours of a face meet in one vertex")
+def tetrahedron():
+    mesh = ms.TriangleMesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    return hessian_is_right(mesh)
+
+
+def hessian_is_right(mesh: ms.TriangleMesh) -> Answer:
+    """H p against central differences of the gradient, from a state that is nowhere special."""
+    problem = Problem(ms.Scene(shell(mesh, thickness=0.01 * mesh.size), allow_rigid_motions=True), Controls())
+    rng = np.random.default_rng(2)
+    length = mesh.edge_lengths.min()
+    positions = mesh.rest_positions + 0.1 * length * rng.normal(size=mesh.rest_positions.shape)
+    q = problem.model.state(positions, 0.1 * rng.normal(size=mesh.n_edges))
+    p = problem.model.state(length * rng.normal(size=positions.shape), rng.normal(size=mesh.n_edges))
+    step = 1e-5
+    differences = (problem.gradient(q + step * p) - problem.gradient(q - step * p)) / (2.0 * step)
+    return near("H p", problem.hessian(q) @ p, differences, rel=1e-7)
 
 
 @case("closed and free: nothing says where it is")
@@ -184,7 +213,5 @@ def one_triangle():
     stress = 0.3
     load = ms.EdgeLoad(mesh.edges_at(x=LENGTH), (stress * 1e6 * sheet.thickness[0], 0, 0))
     found = ms.equilibrium(ms.Scene(sheet, supports=supports, loads=[load]))
-    # A dead force on one side and the reaction at the corner: the stress is uniform, P / (h b) over E.
-    from theory import stretch
-
+    # A dead force on one side and the reaction at the corner: the stress is uniform, twice the force over h b.
     return near("stretch", end_position(mesh, found.positions)[0] / LENGTH, stretch(stress * 2.0), rel=1e-9)

@@ -54,11 +54,6 @@ def stretch(stress: float) -> float:
     return brentq(lambda l: l * (l * l - 1.0) / 2.0 - stress, 1.0 / np.sqrt(3.0), 10.0 + 2.0 * stress)
 
 
-def end_deflection(force: float, length: float, width: float, thickness, young_modulus) -> float:
-    """P L^3 / (3 E I) of a cantilever, m."""
-    return force * length**3 / (3.0 * young_modulus * width * thickness**3 / 12.0)
-
-
 def hanging(weight: float) -> tuple[float, float]:
     """The end (x, z) / L of an inextensible cantilever that its own weight pulls down.
 
