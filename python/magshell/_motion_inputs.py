@@ -202,7 +202,9 @@ def _checked_state(start: MotionState, size: int, n_faces: int) -> MotionState:
         values = getattr(start, name)
         quantity(f"start.{name}", "SI", values, (2, 0 if np.size(values) == 0 else n_faces, 3))
     if not isinstance(start.memory, list):
-        raise ValueError(f"start.memory must be a list of lists of numbers, got {type(start.memory).__name__}")
+        raise ValueError(
+            f"start.memory must be a list of lists of numbers, got {type(start.memory).__name__}"
+        )
     for k, each in enumerate(start.memory):
         quantity(f"start.memory[{k}]", "SI", each, ("n",))
     quantity("start.time", "s", start.time, ())

@@ -38,9 +38,7 @@ def along(amplitude, directions):
     torch = require_torch("parametrize.along")
     amplitude = real_tensor("amplitude", amplitude, ("n_f",))
     directions = real_tensor("directions", directions, ("...", 3)).to(amplitude)
-    if (
-        directions.ndim > 2 or (directions.ndim == 2 and len(directions) != len(amplitude))
-    ):
+    if directions.ndim > 2 or (directions.ndim == 2 and len(directions) != len(amplitude)):
         raise ValueError(
             f"directions must have shape (3,) or ({len(amplitude)}, 3), got {tuple(directions.shape)}"
         )
@@ -88,7 +86,10 @@ def project_to_cap(vectors, limit):
 
 def _bounds(lower, upper) -> tuple[float, float]:
     """The lower bound, and the upper over it."""
-    low, high = (float(quantity(name, "as values", detached(each), ())) for name, each in (("lower", lower), ("upper", upper)))
+    low, high = (
+        float(quantity(name, "as values", detached(each), ()))
+        for name, each in (("lower", lower), ("upper", upper))
+    )
     if not 0 < low < high < math.inf or math.isinf(high / low):
         raise ValueError(f"bounds must be positive and in order, got {lower} and {upper}")
     return low, high / low

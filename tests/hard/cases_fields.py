@@ -23,7 +23,6 @@ import magshell as ms
 NARROW = 4e-4  # m: where it bends at the clamp alone, its cells must not be wider than the bend
 
 
-
 def in_field(number: float, angle: float, rel: float) -> Answer:
     """The end along a field at this angle to the strip, of M B h w L^2 / (E I) = number."""
     mesh = graded(strip((80, 2), width=NARROW))

@@ -39,10 +39,14 @@ def thrown():
     scene = free_sheet()
     x = scene.mesh.rest_positions - center(scene, scene.mesh.rest_positions)
     spin = np.array([0.0, 0.0, 2.0 * np.pi * 1.0])  # 1 turn a second, about the axis of the largest inertia
-    velocities = np.cross(spin, x) + (0.3, -0.2, 0.5)
-    motion = ms.simulate(scene, steps=10_00, time_step=5e-3, velocities=velocities, record_every=100, progress=False)
+    velocities = np.cross(spin, x) + np.array((0.3, -0.2, 0.5))
+    motion = ms.simulate(
+        scene, steps=1000, time_step=5e-3, velocities=velocities, record_every=100, progress=False
+    )
     moved = center(scene, motion.displacements)
-    about = np.cross(motion.positions - (moved + center(scene, scene.mesh.rest_positions))[:, None], motion.velocities)
+    about = np.cross(
+        motion.positions - (moved + center(scene, scene.mesh.rest_positions))[:, None], motion.velocities
+    )
     turning = center(scene, about)[:, 2]
     return both(
         near("center", moved, np.outer(motion.times, (0.3, -0.2, 0.5)), rel=1e-9),
@@ -88,7 +92,7 @@ def neutral_equilibrium():
         lambda: ms.equilibrium(
             scene, remanent_magnetization=(MAGNETIZATION, 0, 0), applied_flux_density=(1e-3, 0, 0)
         ),
-        "neutral|free to move",
+        "neutral: the sheet is free",
         ms.NotConverged,
     )
 
@@ -99,4 +103,6 @@ def pendulum():
     hinge = ms.Pin(sheet.mesh.vertices_at(x=0.0))
     scene = ms.Scene(sheet, supports=[hinge], gravity=(0, 0, -GRAVITY), allow_rigid_motions=True)
     found = ms.equilibrium(scene)
-    return both(near("height of the center", center(scene, found.positions)[2], -LENGTH / 2, rel=1e-4), at_rest(found))
+    return both(
+        near("height of the center", center(scene, found.positions)[2], -LENGTH / 2, rel=1e-4), at_rest(found)
+    )

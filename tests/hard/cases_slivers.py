@@ -151,5 +151,6 @@ def vibration_with_a_tiny_face():
 def a_face_that_is_none():
     points = [[0, 0, 0], [1, 0, 0], [0.5, 1e-11, 0], [0.5, 1, 0]]
     return refused(
-        lambda: ms.TriangleMesh(points, [[0, 1, 2], [0, 2, 3]]), "degenerate: .* vertices coincide or lie on a line"
+        lambda: ms.TriangleMesh(points, [[0, 1, 2], [0, 2, 3]]),
+        "degenerate: .* vertices coincide or lie on a line",
     )

@@ -73,7 +73,9 @@ def toggle_by_arc_length():
     return both(
         near("loads at the limits", [1.5 * point.parameter for point in limits], (1.0, -1.0), rel=1e-5),
         near("heights there", at, np.array([RISE, -RISE]) / np.sqrt(3.0), rel=1e-3),
-        near("height at the end", path.positions[-1][ridge, 2].mean(), heights(1.5)[-1], rel=2e-2, scale=RISE),
+        near(
+            "height at the end", path.positions[-1][ridge, 2].mean(), heights(1.5)[-1], rel=2e-2, scale=RISE
+        ),
     )
 
 

@@ -20,9 +20,7 @@ def bent_far(ratio):
     found = ms.equilibrium(cantilever(sheet, (0, 0, force_for(4.0, sheet, LENGTH))))
     end = end_position(mesh, found.positions) / LENGTH
     # A thick one stretches by P / (E A) = ratio^2 / 3.
-    return both(
-        near("end x, z", end[[0, 2]], elastica(4.0), rel=1e-3 + ratio**2, scale=1.0), at_rest(found)
-    )
+    return both(near("end x, z", end[[0, 2]], elastica(4.0), rel=1e-3 + ratio**2, scale=1.0), at_rest(found))
 
 
 @case("thickness over length {:g}, rolled up by 324 degrees", over=(1e-5, 1e-3))
@@ -39,7 +37,10 @@ def rolled_up(ratio):
     return both(near("end x, z", end, circle, rel=1e-3, scale=1.0), at_rest(found))
 
 
-@case("thickness over length {:g}: a buckling load of 1e-10 of the membrane stiffness at the least", over=(1e-5, 1e-1))
+@case(
+    "thickness over length {:g}: a buckling load of 1e-10 of the membrane stiffness at the least",
+    over=(1e-5, 1e-1),
+)
 def euler_column(ratio):
     sheet = shell(strip((40, 4)), thickness=ratio * LENGTH)
     scene = cantilever(sheet, (-force_for(np.pi**2 / 4.0, sheet, LENGTH), 0, 0))

@@ -61,10 +61,29 @@ def doubled_face():
     return refused(lambda: ms.TriangleMesh(SQUARE[:3], [[0, 1, 2], [2, 1, 0]]), "have the same vertices")
 
 
-@case("two sheets that touch in one vertex: nothing would turn with the other")
+def joined_at_a_vertex(*supports) -> ms.Scene:
+    """Two squares with one vertex in common, the first of them clamped at x = 0, and heavy."""
+    other = SQUARE + np.array((1, 1, 0))
+    points = np.concatenate([SQUARE, other[1:]])
+    mesh = ms.TriangleMesh(points, [[0, 1, 2], [0, 2, 3], [2, 4, 5], [2, 5, 6]])
+    sheet = shell(mesh, thickness=1e-2, mass_density=1e3)
+    clamp = ms.Clamp(mesh.edges_at(x=0.0))
+    return ms.Scene(sheet, supports=[clamp, *supports], gravity=(0, 0, -1e-3))
+
+
+@case("two sheets that touch in one vertex: it is a ball joint")
 def bow_tie():
-    points = np.concatenate([SQUARE[:3], [[-1, 0, 0], [-1, -1, 0.0]]])
-    return refused(lambda: ms.TriangleMesh(points, [[0, 1, 2], [0, 3, 4]]), "vertex 0 .*manifold|fans")
+    """The second hangs by its corner; the corner opposite, kept at y = 2, comes to 1 m below, as both are sqrt(2) apart."""
+    found = ms.equilibrium(joined_at_a_vertex(ms.Pin([5], "y")))
+    drop = found.positions[2, 2] - found.positions[5, 2]
+    return both(near("drop", drop, 1.0, rel=1e-4), at_rest(found))
+
+
+@case("two sheets that touch in one vertex, and nothing keeps the second from turning about the vertical")
+def spinning_bow_tie():
+    return refused(
+        lambda: ms.equilibrium(joined_at_a_vertex()), "neutral: the sheet is free", ms.NotConverged
+    )
 
 
 @case("a vertex that belongs to no face")
@@ -155,7 +174,9 @@ def pinched_ring():
 
 def square_tube(side: float, length: float, cells: tuple[int, int]) -> ms.TriangleMesh:
     """Along y, with four folds of 90 degrees in its rest shape; cells a side and along."""
-    round_tube = ms.meshes.cylinder(1.0, length, (np.pi / 4, np.pi / 4 + 2 * np.pi), cells=(4 * cells[0], cells[1]))
+    round_tube = ms.meshes.cylinder(
+        1.0, length, (np.pi / 4, np.pi / 4 + 2 * np.pi), cells=(4 * cells[0], cells[1])
+    )
     x, y, z = round_tube.rest_positions.T
     # The angle, a multiple of the cells', becomes the way along the sides.
     way = np.mod(np.arctan2(x, z) - np.pi / 4, 2 * np.pi) / (np.pi / 2)
@@ -199,10 +220,8 @@ def disconnected_pieces():
     scene = ms.Scene(sheet, supports=[ms.Clamp(both_pieces.edges_at(x=0.0))], loads=loads)
     found = ms.equilibrium(scene)
     alone = ms.equilibrium(cantilever(shell(one), (0, 0, force)))
-    expected = np.concatenate([alone.positions, alone.positions + (0, 2 * LENGTH, 0)])
-    return both(
-        near("positions", found.positions, expected, rel=1e-7, scale=LENGTH), at_rest(found)
-    )
+    expected = np.concatenate([alone.positions, alone.positions + np.array((0, 2 * LENGTH, 0))])
+    return both(near("positions", found.positions, expected, rel=1e-7, scale=LENGTH), at_rest(found))
 
 
 @case("the smallest sheet there is")

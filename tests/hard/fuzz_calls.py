@@ -106,8 +106,14 @@ def _meshes(s: Sample) -> Iterator[Call]:
     outline = {"outer": square, "holes": [hole], "slits": [slit], "size": 0.5}
     yield Call("meshes.outline", ms.meshes.outline, outline, cost=20)
     apart = mesh.transformed(translation=(0.1, 0, 0))
-    yield Call("weld", lambda meshes, tolerance: ms.weld(*meshes, tolerance=tolerance), {"meshes": [mesh, apart], "tolerance": 1e-6})
-    yield Call("TriangleMesh.transformed", mesh.transformed, {"rotation": np.eye(3), "translation": (1, 0, 0)})
+    yield Call(
+        "weld",
+        lambda meshes, tolerance: ms.weld(*meshes, tolerance=tolerance),
+        {"meshes": [mesh, apart], "tolerance": 1e-6},
+    )
+    yield Call(
+        "TriangleMesh.transformed", mesh.transformed, {"rotation": np.eye(3), "translation": (1, 0, 0)}
+    )
     yield Call("TriangleMesh.scaled", mesh.scaled, {"factor": 2.0})
     at = {"x": 0.0, "y": 0.0, "z": 0.0, "tolerance": 1e-6}
     yield Call("TriangleMesh.vertices_at", mesh.vertices_at, at)
@@ -140,7 +146,11 @@ def _scenes(s: Sample) -> Iterator[Call]:
     def scene(**arguments):
         return ms.Scene(s.shell, **arguments)
 
-    yield Call("Pin", lambda **a: scene(supports=[s.clamp, ms.Pin(**a)]), {"vertices": [11], "components": "xyz", **moved})
+    yield Call(
+        "Pin",
+        lambda **a: scene(supports=[s.clamp, ms.Pin(**a)]),
+        {"vertices": [11], "components": "xyz", **moved},
+    )
     yield Call("Clamp", lambda **a: scene(supports=ms.Clamp(**a)), {"edges": edges, **moved})
     plane = {"normal": (1, 0, 0), "point": (0, 0, 0), "tolerance": 1e-9}
     yield Call("SymmetryPlane", lambda **a: scene(supports=[s.clamp, ms.SymmetryPlane(**a)]), plane)
@@ -208,12 +218,23 @@ def _solves(s: Sample) -> Iterator[Call]:
     quick = ms.MixedNewton(max_iterations=10, max_relaxation_steps=5)
     search = {"start": s.positions, "require_stable": True, "solver": quick, "progress": None}
     yield Call("equilibrium", ms.equilibrium, {**magnetic, **replaced, **search})
-    yield Call("equilibrium of cases", ms.equilibrium, {**magnetic, "applied_flux_density": [s.field, -s.field], "solver": quick})
+    yield Call(
+        "equilibrium of cases",
+        ms.equilibrium,
+        {**magnetic, "applied_flux_density": [s.field, -s.field], "solver": quick},
+    )
     options = {"start": None, "until": None, "first_step": 0.5, "largest_step": 0.5, "lowest_parameter": -1.0}
-    yield Call("follow", ms.follow, {**magnetic, **options, "max_points": 3, "locate_critical": True, "solver": quick, "progress": False}, cost=2)
+    yield Call(
+        "follow",
+        ms.follow,
+        {**magnetic, **options, "max_points": 3, "locate_critical": True, "solver": quick, "progress": False},
+        cost=2,
+    )
     yield Call("linear_response", ms.linear_response, magnetic)
     yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "modes": 1}, cost=2)
-    yield Call("vibration_modes", ms.vibration_modes, {"scene": s.scene, "equilibrium": s.rest, "count": 2}, cost=2)
+    yield Call(
+        "vibration_modes", ms.vibration_modes, {"scene": s.scene, "equilibrium": s.rest, "count": 2}, cost=2
+    )
     viscous = {"damping": 1e-3, "stiffness_damping": 1e-4, "maxwell_modulus": 0.1, "maxwell_time": 1e-2}
     motion = {
         **magnetic,
@@ -232,18 +253,56 @@ def _solves(s: Sample) -> Iterator[Call]:
         "progress": False,
     }
     yield Call("simulate", ms.simulate, motion)
-    yield Call("simulate on", ms.simulate, {"scene": s.scene, "steps": 1, "time_step": 1e-3, "start": s.state, "progress": False})
-    newton = {"tolerance": 1e-9, "max_iterations": 5, "first_load_step": 1.0, "smallest_load_step": 0.1, "max_relaxation_steps": 3}
+    yield Call(
+        "simulate on",
+        ms.simulate,
+        {"scene": s.scene, "steps": 1, "time_step": 1e-3, "start": s.state, "progress": False},
+    )
+    newton = {
+        "tolerance": 1e-9,
+        "max_iterations": 5,
+        "first_load_step": 1.0,
+        "smallest_load_step": 0.1,
+        "max_relaxation_steps": 3,
+    }
     for kind in (ms.Newton, ms.MixedNewton):
         yield Call(kind.__name__, lambda kind=kind, **a: ms.equilibrium(s.scene, solver=kind(**a)), newton)
-    yield Call("WarmStart", lambda start, **a: ms.WarmStart(s.magnetic, start=start, solver=quick)(**a), {"start": None, **{k: v for k, v in magnetic.items() if k != "scene"}})
+    yield Call(
+        "WarmStart",
+        lambda start, **a: ms.WarmStart(s.magnetic, start=start, solver=quick)(**a),
+        {"start": None, **{k: v for k, v in magnetic.items() if k != "scene"}},
+    )
     yield Call("Path.equilibrium", s.path.equilibrium, {"index": 0})
     yield Call("Equilibria", ms.Equilibria, {"cases": [s.rest, s.rest]})
-    state = {"time": 0.0, "state": s.state.state, "velocity": s.state.velocity, "memory": s.state.memory, "acceleration": s.state.acceleration}
-    yield Call("MotionState", lambda **a: ms.simulate(s.scene, steps=1, time_step=1e-3, start=ms.MotionState(**a), progress=False), state)
+    state = {
+        "time": 0.0,
+        "state": s.state.state,
+        "velocity": s.state.velocity,
+        "memory": s.state.memory,
+        "acceleration": s.state.acceleration,
+    }
+    yield Call(
+        "MotionState",
+        lambda **a: ms.simulate(s.scene, steps=1, time_step=1e-3, start=ms.MotionState(**a), progress=False),
+        state,
+    )
     yield Call("set_num_threads", ms.set_num_threads, {"count": 1})
     yield Call("random_starts", ms.random_starts, {"count": 3, "lower": (0, 0), "upper": (1, 1), "seed": 0})
-    yield Call("multistart", ms.multistart, {"run": math.sqrt, "starts": [1.0, 2.0], "executor": _here(), "workers": 1, "attempts": 1, "feasibility": 1e-6, "checkpoint": None, "resume": False, "progress": False})
+    yield Call(
+        "multistart",
+        ms.multistart,
+        {
+            "run": math.sqrt,
+            "starts": [1.0, 2.0],
+            "executor": _here(),
+            "workers": 1,
+            "attempts": 1,
+            "feasibility": 1e-6,
+            "checkpoint": None,
+            "resume": False,
+            "progress": False,
+        },
+    )
 
 
 def _here():
@@ -258,12 +317,67 @@ def _files(s: Sample) -> Iterator[Call]:
     yield Call("read_mesh", ms.read_mesh, {"path": there, "drop_unused": False})
     yield Call("read_fields", ms.read_fields, {"path": there, "drop_unused": False})
     fields = {"vertex_fields": {"u": np.zeros(n_v)}, "face_fields": {"m": np.zeros((n_f, 3))}}
-    yield Call("write_mesh", ms.write_mesh, {"path": s.folder / "out.ply", "mesh": s.mesh, "positions": s.positions, **fields})
+    yield Call(
+        "write_mesh",
+        ms.write_mesh,
+        {"path": s.folder / "out.ply", "mesh": s.mesh, "positions": s.positions, **fields},
+    )
     states = {"positions": np.stack([s.positions] * 2), "times": (0.0, 1.0)}
-    yield Call("write_series", ms.write_series, {"path": s.folder / "out.pvd", "what": s.mesh, **states, "velocities": np.zeros((2, n_v, 3)), **fields, "progress": False}, cost=3)
-    look = {"remanent_magnetization": None, "applied_flux_density": None, "color_label": None, "color_range": None, "view": None}
-    yield Call("plot", ms.plot, {"what": s.mesh, "positions": s.positions, **look, "color": np.zeros(n_f), "width": 100, "columns": 1, "backend": "matplotlib"}, cost=30)
-    yield Call("write_page", ms.write_page, {"what": s.mesh, "path": s.folder / "out.html", **states, **look, "color": None, "size_limit": 1e7}, cost=10)
-    yield Call("animate", ms.animate, {"what": s.mesh, "path": s.folder / "out.gif", **states, **look, "fps": 5.0, "speed": 1.0, "width": 100, "backend": "matplotlib", "progress": False}, cost=60)
+    yield Call(
+        "write_series",
+        ms.write_series,
+        {
+            "path": s.folder / "out.pvd",
+            "what": s.mesh,
+            **states,
+            "velocities": np.zeros((2, n_v, 3)),
+            **fields,
+            "progress": False,
+        },
+        cost=3,
+    )
+    look = {
+        "remanent_magnetization": None,
+        "applied_flux_density": None,
+        "color_label": None,
+        "color_range": None,
+        "view": None,
+    }
+    yield Call(
+        "plot",
+        ms.plot,
+        {
+            "what": s.mesh,
+            "positions": s.positions,
+            **look,
+            "color": np.zeros(n_f),
+            "width": 100,
+            "columns": 1,
+            "backend": "matplotlib",
+        },
+        cost=30,
+    )
+    yield Call(
+        "write_page",
+        ms.write_page,
+        {"what": s.mesh, "path": s.folder / "out.html", **states, **look, "color": None, "size_limit": 1e7},
+        cost=10,
+    )
+    yield Call(
+        "animate",
+        ms.animate,
+        {
+            "what": s.mesh,
+            "path": s.folder / "out.gif",
+            **states,
+            **look,
+            "fps": 5.0,
+            "speed": 1.0,
+            "width": 100,
+            "backend": "matplotlib",
+            "progress": False,
+        },
+        cost=60,
+    )
     yield Call("MotionState.load", ms.MotionState.load, {"path": there})
     yield Call("MotionState.save", s.state.save, {"path": s.folder / "state.npz"})

@@ -26,11 +26,11 @@ from pathlib import Path
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import numpy as np  # noqa: E402
-from fuzz_calls import Call, Sample, calls  # noqa: E402
-from fuzz_values import junk, spoilt  # noqa: E402
+import numpy as np
+from fuzz_calls import Call, Sample, calls
+from fuzz_values import junk, spoilt
 
-import magshell as ms  # noqa: E402
+import magshell as ms
 
 SEED = 20261121
 TIME_LIMIT = 10.0  # s, of a call
@@ -111,7 +111,9 @@ def run(call: Call, arguments: dict) -> BaseException | None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("first", type=int)
     parser.add_argument("count", type=int)
     parser.add_argument("--now", type=Path)
@@ -137,7 +139,9 @@ def main() -> None:
                     traceback.print_exception(error)
             elif error is not None and not documented(call, error):
                 said = f"{type(error).__name__}: {error}"[:300]
-                print(json.dumps({"number": number, "call": f"{call.name}({what})", "error": said}), flush=True)
+                print(
+                    json.dumps({"number": number, "call": f"{call.name}({what})", "error": said}), flush=True
+                )
         print(json.dumps({"done": options.count, "refused": refused}), flush=True)
 
 

@@ -58,7 +58,9 @@ def motion_gradient(on: ms.Scene):
 
 def saddle(on: ms.Scene):
     """Magnetized against the field: it has to be pushed off, and falls to the same side every time."""
-    return ms.equilibrium(on, remanent_magnetization=MAGNETIZATION, applied_flux_density=(-5e-3, 0, 0)).positions
+    return ms.equilibrium(
+        on, remanent_magnetization=MAGNETIZATION, applied_flux_density=(-5e-3, 0, 0)
+    ).positions
 
 
 def modes(on: ms.Scene):
@@ -69,7 +71,9 @@ def failing(on: ms.Scene):
     """Far too little time for it; what it hands back is a result all the same."""
     hasty = ms.MixedNewton(max_iterations=2, smallest_load_step=1.0, max_relaxation_steps=1)
     try:
-        ms.equilibrium(on, remanent_magnetization=MAGNETIZATION, applied_flux_density=(0, 0, 1.0), solver=hasty)
+        ms.equilibrium(
+            on, remanent_magnetization=MAGNETIZATION, applied_flux_density=(0, 0, 1.0), solver=hasty
+        )
     except ms.NotConverged as error:
         return error.last_good.positions
     raise AssertionError("it converged")

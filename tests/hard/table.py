@@ -36,7 +36,9 @@ def _shown(case: Case, wide: bool) -> Verdict:
 
 
 def _line(cells, seconds: str, outcome: str, wide: bool) -> str:
-    fitted = [_fitted(" ".join(cell.split()), width, wide) for cell, width in zip(cells, _WIDTHS, strict=True)]
+    fitted = [
+        _fitted(" ".join(cell.split()), width, wide) for cell, width in zip(cells, _WIDTHS, strict=True)
+    ]
     return "  ".join([*fitted, seconds.rjust(8), outcome]).rstrip()
 
 

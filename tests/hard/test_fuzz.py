@@ -33,7 +33,9 @@ def public_names(module, prefix="") -> set[str]:
 
 
 def _defined_in(module) -> list[str]:
-    return [name for name, each in vars(module).items() if getattr(each, "__module__", None) == module.__name__]
+    return [
+        name for name, each in vars(module).items() if getattr(each, "__module__", None) == module.__name__
+    ]
 
 
 def test_every_public_name_is_called(tmp_path):

@@ -80,7 +80,9 @@ def test_linear_responses_superpose(seed, bending, a, b):
 @given(seed=SEEDS, bending=BENDINGS)
 def test_the_response_is_the_limit_of_small_loads(seed, bending):
     mesh = random_mesh(seed)
-    scene = ms.Scene(sheet(mesh, bending), supports=[clamp(mesh)], loads=[everywhere(mesh, loads(mesh, seed))])
+    scene = ms.Scene(
+        sheet(mesh, bending), supports=[clamp(mesh)], loads=[everywhere(mesh, loads(mesh, seed))]
+    )
     linear = ms.linear_response(scene).displacements
     off = [
         np.abs(ms.equilibrium(scene, load_factor=t, solver=TIGHT).displacements / t - linear).max()
@@ -153,9 +155,7 @@ def test_the_order_of_a_scenes_parts_does_not_matter(seed, order):
     pulls = [everywhere(mesh, loads(mesh, seed + k)) for k in range(3)]
 
     def found(numbers):
-        scene = ms.Scene(
-            sheet(mesh), supports=[parts[k] for k in numbers], loads=[pulls[k] for k in numbers]
-        )
+        scene = ms.Scene(sheet(mesh), supports=[parts[k] for k in numbers], loads=[pulls[k] for k in numbers])
         return ms.equilibrium(scene).positions
 
     assert_close(found(order), found(range(3)), 1e-9)
@@ -233,7 +233,9 @@ def test_units_do_not_matter_to_a_motion(seed, length, modulus, density):
         scene = ms.Scene(
             shell, supports=[clamp(scaled)], loads=[everywhere(scaled, force * stress * size**2)]
         )
-        return moving(scene, time_step=2e-3 * tick, damping=1e-2 * stress * size * tick, stiffness_damping=1e-4 * tick)
+        return moving(
+            scene, time_step=2e-3 * tick, damping=1e-2 * stress * size * tick, stiffness_damping=1e-4 * tick
+        )
 
     here, there = motion(1.0, 1.0, 1.0, 1.0), motion(length, modulus, density, time)
     assert_close(there.positions / length, here.positions, 1e-8)

@@ -60,7 +60,9 @@ def test_the_same_bits_in_another_process():
         "print(json.dumps({f.__name__: digest(f(on)) for f in REPEATS}))"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HERE), *sys.path]), "PYTHONHASHSEED": "7"}
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True
+    )
     on = scene()
     assert json.loads(run.stdout) == {f.__name__: digest(f(on)) for f in REPEATS}
 

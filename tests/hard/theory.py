@@ -49,15 +49,15 @@ def along_a_strong_force(load: float, angle: float) -> float:
 def stretch(stress: float) -> float:
     """The stretch under a dead stress over E, of St. Venant-Kirchhoff material that may narrow freely.
 
-        l (l^2 - 1) / 2 = stress
+    l (l^2 - 1) / 2 = stress
     """
-    return brentq(lambda l: l * (l * l - 1.0) / 2.0 - stress, 1.0 / np.sqrt(3.0), 10.0 + 2.0 * stress)
+    return brentq(lambda x: x * (x * x - 1.0) / 2.0 - stress, 1.0 / np.sqrt(3.0), 10.0 + 2.0 * stress)
 
 
 def hanging(weight: float) -> tuple[float, float]:
     """The end (x, z) / L of an inextensible cantilever that its own weight pulls down.
 
-        theta'' = weight (1 - s) cos(theta),   theta(0) = theta'(1) = 0,   weight = w L^3 / (E I)
+    theta'' = weight (1 - s) cos(theta),   theta(0) = theta'(1) = 0,   weight = w L^3 / (E I)
     """
     return _bent(lambda s, theta: weight * (1.0 - s) * np.cos(theta), -np.pi / 2, weight / 3.0)
 

@@ -3,8 +3,8 @@ depend on its number of steps."""
 
 from __future__ import annotations
 
-from ..objectives import cap
 from .._tensors import positive_number
+from ..objectives import cap
 from ._arguments import tensor
 from .signals import oscillation
 
