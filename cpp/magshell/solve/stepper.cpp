@@ -78,7 +78,15 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             model.set_history(viscosity_.scale(step.stage_time()), &viscous.shift);
         }
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
-        const NewtonReport report = newton_.solve(q, controls[i + 1], {&step.weights(), &target, &motion});
+        const Anchor anchor{&step.weights(), &target, &motion};
+        const VectorXd guess = q;
+        const Model::Memory memory = model.memory();
+        NewtonReport report = newton_.solve(q, controls[i + 1], anchor);
+        if (!report.converged && newton_.options().mixed) {  // what bends far in one step
+            q = guess;
+            model.set_memory(memory);
+            report = newton_.solve_plain(q, controls[i + 1], anchor);
+        }
         if (!report.converged) {
             reason = model.not_finite(q, controls[i + 1]);
             if (reason.empty()) reason = report.reason;
