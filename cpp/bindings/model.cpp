@@ -78,6 +78,7 @@ SceneValues values_of(const py::dict& given) {
     values.motions = motions_of(array("motions"));
     for (const py::handle source : given["field_sources"])
         values.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
+    values.water = given["water"].cast<std::shared_ptr<Water>>();
     values.contacts = contact_laws_of(array("contacts"));
     values.obstacles = obstacles_of(given["obstacles"], array("placements"));
     return values;

@@ -40,6 +40,7 @@ from .supports import Clamp, Pin, SymmetryPlane
 from .trajectory import MotionState, Trajectory
 from .vibration import VibrationModes, vibration_modes
 from .warm_start import WarmStart
+from .water import Water
 from .weld import Weld, weld
 
 __all__ = [
@@ -50,6 +51,7 @@ __all__ = [
     "AreaLoad",
     "Buckling",
     "Clamp",
+    "Contact",
     "CriticalPoint",
     "CustomField",
     "DesignRejected",
@@ -85,6 +87,7 @@ __all__ = [
     "UniformField",
     "VibrationModes",
     "WarmStart",
+    "Water",
     "Weld",
     "__version__",
     "animate",
@@ -98,6 +101,7 @@ __all__ = [
     "multistart",
     "num_threads",
     "objectives",
+    "obstacles",
     "optim",
     "parametrize",
     "plot",

@@ -49,8 +49,8 @@ class Inputs:
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
         if scene.has_forces_of_motion and not moving:
             raise ValueError(
-                "the scene has friction, which only motions know: use ms.simulate with some damping until it rests, or "
-                "leave it out (friction_coefficient=None)"
+                "the scene has friction or water, which act on what moves: use ms.simulate, with some damping until it "
+                "rests, or leave them out of this scene (friction_coefficient=None, water=None)"
             )
         self.scene = scene
         self.given = []

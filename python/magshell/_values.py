@@ -44,12 +44,13 @@ class Values:
             "contacts": np.array([self.current(each).law(self.shell) for each in scene.contacts]).reshape(-1, 5),
             "placements": np.array([(now.center, now.rotation) for now in obstacles]).reshape(-1, 2, 3),
             "obstacles": [now._core for now in obstacles],
+            "water": None if scene.water is None else self.current(scene.water)._core,
             "field_sources": [self.current(source)._core for source in _sources(scene)],
         }
 
     def same_as(self, other: Values) -> bool:
         mine, others = dict(self.core), dict(other.core)
-        for objects in ("field_sources", "obstacles"):
+        for objects in ("field_sources", "obstacles", "water"):
             if mine.pop(objects) != others.pop(objects):
                 return False
         return all(np.array_equal(mine[name], others[name]) for name in mine)
@@ -79,6 +80,8 @@ class Values:
         if owner in scene.contacts:
             names = ("contact_stiffness", "friction_coefficient")
             return dict(zip(names, gradient["contacts"][scene.contacts.index(owner)], strict=True))
+        if owner is scene.water:
+            return gradient["water"]
         if owner in scene.obstacles:
             center, rotation = gradient["placements"][scene.obstacles.index(owner)]
             return {"center": center, "rotation": rotation}

@@ -1,5 +1,7 @@
 #include "magshell/assembly/contact_term.h"
 
+#include <algorithm>
+
 #include "magshell/core/parallel.h"
 
 namespace magshell {
@@ -12,6 +14,23 @@ Vec3 weighted(const ContactPoint& point, const double* all) {
     for (int k = 0; k < 3; ++k)
         if (point.nodes[k] >= 0) sum += point.weights[k] * Eigen::Map<const Vec3>(all + 3 * point.nodes[k]);
     return sum;
+}
+
+// Steps of the distance's own length cannot miss a surface.
+bool passes(const Obstacle& shape, const Vec3& from, const Vec3& to) {
+    const double length = (to - from).norm();
+    Distance at = shape.distance(from);
+    if (at.value > 0.0) {
+        if (length <= at.value) return false;
+        constexpr double smallest = 1e-3;  // of the way
+        double travelled = at.value / length;
+        while (at.value > 0.0) {
+            if (travelled >= 1.0) return false;
+            at = shape.distance(from + travelled * (to - from));
+            travelled += std::max(at.value / length, smallest);
+        }
+    }
+    return at.normal.dot(shape.distance(to).normal) < -1e-6;  // opposite faces; an edge of a box is none
 }
 
 }  // namespace
@@ -75,6 +94,19 @@ std::vector<ContactTerm::Touch> ContactTerm::touches(const double* q, const Cont
         }
     }
     return all;
+}
+
+Index ContactTerm::passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                                  const Controls& controls_at_end) const {
+    for (const Contact& contact : contacts_)
+        for (const Index o : contact.obstacles) {
+            const StandingObstacle before = standing(o, controls), after = standing(o, controls_at_end);
+            for (const ContactPoint& point : contact.points)
+                if (passes(*obstacles_[o].shape, before.own(weighted(point, q.data())),
+                           after.own(weighted(point, end.data()))))
+                    return point.nodes[0];
+        }
+    return -1;
 }
 
 Vec3 ContactTerm::at_point(const Touch& touch, const double* all) const {

@@ -36,6 +36,11 @@ class ContactTerm final : public Term {
     /// Those at the last evaluated state.
     const std::vector<Touch>& touching() const { return touching_; }
 
+    /// The first vertex of a point that comes out on another side of an obstacle than it went in, on its straight
+    /// way from q to `end` as the obstacle sees it; -1 where none does.
+    Index passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                         const Controls& controls_at_end) const;
+
     const ContactPoint& point(const Touch& touch) const { return contacts_[touch.contact].points[touch.point]; }
     const ContactLaw& law(const Touch& touch) const { return laws_[touch.contact]; }
     StandingObstacle standing(Index obstacle, const Controls& controls) const;

@@ -55,11 +55,9 @@ void FrictionTerm::assemble(const Kinematics& at, const Controls&, SystemMatrix&
             rest.add(point.nodes[0], block);
             continue;
         }
-        Mat9 blocks;
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j)
-                blocks.block<3, 3>(3 * i, 3 * j) = point.weights[i] * point.weights[j] * block;
-        rest.add(point.nodes, blocks);
+        Remainder::Shared shared{point.nodes, point.weights, {}};
+        for (int k = 0; k < 3; ++k) shared.block.middleCols<3>(3 * k) = point.weights[k] * block;
+        rest.add(shared);
     }
 }
 

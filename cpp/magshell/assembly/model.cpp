@@ -91,6 +91,11 @@ void Model::add_terms(const SceneInput& input) {
         loads_ = add(std::make_unique<LoadTerm>("loads", no_forces, &Controls::load, &SceneGradient::loads));
     if (!input.couples.empty()) add_couples(input);
     if (!input.contacts.empty()) add_contacts(input.contacts);
+    if (values.water) {
+        std::unique_ptr<WaterTerm> water = std::make_unique<WaterTerm>(sheet_, faces_);
+        water_ = water.get();
+        forces_.push_back(std::move(water));
+    }
 }
 
 void Model::add_contacts(const std::vector<ContactInput>& contacts) {
@@ -117,6 +122,7 @@ void Model::set_values(const SceneValues& values) {
     if (gravity_) gravity_->set_forces(node_forces(values.vertex_mass * values.gravity.transpose(), sheet_));
     if (loads_) loads_->set_forces(node_forces(values.vertex_loads, sheet_));
     if (couples_) couples_->set_couples(values.couples);
+    if (water_) water_->set_water(values.water);
     if (contact_) contact_->set_values(values.contacts, values.obstacles);
     reduction_.set_motions(values.motions);
     cancelling_forces_.resize(0);
@@ -313,6 +319,13 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
 
 void Model::begin_step(const VectorXd& q, const Controls& controls) {
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->begin_step(q, controls);
+}
+
+std::string Model::blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                           const Controls& controls_at_end) const {
+    const Index node = contact_ ? contact_->passes_through(q, controls, end, controls_at_end) : -1;
+    if (node < 0) return {};
+    return "vertex " + std::to_string(sheet_.vertices.user[node]) + " passes through an obstacle within a step";
 }
 
 void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage) {

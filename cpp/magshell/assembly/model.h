@@ -18,6 +18,7 @@
 #include "magshell/assembly/membrane_term.h"
 #include "magshell/assembly/reduction.h"
 #include "magshell/assembly/scene_input.h"
+#include "magshell/assembly/water_term.h"
 #include "magshell/linalg/factor.h"
 
 namespace magshell {
@@ -75,6 +76,10 @@ class Model {
     /// of their Jacobian in remainder().
     bool has_forces() const { return !forces_.empty(); }
     void begin_step(const VectorXd& q, const Controls& controls);
+    bool has_contact() const { return contact_ != nullptr; }
+    /// Why a step from q to `end` cannot be: a point would be on the other side of an obstacle. Else empty.
+    std::string blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                        const Controls& controls_at_end) const;
     void evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage);
     void assemble_forces(const Controls& controls);
     const Remainder& remainder() const { return remainder_; }
@@ -129,6 +134,7 @@ class Model {
     LoadTerm *gravity_ = nullptr, *loads_ = nullptr;
     CoupleTerm* couples_ = nullptr;
     ContactTerm* contact_ = nullptr;
+    WaterTerm* water_ = nullptr;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
     Kinematics kinematics_;  // where the forces were evaluated last
     Remainder remainder_;

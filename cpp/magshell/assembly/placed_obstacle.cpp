@@ -13,7 +13,7 @@ StandingObstacle::StandingObstacle(const PlacedObstacle& placed, const ObstacleP
       axes_(moved_ * rotation(placement_.rotation_vector)) {}
 
 Distance StandingObstacle::distance(const Vec3& x) const {
-    Distance at = shape_->distance(axes_.transpose() * (x - center_));
+    Distance at = shape_->distance(own(x));
     at.normal = axes_ * at.normal;
     at.curvature = axes_ * at.curvature * axes_.transpose();
     return at;

@@ -28,6 +28,8 @@ class StandingObstacle {
 
     /// As Obstacle::distance, at a point of the world and in its axes.
     Distance distance(const Vec3& x) const;
+    /// A point of the world in the obstacle's own frame.
+    Vec3 own(const Vec3& x) const { return axes_.transpose() * (x - center_); }
     /// Of the body at x [m/s].
     Vec3 velocity(const Vec3& x) const { return pose_.velocity + pose_.spin.cross(x - center_); }
     const Vec3& spin() const { return pose_.spin; }

@@ -8,19 +8,31 @@
 
 namespace magshell {
 
-using Mat9 = Eigen::Matrix<double, 9, 9>;
-
 class Remainder {
   public:
+    using Mat39 = Eigen::Matrix<double, 3, 9>;
+
+    /// A force B p that three nodes share by their weights, and that their motions p cause.
+    struct Shared {
+        std::array<Index, 3> nodes;
+        Vec3 weights;
+        Mat39 block;
+    };
+
     void clear() {
         points_.clear();
-        faces_.clear();
+        shared_.clear();
     }
-    bool empty() const { return points_.empty() && faces_.empty(); }
+    bool empty() const { return points_.empty() && shared_.empty(); }
 
-    /// A block of one node, and one of three, whose unknowns follow each other.
+    /// A block of one node.
     void add(Index node, const Mat3& block) { points_.push_back({node, block}); }
-    void add(const std::array<Index, 3>& nodes, const Mat9& block) { faces_.push_back({nodes, block}); }
+    void add(const Shared& shared) { shared_.push_back(shared); }
+    /// So many more, for the caller to fill before the next call.
+    Shared* extend(std::size_t count) {
+        shared_.resize(shared_.size() + count);
+        return shared_.data() + shared_.size() - count;
+    }
 
     /// out += R p, or R^T p. All unknowns.
     void add_product(const VectorXd& p, bool transposed, VectorXd& out) const;
@@ -30,12 +42,8 @@ class Remainder {
         Index node;
         Mat3 block;
     };
-    struct Face {
-        std::array<Index, 3> nodes;
-        Mat9 block;
-    };
     std::vector<Point> points_;
-    std::vector<Face> faces_;
+    std::vector<Shared> shared_;
 };
 
 }  // namespace magshell

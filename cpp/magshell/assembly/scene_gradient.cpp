@@ -36,6 +36,7 @@ void SceneGradient::add_scene(const SceneGradient& part) {
         sum.stiffness += one.stiffness;
         sum.friction += one.friction;
     });
+    water.add(part.water, 1.0);
     add_each(obstacles, part.obstacles, [](Placement& sum, const Placement& one) {
         sum.center += one.center;
         sum.rotation_vector += one.rotation_vector;

@@ -7,6 +7,7 @@
 #include "magshell/assembly/motion.h"
 #include "magshell/assembly/placed_obstacle.h"
 #include "magshell/energy/contact.h"
+#include "magshell/force/drag.h"
 #include "magshell/energy/controls.h"
 
 namespace magshell {
@@ -22,6 +23,7 @@ struct SceneGradient {
     std::vector<VectorXd> field_sources;  // of each source, by its own parameters
     std::vector<ContactLaw> contacts;     // stiffness and friction
     std::vector<Placement> obstacles;
+    Drag::Gradient water;
     Controls controls;
 
     /// Adds another one, or a part of one, but for the controls: those of a motion are many.

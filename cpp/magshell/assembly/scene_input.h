@@ -13,6 +13,7 @@
 #include "magshell/energy/contact.h"
 #include "magshell/energy/material.h"
 #include "magshell/field/applied_field.h"
+#include "magshell/force/drag.h"
 
 namespace magshell {
 
@@ -46,6 +47,7 @@ struct SceneValues {
     std::vector<std::shared_ptr<const AppliedField>> field_sources;
     std::vector<ContactLaw> contacts;
     std::vector<PlacedObstacle> obstacles;
+    std::shared_ptr<const Water> water;
 };
 
 /// Held nodes count vertices first, then directions.

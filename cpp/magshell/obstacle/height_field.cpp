@@ -12,6 +12,8 @@
 namespace magshell {
 namespace {
 
+constexpr Index settled = 2;  // knots beyond the border, where the ground is level
+
 // Where along an axis a coordinate lies: the four coefficients around it, and their weights.
 struct Place {
     std::array<std::ptrdiff_t, 4> index;
@@ -19,7 +21,7 @@ struct Place {
 };
 
 Place place_of(double knots, Index samples) {
-    const double s = std::clamp(knots, -2.0, samples + 1.0);  // constant beyond
+    const double s = std::clamp<double>(knots, -settled, samples - 1.0 + settled);  // constant beyond
     const double i = std::floor(s);
     Place place;
     place.weights = spline_weights(s - i);
@@ -32,7 +34,7 @@ Place place_of(double knots, Index samples) {
 
 HeightField::HeightField(const Pair& origin, const Pair& spacing, const std::array<Index, 2>& samples,
                          std::span<const double> heights)
-    : origin_(origin), spacing_(spacing), samples_(samples), heights_(heights.begin(), heights.end()) {
+    : origin_(origin), spacing_(spacing), samples_(samples) {
     if (samples[0] < 2 || samples[1] < 2 ||
         heights.size() != static_cast<std::size_t>(samples[0]) * static_cast<std::size_t>(samples[1])) {
         throw InvalidInput("a height field needs at least 2 x 2 heights, and " + std::to_string(samples[0]) +
@@ -41,7 +43,7 @@ HeightField::HeightField(const Pair& origin, const Pair& spacing, const std::arr
     }
     coefficients_ = grid_coefficients(heights, samples);
     bound_derivatives();
-    build_blocks(heights);
+    build_blocks();
 }
 
 // Derivatives of a B-spline are averages of differences of its coefficients.
@@ -65,19 +67,20 @@ void HeightField::bound_derivatives() {
     sharpest_ = std::max(xx / (dx * dx), yy / (dy * dy)) + xy / (dx * dy);
 }
 
-void HeightField::build_blocks(std::span<const double> heights) {
+void HeightField::build_blocks() {
     constexpr Index side = 8;
-    for (Index i = 0; i < samples_[0]; i += side) {
-        for (Index j = 0; j < samples_[1]; j += side) {
-            Block block{
-                {i, j}, {std::min(i + side, samples_[0]) - 1, std::min(j + side, samples_[1]) - 1}, 0.0, 0.0};
-            block.low = std::numeric_limits<double>::infinity();
-            block.high = -block.low;
+    const Index nx = samples_[0] + 2 * settled, ny = samples_[1] + 2 * settled;
+    for (Index i = 0; i < nx; ++i)
+        for (Index j = 0; j < ny; ++j) knots_.push_back(ground(Pair(knot(0, i), knot(1, j))).height);
+    const auto height = [&](Index i, Index j) { return knots_[static_cast<std::size_t>(i) * ny + j]; };
+    for (Index i = 0; i < nx - 1; i += side) {
+        for (Index j = 0; j < ny - 1; j += side) {
+            Block block{{i, j}, {std::min(i + side, nx - 1), std::min(j + side, ny - 1)}, height(i, j), 0.0};
+            block.high = block.low;
             for (Index k = i; k <= block.last[0]; ++k) {
                 for (Index l = j; l <= block.last[1]; ++l) {
-                    const double height = heights[static_cast<std::size_t>(k) * samples_[1] + l];
-                    block.low = std::min(block.low, height);
-                    block.high = std::max(block.high, height);
+                    block.low = std::min(block.low, height(k, l));
+                    block.high = std::max(block.high, height(k, l));
                 }
             }
             blocks_.push_back(block);
@@ -104,39 +107,55 @@ HeightField::Ground HeightField::ground(const Pair& at) const {
     return g;
 }
 
-// The knot nearest to the point, or the start if none is nearer than the ground there. Knots of the border
-// stand for all that lies beyond them.
-HeightField::Pair HeightField::scan(const Vec3& point, const Pair& start) const {
-    const double gap = point.z() - ground(start).height;
-    double least = (start - point.head<2>()).squaredNorm() + gap * gap;
-    Pair best = start;
-    const auto outside = [](double x, double low, double high) {
-        return x < low ? low - x : x > high ? x - high : 0.0;
-    };
-    const auto knot = [&](int axis, Index i) { return origin_[axis] + i * spacing_[axis]; };
-    const auto reach = [&](int axis, Index first, Index last) {
-        constexpr double endless = std::numeric_limits<double>::infinity();
-        const double low = first == 0 ? -endless : knot(axis, first);
-        const double high = last == samples_[axis] - 1 ? endless : knot(axis, last);
-        return outside(point[axis], low, high);
-    };
-    for (const Block& block : blocks_) {
-        const double x = reach(0, block.first[0], block.last[0]), y = reach(1, block.first[1], block.last[1]);
-        const double z = outside(point.z(), block.low, block.high);
-        if (x * x + y * y + z * z >= least) continue;
-        for (Index i = block.first[0]; i <= block.last[0]; ++i) {
-            for (Index j = block.first[1]; j <= block.last[1]; ++j) {
-                const bool past_x = (i == 0 && point.x() < knot(0, 0)) ||
-                                    (i == samples_[0] - 1 && point.x() > knot(0, samples_[0] - 1));
-                const bool past_y = (j == 0 && point.y() < knot(1, 0)) ||
-                                    (j == samples_[1] - 1 && point.y() > knot(1, samples_[1] - 1));
-                const Pair at(past_x ? point.x() : knot(0, i), past_y ? point.y() : knot(1, j));
-                const double rise = point.z() - heights_[static_cast<std::size_t>(i) * samples_[1] + j];
-                const double squared = (at - point.head<2>()).squaredNorm() + rise * rise;
-                if (squared < least) least = squared, best = at;
-            }
+double HeightField::knot(int axis, Index i) const {
+    return origin_[axis] + (i - settled) * spacing_[axis];
+}
+
+HeightField::Range HeightField::range(int axis, Index first, Index last) const {
+    constexpr double endless = std::numeric_limits<double>::infinity();
+    return {first == 0 ? -endless : knot(axis, first),
+            last == samples_[axis] + 2 * settled - 1 ? endless : knot(axis, last)};
+}
+
+double HeightField::squared_bound(const Block& block, const Vec3& point) const {
+    const double x = range(0, block.first[0], block.last[0]).clamp(point.x()) - point.x();
+    const double y = range(1, block.first[1], block.last[1]).clamp(point.y()) - point.y();
+    const double z = std::clamp(point.z(), block.low, block.high) - point.z();
+    return x * x + y * y + z * z;
+}
+
+void HeightField::scan_block(const Block& block, const Vec3& point, double& least, Pair& best) const {
+    const Index ny = samples_[1] + 2 * settled;
+    for (Index i = block.first[0]; i < block.last[0]; ++i) {
+        const double x = range(0, i, i + 1).clamp(point.x());
+        const double s = std::clamp((x - knot(0, i)) / spacing_.x(), 0.0, 1.0);
+        for (Index j = block.first[1]; j < block.last[1]; ++j) {
+            const double y = range(1, j, j + 1).clamp(point.y());
+            const double t = std::clamp((y - knot(1, j)) / spacing_.y(), 0.0, 1.0);
+            const double* corner = knots_.data() + static_cast<std::size_t>(i) * ny + j;
+            const double height = (1.0 - s) * ((1.0 - t) * corner[0] + t * corner[1]) +
+                                  s * ((1.0 - t) * corner[ny] + t * corner[ny + 1]);
+            const double squared = (Vec3(x, y, height) - point).squaredNorm();
+            if (squared < least) least = squared, best = Pair(x, y);
         }
     }
+}
+
+// Where the ground comes nearest to the point, if each cell is looked at in one place only, the one below it
+// or the nearest to that. `start` if that is nearer still.
+HeightField::Pair HeightField::scan(const Vec3& point, const Pair& start, double gap) const {
+    double least = (start - point.head<2>()).squaredNorm() + gap * gap;
+    Pair best = start;
+    const Block* first = nullptr;  // the most promising one: it leaves little for the others
+    double lowest = least;
+    for (const Block& block : blocks_) {
+        const double bound = squared_bound(block, point);
+        if (bound < lowest) lowest = bound, first = &block;
+    }
+    if (!first) return best;
+    scan_block(*first, point, least, best);
+    for (const Block& block : blocks_)
+        if (&block != first && squared_bound(block, point) < least) scan_block(block, point, least, best);
     return best;
 }
 
@@ -184,7 +203,7 @@ Distance HeightField::distance(const Vec3& point) const {
     const double gap = point.z() - below.height;
     // The nearest point is at most |gap| away. Where D is convex as far as that, there is no other minimum.
     const bool convex = std::abs(gap) * (1.0 + steepest_) * sharpest_ < 1.0;
-    if (!convex) start = scan(point, start);
+    if (!convex) start = scan(point, start, gap);
 
     const Pair foot = nearest(point, start);
     const Ground g = ground(foot);

@@ -33,8 +33,7 @@ class HeightField final : public Obstacle {
     Ground ground(const Pair& at) const;
 
     void bound_derivatives();
-    void build_blocks(std::span<const double> heights);
-    Pair scan(const Vec3& point, const Pair& start) const;
+    void build_blocks();
     Pair nearest(const Vec3& point, Pair at) const;
 
     Pair origin_, spacing_;
@@ -42,13 +41,24 @@ class HeightField final : public Obstacle {
     std::vector<double> coefficients_;
     double steepest_, sharpest_;  // bounds of |dh| and of the eigenvalues of d2h [1/m]
 
-    // Squares of knots, with the range of their heights: what a scan can leave out.
+    // For the scan: heights of the knots, with those beyond the border until the ground is level, and squares
+    // of cells with the range of their heights: what can be left out.
+    struct Range {
+        double low, high;
+        double clamp(double x) const { return x < low ? low : x > high ? high : x; }
+    };
     struct Block {
-        std::array<Index, 2> first, last;
+        std::array<Index, 2> first, last;  // knots around it
         double low, high;
     };
+    double knot(int axis, Index i) const;
+    Range range(int axis, Index first,
+                Index last) const;  // of a coordinate between knots; without end at the border
+    double squared_bound(const Block& block, const Vec3& point) const;  // of the distance to a block
+    void scan_block(const Block& block, const Vec3& point, double& least, Pair& best) const;
+    Pair scan(const Vec3& point, const Pair& start, double gap) const;
+    std::vector<double> knots_;
     std::vector<Block> blocks_;
-    std::vector<double> heights_;
 };
 
 }  // namespace magshell

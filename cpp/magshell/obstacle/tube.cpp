@@ -12,14 +12,26 @@ namespace magshell {
 namespace {
 
 constexpr int samples_a_segment = 4;
-constexpr int transition = 2;  // knots within which an open end becomes straight
+constexpr int transition =
+    3;  // knots after which an open end is straight and round: coefficients reach so far
 
-// Coefficients beyond the last ones: on the straight line through the last two, with the last radius.
-void continue_straight(std::vector<Vec4>& c) {
+// Of an open tube the radius settles: its spline goes on through values like the last one.
+void settle(std::vector<Vec4>& coefficients, std::span<const double> radii) {
+    std::vector<Vec4> longer(radii.size() + 2 * transition);
+    for (std::size_t k = 0; k < longer.size(); ++k) {
+        const std::size_t inner =
+            std::clamp<std::size_t>(k, transition, radii.size() - 1 + transition) - transition;
+        longer[k] = Vec4(0.0, 0.0, 0.0, radii[inner]);
+    }
+    longer = spline_coefficients(longer);
+    for (std::size_t k = 0; k < coefficients.size(); ++k) coefficients[k][3] = longer[k + transition][3];
+}
+
+// Coefficients beyond the last ones: on the straight line through the last two, with the radius of the end.
+void continue_straight(std::vector<Vec4>& c, double radius) {
     for (int k = 0; k < transition; ++k) {
-        const std::size_t n = c.size();
-        Vec4 next = 2.0 * c[n - 1] - c[n - 2];
-        next[3] = c[n - 1][3];
+        Vec4 next = 2.0 * c[c.size() - 1] - c[c.size() - 2];
+        next[3] = radius;
         c.push_back(next);
     }
 }
@@ -34,8 +46,9 @@ Tube::Tube(std::span<const Vec3> points, std::span<const double> radii, bool clo
         values.emplace_back(points[k].x(), points[k].y(), points[k].z(), radii[k]);
     coefficients_ = spline_coefficients(values);
     if (!closed) {
-        for (int side = 0; side < 2; ++side) {
-            continue_straight(coefficients_);
+        settle(coefficients_, radii);
+        for (const double radius : {radii.back(), radii.front()}) {
+            continue_straight(coefficients_, radius);
             std::reverse(coefficients_.begin(), coefficients_.end());
         }
     }

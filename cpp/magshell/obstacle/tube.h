@@ -23,7 +23,8 @@ namespace magshell {
 class Tube final : public Obstacle {
   public:
     /// The curve goes through the points, the radius through the radii, one a point, with one knot at each.
-    /// An open tube goes on straight at both ends, with a radius that settles within two knots; a closed one
+    /// An open tube goes on straight at both ends, with the radii of the last points, which it settles to
+    /// within three knots; a closed one
     /// ends in the last balls. Throws InvalidInput where the radius is not positive, or changes as fast as
     /// the curve advances, so that one ball swallows the next.
     Tube(std::span<const Vec3> points, std::span<const double> radii, bool closed);

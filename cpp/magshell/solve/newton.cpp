@@ -213,6 +213,41 @@ NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const An
     return iterate(q, controls, anchor, options_.max_iterations, false);
 }
 
+NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    constexpr int most_iterations = 60;
+    constexpr double shortest = 1.0 / 4096.0;  // of a step
+    NewtonReport report;
+    q += model_.reduction().prescribed_increment(q, controls.motion);
+    evaluate(q, controls, anchor);
+    for (;; ++report.iterations, ++iterations_) {
+        report.residual = relative_residual(q, anchor);
+        watch(report.residual);
+        report.converged = report.residual <= options_.tolerance;
+        if (report.converged) return report;
+        if (!std::isfinite(report.residual) || report.iterations == most_iterations) {
+            report.reason = "no convergence in " + std::to_string(most_iterations) + " shortened steps";
+            return report;
+        }
+        Eigen::MatrixXd no_moves(q.size(), 0);
+        const FactorReport factor = factorize(q, controls, false, anchor, no_moves);
+        if (!factor.succeeded) {
+            report.reason = factor.reason;
+            return report;
+        }
+        const VectorXd step = solve_with_factor(-gradient(q, anchor)), from = q;
+        const auto length = [&](const VectorXd& p) {
+            return std::sqrt(p.dot(anchor.weights->cwiseProduct(p)));
+        };
+        const double whole = length(step);
+        for (double share = 1.0;; share *= 0.5) {
+            q = from + share * step;
+            evaluate(q, controls, anchor);
+            if (share <= shortest || relative_residual(q, anchor) <= options_.tolerance) break;
+            if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.25 * share) * whole) break;
+        }
+    }
+}
+
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                              bool mixed) {
     NewtonReport report;
@@ -231,9 +266,10 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent())
             return fail("the iteration diverged");
         const bool in_place = move.isZero(0.0);
+        const bool settled = report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent();
         // Under the floor, small forces that move a thin sheet far are lost in larger ones: a step tells them.
-        const bool told = report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance;
-        if (in_place && report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent() && told) {
+        if (in_place && settled &&
+            (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
             return report;
         }

@@ -59,6 +59,9 @@ class Newton {
     /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
     NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
+    /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity): slower, and
+    /// sure of foot where contacts open and close.
+    NewtonReport solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor);
 
     /// The residual's parts at q, with the forces of a time step.
     void evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor);

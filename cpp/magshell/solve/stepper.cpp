@@ -79,13 +79,14 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         }
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
         const Anchor anchor{&step.weights(), &target, &motion};
-        const VectorXd guess = q;
+        const VectorXd predicted = q;
         const Model::Memory memory = model.memory();
         NewtonReport report = newton_.solve(q, controls[i + 1], anchor);
-        if (!report.converged && newton_.options().mixed) {  // what bends far in one step
-            q = guess;
+        if (!report.converged && (model.has_contact() || newton_.options().mixed)) {
+            q = predicted;
             model.set_memory(memory);
-            report = newton_.solve_plain(q, controls[i + 1], anchor);
+            report = model.has_contact() ? newton_.solve_damped(q, controls[i + 1], anchor)
+                                         : newton_.solve_plain(q, controls[i + 1], anchor);
         }
         if (!report.converged) {
             reason = model.not_finite(q, controls[i + 1]);
@@ -103,6 +104,11 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             const bool factorized = with_factors && report.iterations > 0;
             stages.push_back({q, model.memory(), factorized ? newton_.release_factor() : nullptr});
         }
+    }
+    reason = model.blocked(state.q, controls.front(), q, controls.back());
+    if (!reason.empty()) {
+        model.set_memory(state.memory);
+        return false;
     }
     MotionState end{std::move(q), rates.back().v, model.memory(), std::move(e), {}};
     if (tableau_.begins_explicitly) end.rates = std::move(rates.back());

@@ -52,10 +52,12 @@ def box_surface(size: np.ndarray, rounding: float) -> tuple[np.ndarray, np.ndarr
 def swept_surface(points: np.ndarray, radii: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
     """The envelope of balls whose centers go through points (k, 3) m as their radii (k,) m change.
 
-    A ball of the curve c and the radius r touches it where the normal n has n . c' = - r'.
+    A ball of the curve c and the radius r touches it where the normal n has n . c' = - r'. The radius of an open one
+    levels off towards its ends.
     """
-    knots = np.arange(len(points))
-    curve, radius = CubicSpline(knots, points), CubicSpline(knots, radii)
+    knots, beyond = np.arange(len(points)), 0 if closed else 3
+    curve = CubicSpline(knots, points)
+    radius = CubicSpline(np.arange(-beyond, len(points) + beyond), np.pad(radii, beyond, mode="edge"))
     s = np.linspace(0, knots[-1], FINE * (len(points) - 1) + 1)
     speed = np.linalg.norm(curve(s, 1), axis=1, keepdims=True)
     frames = _frames(curve(s, 1) / speed)

@@ -17,8 +17,8 @@ class Tube(Obstacle):
     """A ball swept along a smooth curve while its radius changes; by default the sheet is inside.
 
     Curve and radius are cubic splines with one knot a point: twice continuously differentiable, through all the points,
-    which should be about equally far from each other. An open tube goes on straight and without end at both ends, with a
-    radius that settles within two knots of the last given one; a closed one ends in its last balls.
+    which should be about equally far from each other. An open tube goes on straight and without end at both ends, with
+    the radius of its last point, to which it levels off; a closed one ends in its last balls.
 
     Args:
         points: (k, 3) m, along the curve, in the body's own frame.
