@@ -44,6 +44,7 @@ NOT_CALLED = {
     "Weld": "a result",
     "AppliedField": "abstract",
     "control.Curve": "abstract",
+    "obstacles.Obstacle": "abstract",
     "SDIRK2": "takes nothing",
     "SDIRK3": "takes nothing",
     "TRBDF2": "takes nothing",

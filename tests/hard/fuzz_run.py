@@ -28,6 +28,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 from fuzz_calls import Call, Sample, calls
+from fuzz_contact_calls import contact_calls
 from fuzz_values import junk, spoilt
 
 import magshell as ms
@@ -67,7 +68,7 @@ def everything(folder: Path) -> list[Call]:
     from fuzz_torch_calls import torch_calls
 
     sample = Sample(folder)
-    return [*calls(sample), *torch_calls(sample)]
+    return [*calls(sample), *contact_calls(sample), *torch_calls(sample)]
 
 
 def spoil(table: list[Call], number: int) -> tuple[Call, dict, str]:

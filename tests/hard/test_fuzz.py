@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from fuzz_calls import NOT_CALLED, Sample, calls
+from fuzz_contact_calls import contact_calls
 
 import magshell as ms
 
@@ -43,7 +44,7 @@ def test_every_public_name_is_called(tmp_path):
     from fuzz_torch_calls import torch_calls
 
     sample = Sample(tmp_path)
-    called = {call.name for call in (*calls(sample), *torch_calls(sample))}
+    called = {call.name for call in (*calls(sample), *contact_calls(sample), *torch_calls(sample))}
     assert public_names(ms) - called - set(NOT_CALLED) == set()
     assert set(NOT_CALLED) <= public_names(ms)
 

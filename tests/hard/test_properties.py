@@ -19,7 +19,7 @@ def random_mesh(seed: int) -> ms.TriangleMesh:
     rng = np.random.default_rng(seed)
     points = [np.array(corner, float) for corner in ((0, 0), (0, 0.5), (0, 1), (1, 0), (1, 1))]
     while len(points) < 24:
-        point = rng.random(2)
+        point = rng.random(2) * (0.9, 1.0) + (0.1, 0.0)
         if min(np.linalg.norm(point - other) for other in points) > 0.1:
             points.append(point)
     flat = np.array(points)

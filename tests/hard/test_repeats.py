@@ -44,14 +44,14 @@ def threads():
 
 @pytest.mark.parametrize("solve", REPEATS, ids=lambda f: f.__name__)
 def test_the_same_bits_every_time(solve, threads):
-    on = scene(cells=(60, 20))
+    on = scene(cells=(50, 16))
     expected = digest(solve(on))
     others = [each for each in REPEATS if each is not solve]
     for count, before in ((2, others[0]), (1, others[-1]), (2, repeats.failing)):
         ms.set_num_threads(count)
         before(on)  # leaves its own state in the scene
         assert digest(solve(on)) == expected
-        assert digest(solve(scene(cells=(60, 20)))) == expected
+        assert digest(solve(scene(cells=(50, 16)))) == expected
 
 
 def test_the_same_bits_in_another_process():
