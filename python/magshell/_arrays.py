@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ._quantity import real_numbers
@@ -16,6 +18,13 @@ def index_array(name: str, values) -> np.ndarray:
     if array.size and not np.issubdtype(array.dtype, np.integer):
         raise ValueError(f"{name} must hold integer indices, got dtype {array.dtype}")
     return array.astype(np.int64)
+
+
+def named_values(name: str, values) -> Mapping:
+    """A dictionary, empty for None."""
+    if not isinstance(values, Mapping | None):
+        raise ValueError(f"{name} must be a dictionary of name: values, got {type(values).__name__}")
+    return values or {}
 
 
 def positive(name: str, value) -> float:

@@ -44,10 +44,11 @@ def real_tensor(name: str, values, shape: tuple[int | str, ...]):
 
 
 def positive_number(name: str, unit: str, value):
-    """A positive number, or a tensor that holds one."""
-    if not float(quantity(name, unit, detached(value), ())) > 0:
+    """A positive float, or the tensor that holds one."""
+    number = float(quantity(name, unit, detached(value), ()))
+    if not number > 0:
         raise ValueError(f"{name} [{unit}] must be positive, got {value}")
-    return value
+    return value if is_tensor(value) else number
 
 
 def wants_gradient(value) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ._arrays import named_values
 from ._mesh_selection import RELATIVE_TOLERANCE
 from ._obj import read_obj
 from ._ply import read_ply, write_ply
@@ -175,9 +175,7 @@ def _detached(values):
 
 def _checked_fields(kind: str, fields, rows: int) -> dict[str, np.ndarray]:
     checked = {}
-    if not isinstance(fields, Mapping | None):
-        raise ValueError(f"{kind}_fields must be a dictionary of name: values, got {type(fields).__name__}")
-    for name, values in (fields or {}).items():
+    for name, values in named_values(f"{kind}_fields", fields).items():
         if not isinstance(name, str) or not name or any(character.isspace() for character in name):
             raise ValueError(f"{kind} field names must be words without spaces, got {name!r}")
         array = np.asarray(_detached(values))

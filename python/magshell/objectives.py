@@ -95,7 +95,7 @@ def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
     `TriangleMesh`. edge_lengths: (n_e,) [m], by default 1.
     smoothing eps > 0: in units of the values; jumps far below it count by their squares.
     """
-    positive_number("smoothing", "as values", smoothing)
+    smoothing = positive_number("smoothing", "as values", smoothing)
     values = real_tensor("values", values, ("...",))
     edge_faces = _indices(edge_faces)
     if values.ndim not in (1, 2) or edge_faces.ndim != 2 or edge_faces.shape[1] != 2:
@@ -129,7 +129,8 @@ def cap(remanent_magnetization, limit, sharpness=None):
         return squares - 1
     if len(squares) == 0:
         raise ValueError("remanent_magnetization has no faces")
-    if not float(positive_number("sharpness", "1", sharpness)) > 1:
+    sharpness = positive_number("sharpness", "1", sharpness)
+    if not sharpness > 1:
         raise ValueError(f"sharpness must exceed 1, got {sharpness}")
     largest = squares.detach().max().clamp(min=1e-30)  # taken out: the powers neither overflow nor vanish
     powers = ((squares / largest) ** sharpness).sum() + 1e-30  # a root's derivative at zero is not finite
@@ -149,7 +150,7 @@ def printable(remanent_magnetization, directions, sharpness=None):
     if len(rays) == 0:
         raise ValueError("directions must hold at least one")
     if sharpness is not None:
-        positive_number("sharpness", "m2/A2", sharpness)
+        sharpness = positive_number("sharpness", "m2/A2", sharpness)
     lengths = torch.linalg.vector_norm(rays, dim=1, keepdim=True)
     if not (lengths > 0).all():
         raise ValueError("directions must not be zero")

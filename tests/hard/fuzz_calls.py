@@ -94,7 +94,11 @@ def _meshes(s: Sample) -> Iterator[Call]:
     grid = {"cells": cells, "diagonals": "alternating", "irregular": 0.1, "seed": 0}
     yield Call("TriangleMesh", ms.TriangleMesh, {"rest_positions": mesh.rest_positions, "faces": mesh.faces})
     yield Call("meshes.rectangle", ms.meshes.rectangle, {"length": 1.0, "width": 0.5, **grid})
-    yield Call("meshes.annulus", ms.meshes.annulus, {"inner_radius": 0.5, "outer_radius": 1.0, **grid})
+    yield Call(
+        "meshes.annulus",
+        ms.meshes.annulus,
+        {"inner_radius": 0.5, "outer_radius": 1.0, **grid, "cells": (2, 5)},
+    )
     sector = {"inner_radius": 0.5, "outer_radius": 1.0, "angle": (0.1, 1.0), **grid}
     yield Call("meshes.sector", ms.meshes.sector, sector)
     yield Call("meshes.cylinder", ms.meshes.cylinder, {"radius": 1.0, "length": 1.0, "angle": 1.0, **grid})
@@ -154,7 +158,9 @@ def _scenes(s: Sample) -> Iterator[Call]:
     )
     yield Call("Clamp", lambda **a: scene(supports=ms.Clamp(**a)), {"edges": edges, **moved})
     plane = {"normal": (1, 0, 0), "point": (0, 0, 0), "tolerance": 1e-9}
-    yield Call("SymmetryPlane", lambda **a: scene(supports=[s.clamp, ms.SymmetryPlane(**a)]), plane)
+    yield Call(
+        "SymmetryPlane", lambda **a: scene(supports=[ms.SymmetryPlane(**a)], allow_rigid_motions=True), plane
+    )
 
     def loaded(kind):
         return lambda **a: scene(supports=s.clamp, loads=kind(**a))
@@ -188,12 +194,19 @@ def _fields(s: Sample) -> Iterator[Call]:
 
     gradient = {"gradient": lambda x: np.tile(0.1 * np.eye(3), (len(x), 1, 1))}
     yield Call("CustomField", custom, {"function": lambda x: 0.1 * x, "length_scale": 0.1, **gradient})
-    yield Call("MagpylibField", ms.MagpylibField, {"sources": [], "length_scale": 0.1}, cost=5)
+    yield Call("MagpylibField", _magpylib_field, {"diameter": 0.01, "length_scale": 0.1}, cost=5)
     for name, each in (("Dipoles", s.dipoles), ("SampledField", s.grid)):
         yield Call(f"{name}.flux_density", each.flux_density, {"points": points})
         yield Call(f"{name}.gradient", each.gradient, {"points": points})
     yield Call("SampledField.contains", s.grid.contains, {"points": points})
     yield Call("residual_to_remanent", ms.residual_to_remanent, {"residual_flux_density": np.ones((2, 3))})
+
+
+def _magpylib_field(diameter, length_scale):
+    import magpylib
+
+    ball = magpylib.magnet.Sphere(polarization=(0, 0, 1), diameter=diameter)
+    return ms.MagpylibField([ball], length_scale=length_scale)
 
 
 def _solves(s: Sample) -> Iterator[Call]:
@@ -211,7 +224,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "thickness": np.full(n_f, 1.1e-3),
         "young_modulus": 1.1e6,
         "poisson_ratio": 0.3,
-        "mass_density": 900.0,
+        "mass_density": None,
         "curvature_scale": np.full(n_e, 1.1),
         "vertex_loads": np.zeros((n_v, 3)),
         "values": {s.clamp: {"displacement": (0, 0, 2e-4)}, s.dipoles: {"moments": [(0, 0, 0.2)]}},
@@ -264,7 +277,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "max_iterations": 5,
         "first_load_step": 1.0,
         "smallest_load_step": 0.1,
-        "max_relaxation_steps": 3,
+        "max_relaxation_steps": 50,
     }
     for kind in (ms.Newton, ms.MixedNewton):
         yield Call(kind.__name__, lambda kind=kind, **a: ms.equilibrium(s.scene, solver=kind(**a)), newton)
@@ -296,7 +309,7 @@ def _solves(s: Sample) -> Iterator[Call]:
             "run": math.sqrt,
             "starts": [1.0, 2.0],
             "executor": _here(),
-            "workers": 1,
+            "workers": None,
             "attempts": 1,
             "feasibility": 1e-6,
             "checkpoint": None,
@@ -332,7 +345,8 @@ def _files(s: Sample) -> Iterator[Call]:
             "what": s.mesh,
             **states,
             "velocities": np.zeros((2, n_v, 3)),
-            **fields,
+            "vertex_fields": {"u": np.zeros((2, n_v))},
+            "face_fields": {"m": np.zeros((2, n_f, 3))},
             "progress": False,
         },
         cost=3,
@@ -352,7 +366,7 @@ def _files(s: Sample) -> Iterator[Call]:
             "positions": s.positions,
             **look,
             "color": np.zeros(n_f),
-            "width": 100,
+            "width": 400,
             "columns": 1,
             "backend": "matplotlib",
         },
@@ -374,11 +388,12 @@ def _files(s: Sample) -> Iterator[Call]:
             **look,
             "fps": 5.0,
             "speed": 1.0,
-            "width": 100,
+            "width": 400,
             "backend": "matplotlib",
             "progress": False,
         },
         cost=60,
     )
-    yield Call("MotionState.load", ms.MotionState.load, {"path": there})
+    s.state.save(s.folder / "saved.npz")
+    yield Call("MotionState.load", ms.MotionState.load, {"path": s.folder / "saved.npz"})
     yield Call("MotionState.save", s.state.save, {"path": s.folder / "state.npz"})

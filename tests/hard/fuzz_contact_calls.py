@@ -77,7 +77,7 @@ def _in_scenes(s: Sample) -> Iterator[Call]:
         "face_samples": 1,
     }
     yield Call("Contact", lambda **a: moved(contacts=ms.Contact(**a)), touch)
-    table = np.stack([np.linspace(0.0, np.pi / 2, 4), np.arange(4.0)], axis=1)
+    table = (np.linspace(0.0, np.pi / 2, 4), np.arange(4.0))
     flow = {
         "fluid_density": 1e3,
         "velocity": (0.1, 0, 0),

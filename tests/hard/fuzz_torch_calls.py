@@ -22,7 +22,7 @@ def _objectives(s: Sample) -> Iterator[Call]:
     n_v, n_f = s.mesh.n_vertices, s.mesh.n_faces
     x, tips = s.positions, np.array([0, 3])
     image = np.arange(12.0).reshape(3, 4)
-    extent = ((0.0, 0.1), (0.0, 0.05))
+    extent = (0.0, 0.1, 0.0, 0.05)
     vectors = np.ones((n_f, 3))
     yield Call(
         "objectives.shape_matching",
@@ -33,6 +33,11 @@ def _objectives(s: Sample) -> Iterator[Call]:
         "objectives.height_map",
         objectives.height_map,
         {"positions": x, "rest_positions": x, "image": image, "extent": extent, "weights": np.ones(n_v)},
+    )
+    yield Call(
+        "objectives.bilinear",
+        objectives.bilinear,
+        {"image": image, "points": x, "extent": extent},
     )
     yield Call(
         "objectives.extension",
@@ -131,7 +136,7 @@ def _controls(s: Sample) -> Iterator[Call]:
         "frames": (1, 5),
         "targets": np.ones((2, 2, 3)),
         "vertices": (0, 1),
-        "weights": (1.0, 1.0),
+        "weights": np.ones((2, 2)),
     }
     yield Call("control.key_frames", control.key_frames, frames)
     yield Call(
@@ -194,9 +199,6 @@ def _optimizers() -> Iterator[Call]:
     limits = {"memory": 3, "first_step": 1.0, "max_evaluations": 5, "max_shortenings": 2}
     yield Call("optim.LBFGS", stepped(optim.LBFGS), {**box, **limits})
 
-    def minimized(objective, parameters, optimizer, **arguments):
-        return ms.minimize(objective, parameters, optimizer, **arguments)
-
     x = torch.ones(3, dtype=torch.float64, requires_grad=True)
     options = {
         "max_iterations": 2,
@@ -213,7 +215,12 @@ def _optimizers() -> Iterator[Call]:
     }
     yield Call(
         "minimize",
-        minimized,
-        {"objective": lambda x: (x**2).sum(), "parameters": [x], "optimizer": optim.MMA, **options},
+        ms.minimize,
+        {
+            "objective": lambda x: (x**2).sum(),
+            "parameters": [x],
+            "optimizer": lambda parameters: optim.MMA(parameters, scale=1.0),
+            **options,
+        },
         cost=2,
     )

@@ -39,14 +39,25 @@ def _defined_in(module) -> list[str]:
     ]
 
 
-def test_every_public_name_is_called(tmp_path):
+@pytest.fixture
+def table(tmp_path):
     pytest.importorskip("torch")
     from fuzz_torch_calls import torch_calls
 
     sample = Sample(tmp_path)
-    called = {call.name for call in (*calls(sample), *contact_calls(sample), *torch_calls(sample))}
-    assert public_names(ms) - called - set(NOT_CALLED) == set()
+    return [*calls(sample), *contact_calls(sample), *torch_calls(sample)]
+
+
+def test_every_public_name_is_called(table):
+    assert public_names(ms) - {call.name for call in table} - set(NOT_CALLED) == set()
     assert set(NOT_CALLED) <= public_names(ms)
+
+
+def test_what_is_spoilt_works(table):
+    """Or else nothing but the first refusal would be tested."""
+    pytest.importorskip("magpylib")
+    for call in table:
+        call.function(**call.arguments)
 
 
 @pytest.mark.parametrize("part", range(PROCESSES))

@@ -109,7 +109,7 @@ def curve_distance(track, curve: Curve, smoothing: float | None = None):
     squares = _checked_curve(curve).squared_distance(track)
     if smoothing is None:
         return squares.sum()
-    positive_number("smoothing", "m", smoothing)
+    smoothing = positive_number("smoothing", "m", smoothing)
     return ((squares + smoothing * smoothing) ** 0.5 - smoothing).sum()
 
 

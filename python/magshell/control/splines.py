@@ -58,7 +58,8 @@ def fit_spline(
     torch = require_torch("ms.control.fit_spline")
     times = quantity("times", "s", detached(times), ("n",))
     values = quantity("values", "T", detached(values), (len(times), 3))
-    weights = spline_weights(times, number, float(detached(duration)), degree, periodic).numpy()
+    duration = float(quantity("duration", "s", detached(duration), ()))
+    weights = spline_weights(times, number, duration, degree, periodic).numpy()
     rank = np.linalg.matrix_rank(weights, tol=1e-10)
     if rank < number:
         raise ValueError(
