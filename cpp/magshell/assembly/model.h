@@ -41,8 +41,8 @@ class Model {
     Index size() const { return sheet_.n_unknowns(); }
     double extent() const { return extent_; }
     const VectorXd& metric() const { return metric_; }
-    /// The floor under every residual, to be multiplied by the unit of round-off.
-    VectorXd cancelling_forces() const { return history_scale_ * cancelling_forces_; }
+    /// The floor under every residual of a state, to be multiplied by the unit of round-off.
+    VectorXd cancelling_forces(const VectorXd& q);
 
     VectorXd rest_state() const;
     /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,), and back.
@@ -144,8 +144,9 @@ class Model {
     Residual residual_;
     VectorXd metric_;             // area at each unknown of a vertex, zero for directions and rotations
     VectorXd cancelling_forces_;  // of the elastic terms, without history
+    double beyond_ = 0.0;         // [m] by how much coordinates were larger than at rest then
     double history_scale_ = 1.0;
-    double extent_;
+    double extent_, rest_reach_;  // [m]: of the bounding box; the largest coordinate at rest
     std::mutex in_use_;
 };
 

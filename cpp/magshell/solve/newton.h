@@ -58,7 +58,7 @@ class Newton {
 
     /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
-    NewtonReport solve_plain(VectorXd& q, const Controls& controls);
+    NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
     /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity): slower, and
     /// sure of foot where contacts open and close.
     NewtonReport solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor);
@@ -82,8 +82,10 @@ class Newton {
     VectorXd solve_transposed(const VectorXd& rhs) const;
 
     /// The residual at the last evaluated state, relative to the forces that cancel in it and to their
-    /// round-off.
-    double relative_residual(const VectorXd& q, const Anchor& anchor) const;
+    /// round-off, if that is to count.
+    double relative_residual(const VectorXd& q, const Anchor& anchor, bool with_floor = true) const;
+    /// Whether nothing is left to do at q, which was found at these controls before.
+    bool still_holds(const VectorXd& q, const Controls& controls);
 
     Model& model() { return model_; }
     const std::shared_ptr<Factor>& factor() const { return factor_; }

@@ -108,7 +108,10 @@ def states_of(
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
-        states = [state for item in what for state in states_of(item, **given)]
+        try:
+            states = [state for item in what for state in states_of(item, **given)]
+        except RecursionError:
+            raise ValueError("cannot draw a list that holds itself") from None
         if states:
             return states
         raise ValueError("there is nothing to draw: the list is empty")
