@@ -42,7 +42,13 @@ def resting_on_plane(sheet: ms.Shell, normal_gravity: float = GRAVITY) -> np.nda
 def block_on(obstacle, friction=None, *, gravity=(0, 0, -GRAVITY), sheet=None, **contact) -> ms.Scene:
     """A free block and one obstacle."""
     touching = ms.Contact(
-        obstacle, **{"friction_coefficient": friction, "contact_stiffness": STIFFNESS, "sticking_speed": STICKING, **contact}
+        obstacle,
+        **{
+            "friction_coefficient": friction,
+            "contact_stiffness": STIFFNESS,
+            "sticking_speed": STICKING,
+            **contact,
+        },
     )
     return ms.Scene(sheet or block_sheet(), contacts=[touching], gravity=gravity, allow_rigid_motions=True)
 
@@ -54,3 +60,8 @@ def simulated(scene: ms.Scene, steps: int, time_step: float, **options) -> ms.Tr
         time_step=time_step,
         **{"integrator": ms.ImplicitEuler(), "progress": False, **options},
     )
+
+
+def weight_of(sheet: ms.Shell) -> float:
+    """N."""
+    return float(sheet.vertex_masses.sum() * GRAVITY)
