@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from blocks import (
     GRAVITY,
-    STIFFNESS,
     block_on,
     block_sheet,
     depth_under,
@@ -29,7 +28,7 @@ def normal_forces(contact: ms.Contact, obstacle, positions, sheet) -> np.ndarray
 def test_at_rest_the_ground_carries_the_weight(offset):
     scene = block_on(ms.obstacles.Plane(), offset=offset)
     sheet = scene.shell
-    start = resting_on_plane(sheet) + [0, 0, offset]
+    start = resting_on_plane(sheet) + np.array([0, 0, offset])
     motion = simulated(scene, 20, 1e-2, start=start)
     np.testing.assert_allclose(motion.positions[-1], start, rtol=0, atol=1e-12)
     forces = normal_forces(scene.contacts[0], scene.obstacles[0], motion.positions[-1], sheet)
@@ -53,7 +52,6 @@ def quarter(cells=(8, 8), young_modulus=1e5) -> ms.Shell:
 def test_draped(obstacle):
     """A quarter of a sheet; its symmetry planes push sideways only, so the obstacle carries all of the weight."""
     sheet = quarter()
-    mesh = sheet.mesh
     sides = [ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]
     contact = ms.Contact(obstacle, contact_stiffness=100.0)
     scene = ms.Scene(

@@ -146,7 +146,7 @@ CREEP = 1e-3  # m/s, the sticking speed on ground that moves
 def carried(motion, friction, steps, integrator, velocities=None, at=(0.0, 0.0), **contact):
     """A block on a plane that moves, for so many milliseconds."""
     scene = block_on(ms.obstacles.Plane(motion=motion), friction, sticking_speed=CREEP, **contact)
-    start = resting_on_plane(scene.shell) + [*at, 0.0]
+    start = resting_on_plane(scene.shell) + np.array([*at, 0.0])
     if velocities is not None:
         velocities = velocities(start)
     return simulated(scene, steps, 1e-3, start=start, velocities=velocities, integrator=integrator)
