@@ -65,7 +65,7 @@ class Case:
     """A way to move: a sheet that falls onto an obstacle in a field, or swims, or both."""
 
     obstacle: object = plane
-    integrator: ms.ImplicitEuler | ms.TRBDF2 | ms.SDIRK2 | ms.SDIRK3 = ms.ImplicitEuler()
+    integrator: object = field(default_factory=ms.ImplicitEuler)
     motion: object = None
     contact: dict = field(default_factory=dict)
     water: bool = False
