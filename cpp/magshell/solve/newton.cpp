@@ -80,6 +80,7 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const 
     VectorXd cancelling = model_.cancelling_forces();
     // In the inertia of a short step, positions cancel.
     if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q.cwiseAbs());
+    model_.add_cancelling_contact_forces(anchor.motion != nullptr, cancelling);
     return std::max(
         relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
         relative(free.tail(rotations), magnitude.tail(rotations), cancelling.tail(rotations),
