@@ -51,6 +51,9 @@ class ForceTerm {
     /// - lambda . df/dk to the scene.
     virtual void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda,
                      KinematicsGradient& by, SceneGradient& out) const = 0;
+
+    /// Adds the magnitude of forces that cancel inside velocities at the last evaluated state.
+    virtual void add_cancelling_forces(const Kinematics& /*at*/, VectorXd& /*out*/) const {}
 };
 
 }  // namespace magshell

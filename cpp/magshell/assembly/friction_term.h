@@ -23,6 +23,7 @@ class FrictionTerm final : public ForceTerm {
                   Remainder& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              SceneGradient& out) const override;
+    void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 
   private:
     struct Rub {

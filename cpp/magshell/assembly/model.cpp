@@ -339,6 +339,12 @@ void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const S
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
 }
 
+void Model::add_cancelling_contact_forces(bool in_motion, VectorXd& out) const {
+    if (contact_) contact_->add_cancelling_normal_forces(out);
+    if (!in_motion) return;
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_cancelling_forces(kinematics_, out);
+}
+
 void Model::assemble_forces(const Controls& controls, bool cautious) {
     remainder_.clear();
     for (const std::unique_ptr<ForceTerm>& force : forces_)

@@ -43,6 +43,8 @@ class Model {
     const VectorXd& metric() const { return metric_; }
     /// The floor under every residual of a state, to be multiplied by the unit of round-off.
     VectorXd cancelling_forces(const VectorXd& q);
+    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or without.
+    void add_cancelling_contact_forces(bool in_motion, VectorXd& out) const;
 
     VectorXd rest_state() const;
     /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,), and back.

@@ -80,6 +80,7 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
     VectorXd cancelling = model_.cancelling_forces(q);
     // In the inertia of a short step, positions cancel.
     if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q.cwiseAbs());
+    model_.add_cancelling_contact_forces(anchor.motion != nullptr, cancelling);
     if (!with_floor) cancelling.setZero();
     return std::max(
         relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
