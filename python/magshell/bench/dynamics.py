@@ -12,7 +12,7 @@ import magshell as ms
 from . import motion_costs
 from .oscillator import METHODS, vibration
 from .other_integrators import OTHERS, energy_kept
-from .report import print_table, writable_path
+from .report import print_table
 
 INTEGRATORS = {
     "ImplicitEuler": ms.ImplicitEuler(),
@@ -32,12 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--long", type=int, default=100_000, help="steps of the long run (default 100000; 0: none)"
     )
-    parser.add_argument(
-        "--quick", action="store_true", help="fewer and smaller runs: what it prints, no more"
-    )
-    parser.add_argument(
-        "--figure", type=writable_path, metavar="PATH", help="draw error against time there (matplotlib)"
-    )
 
 
 def run(options: argparse.Namespace) -> dict:
@@ -51,11 +45,6 @@ def run(options: argparse.Namespace) -> dict:
     }
     if options.long:
         results["long run"] = motion_costs.long_run(options.long)
-    if options.figure:
-        from .figure import draw_integrators
-
-        draw_integrators(results["errors"], options.figure)
-        print(f"\nThe figure is {options.figure}.")
     return results
 
 

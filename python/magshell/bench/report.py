@@ -22,6 +22,12 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         help="write the numbers there, with machine and versions",
     )
+    parser.add_argument(
+        "--figure", type=writable_path, metavar="PATH", help="draw them there, a PNG (matplotlib)"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="small and few: to see what it prints and draws, no more"
+    )
     parser.add_argument("--threads", type=int, default=1, help="threads of magshell's loops (default 1)")
 
 
@@ -42,6 +48,40 @@ def writable_path(text: str) -> Path:
     except OSError as error:
         raise argparse.ArgumentTypeError(f"cannot write {path}: {error.strerror}") from error
     return path
+
+
+def writable_folder(text: str) -> Path:
+    """A folder in which files can be written, made if need be."""
+    folder = Path(text)
+    trial = folder / ".written"
+    if not trial.exists():
+        writable_path(str(trial)).unlink()
+    return folder
+
+
+def read_results(text: str) -> dict:
+    """What write_json wrote."""
+    try:
+        content = json.loads(Path(text).read_text())
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"cannot read {text}: {error.strerror}") from error
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text} is not JSON: {error}") from error
+    if not isinstance(content, dict) or not {"part", "setting", "results"} <= content.keys():
+        raise argparse.ArgumentTypeError(f"{text} was not written by the bench: it has no part, setting and results")
+    return content
+
+
+def as_json(results: dict) -> dict:
+    """The same as JSON would hold it: figures draw what a run hands over and what a file holds."""
+    return json.loads(json.dumps(results, default=_plain_number))
+
+
+def _plain_number(value):
+    """Of numpy's."""
+    if isinstance(value, numpy.ndarray | numpy.generic):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is no JSON")
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
