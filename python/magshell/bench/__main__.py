@@ -23,7 +23,7 @@ from .report import (
     write_json,
 )
 
-NO_PICTURE = 3  # exit status where the numbers are there and the picture is not
+MISSING_LIBRARY = 3  # exit status; where it is the plotting library, the numbers are there all the same
 
 
 class Part(NamedTuple):
@@ -40,7 +40,9 @@ PARTS = {
     ),
     "kernels": Part("kernels", "kernels", "gradient and Hessian, a face"),
     "terms": Part("terms", "terms", "what each part of a scene costs"),
-    "statics": Part("statics", "statics", "factorizations from flat, cost of an iteration, threads, backends"),
+    "statics": Part(
+        "statics", "statics", "factorizations from flat, cost of an iteration, threads, backends"
+    ),
     "gradients": Part("gradients", "gradients", "the cost of a gradient over that of its equilibrium"),
     "dynamics": Part(
         "dynamics", "dynamics", "integrators: error, time, energy; gradients and memory of motions"
@@ -69,9 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _part(name: str, arguments: list[str]) -> int:
     part = importlib.import_module(f"magshell.bench.{PARTS[name].module}")
-    parser = argparse.ArgumentParser(
-        prog=f"python -m magshell.bench {name}", description=PARTS[name].summary
-    )
+    parser = argparse.ArgumentParser(prog=f"python -m magshell.bench {name}", description=PARTS[name].summary)
     add_common_arguments(parser)
     part.add_arguments(parser)
     options = parser.parse_args(arguments)
@@ -101,7 +101,7 @@ def _missing(error: ImportError, what: str) -> int:
     if library not in EXTRAS:
         raise error
     print(f'{what}: this needs {library}: pip install "magshell[{EXTRAS[library]}]"', file=sys.stderr)
-    return NO_PICTURE
+    return MISSING_LIBRARY
 
 
 def _all(arguments: list[str]) -> int:
@@ -113,7 +113,10 @@ def _all(arguments: list[str]) -> int:
     status = 0
     for name in PARTS:
         print(f"\n=== {name}: {PARTS[name].summary}")
-        files = [f"--{kind}={options.folder / name}.{ending}" for kind, ending in (("json", "json"), ("figure", "png"))]
+        files = [
+            f"--{kind}={options.folder / name}.{ending}"
+            for kind, ending in (("json", "json"), ("figure", "png"))
+        ]
         try:
             ended = _part(name, [*files, *(["--quick"] if options.quick else [])])
         except SystemExit as error:  # the scenes of the paper may not be there, say

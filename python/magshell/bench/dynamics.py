@@ -38,9 +38,11 @@ def run(options: argparse.Namespace) -> dict:
     """Prints the tables, returns their numbers."""
     if options.rounds < 1 or options.long < 0:
         raise SystemExit("--rounds must be at least 1 and --long at least 0")
+    periods = 2 if options.quick else PERIODS
     results = {
+        "periods": periods,
         "errors": _errors(STEPS[:2] if options.quick else STEPS, 1 if options.quick else options.rounds),
-        "energies": _energies(2 if options.quick else PERIODS),
+        "energies": _energies(periods),
         **motion_costs.measure(options.rounds, options.quick),
     }
     if options.long:

@@ -31,6 +31,11 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threads", type=int, default=1, help="threads of magshell's loops (default 1)")
 
 
+def chosen(given, quick: bool, small, usual):
+    """What was asked for, or else what `--quick` or its lack says."""
+    return given if given is not None else small if quick else usual
+
+
 def set_threads(count: int) -> None:
     try:
         ms.set_num_threads(count)
@@ -68,7 +73,9 @@ def read_results(text: str) -> dict:
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"{text} is not JSON: {error}") from error
     if not isinstance(content, dict) or not {"part", "setting", "results"} <= content.keys():
-        raise argparse.ArgumentTypeError(f"{text} was not written by the bench: it has no part, setting and results")
+        raise argparse.ArgumentTypeError(
+            f"{text} was not written by the bench: it has no part, setting and results"
+        )
     return content
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
 import numpy as np
@@ -12,7 +13,7 @@ import magshell as ms
 from magshell import _core
 from magshell._inputs import Inputs
 
-from .report import print_table
+from .report import chosen, print_table
 from .statics import strongly_bent
 from .timing import Clocked, clocked, peak_memory, resident_memory
 
@@ -22,6 +23,8 @@ THREADS = (1, 2)
 FIELDS = 0.02, 0.05  # of the one that turns the sheet up: from the first to the second is what is timed
 ALLOWED_EXPONENT = 1.4  # of a Newton iteration
 ALLOWED_MEMORY = 1.3  # what the process grows by, over the factor's own
+
+_WHY = "as systems do with one that takes more memory than there is"
 
 # What is timed, s: its heading.
 TIMES = {
@@ -37,7 +40,10 @@ MEMORIES = {"model": "model", "factor": "factor", "peak": "process grew by"}  # 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--faces", type=int, nargs="+", help=f"sizes of the square sheet (default {' '.join(map(str, FACES))})"
+        "--faces",
+        type=int,
+        nargs="+",
+        help=f"sizes of the square sheet (default {' '.join(map(str, FACES))})",
     )
     parser.add_argument("--bending", choices=("midedge", "hinge"), default="midedge")
     parser.add_argument("--rounds", type=int, default=3, help="of each short measurement (default 3)")
@@ -45,22 +51,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the tables, returns their numbers."""
-    faces = options.faces or (QUICK_FACES if options.quick else FACES)
+    faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if min(faces) < 2 or options.rounds < 1:
         raise SystemExit("--faces must be at least 2 and --rounds at least 1")
-    sizes = {
-        threads: [_in_its_own_process(count, threads, options) for count in sorted(faces)] for threads in THREADS
-    }
-    one, two = sizes[THREADS[0]], sizes[THREADS[1]]
+    one, two, ended = _sizes(sorted(faces), options)
+    if not one:
+        raise SystemExit(f"no size was measured: the process of {ended} faces was ended, {_WHY}")
     exponents = _exponents(one)
     _print_times(one, two, exponents)
     _print_memory(one, exponents)
     _print_targets(one, two, exponents)
+    if ended is not None:
+        print(f"\nThe process of {ended} faces was ended, {_WHY}. It and larger sizes are left out.")
     return {
         "bending": options.bending,
-        "sizes": {str(threads): each for threads, each in sizes.items()},
+        "sizes": {str(threads): each for threads, each in zip(THREADS, (one, two), strict=True)},
         "exponents": exponents,
+        "ended": ended,
     }
+
+
+def _sizes(faces: list[int], options: argparse.Namespace) -> tuple[list[dict], list[dict], int | None]:
+    """Costs on one thread and on two, by size; and the size whose process was ended, if one was."""
+    measured = []
+    for count in faces:
+        try:
+            measured.append([_in_its_own_process(count, threads, options) for threads in THREADS])
+        except BrokenProcessPool:
+            return *([each[k] for each in measured] for k in (0, 1)), count
+    return *([each[k] for each in measured] for k in (0, 1)), None
 
 
 def _exponents(sizes: list[dict]) -> dict[str, float | None]:
@@ -129,9 +148,7 @@ def _gradient(scene: ms.Scene, inputs: dict, found: ms.Equilibrium, rounds: int)
         kept = _core.find_equilibrium(scene._model, state, memory, controls, controls, options)
         by_positions = np.ones((scene.mesh.n_vertices, 3))
         by_rotations = np.zeros(scene.mesh.n_edges)
-        return clocked(
-            lambda: _core.pull_back(scene._model, kept, by_positions, by_rotations), rounds=rounds
-        )
+        return clocked(lambda: _core.pull_back(scene._model, kept, by_positions, by_rotations), rounds=rounds)
 
 
 def _linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> dict[str, Clocked]:
@@ -150,7 +167,11 @@ def _linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> dict
 
 def _print_times(one: list[dict], two: list[dict], exponents: dict) -> None:
     rows = [
-        [f"{size['faces']}", f"{size['unknowns']}", *(f"{1e3 * size['processor'][name]:.3g}" for name in TIMES)]
+        [
+            f"{size['faces']}",
+            f"{size['unknowns']}",
+            *(f"{1e3 * size['processor'][name]:.3g}" for name in TIMES),
+        ]
         for size in one
     ]
     rows.append(["grows with", "faces to the", *(_exponent(exponents[name]) for name in TIMES)])
@@ -159,7 +180,11 @@ def _print_times(one: list[dict], two: list[dict], exponents: dict) -> None:
         [f"{a['faces']}", f"{a['unknowns']}", *(f"{a['wall'][name] / b['wall'][name]:.2f}" for name in TIMES)]
         for a, b in zip(one, two, strict=True)
     ]
-    print_table("Two threads: how many times as fast, by the clock on the wall", ["faces", "unknowns", *TIMES.values()], rows)
+    print_table(
+        "Two threads: how many times as fast, by the clock on the wall",
+        ["faces", "unknowns", *TIMES.values()],
+        rows,
+    )
 
 
 def _print_memory(sizes: list[dict], exponents: dict) -> None:
@@ -178,11 +203,15 @@ def _print_targets(one: list[dict], two: list[dict], exponents: dict) -> None:
     exponent = exponents["iteration"]
     if exponent is not None:
         missed = " MISSED" if exponent > ALLOWED_EXPONENT else ""
-        print(f"  a Newton iteration grows with the faces to the {exponent:.2f} (at most {ALLOWED_EXPONENT}){missed}")
+        print(
+            f"  a Newton iteration grows with the faces to the {exponent:.2f} (at most {ALLOWED_EXPONENT}){missed}"
+        )
     if last["peak"] is not None:
         ratio = last["peak"] / last["factor"]
         missed = " MISSED" if ratio > ALLOWED_MEMORY else ""
-        print(f"  the process grows by {ratio:.2f} times the factor's memory (at most {ALLOWED_MEMORY}){missed}")
+        print(
+            f"  the process grows by {ratio:.2f} times the factor's memory (at most {ALLOWED_MEMORY}){missed}"
+        )
     ratios = [a["wall"]["iteration"] / b["wall"]["iteration"] for a, b in zip(one, two, strict=True)]
     print(f"  an iteration on two threads is {ratios[0]:.2f} times as fast at {first['faces']} faces", end="")
     print(f", {ratios[-1]:.2f} times at {last['faces']}" if len(one) > 1 else "")

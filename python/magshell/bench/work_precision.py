@@ -132,7 +132,9 @@ def measure(studies: Iterable[Study] = STUDIES, *, quick: bool = False, rounds: 
     return points
 
 
-def _point(study: Study, mesh, bending: str, solver: str, irregular: bool, options: dict, rounds: int) -> Point:
+def _point(
+    study: Study, mesh, bending: str, solver: str, irregular: bool, options: dict, rounds: int
+) -> Point:
     kind = (study.name, bending, solver, irregular)
     runs: list[Outcome] = []
     try:
@@ -140,7 +142,9 @@ def _point(study: Study, mesh, bending: str, solver: str, irregular: bool, optio
             runs.append(study.run(mesh, bending, **options))
     except ms.NotConverged as error:
         found = error.last_good
-        return Point(*kind, str(mesh), 0, None, found.wall_time, found.factorizations, found.failed_factorizations)
+        return Point(
+            *kind, str(mesh), 0, None, found.wall_time, found.factorizations, found.failed_factorizations
+        )
     best = min(runs, key=lambda run: run.time)
     return Point(
         *kind,
@@ -174,13 +178,21 @@ def print_points(points: list[Point]) -> None:
                 for solver in ("mixed", "plain", "linear")
             }
             times = [
-                _until(ways[bending, solver] or (ways[bending, "linear"] if solver == "mixed" else []), within)
+                _until(
+                    ways[bending, solver] or (ways[bending, "linear"] if solver == "mixed" else []), within
+                )
                 for bending in BENDINGS
                 for solver in ("mixed", "plain")
             ]
             smallest = [
                 min(
-                    (p.error for way, each in ways.items() if way[0] == bending for p in each if p.error is not None),
+                    (
+                        p.error
+                        for way, each in ways.items()
+                        if way[0] == bending
+                        for p in each
+                        if p.error is not None
+                    ),
                     default=None,
                 )
                 for bending in BENDINGS

@@ -12,16 +12,12 @@ RADIUS, THICKNESS, YOUNG_MODULUS, POISSON_RATIO = 10.0, 0.04, 6.825e7, 0.3
 HOLE = np.radians(18.0)
 
 
-def quarter(
-    cells: tuple[int, int], hole: float = HOLE, irregular: float | None = None
-) -> ms.TriangleMesh:
+def quarter(cells: tuple[int, int], hole: float = HOLE, irregular: float | None = None) -> ms.TriangleMesh:
     """A quarter of the hemisphere, cells as those of the whole: around, along the meridian."""
     if cells[0] % 4:
         raise ValueError(f"a quarter needs a multiple of 4 cells around, got {cells[0]}")
     of_quarter = (cells[0] // 4, cells[1])
-    return ms.meshes.spherical_cap(
-        RADIUS, hole, np.pi / 2, np.pi / 2, cells=of_quarter, irregular=irregular
-    )
+    return ms.meshes.spherical_cap(RADIUS, hole, np.pi / 2, np.pi / 2, cells=of_quarter, irregular=irregular)
 
 
 def scene(mesh: ms.TriangleMesh, bending: str, force: float) -> ms.Scene:

@@ -55,9 +55,7 @@ def even_plate(
     return _quarter(mesh, bending, mesh_name(cells, irregular), allowed=None)
 
 
-def circular_plate(
-    rings: int = 48, bending: str = "midedge", *, irregular: float | None = None
-) -> Outcome:
+def circular_plate(rings: int = 48, bending: str = "midedge", *, irregular: float | None = None) -> Outcome:
     """The four deflections of a disk of radius 1.
 
     Its rim is a polygon, simply supported at its vertices. The lowest-order Hellan-Herrmann-Johnson element

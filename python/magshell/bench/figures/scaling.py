@@ -20,9 +20,18 @@ def draw(results: dict, setting: dict) -> Figure:
     times, faster, memory = figure.subplots(1, 3, width_ratios=(1.35, 0.9, 1.1))
     exponents = results["exponents"]
     for name, label in TIMES.items():
-        _line(times, faces, [size["processor"][name] for size in one], _TIME_COLOURS[name], label, exponents[name])
+        _line(
+            times,
+            faces,
+            [size["processor"][name] for size in one],
+            _TIME_COLOURS[name],
+            label,
+            exponents[name],
+        )
     times.set(xscale="log", yscale="log")
-    panel_title(times, "Seconds of one processor", f"an iteration may grow with the faces to the {ALLOWED_EXPONENT}")
+    panel_title(
+        times, "Seconds of one processor", f"an iteration may grow with the faces to the {ALLOWED_EXPONENT}"
+    )
     _ends(times)
 
     for name, label in TIMES.items():
@@ -46,7 +55,10 @@ def draw(results: dict, setting: dict) -> Figure:
         axes.xaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel("faces", fontsize=9)
-    note(figure, f"a square sheet bent by a field, {results['bending']}; {machine(setting).replace('1 thread, ', '')}")
+    note(
+        figure,
+        f"a square sheet bent by a field, {results['bending']}; {machine(setting).replace('1 thread, ', '')}",
+    )
     return figure
 
 
@@ -59,7 +71,8 @@ def _line(axes, faces, values, colour: str, label: str, exponent: float | None) 
 def _ends(axes) -> None:
     """Names at the ends of the lines, pushed apart where they would lie on each other."""
     lines = sorted(
-        (line for line in axes.lines if not line.get_label().startswith("_")), key=lambda line: line.get_ydata()[-1]
+        (line for line in axes.lines if not line.get_label().startswith("_")),
+        key=lambda line: line.get_ydata()[-1],
     )
     apart = 0.062
     low, high = (axes.transData.transform((1, y))[1] for y in axes.get_ylim())
@@ -71,5 +84,10 @@ def _ends(axes) -> None:
         places[k] = min(places[k], places[k + 1] - apart)
     for line, place in zip(lines, places, strict=True):
         axes.annotate(
-            line.get_label(), (1.02, place), xycoords="axes fraction", fontsize=8, color=line.get_color(), va="center"
+            line.get_label(),
+            (1.02, place),
+            xycoords="axes fraction",
+            fontsize=8,
+            color=line.get_color(),
+            va="center",
         )

@@ -33,7 +33,9 @@ def draw(results: dict, setting: dict) -> Figure:
         axes.tick_params(labelleft=k % columns == 0, labelbottom=below >= len(studies))
     figure.supylabel("largest relative error", fontsize=10, color=INK)
     figure.supxlabel(
-        f"wall time of one call from the rest shape, analysis included ({machine(setting)})", fontsize=10, color=INK
+        f"wall time of one call from the rest shape, analysis included ({machine(setting)})",
+        fontsize=10,
+        color=INK,
     )
     return figure
 
@@ -47,7 +49,9 @@ def _panel(axes, study: Study, points: list[dict]) -> None:
         axis.set_minor_formatter(NullFormatter())
     if study.known_to > _SMALLEST:
         axes.axhspan(_SMALLEST, study.known_to, color=SHADE, zorder=0)
-    for (bending, colour), irregular in ((each, i) for each in BENDING_COLOURS.items() for i in (False, True)):
+    for (bending, colour), irregular in (
+        (each, i) for each in BENDING_COLOURS.items() for i in (False, True)
+    ):
         of_kind = [
             p
             for p in points
@@ -92,11 +96,19 @@ def _legend(axes) -> None:
     lines.append(("the same by plain Newton", _look(INK, irregular=False, plain=True)))
     handles = [Line2D([], [], label=label, **look) for label, look in lines]
     handles.append(Patch(color=SHADE, label="below what the reference tells"))
-    axes.legend(handles=handles, loc="upper left", frameon=False, fontsize=8.5, labelcolor=INK, borderaxespad=0)
+    axes.legend(
+        handles=handles, loc="upper left", frameon=False, fontsize=8.5, labelcolor=INK, borderaxespad=0
+    )
 
 
 def _time(seconds: float, _) -> str:
-    return f"{1e6 * seconds:.0f} µs" if seconds < 1e-3 else f"{1e3 * seconds:g} ms" if seconds < 1 else f"{seconds:g} s"
+    return (
+        f"{1e6 * seconds:.0f} µs"
+        if seconds < 1e-3
+        else f"{1e3 * seconds:g} ms"
+        if seconds < 1
+        else f"{seconds:g} s"
+    )
 
 
 def _percent(error: float, _) -> str:
