@@ -18,6 +18,7 @@ from .report import (
     read_results,
     set_threads,
     setting,
+    settle_rounds,
     writable_folder,
     writable_path,
     write_json,
@@ -75,6 +76,7 @@ def _part(name: str, arguments: list[str]) -> int:
     add_common_arguments(parser)
     part.add_arguments(parser)
     options = parser.parse_args(arguments)
+    settle_rounds(options)
     set_threads(options.threads)
     try:
         results = as_json(part.run(options))

@@ -12,7 +12,7 @@ from .cases.hemisphere import large_deflection
 from .cases.magnetic_strip import field_across
 from .cases.shear_strip import end_shear
 from .convergence import COARSE_MESHES, MESHES, REQUIRED_ORDER, STUDIES, Convergence, converge
-from .report import print_table
+from .report import add_rounds, print_table
 from .work_precision import BENDINGS, measure, print_points
 from .work_precision import STUDIES as CURVES
 
@@ -29,13 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only", nargs="+", choices=names, metavar="CASE", help=f"some of {', '.join(names)}"
     )
-    parser.add_argument("--rounds", type=int, default=3, help="of each measurement of time (default 3)")
+    add_rounds(parser, 3)
 
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the tables, returns their numbers."""
-    if options.rounds < 1:
-        raise SystemExit("--rounds must be at least 1")
     cases = [case for case in CASES if options.only is None or case.name in options.only]
     curves = [curve for curve in CURVES if options.only is None or curve.name in options.only]
     if options.figure and not curves:
@@ -50,7 +48,7 @@ def run(options: argparse.Namespace) -> dict:
             (name, bending): converge(name, bending, meshes) for name in STUDIES for bending in BENDINGS
         }
         results["convergence"] = _print_orders(studies)
-    points = measure(curves, quick=options.quick, rounds=1 if options.quick else options.rounds)
+    points = measure(curves, quick=options.quick, rounds=options.rounds)
     print_points(points)
     results["error against time"] = [point._asdict() for point in points]
     return results

@@ -9,7 +9,7 @@ import numpy as np
 
 import magshell as ms
 
-from .report import chosen, print_table
+from .report import add_rounds, chosen, print_table
 
 FACES, QUICK_FACES = 8192, 128
 ALLOWED_SHARE = 0.10  # of the equilibrium's time
@@ -17,14 +17,14 @@ ALLOWED_SHARE = 0.10  # of the equilibrium's time
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--faces", type=int, help=f"of the sheet (default {FACES})")
-    parser.add_argument("--rounds", type=int, default=5, help="of each measurement (default 5)")
+    add_rounds(parser, 5)
 
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the table, returns its numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
-    if faces < 2 or options.rounds < 1:
-        raise SystemExit("--faces must be at least 2 and --rounds at least 1")
+    if faces < 2:
+        raise SystemExit("--faces must be at least 2")
     results = {bending: _cost(faces, options.rounds, bending) for bending in ("midedge", "hinge")}
     rows = [
         [bending, f"{cost['faces']} faces", cost["factorizations"]]

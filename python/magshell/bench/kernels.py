@@ -11,7 +11,7 @@ import numpy as np
 import magshell as ms
 from magshell import _core
 
-from .report import chosen, print_table
+from .report import add_rounds, chosen, print_table
 from .timing import Timing, clocked, measure, peak_memory
 
 FACES, QUICK_FACES = (8192, 131072), (128, 512)
@@ -55,14 +55,14 @@ class Cost(NamedTuple):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     shown = " and ".join(str(count) for count in FACES)
     parser.add_argument("--faces", type=int, nargs="+", help=f"sizes of the square sheet (default {shown})")
-    parser.add_argument("--rounds", type=int, default=7, help="of each measurement (default 7)")
+    add_rounds(parser, 7)
 
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the table, returns its numbers."""
     sizes = chosen(options.faces, options.quick, QUICK_FACES, FACES)
-    if min(sizes) < 2 or options.rounds < 1:
-        raise SystemExit("--faces must be at least 2 and --rounds at least 1")
+    if min(sizes) < 2:
+        raise SystemExit("--faces must be at least 2")
     costs = {sheet.name: [cost(sheet, faces, options.rounds) for faces in sizes] for sheet in SHEETS}
     rows = [row for name, each in costs.items() for row in _rows(name, each)]
     headings = ["sheet", "faces", "gradient", "median", "and Hessian", "median", "model [MB]", "built in [s]"]

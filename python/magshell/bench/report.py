@@ -31,6 +31,24 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threads", type=int, default=1, help="threads of magshell's loops (default 1)")
 
 
+def add_rounds(parser: argparse.ArgumentParser, usual: int) -> None:
+    """Of a part that measures times several times."""
+    parser.add_argument(
+        "--rounds",
+        type=int,
+        help=f"of each measurement of time, the best counts (default {usual}, with --quick 1)",
+    )
+    parser.set_defaults(usual_rounds=usual)
+
+
+def settle_rounds(options: argparse.Namespace) -> None:
+    """Puts the number in place, where the part has one."""
+    if hasattr(options, "rounds"):
+        options.rounds = chosen(options.rounds, options.quick, 1, options.usual_rounds)
+        if options.rounds < 1:
+            raise SystemExit(f"--rounds must be at least 1, got {options.rounds}")
+
+
 def chosen(given, quick: bool, small, usual):
     """What was asked for, or else what `--quick` or its lack says."""
     return given if given is not None else small if quick else usual

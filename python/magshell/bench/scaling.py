@@ -13,7 +13,7 @@ import magshell as ms
 from magshell import _core
 from magshell._inputs import Inputs
 
-from .report import chosen, print_table
+from .report import add_rounds, chosen, print_table
 from .statics import strongly_bent
 from .timing import Clocked, clocked, peak_memory, resident_memory
 
@@ -46,14 +46,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"sizes of the square sheet (default {' '.join(map(str, FACES))})",
     )
     parser.add_argument("--bending", choices=("midedge", "hinge"), default="midedge")
-    parser.add_argument("--rounds", type=int, default=3, help="of each short measurement (default 3)")
+    add_rounds(parser, 3)
 
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the tables, returns their numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
-    if min(faces) < 2 or options.rounds < 1:
-        raise SystemExit("--faces must be at least 2 and --rounds at least 1")
+    if min(faces) < 2:
+        raise SystemExit("--faces must be at least 2")
     one, two, ended = _sizes(sorted(faces), options)
     if not one:
         raise SystemExit(f"no size was measured: the process of {ended} faces was ended, {_WHY}")

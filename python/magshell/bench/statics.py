@@ -11,7 +11,7 @@ import magshell as ms
 from magshell import _core
 
 from .cases import hemisphere, magnetic_strip, shear_strip
-from .report import chosen, print_table
+from .report import add_rounds, chosen, print_table
 from .timing import clocked, measure, peak_memory
 
 FACES, QUICK_FACES = 8192, 128
@@ -38,14 +38,14 @@ SOLVERS = {"mixed": ms.MixedNewton(), "plain": ms.Newton(max_iterations=60)}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--faces", type=int, help=f"of the sheet that is bent strongly (default {FACES})")
-    parser.add_argument("--rounds", type=int, default=3, help="of each measurement (default 3)")
+    add_rounds(parser, 3)
 
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the tables, returns their numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
-    if faces < 2 or options.rounds < 1:
-        raise SystemExit("--faces must be at least 2 and --rounds at least 1")
+    if faces < 2:
+        raise SystemExit("--faces must be at least 2")
     scene, controls = strongly_bent(faces)
     from_flat = _from_flat()
     iteration = _iteration(scene, controls, options.rounds)

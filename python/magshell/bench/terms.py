@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import magshell as ms
 
-from .report import chosen, print_table
+from .report import add_rounds, chosen, print_table
 from .timing import Clocked, clocked
 
 FACES, QUICK_FACES = 8192, 128
@@ -63,14 +63,14 @@ def _dipole(count: int) -> ms.Dipoles:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--faces", type=int, help=f"of the square sheet (default {FACES})")
-    parser.add_argument("--rounds", type=int, default=3, help="of each measurement (default 3)")
+    add_rounds(parser, 3)
 
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the table, returns its numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
-    if faces < 2 or options.rounds < 1:
-        raise SystemExit("--faces must be at least 2 and --rounds at least 1")
+    if faces < 2:
+        raise SystemExit("--faces must be at least 2")
     cells = max(1, round((faces / 2) ** 0.5))
     mesh = ms.meshes.rectangle(SIDE, SIDE, cells=(cells, cells))
     results: list[dict] = []
