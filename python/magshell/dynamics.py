@@ -112,7 +112,7 @@ def simulate(
         curvature_scale=curvature_scale,
     )
     uniform = np.zeros(3) if scene.has_uniform_field else None
-    inputs = Inputs(scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True)
+    inputs = Inputs(scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True, moving=True)
     asked = MotionInputs(
         inputs,
         steps=steps,

@@ -10,12 +10,15 @@
 #include <vector>
 
 #include "magshell/assembly/bending_term.h"
+#include "magshell/assembly/contact_term.h"
 #include "magshell/assembly/couple_term.h"
+#include "magshell/assembly/force_term.h"
 #include "magshell/assembly/load_term.h"
 #include "magshell/assembly/magnetic_term.h"
 #include "magshell/assembly/membrane_term.h"
 #include "magshell/assembly/reduction.h"
 #include "magshell/assembly/scene_input.h"
+#include "magshell/assembly/water_term.h"
 #include "magshell/linalg/factor.h"
 
 namespace magshell {
@@ -68,6 +71,21 @@ class Model {
     /// them.
     VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
 
+    /// Forces that no energy has act only within the stages of time steps. A step begins at q; at a stage, after
+    /// evaluate and after assemble at the same q, they add to the residual and to matrix(), and leave the rest
+    /// of their Jacobian in remainder().
+    bool has_forces() const { return !forces_.empty(); }
+    void begin_step(const VectorXd& q, const Controls& controls);
+    bool has_contact() const { return contact_ != nullptr; }
+    /// Why a step from q to `end` cannot be: a point would be on the other side of an obstacle. Else empty.
+    std::string blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                        const Controls& controls_at_end) const;
+    void evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage);
+    void assemble_forces(const Controls& controls);
+    const Remainder& remainder() const { return remainder_; }
+    /// Adds - lambda . df/dk to the scene's gradient; returns lambda . df by what else they depend on.
+    KinematicsGradient forces_vjp(const Controls& controls, const VectorXd& lambda, SceneGradient& out) const;
+
     /// lambda . dg/dk at the last evaluated state, for all k but what supports do; lambda is zero where they
     /// hold.
     SceneGradient vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda);
@@ -96,6 +114,7 @@ class Model {
   private:
     void add_terms(const SceneInput& input);
     void add_couples(const SceneInput& input);
+    void add_contacts(const std::vector<ContactInput>& contacts);
     template <class T>
     T* add(std::unique_ptr<T> term);
     void share_out_columns();
@@ -114,6 +133,11 @@ class Model {
     MagneticTerm* magnetic_ = nullptr;
     LoadTerm *gravity_ = nullptr, *loads_ = nullptr;
     CoupleTerm* couples_ = nullptr;
+    ContactTerm* contact_ = nullptr;
+    WaterTerm* water_ = nullptr;
+    std::vector<std::unique_ptr<ForceTerm>> forces_;
+    Kinematics kinematics_;  // where the forces were evaluated last
+    Remainder remainder_;
     std::unique_ptr<Factor> analysed_;
     int analyses_ = 0;
     std::vector<double> thickness_;  // in our numbering

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "magshell/core/errors.h"
+
 namespace magshell {
 namespace {
 
@@ -26,6 +28,10 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
 constexpr Index most_new_negative_pivots = 10;
 constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
+
+// Of linear solves with forces that make the matrix unsymmetric: within Newton's iteration, and for gradients.
+constexpr double inexact_solve = 1e-9, exact_solve = 1e-13;
+constexpr int few_vectors = 30, many_vectors = 300;
 
 // Adds the time it lives to a sum.
 class Stopwatch {
@@ -97,19 +103,35 @@ void Newton::add_weights(const Anchor& anchor) {
     for (Index k = 0; k < pattern.size; ++k) values_[pattern.column_starts[k]] += weights[k];
 }
 
-FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
+void Newton::evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
     model_.evaluate(q, controls);
-    model_.assemble(q, controls, false);
+    if (anchor.motion && model_.has_forces()) model_.evaluate_forces(q, controls, *anchor.motion);
+}
+
+void Newton::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+                      const Anchor& anchor) {
+    model_.assemble(q, controls, extrapolated_stress);
+    const bool forces = anchor.motion && model_.has_forces();
+    if (forces) model_.assemble_forces(controls);
+    unsymmetric_ = forces && !model_.remainder().empty();
+}
+
+FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    evaluate(q, controls, anchor);
+    assemble(q, controls, false, anchor);
     return factorize_assembled(anchor);
 }
 
 FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
                                const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves) {
-    model_.assemble(q, controls, extrapolated_stress);
+    assemble(q, controls, extrapolated_stress, anchor);
     for (Eigen::Index k = 0; k < moves.cols(); ++k) {
         if (moves.col(k).isZero(0.0)) continue;
         const VectorXd move = moves.col(k);
-        model_.matrix().multiply(move.data(), moves.col(k).data());
+        VectorXd pull(move.size());
+        model_.matrix().multiply(move.data(), pull.data());
+        if (unsymmetric_) model_.remainder().add_product(move, false, pull);
+        moves.col(k) = pull;
     }
     return factorize_assembled(anchor);
 }
@@ -119,11 +141,15 @@ std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& 
                                              const VectorXd& rhs) {
     constexpr int most_refinements = 4;
     constexpr double exact = 1e-13;  // of the right-hand side
-    model_.evaluate(q, controls);
-    model_.assemble(q, controls, false);
+    evaluate(q, controls, anchor);
+    assemble(q, controls, false, anchor);
     reduce_assembled(anchor);
     const Stopwatch running(linear_time_);
-    const VectorXd b = model_.reduction().vector(rhs);
+    VectorXd b = model_.reduction().vector(rhs);
+    if (unsymmetric_) {
+        if (!solve_unsymmetric(nearby, true, {exact_solve, few_vectors}, b).converged) return std::nullopt;
+        return model_.reduction().expand(b);
+    }
     VectorXd solution = VectorXd::Zero(b.size()), left = b;
     for (int k = 0; k <= most_refinements; ++k) {
         if (left.norm() <= exact * b.norm()) return model_.reduction().expand(solution);
@@ -137,8 +163,35 @@ std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& 
 VectorXd Newton::solve_with_factor(const VectorXd& rhs) const {
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
-    factor_->solve(reduced);
+    if (unsymmetric_)
+        solve_unsymmetric(*factor_, false, {inexact_solve, many_vectors}, reduced);
+    else
+        factor_->solve(reduced);
     return model_.reduction().expand(reduced);
+}
+
+VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
+    if (!unsymmetric_) return solve_with_factor(rhs);
+    const Stopwatch running(linear_time_);
+    VectorXd reduced = model_.reduction().vector(rhs);
+    const GmresReport report = solve_unsymmetric(*factor_, true, {exact_solve, many_vectors}, reduced);
+    if (!report.converged)
+        throw InvalidInput("a linear solve with friction or water stopped at a residual of " +
+                           std::to_string(report.residual));
+    return model_.reduction().expand(reduced);
+}
+
+VectorXd Newton::assembled_product(const VectorXd& reduced, bool transposed) const {
+    const Reduction& reduction = model_.reduction();
+    VectorXd rest = VectorXd::Zero(model_.size());
+    model_.remainder().add_product(reduction.expand(reduced), transposed, rest);
+    return product(reduction.pattern(), values_.data(), reduced) + reduction.vector(rest);
+}
+
+GmresReport Newton::solve_unsymmetric(const Factor& factor, bool transposed, const GmresOptions& options,
+                                      VectorXd& reduced) const {
+    return gmres([&](const VectorXd& x) { return assembled_product(x, transposed); },
+                 [&](VectorXd& x) { factor.solve(x); }, reduced, options);
 }
 
 NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor) {
@@ -153,6 +206,41 @@ NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls) {
     return iterate(q, controls, {}, options_.max_iterations, false);
 }
 
+NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    constexpr int most_iterations = 60;
+    constexpr double shortest = 1.0 / 4096.0;  // of a step
+    NewtonReport report;
+    q += model_.reduction().prescribed_increment(q, controls.motion);
+    evaluate(q, controls, anchor);
+    for (;; ++report.iterations, ++iterations_) {
+        report.residual = relative_residual(q, anchor);
+        watch(report.residual);
+        report.converged = report.residual <= options_.tolerance;
+        if (report.converged) return report;
+        if (!std::isfinite(report.residual) || report.iterations == most_iterations) {
+            report.reason = "no convergence in " + std::to_string(most_iterations) + " shortened steps";
+            return report;
+        }
+        Eigen::MatrixXd no_moves(q.size(), 0);
+        const FactorReport factor = factorize(q, controls, false, anchor, no_moves);
+        if (!factor.succeeded) {
+            report.reason = factor.reason;
+            return report;
+        }
+        const VectorXd step = solve_with_factor(-gradient(q, anchor)), from = q;
+        const auto length = [&](const VectorXd& p) {
+            return std::sqrt(p.dot(anchor.weights->cwiseProduct(p)));
+        };
+        const double whole = length(step);
+        for (double share = 1.0;; share *= 0.5) {
+            q = from + share * step;
+            evaluate(q, controls, anchor);
+            if (share <= shortest || relative_residual(q, anchor) <= options_.tolerance) break;
+            if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.25 * share) * whole) break;
+        }
+    }
+}
+
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                              bool mixed) {
     NewtonReport report;
@@ -164,7 +252,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         report.reason = std::move(reason);
         return report;
     };
-    model_.evaluate(q, controls);
+    evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);
         watch(report.residual);
@@ -194,7 +282,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         extrapolated = true;
         last_step = length;
         q += step;
-        model_.evaluate(q, controls);
+        evaluate(q, controls, anchor);
     }
 }
 
