@@ -122,10 +122,13 @@ def test_terms(tmp_path, capsys) -> None:
 
 def test_parts_of_a_scene_add_up() -> None:
     mesh = ms.meshes.rectangle(0.1, 0.1, cells=(2, 2))
-    scene, solve, motion = _together(mesh, PARTS)
+    scene, solve, motion = _together(mesh, PARTS, moving=True)
     assert len(scene.loads) == 2 and len(scene.fields) == 3 and scene.gravity.any()
     assert scene.shell.bending == "midedge" and solve["remanent_magnetization"][2] > 0
     assert motion.keys() == {"damping", "stiffness_damping", "maxwell_modulus", "maxwell_time"}
+    assert [contact.friction_coefficient for contact in scene.contacts] == [0.6] and scene.water is not None
+    at_rest, *_ = _together(mesh, PARTS, moving=False)
+    assert [contact.friction_coefficient for contact in at_rest.contacts] == [None] and at_rest.water is None
 
 
 # The banner alone would take as long as all others.

@@ -21,14 +21,22 @@ COLUMNS = {"assembly": 2, "iteration": 1, "step_iteration": 1}  # of the table, 
 
 
 class Part(NamedTuple):
-    """What a scene gets more, beyond the parts before it: keywords for ms.Scene, given the mesh, for every solve, and for
-    motions only. Lists are added to what is there; `sheet` goes to ms.Shell."""
+    """What a scene gets more, beyond the parts before it.
+
+    sheet: keywords for ms.Shell. scene: for ms.Scene, given the mesh; lists are added to what is there, all else
+    replaces it. solve: for ms.equilibrium and ms.simulate. What only motions know: in_motion, as scene; motion, for
+    ms.simulate.
+    """
 
     name: str
     sheet: dict[str, Any] = {}  # noqa: RUF012
     scene: Callable[[ms.TriangleMesh], dict[str, Any]] = lambda mesh: {}
     solve: dict[str, Any] = {}  # noqa: RUF012
+    in_motion: Callable[[ms.TriangleMesh], dict[str, Any]] = lambda mesh: {}
     motion: dict[str, Any] = {}  # noqa: RUF012
+
+    def only_moves(self, mesh: ms.TriangleMesh) -> bool:
+        return not (self.sheet or self.scene(mesh) or self.solve)
 
 
 # A new term is one line here.
@@ -49,6 +57,9 @@ PARTS = (
     Part("and out of its plane", solve={"remanent_magnetization": OUT_OF_PLANE}),
     Part("field of a dipole", scene=lambda mesh: {"field": [_dipole(1)]}),
     Part("of nine more dipoles", scene=lambda mesh: {"field": [_dipole(9)]}),
+    Part("contact with a plane", scene=lambda mesh: {"contacts": (_floor(),)}),
+    Part("friction there", in_motion=lambda mesh: {"contacts": (_floor(friction_coefficient=0.6),)}),
+    Part("water", in_motion=lambda mesh: {"water": ms.Water()}),
     Part("viscous damping", motion={"damping": 1e-6}),
     Part("stiffness damping", motion={"stiffness_damping": 1e-4}),
     Part("Maxwell branch", motion={"maxwell_modulus": 0.5, "maxwell_time": 0.01}),
@@ -59,6 +70,10 @@ def _dipole(count: int) -> ms.Dipoles:
     """In a row under the sheet."""
     places = [(SIDE * (k + 0.5) / count, 0.3 * SIDE, -2.0 * SIDE) for k in range(count)]
     return ms.Dipoles(places, [(0.0, 0.0, 0.3 / count)] * count)
+
+
+def _floor(**options) -> ms.Contact:
+    return ms.Contact(ms.obstacles.Plane(), contact_stiffness=100.0, **options)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,8 +92,7 @@ def run(options: argparse.Namespace) -> dict:
     for k, part in enumerate(PARTS):
         so_far = PARTS[: k + 1]
         before = results[-1] if results else None
-        # What only motions feel leaves the others as they are.
-        of_rest = before if before and not (part.sheet or part.solve or part.scene(mesh)) else None
+        of_rest = before if before and part.only_moves(mesh) else None  # nothing changes at rest
         results.append({"part": part.name, **_costs(mesh, so_far, options.rounds, of_rest)})
     _print(mesh.n_faces, results)
     return {"faces": mesh.n_faces, "parts": results}
@@ -86,9 +100,9 @@ def run(options: argparse.Namespace) -> dict:
 
 def _costs(mesh: ms.TriangleMesh, parts: tuple[Part, ...], rounds: int, of_rest: dict | None) -> dict:
     """s: of gradient and Hessian, of a Newton iteration, of a time step and of an iteration of it."""
-    scene, solve, motion = _together(mesh, parts)
-    found = ms.equilibrium(scene, **solve)
     if of_rest is None:
+        scene, solve, _ = _together(mesh, parts, moving=False)
+        found = ms.equilibrium(scene, **solve)
         model, state, controls = scene._model, found._state, found._controls
         assembly = clocked(lambda: model.assemble(state, controls), rounds=rounds)
         whole = clocked(lambda: ms.equilibrium(scene, **solve), rounds=rounds)
@@ -99,12 +113,13 @@ def _costs(mesh: ms.TriangleMesh, parts: tuple[Part, ...], rounds: int, of_rest:
             "iteration": _seconds(iteration),
             "factorizations": found.factorizations,
         }
+    scene, solve, motion = _together(mesh, parts, moving=True)
     moves: list[ms.Trajectory] = []
 
     def move() -> None:
         options = {"steps": STEPS, "time_step": TIME_STEP, "record_every": STEPS, "progress": False}
-        integrator = ms.ImplicitEuler()
-        moves[:] = [ms.simulate(scene, integrator=integrator, **options, **solve, **motion)]
+        options["integrator"] = ms.ImplicitEuler()
+        moves[:] = [ms.simulate(scene, **options, **solve, **motion)]
 
     step = Clocked(*(seconds / STEPS for seconds in clocked(move, rounds=rounds)))
     names = ("unknowns", "assembly", "iteration", "factorizations")
@@ -116,7 +131,7 @@ def _costs(mesh: ms.TriangleMesh, parts: tuple[Part, ...], rounds: int, of_rest:
     }
 
 
-def _together(mesh: ms.TriangleMesh, parts: tuple[Part, ...]) -> tuple[ms.Scene, dict, dict]:
+def _together(mesh: ms.TriangleMesh, parts: tuple[Part, ...], moving: bool) -> tuple[ms.Scene, dict, dict]:
     """A scene with all parts, what its solves take and what its motions take beside."""
     shell = {"thickness": THICKNESS, "young_modulus": 1e6, "poisson_ratio": 0.45, "mass_density": 1e3}
     scene: dict[str, Any] = {"supports": [ms.Clamp(mesh.edges_at(x=0.0))]}
@@ -125,7 +140,8 @@ def _together(mesh: ms.TriangleMesh, parts: tuple[Part, ...]) -> tuple[ms.Scene,
         shell |= part.sheet
         solve |= part.solve
         motion |= part.motion
-        for name, value in part.scene(mesh).items():
+        more = part.scene(mesh) | (part.in_motion(mesh) if moving else {})
+        for name, value in more.items():
             scene[name] = scene.get(name, []) + value if isinstance(value, list) else value
     return ms.Scene(ms.Shell(mesh, **shell), **scene), solve, motion
 
