@@ -1,6 +1,7 @@
 """The parts of the bench that measure speed: what they print and write on tiny sheets. Never how fast."""
 
 import json
+import time
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from bench_figures import is_a_picture
 
 import magshell as ms
+from magshell.bench import timing
 from magshell.bench.__main__ import main
 from magshell.bench.paper import examples_folder
 from magshell.bench.paper_rows import ROWS
@@ -107,6 +109,23 @@ def test_scaling_without_the_memory_for_it(monkeypatch, tmp_path, capsys) -> Non
 def test_exponents() -> None:
     assert fitted_exponent([10, 100, 1000], [3.0, 30.0 * 10**0.5, 3000.0]) == pytest.approx(1.5)
     assert fitted_exponent([10, 10], [1.0, 2.0]) is None and fitted_exponent([1, 2], [1.0, None]) is None
+
+
+@pytest.mark.parametrize("long", [True, False])
+def test_a_long_call_is_measured_once(monkeypatch, long: bool) -> None:
+    calls = []
+    monkeypatch.setattr(timing, "LONG", -1.0 if long else 1e9)
+    measured = timing.clocked(lambda: calls.append(time.sleep(2e-3)), rounds=2, seconds=6e-3)
+    assert len(calls) == 1 if long else 3 <= len(calls) <= 1 + 2 * 3
+    assert measured.wall >= 2e-3 and 0 <= measured.processor < measured.wall
+
+
+def test_share_of_the_processor() -> None:
+    ms.set_num_threads(1)
+    slept, share = timing.with_share(lambda: time.sleep(0.05))
+    assert slept is None and share < 0.5
+    ms.set_num_threads(2)
+    assert timing.with_share(lambda: time.sleep(0.01))[1] == 1.0
 
 
 def test_terms(tmp_path, capsys) -> None:

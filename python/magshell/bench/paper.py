@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import magshell as ms
 
 from .paper_rows import ROWS, Row
 from .report import chosen, print_table
+from .timing import with_share
 
 ITERATIONS, QUICK_ITERATIONS = 5, 1
 PAPER_MACHINE = "six cores of an i7-8700, 3.2 GHz"
@@ -87,10 +87,7 @@ def _measured(row: Row, iterations: int) -> dict:
     }
     if importlib.util.find_spec(row.example) is None:
         return {**known, "absent": True}
-    wall, processor = time.perf_counter(), time.process_time()
-    found = row.run(iterations)
-    # By the share of the wall's time that this process had: another's work is none of the row's.
-    share = (time.process_time() - processor) / (time.perf_counter() - wall)
+    found, share = with_share(lambda: row.run(iterations))
     seconds = found.seconds * share
     return {
         **known,

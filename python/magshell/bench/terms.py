@@ -78,7 +78,7 @@ def _floor(**options) -> ms.Contact:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--faces", type=int, help=f"of the square sheet (default {FACES})")
-    add_rounds(parser, 3)
+    add_rounds(parser, 5)
 
 
 def run(options: argparse.Namespace) -> dict:

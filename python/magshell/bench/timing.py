@@ -6,9 +6,11 @@ import statistics
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import magshell as ms
+
+Result = TypeVar("Result")
 
 
 class Timing(NamedTuple):
@@ -63,6 +65,16 @@ def _timed(call: Callable[[], object], repeats: int) -> Clocked:
     for _ in range(repeats):
         call()
     return Clocked((time.process_time() - processor) / repeats, (time.perf_counter() - wall) / repeats)
+
+
+def with_share(call: Callable[[], Result]) -> tuple[Result, float]:
+    """What it returns, and the share of the wall's time that this process had meanwhile: wall times that were measured
+    inside, times this, are what they would have been without other people's work. 1 on several threads.
+    """
+    processor, wall = time.process_time(), time.perf_counter()
+    result = call()
+    processor, wall = time.process_time() - processor, time.perf_counter() - wall
+    return result, processor / wall if ms.num_threads() == 1 else 1.0
 
 
 def peak_memory() -> int | None:
