@@ -124,6 +124,7 @@ def test_share_of_the_processor() -> None:
     ms.set_num_threads(1)
     slept, share = timing.with_share(lambda: time.sleep(0.05))
     assert slept is None and share < 0.5
+    assert timing.with_share(lambda: None)[1] == 1.0
     ms.set_num_threads(2)
     assert timing.with_share(lambda: time.sleep(0.01))[1] == 1.0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import platform
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import scipy
 
 import magshell as ms
 from magshell import _core
+from magshell._progress import progress_bar
 
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:
@@ -107,6 +109,11 @@ def _plain_number(value):
     if isinstance(value, numpy.ndarray | numpy.generic):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} is no JSON")
+
+
+def bar(title: str, total: int):
+    """A progress bar, where someone looks on."""
+    return progress_bar(title, total, shown=sys.stderr.isatty(), leave=False, delay=2.0)
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

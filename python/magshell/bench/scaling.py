@@ -13,7 +13,7 @@ import magshell as ms
 from magshell import _core
 from magshell._inputs import Inputs
 
-from .report import add_rounds, chosen, print_table
+from .report import add_rounds, bar, chosen, print_table
 from .statics import strongly_bent
 from .timing import Clocked, clocked, peak_memory, resident_memory
 
@@ -73,13 +73,19 @@ def run(options: argparse.Namespace) -> dict:
 
 def _sizes(faces: list[int], options: argparse.Namespace) -> tuple[list[dict], list[dict], int | None]:
     """Costs on one thread and on two, by size; and the size whose process was ended, if one was."""
-    measured = []
-    for count in faces:
-        try:
-            measured.append([_in_its_own_process(count, threads, options) for threads in THREADS])
-        except BrokenProcessPool:
-            return *([each[k] for each in measured] for k in (0, 1)), count
-    return *([each[k] for each in measured] for k in (0, 1)), None
+    one, two = [], []
+    with bar("sizes", 2 * len(faces)) as shown:
+        for count in faces:
+            try:
+                pair = []
+                for threads in THREADS:
+                    pair.append(_in_its_own_process(count, threads, options))
+                    shown.update()
+            except BrokenProcessPool:
+                return one, two, count
+            one.append(pair[0])
+            two.append(pair[1])
+    return one, two, None
 
 
 def _exponents(sizes: list[dict]) -> dict[str, float | None]:

@@ -47,6 +47,7 @@ class Clocked(NamedTuple):
     wall: float
 
 
+SHORT = 0.02  # s: what a call may take to be left alone for once
 LONG = 1.0  # s: a call that takes longer is measured once, without one that warms up
 
 
@@ -69,12 +70,13 @@ def _timed(call: Callable[[], object], repeats: int) -> Clocked:
 
 def with_share(call: Callable[[], Result]) -> tuple[Result, float]:
     """What it returns, and the share of the wall's time that this process had meanwhile: wall times that were measured
-    inside, times this, are what they would have been without other people's work. 1 on several threads.
+    inside, times this, are what they would have been without other people's work. 1 on several threads, and for short
+    calls, of which one in a few goes undisturbed.
     """
     processor, wall = time.process_time(), time.perf_counter()
     result = call()
     processor, wall = time.process_time() - processor, time.perf_counter() - wall
-    return result, processor / wall if ms.num_threads() == 1 else 1.0
+    return result, processor / wall if ms.num_threads() == 1 and wall > SHORT else 1.0
 
 
 def peak_memory() -> int | None:

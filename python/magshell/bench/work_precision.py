@@ -18,15 +18,14 @@ from .cases.magnetic_strip import field_across, field_against
 from .cases.plates import circular_plate, even_plate, square_plate
 from .cases.rolled_strip import end_moment
 from .cases.shear_strip import end_shear
-from .report import print_table
-from .timing import with_share
+from .report import bar, print_table
+from .timing import LONG, SHORT, with_share
 
 BENDINGS = ("midedge", "hinge")
 IRREGULAR = 0.25  # of the spacing: how far vertices are moved
 SOLVERS: dict[str, ms.Newton] = {"mixed": ms.MixedNewton(), "plain": ms.Newton()}
 WITHIN = 0.01  # the error that the table gives times for, where the case's reference is known that well
 QUICK_MESHES = 2  # of each case
-LONG = 1.0  # s: what takes longer is measured once
 
 
 class Study(NamedTuple):
@@ -121,25 +120,29 @@ class Point(NamedTuple):
 
 def measure(studies: Iterable[Study] = STUDIES, *, quick: bool = False, rounds: int = 3) -> list[Point]:
     """The points of all cases; of each time the best of so many rounds."""
+    asked = [
+        (study, mesh, bending, solver, irregular)
+        for study in studies
+        for bending, irregular in product(BENDINGS, (False, True))
+        for solver in (SOLVERS if study.nonlinear else ("linear",))
+        for mesh in (study.meshes[:QUICK_MESHES] if quick else study.meshes)
+    ]
     points = []
-    for study in studies:
-        meshes = study.meshes[:QUICK_MESHES] if quick else study.meshes
-        solvers = SOLVERS if study.nonlinear else {"linear": None}
-        for bending, irregular, solver, mesh in product(BENDINGS, (False, True), solvers, meshes):
-            options: dict[str, Any] = {"irregular": IRREGULAR if irregular else None}
-            if study.nonlinear:
-                options["solver"] = solvers[solver]
-            points.append(_point(study, mesh, bending, solver, irregular, options, rounds))
+    with bar("error against time", len(asked)) as shown:
+        for each in asked:
+            points.append(_point(*each, rounds))
+            shown.update()
     return points
 
 
-def _point(
-    study: Study, mesh, bending: str, solver: str, irregular: bool, options: dict, rounds: int
-) -> Point:
+def _point(study: Study, mesh, bending: str, solver: str, irregular: bool, rounds: int) -> Point:
+    options: dict[str, Any] = {"irregular": IRREGULAR if irregular else None}
+    if study.nonlinear:
+        options["solver"] = SOLVERS[solver]
     kind = (study.name, bending, solver, irregular)
     runs: list[tuple[Outcome, float]] = []
     try:
-        while not runs or (len(runs) < rounds and runs[-1][1] < LONG):
+        while not runs or len(runs) < _worth_repeating(runs[-1][1], rounds):
             run, share = with_share(lambda: study.run(mesh, bending, **options))
             runs.append((run, run.time * share))
     except ms.NotConverged as error:
@@ -157,6 +160,10 @@ def _point(
         best.factorizations,
         best.failed_factorizations,
     )
+
+
+def _worth_repeating(seconds: float, rounds: int) -> int:
+    return 1 if seconds > LONG else rounds if seconds > SHORT else 4 * rounds
 
 
 def print_points(points: list[Point]) -> None:

@@ -30,7 +30,9 @@ def draw(results: dict, setting: dict) -> Figure:
         )
     times.set(xscale="log", yscale="log")
     panel_title(
-        times, "Seconds of one processor", f"an iteration may grow with the faces to the {ALLOWED_EXPONENT}"
+        times,
+        "Seconds of one processor",
+        f"with exponents of the faces: at most {ALLOWED_EXPONENT} for an iteration",
     )
     _ends(times)
 
@@ -47,7 +49,7 @@ def draw(results: dict, setting: dict) -> Figure:
             megabytes = [value / 1e6 for value in values]
             _line(memory, faces, megabytes, _MEMORY_COLOURS[name], label, exponents[name])
     memory.set(xscale="log", yscale="log")
-    panel_title(memory, "MB", f"the process may grow by {ALLOWED_MEMORY} times the factor's")
+    panel_title(memory, "MB", f"with exponents; the process at most {ALLOWED_MEMORY} times the factor")
     _ends(memory)
     for axes in (times, faster, memory):
         tidy(axes)
