@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import platform
 import sys
 from collections.abc import Iterable, Sequence
@@ -145,6 +146,7 @@ def setting() -> dict[str, str | int]:
     return {
         "machine": platform.machine(),
         "processor": _processor(),
+        "processors": os.cpu_count() or 1,
         "system": platform.platform(),
         "python": platform.python_version(),
         "numpy": numpy.__version__,
