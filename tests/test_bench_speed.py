@@ -83,14 +83,22 @@ def test_scaling(tmp_path, capsys) -> None:
         assert all(size["processor"].keys() == size["wall"].keys() == TIMES.keys() for size in sizes)
         assert all(min(size["wall"].values()) > 0 for size in sizes)
     small, large = results["sizes"]["1"]
-    assert small["factor"] < large["factor"] and small["model"] < large["model"]
+    assert small["entries"] < small["factor"] < large["factor"] and small["model"] < large["model"]
     assert results["exponents"].keys() == TIMES.keys() | MEMORIES.keys()
     assert 0.9 < results["exponents"]["model"] < 1.1
 
 
 def test_scaling_without_the_memory_for_it(monkeypatch, tmp_path, capsys) -> None:
     """What was measured before the process was ended is there."""
-    size = {"faces": 8, "unknowns": 9, "factorizations": 1, "model": 10, "factor": 20, "peak": None}
+    size = {
+        "faces": 8,
+        "unknowns": 9,
+        "factorizations": 1,
+        "model": 10,
+        "entries": 9,
+        "factor": 20,
+        "peak": None,
+    }
     size |= {clock: dict.fromkeys(TIMES, 1.0) for clock in ("processor", "wall")}
 
     def measured(faces: int, threads: int, options) -> dict:

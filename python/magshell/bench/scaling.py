@@ -35,7 +35,8 @@ TIMES = {
     "iteration": "Newton iteration",
     "gradient": "adjoint gradient",
 }
-MEMORIES = {"model": "model", "factor": "factor", "peak": "process grew by"}  # bytes
+# Bytes: the core's model; the entries of L; the factor with its work space; the whole process.
+MEMORIES = {"model": "model", "entries": "entries of L", "factor": "factor", "peak": "process grew by"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -124,10 +125,11 @@ def costs(faces: int, threads: int, bending: str, rounds: int) -> dict:
 
     whole = clocked(solve, rounds=rounds)
     peak = peak_memory()
+    algebra, nonzeros = _linear_algebra(scene, found, rounds)
     times = {
         "iteration": Clocked(*(seconds / found.factorizations for seconds in whole)),
         "gradient": _gradient(scene, inputs, found, rounds),
-        **_linear_algebra(scene, found, rounds),
+        **algebra,
     }
     return {
         "faces": scene.mesh.n_faces,
@@ -136,6 +138,7 @@ def costs(faces: int, threads: int, bending: str, rounds: int) -> dict:
         "processor": {name: each.processor for name, each in times.items()},
         "wall": {name: each.wall for name, each in times.items()},
         "model": scene._model.bytes,
+        "entries": 8 * nonzeros,
         "factor": found.memory - scene._model.bytes,
         "peak": None if peak is None or before is None else peak - before,
     }
@@ -157,8 +160,8 @@ def _gradient(scene: ms.Scene, inputs: dict, found: ms.Equilibrium, rounds: int)
         return clocked(lambda: _core.pull_back(scene._model, kept, by_positions, by_rotations), rounds=rounds)
 
 
-def _linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> dict[str, Clocked]:
-    """Each step of an iteration by itself, at the equilibrium."""
+def _linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> tuple[dict[str, Clocked], int]:
+    """Each step of an iteration by itself, at the equilibrium; and how many entries L has."""
     model, state, controls = scene._model, found._state, found._controls
     n, starts, rows, values = model.hessian(state, controls)
     factor, right = _core.analyze(n, starts, rows), np.ones(n)
@@ -168,7 +171,7 @@ def _linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> dict
         "factorization": lambda: factor.factorize(values),
         "solve": lambda: factor.solve(right),
     }
-    return {name: clocked(step, rounds=rounds) for name, step in steps.items()}
+    return {name: clocked(step, rounds=rounds) for name, step in steps.items()}, factor.nonzeros
 
 
 def _print_times(one: list[dict], two: list[dict], exponents: dict) -> None:

@@ -6,11 +6,24 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, NullLocator
 
 from ..scaling import ALLOWED_EXPONENT, ALLOWED_MEMORY, MEMORIES, TIMES
-from .style import BLUE, COLOURS, FAINT, GREEN, INK, VERMILION, machine, new_figure, note, panel_title, tidy
+from .style import (
+    BLUE,
+    COLOURS,
+    FAINT,
+    GREEN,
+    INK,
+    SKY,
+    VERMILION,
+    machine,
+    new_figure,
+    note,
+    panel_title,
+    tidy,
+)
 
 _TIME_COLOURS = dict(zip(TIMES, COLOURS, strict=True))
 _TIME_COLOURS["iteration"] = INK
-_MEMORY_COLOURS = dict(zip(MEMORIES, (GREEN, BLUE, VERMILION), strict=True))
+_MEMORY_COLOURS = dict(zip(MEMORIES, (GREEN, SKY, BLUE, VERMILION), strict=True))
 
 
 def draw(results: dict, setting: dict) -> Figure:
