@@ -42,8 +42,9 @@ class ForceTerm {
     /// Subtracts the force, once all energies were evaluated at the same state.
     virtual void evaluate(const Kinematics& at, const Controls& controls, Residual& out) = 0;
 
-    /// Adds K at the last evaluated state.
-    virtual void assemble(const Kinematics& at, const Controls& controls, SystemMatrix& out,
+    /// Adds K at the last evaluated state. Cautious: what keeps an iteration from overshooting instead of the exact
+    /// derivatives, where there is such a thing.
+    virtual void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
                           Remainder& rest) const = 0;
 
     /// At the last evaluated state: adds lambda . df/dv, lambda . df/dw and lambda . df/d(begin) to `by`, and

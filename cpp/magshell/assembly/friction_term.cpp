@@ -44,10 +44,12 @@ void FrictionTerm::evaluate(const Kinematics& at, const Controls& controls, Resi
         if (rubs_[touch.contact]) rub(touch, true);
 }
 
-void FrictionTerm::assemble(const Kinematics& at, const Controls&, SystemMatrix& out, Remainder& rest) const {
+void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool cautious, SystemMatrix& out,
+                            Remainder& rest) const {
     for (const Rub& each : rubbing_) {
         const double coefficient = contact_.law(each.touch).friction;
-        contact_.add_block(each.touch, -coefficient * at.rate * each.friction.by_velocity, out);
+        const Mat3& by_velocity = cautious ? each.friction.secant : each.friction.by_velocity;
+        contact_.add_block(each.touch, -coefficient * at.rate * by_velocity, out);
         if (each.lagged) continue;
         const Mat3 block = -coefficient * by_place(each.friction, each.touch, each.obstacle.spin());
         const ContactPoint& point = contact_.point(each.touch);

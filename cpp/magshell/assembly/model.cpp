@@ -323,10 +323,10 @@ void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const S
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
 }
 
-void Model::assemble_forces(const Controls& controls) {
+void Model::assemble_forces(const Controls& controls, bool cautious) {
     remainder_.clear();
     for (const std::unique_ptr<ForceTerm>& force : forces_)
-        force->assemble(kinematics_, controls, matrix_, remainder_);
+        force->assemble(kinematics_, controls, cautious, matrix_, remainder_);
 }
 
 KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda,

@@ -70,13 +70,14 @@ class Newton {
     /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes,
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
-                           const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves);
+                           const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves, bool cautious = false);
     /// K^T p = rhs with the Hessian at q, by refinement with a factorization from nearby. Empty where that does
     /// not converge quickly.
     std::optional<VectorXd> solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
                                          const Factor& nearby, const VectorXd& rhs);
-    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held.
-    VectorXd solve_with_factor(const VectorXd& rhs) const;
+    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held. Only where forces make
+    /// K unsymmetric the tolerance counts: of the residual, over the norm of rhs.
+    VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
     /// K^T p = rhs likewise, to round-off. Throws InvalidInput where forces make K too unsymmetric for that.
     VectorXd solve_transposed(const VectorXd& rhs) const;
 
@@ -101,7 +102,8 @@ class Newton {
   private:
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                          bool mixed);
-    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor);
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor,
+                  bool cautious = false);
     void reduce_assembled(const Anchor& anchor);
     /// K p, or K^T p, of what was assembled last, free unknowns.
     VectorXd assembled_product(const VectorXd& reduced, bool transposed) const;
