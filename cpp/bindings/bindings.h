@@ -20,8 +20,10 @@ void register_mesh(py::module_& module);
 void register_continuation(py::module_& module);
 void register_dynamics(py::module_& module);
 void register_field(py::module_& module);
+void register_force(py::module_& module);
 void register_linalg(py::module_& module);
 void register_model(py::module_& module);
+void register_obstacle(py::module_& module);
 void register_statics(py::module_& module);
 
 }  // namespace magshell::bindings

@@ -18,9 +18,14 @@ std::vector<Controls> controls_of(const py::dict& given) {
     const auto factor = [&](const char* name) { return to_vector(given[name].cast<Array>()); };
     const VectorXd field = factor("field"), load = factor("load"), gravity = factor("gravity"),
                    motion = factor("motion");
+    const Array poses = given["obstacles"].cast<Array>();  // (knots, n, 4, 3), or none
     std::vector<Controls> controls;
-    for (Index k = 0; k < flux_density.rows(); ++k)
-        controls.push_back({flux_density.row(k).transpose(), field[k], load[k], gravity[k], motion[k]});
+    for (Index k = 0; k < flux_density.rows(); ++k) {
+        controls.push_back({flux_density.row(k).transpose(), field[k], load[k], gravity[k], motion[k], {}});
+        for (py::ssize_t o = 0; poses.ndim() == 4 && o < poses.shape(1); ++o)
+            controls.back().obstacles.push_back({Vec3(poses.data(k, o, 0, 0)), Vec3(poses.data(k, o, 1, 0)),
+                                                 Vec3(poses.data(k, o, 2, 0)), Vec3(poses.data(k, o, 3, 0))});
+    }
     return controls;
 }
 

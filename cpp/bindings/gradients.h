@@ -17,6 +17,27 @@ inline Array rows_of(const std::vector<Motion>& motions) {
     return rows;
 }
 
+// Stiffness and friction, (k, 2).
+inline Array rows_of(const std::vector<ContactLaw>& contacts) {
+    Array rows({static_cast<py::ssize_t>(contacts.size()), py::ssize_t{2}});
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+        rows.mutable_at(k, 0) = contacts[k].stiffness;
+        rows.mutable_at(k, 1) = contacts[k].friction;
+    }
+    return rows;
+}
+
+// Centers and rotation vectors, (k, 2, 3).
+inline Array rows_of(const std::vector<Placement>& placements) {
+    Array rows({static_cast<py::ssize_t>(placements.size()), py::ssize_t{2}, py::ssize_t{3}});
+    for (std::size_t k = 0; k < placements.size(); ++k)
+        for (int c = 0; c < 3; ++c) {
+            rows.mutable_at(k, 0, c) = placements[k].center[c];
+            rows.mutable_at(k, 1, c) = placements[k].rotation_vector[c];
+        }
+    return rows;
+}
+
 inline py::dict to_dict(const Model& model, const SceneGradient& g) {
     py::dict result;
     result["thickness"] = g.thickness;
@@ -29,6 +50,13 @@ inline py::dict to_dict(const Model& model, const SceneGradient& g) {
     result["couples"] = g.couples;
     result["motions"] = rows_of(g.motions);
     result["field_sources"] = g.field_sources;
+    result["water"] = py::dict(py::arg("fluid_density") = g.water.fluid_density,
+                               py::arg("velocity") = g.water.velocity,
+                               py::arg("drag_coefficient") = g.water.drag_coefficient,
+                               py::arg("thrust_coefficient") = g.water.thrust_coefficient,
+                               py::arg("added_mass") = g.water.added_mass);
+    result["contacts"] = rows_of(g.contacts);
+    result["placements"] = rows_of(g.obstacles);
     result["applied_flux_density"] = g.controls.flux_density;
     result["field_factor"] = g.controls.field;
     result["load_factor"] = g.controls.load;

@@ -32,6 +32,37 @@ std::vector<Motion> motions_of(const Array& rows) {
     return motions;
 }
 
+std::vector<ContactInput> contacts_of(const py::list& given) {
+    std::vector<ContactInput> contacts;
+    for (const py::handle each : given) {
+        ContactInput& contact = contacts.emplace_back();
+        contact.obstacles = each["obstacles"].cast<std::vector<Index>>();
+        contact.rubs = each["rubs"].cast<bool>();
+        contact.lagged = each["lagged"].cast<bool>();
+        const IndexArray vertices = each["vertices"].cast<IndexArray>();
+        const Array weights = each["weights"].cast<Array>();
+        for (py::ssize_t p = 0; p < vertices.shape(0); ++p)
+            contact.points.push_back(
+                {{vertices.at(p, 0), vertices.at(p, 1), vertices.at(p, 2)}, Vec3(weights.data(p, 0))});
+    }
+    return contacts;
+}
+
+std::vector<ContactLaw> contact_laws_of(const Array& rows) {
+    std::vector<ContactLaw> laws;
+    for (py::ssize_t k = 0; k < rows.shape(0); ++k)
+        laws.push_back({rows.at(k, 0), rows.at(k, 1), rows.at(k, 2), rows.at(k, 3), rows.at(k, 4)});
+    return laws;
+}
+
+std::vector<PlacedObstacle> obstacles_of(const py::list& shapes, const Array& placements) {
+    std::vector<PlacedObstacle> placed;
+    for (py::size_t k = 0; k < shapes.size(); ++k)
+        placed.push_back({shapes[k].cast<std::shared_ptr<Obstacle>>(),
+                          {Vec3(placements.data(k, 0)), Vec3(placements.data(k, 1))}});
+    return placed;
+}
+
 SceneValues values_of(const py::dict& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     SceneValues values;
@@ -47,6 +78,9 @@ SceneValues values_of(const py::dict& given) {
     values.motions = motions_of(array("motions"));
     for (const py::handle source : given["field_sources"])
         values.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
+    values.water = given["water"].cast<std::shared_ptr<Water>>();
+    values.contacts = contact_laws_of(array("contacts"));
+    values.obstacles = obstacles_of(given["obstacles"], array("placements"));
     return values;
 }
 
@@ -63,6 +97,7 @@ std::unique_ptr<Model> make_model(const std::shared_ptr<TriangleMesh>& mesh, con
     for (py::ssize_t k = 0; k < couple_edges.shape(0); ++k)
         input.couples.push_back({couple_edges.at(k, 0), couple_edges.at(k, 1)});
     input.magnetic = given["magnetic"].cast<bool>();
+    input.contacts = contacts_of(given["contacts"]);
     input.values = values_of(values);
     const py::gil_scoped_release unlocked;
     return std::make_unique<Model>(std::move(input));
@@ -105,7 +140,7 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
 void register_model(py::module_& module) {
     py::class_<Controls>(module, "Controls")
         .def(py::init([](const Vec3& flux_density, double field, double load, double gravity, double motion) {
-                 return Controls{flux_density, field, load, gravity, motion};
+                 return Controls{flux_density, field, load, gravity, motion, {}};
              }),
              py::kw_only(), py::arg("flux_density") = Vec3::Zero().eval(), py::arg("field") = 0.0,
              py::arg("load") = 0.0, py::arg("gravity") = 0.0, py::arg("motion") = 0.0)

@@ -1,9 +1,10 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
-from . import control, meshes, objectives, optim, parametrize
+from . import control, meshes, objectives, obstacles, optim, parametrize
 from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
+from .contact import Contact
 from .design import minimize
 from .dynamics import simulate
 from .equilibria import Equilibria
@@ -39,6 +40,7 @@ from .supports import Clamp, Pin, SymmetryPlane
 from .trajectory import MotionState, Trajectory
 from .vibration import VibrationModes, vibration_modes
 from .warm_start import WarmStart
+from .water import Water
 from .weld import Weld, weld
 
 __all__ = [
@@ -49,6 +51,7 @@ __all__ = [
     "AreaLoad",
     "Buckling",
     "Clamp",
+    "Contact",
     "CriticalPoint",
     "CustomField",
     "DesignRejected",
@@ -84,6 +87,7 @@ __all__ = [
     "UniformField",
     "VibrationModes",
     "WarmStart",
+    "Water",
     "Weld",
     "__version__",
     "animate",
@@ -97,6 +101,7 @@ __all__ = [
     "multistart",
     "num_threads",
     "objectives",
+    "obstacles",
     "optim",
     "parametrize",
     "plot",

@@ -31,7 +31,7 @@ class Inputs:
     """The controls, the magnetization and the scene's values of one solve. Raises ValueError where they do not fit.
 
     `replaced`: {object of the scene: {name: value}}. `leaves`: the tensors that a gradient goes back to; without
-    `differentiable` they are refused.
+    `differentiable` they are refused. `moving`: the solve is in time.
     """
 
     def __init__(
@@ -42,10 +42,16 @@ class Inputs:
         *,
         replaced: dict[object, dict] | None = None,
         differentiable: bool = False,
+        moving: bool = False,
         **factors,
     ):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+        if scene.has_forces_of_motion and not moving:
+            raise ValueError(
+                "the scene has friction or water, which act on what moves: use ms.simulate, with some damping until it "
+                "rests, or leave them out of this scene (friction_coefficient=None, water=None)"
+            )
         self.scene = scene
         self.given = []
         self.leaves: list[Leaf] = []

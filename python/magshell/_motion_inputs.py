@@ -11,6 +11,7 @@ from ._inputs import Inputs
 from ._quantity import quantity
 from ._schedule import scheduled
 from ._start import check_faces
+from ._surroundings import check_outside, poses
 from ._tensors import is_tensor
 from .equilibrium import Equilibrium
 from .integrators import Integrator
@@ -78,7 +79,10 @@ class MotionInputs:
                 "integrator": integrator._name,
                 "time_step": self.time_step,
                 "steps": self.steps,
-                "controls": {_CONTROLS[name][2]: array for name, array in self._knots.items()},
+                "controls": {
+                    **{_CONTROLS[name][2]: array for name, array in self._knots.items()},
+                    "obstacles": self._poses(),
+                },
                 "newton": solver._newton_options(),
                 "record_every": self.record_every,
             },
@@ -90,6 +94,17 @@ class MotionInputs:
         a_step = len(self.integrator._times) + 1
         ends = a_step * self.record_every * np.arange(1, count) - 1
         return knots[np.concatenate([[0], ends])]
+
+    def _poses(self) -> np.ndarray:
+        """Of the obstacles at all knots; their time goes on where the start's ended."""
+        values, scene = self.inputs.values, self.inputs.scene
+        shares = np.array((0.0, *self.integrator._times))
+        if any(leaf.name == "time_step" for leaf in self.inputs.leaves) and any(
+            values.current(each).motion is not None for each in scene.obstacles
+        ):
+            raise ValueError("time_step cannot have a gradient where obstacles move by a function of the time")
+        times = self.start.time + self.time_step * (np.arange(self.steps)[:, None] + shares).ravel()
+        return poses([values.current(each) for each in scene.obstacles], times)
 
     def _controls(self, name: str, value, time_step) -> np.ndarray:
         unit, row, _ = _CONTROLS[name]
@@ -162,6 +177,7 @@ class MotionInputs:
         inputs, model, mesh = self.inputs, self.inputs.scene._model, self.inputs.scene.mesh
         still = np.zeros(model.size)
         if start is None:
+            check_outside(inputs.scene, inputs.values, mesh.rest_positions, 0.0)
             return MotionState(0.0, model.rest_state(), still, [])
         if isinstance(start, Equilibrium | Trajectory):
             if start.scene is not inputs.scene:
@@ -170,15 +186,33 @@ class MotionInputs:
                 return start.end
             return MotionState(0.0, start._state, still, start._memory)
         if isinstance(start, MotionState):
-            if len(start.state) != model.size:
-                raise ValueError(
-                    f"start is a state of {len(start.state)} unknowns, but the scene has {model.size}"
-                )
-            return start
+            return _checked_state(start, model.size, mesh.n_faces)
         given = inputs.take("positions", start)
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
         check_faces(mesh, positions)
+        check_outside(inputs.scene, inputs.values, positions, 0.0)
         return MotionState(0.0, model.state(positions, np.zeros(mesh.n_edges)), still, [])
+
+
+def _checked_state(start: MotionState, size: int, n_faces: int) -> MotionState:
+    """A MotionState as it is. Its arrays come from a file, or from a caller who made it."""
+    if np.ndim(start.state) == 1 and len(start.state) != size:
+        raise ValueError(f"start is a state of {len(start.state)} unknowns, but the scene has {size}")
+    given = {name: getattr(start, name) for name in ("state", "velocity", "acceleration")}
+    for name, values in given.items():
+        optional = name == "acceleration" and np.shape(values) == (0,)
+        quantity(f"start.{name}", "SI", values, (0,) if optional else (size,))
+    for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
+        values = getattr(start, name)
+        quantity(f"start.{name}", "SI", values, (2, 0 if np.size(values) == 0 else n_faces, 3))
+    if not isinstance(start.memory, list):
+        raise ValueError(
+            f"start.memory must be a list of lists of numbers, got {type(start.memory).__name__}"
+        )
+    for k, each in enumerate(start.memory):
+        quantity(f"start.memory[{k}]", "SI", each, ("n",))
+    quantity("start.time", "s", start.time, ())
+    return start
 
 
 def _count(name: str, value) -> int:

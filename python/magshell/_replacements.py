@@ -45,7 +45,8 @@ def _add(asked: dict, owner, name: str, value) -> None:
 
 
 def _check(scene, owner, named) -> None:
-    if not any(owner is item for item in (scene, scene.shell, *scene.supports, *scene.loads, *scene.fields)):
+    parts = (*scene.supports, *scene.loads, *scene.fields, *scene.contacts, *scene.obstacles, scene.water)
+    if not any(owner is item for item in (scene, scene.shell, *parts)):
         raise ValueError(f"values has a key that is not the scene, nor an object of it: {owner!r}")
     if not isinstance(named, dict):
         raise ValueError(f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}")

@@ -9,6 +9,7 @@ import numpy as np
 from . import _core
 from ._inputs import Inputs
 from ._quantity import quantity
+from ._surroundings import check_outside
 from ._tensors import to_array
 from .equilibrium import Equilibrium
 from .scene import Scene
@@ -26,6 +27,7 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     """State, the core's memory of it, controls at which it holds, and whether it is an equilibrium there."""
     model = scene._model
     if start is None:
+        check_outside(scene, inputs.values, scene.mesh.rest_positions, 0.0)
         return model.rest_state(), [], _core.Controls(), True
     if isinstance(start, Origin):
         return start.state, start.memory, start.inputs.controls, True
@@ -41,6 +43,7 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     if len(positions) != n_v:
         raise ValueError(f"start [m] must have shape (n_v, 3) = ({n_v}, 3), got {positions.shape}")
     check_faces(scene.mesh, positions)
+    check_outside(scene, inputs.values, positions, 0.0)
     return model.state(positions, np.zeros(scene.mesh.n_edges)), [], inputs.controls, False
 
 

@@ -22,7 +22,7 @@ class Values:
         self._now = {
             item: item.replaced(**values) for item, values in (replaced or {}).items() if item is not scene
         }
-        self.shell = self._current(scene.shell)
+        self.shell = self.current(scene.shell)
         self._constraints = constraints
         if any(support in self._now for support in scene.supports):
             self._constraints = self._moved(constraints)
@@ -30,6 +30,7 @@ class Values:
         self.gravity = own.get("gravity", scene.gravity)
         self._heavy = bool(scene.gravity.any())
         self.couple_edges, couples = self._couples()
+        obstacles = [self.current(each) for each in scene.obstacles]
         self.core = {
             "thickness": self.shell.thickness,
             "young_modulus": self.shell.young_modulus,
@@ -40,13 +41,18 @@ class Values:
             "vertex_loads": own.get("vertex_loads", self._vertex_loads()),
             "couples": couples,
             "motions": np.array([motion[:3] for motion in self._constraints.motions]).reshape(-1, 3, 3),
-            "field_sources": [self._current(source)._core for source in _sources(scene)],
+            "contacts": np.array([self.current(each).law(self.shell) for each in scene.contacts]).reshape(-1, 5),
+            "placements": np.array([(now.center, now.rotation) for now in obstacles]).reshape(-1, 2, 3),
+            "obstacles": [now._core for now in obstacles],
+            "water": None if scene.water is None else self.current(scene.water)._core,
+            "field_sources": [self.current(source)._core for source in _sources(scene)],
         }
 
     def same_as(self, other: Values) -> bool:
         mine, others = dict(self.core), dict(other.core)
-        if mine.pop("field_sources") != others.pop("field_sources"):
-            return False
+        for objects in ("field_sources", "obstacles", "water"):
+            if mine.pop(objects) != others.pop(objects):
+                return False
         return all(np.array_equal(mine[name], others[name]) for name in mine)
 
     def gradients(self, owner, gradient: dict) -> dict[str, np.ndarray]:
@@ -70,16 +76,25 @@ class Values:
         if owner in scene.loads:
             return owner.gradients(mesh, gradient["vertex_loads"])
         if owner in scene.supports:
-            return self._motion_gradients(self._current(owner), gradient["motions"])
+            return self._motion_gradients(self.current(owner), gradient["motions"])
+        if owner in scene.contacts:
+            names = ("contact_stiffness", "friction_coefficient")
+            return dict(zip(names, gradient["contacts"][scene.contacts.index(owner)], strict=True))
+        if owner is scene.water:
+            return gradient["water"]
+        if owner in scene.obstacles:
+            center, rotation = gradient["placements"][scene.obstacles.index(owner)]
+            return {"center": center, "rotation": rotation}
         return owner.gradients(gradient["field_sources"][_sources(scene).index(owner)])
 
-    def _current(self, item):
+    def current(self, item):
+        """An object of the scene as it is in this solve."""
         return self._now.get(item, item)
 
     def _moved(self, constraints: _constraints.Constraints) -> _constraints.Constraints:
         """The same constraints with other motions."""
         scene = self._scene
-        supports = [self._current(support) for support in scene.supports]
+        supports = [self.current(support) for support in scene.supports]
         moved = _constraints.gather(scene.mesh, supports, scene._couple_directions)
         if not np.array_equal(moved.held_nodes, constraints.held_nodes):
             raise ValueError(
@@ -94,13 +109,13 @@ class Values:
         return {"center": center, "rotation": rotation, "displacement": displacement}
 
     def _vertex_loads(self) -> np.ndarray:
-        loads = [self._current(load) for load in self._scene.loads if not isinstance(load, EdgeCouple)]
+        loads = [self.current(load) for load in self._scene.loads if not isinstance(load, EdgeCouple)]
         forces = [load.vertex_forces(self._scene.mesh) for load in loads]
         return np.sum(forces, axis=0) if forces else np.zeros((0, 3))
 
     def _couples(self) -> tuple[np.ndarray, np.ndarray]:
         """Edges and what turns them, N m."""
-        loads = [self._current(load) for load in self._scene.loads if isinstance(load, EdgeCouple)]
+        loads = [self.current(load) for load in self._scene.loads if isinstance(load, EdgeCouple)]
         parts = [load.edge_couples(self._scene.mesh) for load in loads]
         if not parts:
             return np.zeros(0, dtype=np.int64), np.zeros(0)

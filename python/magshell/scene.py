@@ -8,13 +8,15 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from . import _constraints, _core
+from . import _constraints, _core, _surroundings
 from ._quantity import quantity
 from ._values import Values
+from .contact import Contact
 from .field import AppliedField, UniformField
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .shell import Shell
 from .supports import Clamp, Pin, SymmetryPlane, continuations
+from .water import Water
 
 _LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple)
 _SUPPORTS = (Pin, Clamp, SymmetryPlane)
@@ -28,6 +30,8 @@ class Scene:
     loads: PointLoad, EdgeLoad, AreaLoad and EdgeCouple objects.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     gravity: (3,), m/s2; needs the shell's mass density.
+    contacts: Contact objects, each with the obstacles that it is about.
+    water: what the sheet moves through, in ms.simulate only.
     allow_rigid_motions: accept a scene that supports do not hold entirely, because a field or gravity does.
 
     >>> import magshell as ms
@@ -45,6 +49,8 @@ class Scene:
         loads=(),
         field=None,
         gravity=None,
+        contacts=(),
+        water: Water | None = None,
         allow_rigid_motions: bool = False,
     ):
         if not isinstance(shell, Shell):
@@ -53,6 +59,11 @@ class Scene:
         self.supports = _checked_list("supports", supports, _SUPPORTS)
         self.loads = _checked_list("loads", loads, _LOADS)
         self.fields = () if field is None else _checked_list("field", field, (AppliedField,))
+        self.contacts = _checked_list("contacts", contacts, (Contact,))
+        self.obstacles = _surroundings.obstacles_of(self.contacts)
+        if water is not None and not isinstance(water, Water):
+            raise ValueError(f"water must be a Water, got {type(water).__name__}")
+        self.water = water
         self.gravity = np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
         if any(f._core is None and not isinstance(f, UniformField) for f in self.fields):
             raise ValueError("field holds an AppliedField without a value: use a CustomField")
@@ -73,6 +84,8 @@ class Scene:
             "loads": self.loads,
             "field": self.fields,
             "gravity": self.gravity,
+            "contacts": self.contacts,
+            "water": self.water,
             "allow_rigid_motions": self._allow_rigid_motions,
         }
 
@@ -110,6 +123,7 @@ class Scene:
                 np.int32
             ),
             magnetic=bool(self.fields),
+            contacts=_surroundings.contact_inputs(self.contacts, mesh),
         )
 
     @contextmanager
@@ -133,6 +147,11 @@ class Scene:
         return any(isinstance(f, UniformField) for f in self.fields)
 
     @property
+    def has_forces_of_motion(self) -> bool:
+        """Whether forces act on it that no energy has: friction, water."""
+        return self.water is not None or any(contact.friction_coefficient is not None for contact in self.contacts)
+
+    @property
     def n_unknowns(self) -> int:
         """Free position components and edge rotations."""
         return self._model.free_size
@@ -142,6 +161,9 @@ class Scene:
         lines += [f"  held by {support!r}" for support in self.supports]
         lines += [f"  loaded by {type(load).__name__}" for load in self.loads]
         lines += [f"  in {field!r}" for field in self.fields]
+        lines += [f"  kept out by {contact!r}" for contact in self.contacts]
+        if self.water is not None:
+            lines.append(f"  in {self.water!r}")
         if self.gravity.any():
             lines.append(f"  under gravity {tuple(self.gravity.tolist())} m/s2")
         lines.append(f"  {self.n_unknowns} unknowns")

@@ -9,34 +9,6 @@
 namespace magshell {
 namespace {
 
-void add(VectorXd& sum, const VectorXd& part) {
-    if (sum.size() == 0)
-        sum = part;
-    else if (part.size() > 0)
-        sum += part;
-}
-
-void add(SceneGradient& sum, const SceneGradient& part) {
-    for (VectorXd SceneGradient::* each :
-         {&SceneGradient::thickness, &SceneGradient::young_modulus, &SceneGradient::poisson_ratio,
-          &SceneGradient::curvature_scale, &SceneGradient::weights, &SceneGradient::loads,
-          &SceneGradient::couples})
-        add(sum.*each, part.*each);
-    if (sum.remanent_magnetization.rows() == 0)
-        sum.remanent_magnetization = part.remanent_magnetization;
-    else
-        sum.remanent_magnetization += part.remanent_magnetization;
-    sum.motions.resize(part.motions.size());
-    for (std::size_t k = 0; k < part.motions.size(); ++k) {
-        sum.motions[k].centre += part.motions[k].centre;
-        sum.motions[k].rotation_vector += part.motions[k].rotation_vector;
-        sum.motions[k].translation += part.motions[k].translation;
-    }
-    sum.field_sources.resize(part.field_sources.size());
-    for (std::size_t k = 0; k < part.field_sources.size(); ++k)
-        add(sum.field_sources[k], part.field_sources[k]);
-}
-
 // The rates of a step, from its states: those it began with, and those of its stages.
 struct Rates {
     std::vector<VectorXd> x_hat, v_hat;
@@ -147,7 +119,8 @@ class Backward {
             by_x.head(coordinates) += by_vi.head(coordinates) / adt;
             by_x_hat.head(coordinates) = -by_vi.head(coordinates) / adt;
 
-            const VectorXd lambda = back_through(algebra, at, i, record.stages[i], step, part, by_x, viscous);
+            const auto [lambda, by_forces] =
+                back_through(algebra, at, i, record, step, part, by_x, viscous);
             const VectorXd accelerated = lambda.cwiseProduct(w), moved = lambda.cwiseProduct(v);
             g_.mass += accelerated;
             g_.damping += moved;
@@ -155,6 +128,13 @@ class Backward {
             by_dt -= (mass.dot(accelerated + moved / adt) + damping.dot(moved)) / dt;
             by_x_hat -= algebra.weights().cwiseProduct(lambda);
             by_v_hat -= mass.cwiseProduct(lambda) / adt;
+            if (model_.has_forces()) {  // - f(x, (x - x^)/(a dt), ...)
+                const VectorXd by_rate = by_forces.velocity + by_forces.acceleration / adt;
+                by_x_hat += by_rate / adt;
+                by_v_hat += by_forces.acceleration / adt;
+                by_dt += (by_rate.dot(v) + by_forces.acceleration.dot(w)) / dt;
+                g_.positions -= by_forces.begin;
+            }
 
             g_.positions += by_x_hat;
             g_.velocities += by_v_hat;
@@ -192,39 +172,48 @@ class Backward {
                 return *found;
         const FactorReport factor = newton_.factorize_at(stage.q, controls, anchor);
         if (!factor.succeeded) throw InvalidInput("the adjoint of a step: " + factor.reason);
-        return newton_.solve_with_factor(rhs);
+        return newton_.solve_transposed(rhs);
     }
 
-    // lambda of a stage; adds what it says of the scene and of the controls.
-    VectorXd back_through(const StepAlgebra& algebra, const Rates& at, int i, const StageState& stage,
-                          Index step, const std::pair<double, double>& part, VectorXd& by_x,
-                          ViscousAdjoint& viscous) {
+    // lambda of a stage, and what its forces say of how it moved; adds what it says of the scene and of the
+    // controls.
+    std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const Rates& at, int i,
+                                                         const PartRecord& record, Index step,
+                                                         const std::pair<double, double>& part, VectorXd& by_x,
+                                                         ViscousAdjoint& viscous) {
+        const StageState& stage = record.stages[i];
         const ElasticAfterwards elastic_afterwards(model_);
         const double share = part.first + algebra.tableau().time(i) * (part.second - part.first);
         const Controls controls = input_.controls_at(step, share);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
+        const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
         model_.set_memory(stage.memory);
+        model_.begin_step(record.begin.q, input_.controls_at(step, part.first));
         viscous.set_history(i);
         model_.evaluate(stage.q, controls);
         viscous.before_solve(i, by_x);
-        const Anchor anchor{&algebra.weights(), &target};
+        const Anchor anchor{&algebra.weights(), &target, &motion};
         const VectorXd lambda = solve(stage, controls, anchor, -by_x);
         viscous.after_solve(i, lambda);
 
         SceneGradient gradient = model_.vjp(stage.q, controls, lambda);
+        KinematicsGradient by_forces;
+        if (model_.has_forces()) by_forces = model_.forces_vjp(controls, lambda, gradient);
         if (model_.reduction().moves()) {
-            model_.assemble(stage.q, controls,
-                            false);  // the factorization has turned the blocks of framed nodes
+            // Once more: the factorization has turned the blocks of framed nodes.
+            model_.assemble(stage.q, controls, false);
+            if (model_.has_forces()) model_.assemble_forces(controls);
             VectorXd reaction(model_.size());
             model_.matrix().multiply(lambda.data(), reaction.data());
+            if (model_.has_forces()) model_.remainder().add_product(lambda, true, reaction);
             reaction += by_x;
             model_.reduction().vjp(reaction, controls.motion, gradient.motions, gradient.controls.motion);
         }
         const auto [first, weight] = input_.between(step, share);
         g_.controls[first] = g_.controls[first] + (1.0 - weight) * gradient.controls;
         g_.controls[first + 1] = g_.controls[first + 1] + weight * gradient.controls;
-        add(g_.scene, gradient);
-        return lambda;
+        g_.scene.add_scene(gradient);
+        return {lambda, std::move(by_forces)};
     }
 
     // Rotations that were put to rest depend on everything else.
@@ -243,7 +232,7 @@ class Backward {
         g_.positions += reaction;
         const SceneGradient gradient = model_.vjp(q, controls, lambda);
         g_.controls[0] = g_.controls[0] + gradient.controls;
-        add(g_.scene, gradient);
+        g_.scene.add_scene(gradient);
     }
 
     // Adds what the loss says of the state at the beginning of a step.

@@ -1,7 +1,9 @@
 #include "magshell/assembly/model.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "magshell/assembly/friction_term.h"
 #include "magshell/strain/fold_angle.h"
 
 namespace magshell {
@@ -62,7 +64,8 @@ Model::Model(SceneInput input)
       schedule_(sheet_),
       faces_(sheet_, schedule_, matrix_),
       metric_(area_metric(sheet_)),
-      extent_(extent_of(input.mesh)) {
+      extent_(extent_of(input.mesh)),
+      rest_reach_(input.mesh.rest_positions().lpNorm<Eigen::Infinity>()) {
     add_terms(input);
     share_out_columns();
     set_values(input.values);
@@ -87,6 +90,23 @@ void Model::add_terms(const SceneInput& input) {
     if (values.vertex_loads.rows() > 0)
         loads_ = add(std::make_unique<LoadTerm>("loads", no_forces, &Controls::load, &SceneGradient::loads));
     if (!input.couples.empty()) add_couples(input);
+    if (!input.contacts.empty()) add_contacts(input.contacts);
+    if (values.water) {
+        std::unique_ptr<WaterTerm> water = std::make_unique<WaterTerm>(sheet_, faces_);
+        water_ = water.get();
+        forces_.push_back(std::move(water));
+    }
+}
+
+void Model::add_contacts(const std::vector<ContactInput>& contacts) {
+    contact_ = add(std::make_unique<ContactTerm>(sheet_, matrix_, contacts));
+    std::vector<bool> rubs, lagged;
+    for (const ContactInput& contact : contacts) {
+        rubs.push_back(contact.rubs);
+        lagged.push_back(contact.lagged);
+    }
+    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
+        forces_.push_back(std::make_unique<FrictionTerm>(*contact_, std::move(rubs), std::move(lagged)));
 }
 
 void Model::set_values(const SceneValues& values) {
@@ -102,9 +122,26 @@ void Model::set_values(const SceneValues& values) {
     if (gravity_) gravity_->set_forces(node_forces(values.vertex_mass * values.gravity.transpose(), sheet_));
     if (loads_) loads_->set_forces(node_forces(values.vertex_loads, sheet_));
     if (couples_) couples_->set_couples(values.couples);
+    if (water_) water_->set_water(values.water);
+    if (contact_) contact_->set_values(values.contacts, values.obstacles);
     reduction_.set_motions(values.motions);
-    cancelling_forces_ = VectorXd::Zero(size());
-    for (const std::unique_ptr<Term>& term : terms_) term->add_cancelling_forces(cancelling_forces_);
+    cancelling_forces_.resize(0);
+}
+
+// A sheet that has fallen or flown far knows its shape less exactly. By powers of two, so that most states
+// share what was computed once.
+VectorXd Model::cancelling_forces(const VectorXd& q) {
+    const double reach = q.head(3 * sheet_.n_vertices()).lpNorm<Eigen::Infinity>();
+    double beyond = 0.0;
+    if (std::isfinite(reach) && reach > 2.0 * rest_reach_)
+        beyond = std::exp2(std::ceil(std::log2(reach / rest_reach_))) * rest_reach_;
+    if (cancelling_forces_.size() == 0 || beyond != beyond_) {
+        beyond_ = beyond;
+        cancelling_forces_ = VectorXd::Zero(size());
+        for (const std::unique_ptr<Term>& term : terms_)
+            term->add_cancelling_forces(beyond, cancelling_forces_);
+    }
+    return history_scale_ * cancelling_forces_;
 }
 
 SceneGradient Model::vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda) {
@@ -278,6 +315,48 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
             term->assemble(part, q.data(), controls, extrapolated_stress, matrix_);
     });
     for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
+}
+
+void Model::begin_step(const VectorXd& q, const Controls& controls) {
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->begin_step(q, controls);
+}
+
+std::string Model::blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                           const Controls& controls_at_end) const {
+    const Index node = contact_ ? contact_->passes_through(q, controls, end, controls_at_end) : -1;
+    if (node < 0) return {};
+    return "vertex " + std::to_string(sheet_.vertices.user[node]) + " passes through an obstacle within a step";
+}
+
+void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage) {
+    const Index coordinates = 3 * sheet_.n_vertices();
+    kinematics_.q = q;
+    kinematics_.rate = 1.0 / stage.time;
+    kinematics_.v.setZero(size());
+    kinematics_.w.setZero(size());
+    kinematics_.v.head(coordinates) = kinematics_.rate * (q - *stage.x_hat).head(coordinates);
+    kinematics_.w.head(coordinates) = kinematics_.rate * (kinematics_.v - *stage.v_hat).head(coordinates);
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
+}
+
+void Model::add_cancelling_contact_forces(bool in_motion, VectorXd& out) const {
+    if (contact_) contact_->add_cancelling_normal_forces(out);
+    if (!in_motion) return;
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_cancelling_forces(kinematics_, out);
+}
+
+void Model::assemble_forces(const Controls& controls, bool cautious) {
+    remainder_.clear();
+    for (const std::unique_ptr<ForceTerm>& force : forces_)
+        force->assemble(kinematics_, controls, cautious, matrix_, remainder_);
+}
+
+KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda,
+                                     SceneGradient& out) const {
+    KinematicsGradient by{VectorXd::Zero(size()), VectorXd::Zero(size()), VectorXd::Zero(size())};
+    for (const std::unique_ptr<ForceTerm>& force : forces_)
+        force->vjp(kinematics_, controls, lambda, by, out);
+    return by;
 }
 
 void Model::share_out_columns() {

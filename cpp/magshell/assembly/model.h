@@ -10,12 +10,15 @@
 #include <vector>
 
 #include "magshell/assembly/bending_term.h"
+#include "magshell/assembly/contact_term.h"
 #include "magshell/assembly/couple_term.h"
+#include "magshell/assembly/force_term.h"
 #include "magshell/assembly/load_term.h"
 #include "magshell/assembly/magnetic_term.h"
 #include "magshell/assembly/membrane_term.h"
 #include "magshell/assembly/reduction.h"
 #include "magshell/assembly/scene_input.h"
+#include "magshell/assembly/water_term.h"
 #include "magshell/linalg/factor.h"
 
 namespace magshell {
@@ -38,8 +41,10 @@ class Model {
     Index size() const { return sheet_.n_unknowns(); }
     double extent() const { return extent_; }
     const VectorXd& metric() const { return metric_; }
-    /// The floor under every residual, to be multiplied by the unit of round-off.
-    VectorXd cancelling_forces() const { return history_scale_ * cancelling_forces_; }
+    /// The floor under every residual of a state, to be multiplied by the unit of round-off.
+    VectorXd cancelling_forces(const VectorXd& q);
+    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or without.
+    void add_cancelling_contact_forces(bool in_motion, VectorXd& out) const;
 
     VectorXd rest_state() const;
     /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,), and back.
@@ -67,6 +72,21 @@ class Model {
     /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in
     /// them.
     VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
+
+    /// Forces that no energy has act only within the stages of time steps. A step begins at q; at a stage, after
+    /// evaluate and after assemble at the same q, they add to the residual and to matrix(), and leave the rest
+    /// of their Jacobian in remainder().
+    bool has_forces() const { return !forces_.empty(); }
+    void begin_step(const VectorXd& q, const Controls& controls);
+    bool has_contact() const { return contact_ != nullptr; }
+    /// Why a step from q to `end` cannot be: a point would be on the other side of an obstacle. Else empty.
+    std::string blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                        const Controls& controls_at_end) const;
+    void evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage);
+    void assemble_forces(const Controls& controls, bool cautious = false);
+    const Remainder& remainder() const { return remainder_; }
+    /// Adds - lambda . df/dk to the scene's gradient; returns lambda . df by what else they depend on.
+    KinematicsGradient forces_vjp(const Controls& controls, const VectorXd& lambda, SceneGradient& out) const;
 
     /// lambda . dg/dk at the last evaluated state, for all k but what supports do; lambda is zero where they
     /// hold.
@@ -96,6 +116,7 @@ class Model {
   private:
     void add_terms(const SceneInput& input);
     void add_couples(const SceneInput& input);
+    void add_contacts(const std::vector<ContactInput>& contacts);
     template <class T>
     T* add(std::unique_ptr<T> term);
     void share_out_columns();
@@ -114,14 +135,20 @@ class Model {
     MagneticTerm* magnetic_ = nullptr;
     LoadTerm *gravity_ = nullptr, *loads_ = nullptr;
     CoupleTerm* couples_ = nullptr;
+    ContactTerm* contact_ = nullptr;
+    WaterTerm* water_ = nullptr;
+    std::vector<std::unique_ptr<ForceTerm>> forces_;
+    Kinematics kinematics_;  // where the forces were evaluated last
+    Remainder remainder_;
     std::unique_ptr<Factor> analysed_;
     int analyses_ = 0;
     std::vector<double> thickness_;  // in our numbering
     Residual residual_;
     VectorXd metric_;             // area at each unknown of a vertex, zero for directions and rotations
     VectorXd cancelling_forces_;  // of the elastic terms, without history
+    double beyond_ = 0.0;         // [m] by how much coordinates were larger than at rest then
     double history_scale_ = 1.0;
-    double extent_;
+    double extent_, rest_reach_;  // [m]: of the bounding box; the largest coordinate at rest
     std::mutex in_use_;
 };
 

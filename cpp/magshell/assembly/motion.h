@@ -1,9 +1,6 @@
 // A rigid motion of what a support holds.
 //
 //   x -> centre + R(t w)(x - centre) + t u,   direction -> R(t w) direction           t = controls.motion
-//
-// R(phi) turns about phi by |phi|. As phi changes by dphi, R y turns by J(phi) dphi, with the left Jacobian
-// of the rotations, J(phi) = I + (1 - cos a)/a^2 [phi] + (a - sin a)/a^3 [phi]^2, a = |phi|.
 #pragma once
 
 #include "magshell/core/types.h"

@@ -5,6 +5,9 @@
 #include <vector>
 
 #include "magshell/assembly/motion.h"
+#include "magshell/assembly/placed_obstacle.h"
+#include "magshell/energy/contact.h"
+#include "magshell/force/drag.h"
 #include "magshell/energy/controls.h"
 
 namespace magshell {
@@ -18,7 +21,13 @@ struct SceneGradient {
     VectorXd couples;
     std::vector<Motion> motions;
     std::vector<VectorXd> field_sources;  // of each source, by its own parameters
+    std::vector<ContactLaw> contacts;     // stiffness and friction
+    std::vector<Placement> obstacles;
+    Drag::Gradient water;
     Controls controls;
+
+    /// Adds another one, or a part of one, but for the controls: those of a motion are many.
+    void add_scene(const SceneGradient& part);
 };
 
 }  // namespace magshell

@@ -11,9 +11,10 @@ namespace {
 
 constexpr double smallest_part = 1.0 / 64.0;  // of a step
 
-std::vector<Controls> at_stages(const MotionInput& input, const Tableau& tableau, Index step,
-                                std::pair<double, double> part) {
-    std::vector<Controls> controls;
+// At the beginning of a step or of a part of one, and at its stages.
+std::vector<Controls> controls_of(const MotionInput& input, const Tableau& tableau, Index step,
+                                  std::pair<double, double> part) {
+    std::vector<Controls> controls = {input.controls_at(step, part.first)};
     for (int i = 0; i < tableau.stages; ++i)
         controls.push_back(
             input.controls_at(step, part.first + tableau.time(i) * (part.second - part.first)));
@@ -118,7 +119,7 @@ class Run {
             ahead.pop_back();
             PartRecord record;
             const std::vector<Controls> controls =
-                at_stages(input_, stepper_.tableau_from(state), step, part);
+                controls_of(input_, stepper_.tableau_from(state), step, part);
             const double share = part.second - part.first;
             if (stepper_.step(state, share * input_.time_step, controls, keep ? &record : nullptr,
                               result_.keep == Keep::factors, result_.reason)) {
@@ -191,7 +192,7 @@ void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const P
     for (const std::pair<double, double>& part : parts) {
         PartRecord record;
         std::string reason;
-        const std::vector<Controls> controls = at_stages(input, stepper.tableau_from(state), step, part);
+        const std::vector<Controls> controls = controls_of(input, stepper.tableau_from(state), step, part);
         if (!stepper.step(state, (part.second - part.first) * input.time_step, controls,
                           kept ? &record : nullptr, false, reason))
             throw InvalidInput("a step that was taken before cannot be repeated: " + reason);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "magshell/core/errors.h"
+
 namespace magshell {
 namespace {
 
@@ -26,6 +28,18 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
 constexpr Index most_new_negative_pivots = 10;
 constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
+// A residual that shrinks less makes the next step a cautious one.
+constexpr double contracting = 0.5;
+
+// How exactly to solve for a Newton step with an unsymmetric matrix: what its quadratic convergence deserves, and no
+// more than the end needs.
+double deserved(double residual, double tolerance) {
+    return std::max(0.1 * tolerance / residual, std::min(1e-2, residual));
+}
+
+// Of solves with an unsymmetric matrix for gradients.
+constexpr double exact_solve = 1e-13;
+constexpr int few_vectors = 30, many_vectors = 300;
 
 // Adds the time it lives to a sum.
 class Stopwatch {
@@ -56,16 +70,18 @@ VectorXd Newton::gradient(const VectorXd& q, const Anchor& anchor) const {
     return g;
 }
 
-double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const {
+double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool with_floor) const {
     const Reduction& reduction = model_.reduction();
     // Held components have no residual of their own; those of framed nodes are told apart in their frames.
     const VectorXd free = reduction.expand(reduction.vector(gradient(q, anchor)));
     const Index nodes = 3 * model_.sheet().n_nodes(), rotations = model_.sheet().n_rotations();
     VectorXd magnitude = model_.residual().magnitude;
     if (anchor.weights) magnitude += anchor.weights->cwiseProduct(q - *anchor.target).cwiseAbs();
-    VectorXd cancelling = model_.cancelling_forces();
+    VectorXd cancelling = model_.cancelling_forces(q);
     // In the inertia of a short step, positions cancel.
     if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q.cwiseAbs());
+    model_.add_cancelling_contact_forces(anchor.motion != nullptr, cancelling);
+    if (!with_floor) cancelling.setZero();
     return std::max(
         relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
         relative(free.tail(rotations), magnitude.tail(rotations), cancelling.tail(rotations),
@@ -97,19 +113,35 @@ void Newton::add_weights(const Anchor& anchor) {
     for (Index k = 0; k < pattern.size; ++k) values_[pattern.column_starts[k]] += weights[k];
 }
 
-FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
+void Newton::evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
     model_.evaluate(q, controls);
-    model_.assemble(q, controls, false);
+    if (anchor.motion && model_.has_forces()) model_.evaluate_forces(q, controls, *anchor.motion);
+}
+
+void Newton::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+                      const Anchor& anchor, bool cautious) {
+    model_.assemble(q, controls, extrapolated_stress);
+    const bool forces = anchor.motion && model_.has_forces();
+    if (forces) model_.assemble_forces(controls, cautious);
+    unsymmetric_ = forces && !model_.remainder().empty();
+}
+
+FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    evaluate(q, controls, anchor);
+    assemble(q, controls, false, anchor);
     return factorize_assembled(anchor);
 }
 
 FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
-                               const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves) {
-    model_.assemble(q, controls, extrapolated_stress);
+                               const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves, bool cautious) {
+    assemble(q, controls, extrapolated_stress, anchor, cautious);
     for (Eigen::Index k = 0; k < moves.cols(); ++k) {
         if (moves.col(k).isZero(0.0)) continue;
         const VectorXd move = moves.col(k);
-        model_.matrix().multiply(move.data(), moves.col(k).data());
+        VectorXd pull(move.size());
+        model_.matrix().multiply(move.data(), pull.data());
+        if (unsymmetric_) model_.remainder().add_product(move, false, pull);
+        moves.col(k) = pull;
     }
     return factorize_assembled(anchor);
 }
@@ -119,11 +151,15 @@ std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& 
                                              const VectorXd& rhs) {
     constexpr int most_refinements = 4;
     constexpr double exact = 1e-13;  // of the right-hand side
-    model_.evaluate(q, controls);
-    model_.assemble(q, controls, false);
+    evaluate(q, controls, anchor);
+    assemble(q, controls, false, anchor);
     reduce_assembled(anchor);
     const Stopwatch running(linear_time_);
-    const VectorXd b = model_.reduction().vector(rhs);
+    VectorXd b = model_.reduction().vector(rhs);
+    if (unsymmetric_) {
+        if (!solve_unsymmetric(nearby, true, {exact_solve, few_vectors}, b).converged) return std::nullopt;
+        return model_.reduction().expand(b);
+    }
     VectorXd solution = VectorXd::Zero(b.size()), left = b;
     for (int k = 0; k <= most_refinements; ++k) {
         if (left.norm() <= exact * b.norm()) return model_.reduction().expand(solution);
@@ -134,11 +170,44 @@ std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& 
     return std::nullopt;
 }
 
-VectorXd Newton::solve_with_factor(const VectorXd& rhs) const {
+VectorXd Newton::solve_with_factor(const VectorXd& rhs, double tolerance) const {
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
-    factor_->solve(reduced);
+    if (unsymmetric_)
+        solve_unsymmetric(*factor_, false, {tolerance, many_vectors}, reduced);
+    else
+        factor_->solve(reduced);
     return model_.reduction().expand(reduced);
+}
+
+VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
+    if (!unsymmetric_) return solve_with_factor(rhs);
+    const Stopwatch running(linear_time_);
+    VectorXd reduced = model_.reduction().vector(rhs);
+    const GmresReport report = solve_unsymmetric(*factor_, true, {exact_solve, many_vectors}, reduced);
+    if (!report.converged)
+        throw InvalidInput("a linear solve with friction or water stopped at a residual of " +
+                           std::to_string(report.residual));
+    return model_.reduction().expand(reduced);
+}
+
+VectorXd Newton::assembled_product(const VectorXd& reduced, bool transposed) const {
+    const Reduction& reduction = model_.reduction();
+    VectorXd rest = VectorXd::Zero(model_.size());
+    model_.remainder().add_product(reduction.expand(reduced), transposed, rest);
+    return product(reduction.pattern(), values_.data(), reduced) + reduction.vector(rest);
+}
+
+GmresReport Newton::solve_unsymmetric(const Factor& factor, bool transposed, const GmresOptions& options,
+                                      VectorXd& reduced) const {
+    return gmres([&](const VectorXd& x) { return assembled_product(x, transposed); },
+                 [&](VectorXd& x) { factor.solve(x); }, reduced, options);
+}
+
+bool Newton::still_holds(const VectorXd& q, const Controls& controls) {
+    evaluate(q, controls, {});
+    const bool in_place = model_.reduction().prescribed_increment(q, controls.motion).isZero(0.0);
+    return in_place && relative_residual(q, {}) <= options_.tolerance;
 }
 
 NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor) {
@@ -149,8 +218,46 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
     return iterate(q, controls, anchor, max_iterations, options_.mixed);
 }
 
-NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls) {
-    return iterate(q, controls, {}, options_.max_iterations, false);
+NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    return iterate(q, controls, anchor, options_.max_iterations, false);
+}
+
+NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    constexpr int most_iterations = 60;
+    constexpr double shortest = 1.0 / 4096.0;  // of a step
+    NewtonReport report;
+    double last_residual = std::numeric_limits<double>::infinity();
+    q += model_.reduction().prescribed_increment(q, controls.motion);
+    evaluate(q, controls, anchor);
+    for (;; ++report.iterations, ++iterations_) {
+        report.residual = relative_residual(q, anchor);
+        watch(report.residual);
+        report.converged = report.residual <= options_.tolerance;
+        if (report.converged) return report;
+        if (!std::isfinite(report.residual) || report.iterations == most_iterations) {
+            report.reason = "no convergence in " + std::to_string(most_iterations) + " shortened steps";
+            return report;
+        }
+        Eigen::MatrixXd no_moves(q.size(), 0);
+        const bool cautious = report.residual > contracting * last_residual;
+        last_residual = report.residual;
+        const FactorReport factor = factorize(q, controls, false, anchor, no_moves, cautious);
+        if (!factor.succeeded) {
+            report.reason = factor.reason;
+            return report;
+        }
+        const VectorXd step = solve_with_factor(-gradient(q, anchor)), from = q;
+        const auto length = [&](const VectorXd& p) {
+            return std::sqrt(p.dot(anchor.weights->cwiseProduct(p)));
+        };
+        const double whole = length(step);
+        for (double share = 1.0;; share *= 0.5) {
+            q = from + share * step;
+            evaluate(q, controls, anchor);
+            if (share <= shortest || relative_residual(q, anchor) <= options_.tolerance) break;
+            if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.25 * share) * whole) break;
+        }
+    }
 }
 
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
@@ -158,33 +265,39 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
     NewtonReport report;
     VectorXd move = model_.reduction().prescribed_increment(q, controls.motion);
     bool extrapolated = false;
-    double last_step = 0.0;
+    double last_step = 0.0, last_residual = std::numeric_limits<double>::infinity();
     Index first_negative_pivots = 0;
     const auto fail = [&](std::string reason) {
         report.reason = std::move(reason);
         return report;
     };
-    model_.evaluate(q, controls);
+    evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);
         watch(report.residual);
         if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent())
             return fail("the iteration diverged");
         const bool in_place = move.isZero(0.0);
-        if (in_place && report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent()) {
+        const bool settled = report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent();
+        // Under the floor, small forces that move a thin sheet far are lost in larger ones: a step tells them.
+        if (in_place && settled &&
+            (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
             return report;
         }
         if (report.iterations == max_iterations)
             return fail("no convergence in " + std::to_string(max_iterations) + " iterations");
         Eigen::MatrixXd pull = move;
-        const FactorReport factor = factorize(q, controls, mixed && extrapolated, anchor, pull);
+        const bool cautious = report.residual > contracting * last_residual;
+        last_residual = report.residual;
+        const FactorReport factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
         report.negative_pivots = factor.negative_pivots;
         if (!factor.succeeded) return fail(factor.reason);
         if (report.iterations == 0) first_negative_pivots = factor.negative_pivots;
         report.lost = factor.negative_pivots > first_negative_pivots + most_new_negative_pivots;
         if (mixed && report.lost) return fail("the iteration lost its way");
-        const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0));
+        const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
+                                                      deserved(report.residual, options_.tolerance));
         move.setZero();
         const double length = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
@@ -194,7 +307,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         extrapolated = true;
         last_step = length;
         q += step;
-        model_.evaluate(q, controls);
+        evaluate(q, controls, anchor);
     }
 }
 

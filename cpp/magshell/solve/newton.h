@@ -16,6 +16,7 @@
 
 #include "magshell/assembly/model.h"
 #include "magshell/linalg/factor.h"
+#include "magshell/linalg/gmres.h"
 
 namespace magshell {
 
@@ -40,6 +41,7 @@ struct NewtonReport {
 struct Anchor {
     const VectorXd* weights = nullptr;
     const VectorXd* target = nullptr;
+    const StageMotion* motion = nullptr;  // of a time step: forces that no energy has act as well
 };
 
 /// A model with its factorization, counting what it costs. Everything that solves goes through here.
@@ -56,24 +58,34 @@ class Newton {
 
     /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
-    NewtonReport solve_plain(VectorXd& q, const Controls& controls);
+    NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
+    /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity): slower, and
+    /// sure of foot where contacts open and close.
+    NewtonReport solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor);
 
+    /// The residual's parts at q, with the forces of a time step.
+    void evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor);
     /// Evaluates, assembles with the state's own stresses and factorizes.
     FactorReport factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor = {});
     /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes,
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
-                           const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves);
-    /// K p = rhs with the last evaluated state's own Hessian, by refinement with a factorization from nearby.
-    /// Empty where that does not converge quickly.
+                           const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves, bool cautious = false);
+    /// K^T p = rhs with the Hessian at q, by refinement with a factorization from nearby. Empty where that does
+    /// not converge quickly.
     std::optional<VectorXd> solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
                                          const Factor& nearby, const VectorXd& rhs);
-    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held.
-    VectorXd solve_with_factor(const VectorXd& rhs) const;
+    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held. Only where forces make
+    /// K unsymmetric the tolerance counts: of the residual, over the norm of rhs.
+    VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
+    /// K^T p = rhs likewise, to round-off. Throws InvalidInput where forces make K too unsymmetric for that.
+    VectorXd solve_transposed(const VectorXd& rhs) const;
 
     /// The residual at the last evaluated state, relative to the forces that cancel in it and to their
-    /// round-off.
-    double relative_residual(const VectorXd& q, const Anchor& anchor) const;
+    /// round-off, if that is to count.
+    double relative_residual(const VectorXd& q, const Anchor& anchor, bool with_floor = true) const;
+    /// Whether nothing is left to do at q, which was found at these controls before.
+    bool still_holds(const VectorXd& q, const Controls& controls);
 
     Model& model() { return model_; }
     const std::shared_ptr<Factor>& factor() const { return factor_; }
@@ -92,7 +104,14 @@ class Newton {
   private:
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                          bool mixed);
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor,
+                  bool cautious = false);
     void reduce_assembled(const Anchor& anchor);
+    /// K p, or K^T p, of what was assembled last, free unknowns.
+    VectorXd assembled_product(const VectorXd& reduced, bool transposed) const;
+    /// As solve_with_factor with an unsymmetric K.
+    GmresReport solve_unsymmetric(const Factor& factor, bool transposed, const GmresOptions& options,
+                                  VectorXd& reduced) const;
     FactorReport factorize_assembled(const Anchor& anchor);
     VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
     void add_weights(const Anchor& anchor);
@@ -102,6 +121,7 @@ class Newton {
     Watch watch_;
     std::shared_ptr<Factor> factor_;
     std::vector<double> values_;
+    bool unsymmetric_ = false;  // whether what was assembled last has a remainder
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     mutable double linear_time_ = 0.0;
 };

@@ -52,13 +52,14 @@ std::vector<StageRates> first_rates(const Tableau& tableau, const MotionState& s
     return {state.rates};
 }
 
-bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, PartRecord* kept,
+bool Stepper::step(MotionState& state, double dt, std::span<const Controls> controls, PartRecord* kept,
                    bool with_factors, std::string& reason) {
     const StepAlgebra& step = algebra(dt, tableau_from(state));
     const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
     const Index coordinates = 3 * model.sheet().n_vertices();
     model.set_memory(state.memory);
+    model.begin_step(state.q, controls.front());
     const ElasticAfterwards elastic_afterwards(model);
     const SheetStrains at_begin = viscosity_.any() ? model.strains(state.q) : SheetStrains();
     std::vector<StageRates> rates = first_rates(tableau, state);
@@ -76,9 +77,19 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, 
             viscous = ViscousStage(viscosity_, step.stage_time(), dt, tableau.a[i], rates, at_begin, state.e);
             model.set_history(viscosity_.scale(step.stage_time()), &viscous.shift);
         }
-        const NewtonReport report = newton_.solve(q, at[i], {&step.weights(), &target});
+        const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
+        const Anchor anchor{&step.weights(), &target, &motion};
+        const VectorXd predicted = q;
+        const Model::Memory memory = model.memory();
+        NewtonReport report = newton_.solve(q, controls[i + 1], anchor);
+        if (!report.converged && (model.has_contact() || newton_.options().mixed)) {
+            q = predicted;
+            model.set_memory(memory);
+            report = model.has_contact() ? newton_.solve_damped(q, controls[i + 1], anchor)
+                                         : newton_.solve_plain(q, controls[i + 1], anchor);
+        }
         if (!report.converged) {
-            reason = model.not_finite(q, at[i]);
+            reason = model.not_finite(q, controls[i + 1]);
             if (reason.empty()) reason = report.reason;
             model.set_memory(state.memory);
             return false;
@@ -93,6 +104,11 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> at, 
             const bool factorized = with_factors && report.iterations > 0;
             stages.push_back({q, model.memory(), factorized ? newton_.release_factor() : nullptr});
         }
+    }
+    reason = model.blocked(state.q, controls.front(), q, controls.back());
+    if (!reason.empty()) {
+        model.set_memory(state.memory);
+        return false;
     }
     MotionState end{std::move(q), rates.back().v, model.memory(), std::move(e), {}};
     if (tableau_.begins_explicitly) end.rates = std::move(rates.back());

@@ -1,0 +1,25 @@
+#include "magshell/assembly/remainder.h"
+
+namespace magshell {
+
+void Remainder::add_product(const VectorXd& p, bool transposed, VectorXd& out) const {
+    for (const Point& each : points_) {
+        const Vec3 at = p.segment<3>(3 * each.node);
+        out.segment<3>(3 * each.node) += transposed ? Vec3(each.block.transpose() * at) : Vec3(each.block * at);
+    }
+    for (const Shared& each : shared_) {
+        Vec3 at[3];
+        for (int k = 0; k < 3; ++k) at[k] = p.segment<3>(3 * each.nodes[k]);
+        if (transposed) {
+            const Vec3 sum = each.weights[0] * at[0] + each.weights[1] * at[1] + each.weights[2] * at[2];
+            for (int k = 0; k < 3; ++k)
+                out.segment<3>(3 * each.nodes[k]) += each.block.middleCols<3>(3 * k).transpose() * sum;
+            continue;
+        }
+        const Vec3 force = each.block.leftCols<3>() * at[0] + each.block.middleCols<3>(3) * at[1] +
+                           each.block.rightCols<3>() * at[2];
+        for (int k = 0; k < 3; ++k) out.segment<3>(3 * each.nodes[k]) += each.weights[k] * force;
+    }
+}
+
+}  // namespace magshell

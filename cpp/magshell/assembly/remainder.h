@@ -1,0 +1,49 @@
+// What a symmetric matrix does not hold of the Jacobian of forces: small unsymmetric blocks, never assembled.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "magshell/core/types.h"
+
+namespace magshell {
+
+class Remainder {
+  public:
+    using Mat39 = Eigen::Matrix<double, 3, 9>;
+
+    /// A force B p that three nodes share by their weights, and that their motions p cause.
+    struct Shared {
+        std::array<Index, 3> nodes;
+        Vec3 weights;
+        Mat39 block;
+    };
+
+    void clear() {
+        points_.clear();
+        shared_.clear();
+    }
+    bool empty() const { return points_.empty() && shared_.empty(); }
+
+    /// A block of one node.
+    void add(Index node, const Mat3& block) { points_.push_back({node, block}); }
+    void add(const Shared& shared) { shared_.push_back(shared); }
+    /// So many more, for the caller to fill before the next call.
+    Shared* extend(std::size_t count) {
+        shared_.resize(shared_.size() + count);
+        return shared_.data() + shared_.size() - count;
+    }
+
+    /// out += R p, or R^T p. All unknowns.
+    void add_product(const VectorXd& p, bool transposed, VectorXd& out) const;
+
+  private:
+    struct Point {
+        Index node;
+        Mat3 block;
+    };
+    std::vector<Point> points_;
+    std::vector<Shared> shared_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,176 @@
+// Drag and thrust of water on a face that moves through it, and the water that the face carries along.
+//
+//   f = 1/2 rho A (C_d(phi) |u|^2 d - C_t(phi) |u|^2 n) - m A (n . w) n        [N]   [Chen22] (42), (43)
+//
+// with the flow u seen from the face (the water's velocity less the mean of the corners'), its direction d,
+// the current area A and unit normal n, the mean acceleration w of the corners, and the added mass m [kg/m2].
+// A third of f acts on each corner.
+//
+// n is turned against the flow, n . u <= 0, so that the two sides of a face are alike: the printed equations
+// leave the sign open, and drag and thrust would cancel on one of the sides. With n as the corners have it,
+// s = n . d in [-1, 1] and k the sign of s, this is
+//
+//   f = 1/2 rho A |u|^2 (D d + T n) - m A (n . w) n,    sin phi = |s|,   D = C_d(phi),   T = k C_t(phi)
+//
+// Derivatives go by the signed angle psi = k phi, of which D is an even function and T an odd one. With c =
+// cos phi and unit vectors e_u, e_n along the components of n across d and of d across n,
+//
+//   dpsi = e_u . du / |u| + e_n . dn,     e_u = (n - s d) / c,     e_n = (d - s n) / c = c d - s e_u
+//
+// and no angle is taken by acos, whose slope is infinite head on. There (c = 0) e_u and e_n are set to zero,
+// as are d where the water is at rest and n where the face has no area: what they stand in is zero, or has no
+// derivative and this is the mean over all directions.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "magshell/core/types.h"
+#include "magshell/force/attack_curve.h"
+
+namespace magshell {
+
+/// The water around a sheet.
+struct Water {
+    double fluid_density = 1000.0;  // rho [kg/m3]
+    Vec3 velocity = Vec3::Zero();   // [m/s]
+    double drag_coefficient = 1.0;  // C_d = drag_coefficient * drag_curve(phi), C_t likewise
+    double thrust_coefficient = 1.0;
+    double added_mass = 0.0;  // m, of a face that moves along its normal [kg/m2]
+    AttackCurve drag_curve, thrust_curve;
+};
+
+/// What water does to one face. Refers to its water, which must outlive it.
+class Drag {
+  public:
+    using Corners = std::array<Vec3, 3>;
+
+    /// Of the force on each corner. A corner's own velocity or acceleration enters by a third of what is
+    /// here.
+    struct Jacobian {
+        std::array<Mat3, 3> by_position;  // each corner's               [N/m]
+        Mat3 by_velocity;                 // the mean of the corners'    [N s/m]
+        Mat3 by_acceleration;             // the mean of the corners'    [N s2/m]
+    };
+
+    /// Of the product of a vector with the force, by what describes the water.
+    struct Gradient {
+        double fluid_density = 0.0, drag_coefficient = 0.0, thrust_coefficient = 0.0, added_mass = 0.0;
+        Vec3 velocity = Vec3::Zero();
+
+        void add(const Gradient& other, double factor) {
+            fluid_density += factor * other.fluid_density;
+            drag_coefficient += factor * other.drag_coefficient;
+            thrust_coefficient += factor * other.thrust_coefficient;
+            added_mass += factor * other.added_mass;
+            velocity += factor * other.velocity;
+        }
+    };
+
+    Drag(const Water& water, const Corners& positions, const Corners& velocities,
+         const Corners& accelerations)
+        : water_(water), acceleration_(mean(accelerations)) {
+        for (int k = 0; k < 3; ++k) opposite_[k] = positions[(k + 2) % 3] - positions[(k + 1) % 3];
+        const Vec3 across = opposite_[0].cross(opposite_[1]);
+        area_ = 0.5 * across.norm();
+        normal_ = reciprocal(2.0 * area_) * across;
+
+        const Vec3 flow = water.velocity - mean(velocities);
+        speed_ = flow.norm();
+        direction_ = reciprocal(speed_) * flow;
+
+        const double sine = normal_.dot(direction_);
+        const double side = sine > 0.0 ? 1.0 : sine < 0.0 ? -1.0 : 0.0;
+        const Vec3 slip = normal_ - sine * direction_;
+        const double cosine = slip.norm();
+        by_flow_ = reciprocal(cosine) * slip;
+        by_normal_ = cosine * direction_ - sine * by_flow_;
+
+        const AttackCurve::Sample drag = water.drag_curve.at(std::abs(sine), cosine);
+        const AttackCurve::Sample thrust = water.thrust_curve.at(std::abs(sine), cosine);
+        drag_ = {drag.value, side * drag.slope};
+        thrust_ = {side * thrust.value, thrust.slope};
+    }
+
+    /// f / 3
+    Vec3 corner_force() const {
+        const Vec3 carried = normal_.dot(acceleration_) * normal_;
+        const Vec3 pushed = drag().value * direction_ + thrust().value * normal_;
+        return (area_ / 3.0) * (pressure() * pushed - water_.added_mass * carried);
+    }
+
+    Jacobian corner_jacobian() const {
+        // By N = 2 A n: dA = n . dN / 2, A dn = (dN - n n . dN) / 2.
+        const double along = normal_.dot(acceleration_);
+        const Vec3 sideways = acceleration_ - along * normal_;
+        Mat3 by_across = pressure() * (drag().value * direction_ * normal_.transpose() +
+                                       turning() * by_normal_.transpose()) -
+                         water_.added_mass * normal_ * sideways.transpose();
+        by_across.diagonal().array() += pressure() * thrust().value - water_.added_mass * along;
+        by_across /= 6.0;
+
+        Jacobian jacobian;
+        for (int k = 0; k < 3; ++k) {  // dN = a_k x dx_k
+            const Vec3& a = opposite_[k];
+            Mat3& by_corner = jacobian.by_position[k];
+            by_corner.col(0) = by_across.col(1) * a.z() - by_across.col(2) * a.y();
+            by_corner.col(1) = by_across.col(2) * a.x() - by_across.col(0) * a.z();
+            by_corner.col(2) = by_across.col(0) * a.y() - by_across.col(1) * a.x();
+        }
+        jacobian.by_velocity = by_flow() / -3.0;
+        jacobian.by_acceleration = (water_.added_mass * area_ / -3.0) * normal_ * normal_.transpose();
+        return jacobian;
+    }
+
+    /// Of lambda . f. Three vectors on the corners' forces make the same product with their mean.
+    Gradient gradient(const Vec3& lambda) const {
+        const double along = normal_.dot(lambda);
+        const double by_drag = area_ * direction_.dot(lambda), by_thrust = area_ * along;
+        return {
+            .fluid_density = 0.5 * speed_ * speed_ * (by_drag * drag().value + by_thrust * thrust().value),
+            .drag_coefficient = pressure() * by_drag * drag_.value,
+            .thrust_coefficient = pressure() * by_thrust * thrust_.value,
+            .added_mass = -area_ * normal_.dot(acceleration_) * along,
+            .velocity = by_flow().transpose() * lambda};
+    }
+
+  private:
+    /// Exact where the three are equal: nothing acts on a face that moves with the water.
+    static Vec3 mean(const Corners& c) { return c[0] + ((c[1] - c[0]) + (c[2] - c[0])) / 3.0; }
+
+    /// 1 / x, and 0 where there is none.
+    static double reciprocal(double x) { return x > std::numeric_limits<double>::min() ? 1.0 / x : 0.0; }
+
+    /// rho |u|^2 / 2 [Pa]
+    double pressure() const { return 0.5 * water_.fluid_density * speed_ * speed_; }
+
+    /// D and T with their slopes by psi
+    AttackCurve::Sample drag() const {
+        return {water_.drag_coefficient * drag_.value, water_.drag_coefficient * drag_.slope};
+    }
+    AttackCurve::Sample thrust() const {
+        return {water_.thrust_coefficient * thrust_.value, water_.thrust_coefficient * thrust_.slope};
+    }
+
+    /// d(D d + T n) / dpsi, with d and n held
+    Vec3 turning() const { return drag().slope * direction_ + thrust().slope * normal_; }
+
+    /// df/du [N s/m]
+    Mat3 by_flow() const {
+        Mat3 m = (drag().value * direction_ + 2.0 * thrust().value * normal_) * direction_.transpose() +
+                 turning() * by_flow_.transpose();
+        m.diagonal().array() += drag().value;
+        return (0.5 * water_.fluid_density * area_ * speed_) * m;
+    }
+
+    const Water& water_;
+    Vec3 acceleration_;                  // w
+    Corners opposite_;                   // a_k, the edge opposite corner k
+    double area_, speed_;                // A, |u|
+    Vec3 normal_, direction_;            // n as the corners have it, d
+    Vec3 by_flow_, by_normal_;           // e_u, e_n
+    AttackCurve::Sample drag_, thrust_;  // of the curves alone, as functions of psi
+};
+
+}  // namespace magshell

@@ -1,0 +1,24 @@
+// The space around a body, as a body: what keeps a sheet inside.
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "magshell/obstacle/obstacle.h"
+
+namespace magshell {
+
+class Inverted final : public Obstacle {
+  public:
+    explicit Inverted(std::shared_ptr<const Obstacle> body) : body_(std::move(body)) {}
+
+    Distance distance(const Vec3& point) const override {
+        const Distance d = body_->distance(point);
+        return {-d.value, -d.normal, -d.curvature};
+    }
+
+  private:
+    std::shared_ptr<const Obstacle> body_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,61 @@
+"""Contacts of a scene as the core takes them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def obstacles_of(contacts) -> tuple:
+    """Every obstacle once, in the order in which contacts name them."""
+    return tuple({id(each): each for contact in contacts for each in contact.obstacles}.values())
+
+
+def contact_inputs(contacts, mesh) -> list[dict]:
+    """What of the contacts no solve can change."""
+    numbers = {id(each): k for k, each in enumerate(obstacles_of(contacts))}
+    inputs = []
+    for contact in contacts:
+        vertices, weights = contact.points(mesh)
+        inputs.append(
+            {
+                "obstacles": [numbers[id(each)] for each in contact.obstacles],
+                "vertices": vertices,
+                "weights": weights,
+                "rubs": contact.friction_coefficient is not None,
+                "lagged": contact.lagged_friction,
+            }
+        )
+    return inputs
+
+
+def poses(obstacles, times: np.ndarray) -> np.ndarray:
+    """Displacements, rotation vectors, velocities and spins at these times, (len(times), n, 4, 3); empty if none moves."""
+    if all(each.motion is None for each in obstacles):
+        return np.zeros(0)
+    rows = np.empty((len(times), len(obstacles), 4, 3))
+    for k, time in enumerate(times):
+        for n, each in enumerate(obstacles):
+            rows[k, n, :2], rows[k, n, 2:] = each.pose(time), each.rates(time)
+    return rows
+
+
+def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
+    """A body that starts deeper in an obstacle than half its thickness would be shot out of it."""
+    for contact in scene.contacts:
+        vertices, weights = contact.points(scene.mesh)
+        where = np.einsum("pk,pkc->pc", weights, positions[vertices])
+        for obstacle in contact.obstacles:
+            depth = contact.offset - values.current(obstacle).signed_distance(where, time)
+            inside = np.flatnonzero(depth > 0.5 * np.max(scene.shell.thickness))
+            if inside.size:
+                worst = inside[np.argmax(depth[inside])]
+                touched = np.unique(vertices[inside][vertices[inside] >= 0])
+                raise ValueError(
+                    f"the sheet starts inside {obstacle!r}: {_list(touched)}, the deepest {depth[worst]:.3g} m deep "
+                    f"at vertex {vertices[worst, 0]}"
+                )
+
+
+def _list(vertices: np.ndarray) -> str:
+    shown = ", ".join(map(str, vertices[:5]))
+    return f"vertices {shown}" + (f" and {len(vertices) - 5} more" if len(vertices) > 5 else "")
