@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from _reptile.model import GROUNDS, TIME_STEP, Crawler, crawler
-from _reptile.report import draw_paths, draw_progress, draw_side, movie, summary
+from _reptile.report import draw_paths, draw_progress, draw_side, movie, picture, summary
 from _reptile.study import study
 
 import magshell as ms
@@ -45,6 +45,7 @@ def plot(result: dict):
         side = figure.add_subplot(grid[row, :])
         draw_side(side, who, motion, name)
         side.set_title(name, loc="left", fontweight="bold")
+    figure.axes[0].legend(frameon=False, fontsize=8, loc="upper left")
     draw_progress(figure.add_subplot(grid[-1, 0]), walks)
     draw_paths(figure.add_subplot(grid[-1, 1]), walks)
     for each in figure.axes:
@@ -64,6 +65,7 @@ if __name__ == "__main__":
     out = Path("out")
     out.mkdir(exist_ok=True)
     plot(outcome).savefig(out / "reptile.png", dpi=160)
-    for ground in outcome["walks"]:
+    for ground, crawled in outcome["walks"].items():
+        picture(*crawled).save(out / f"reptile_{ground}.png")
         animation(outcome, ground, out / f"reptile_{ground}.gif")
     print(f"\nPictures and movies in {out}/; {time.perf_counter() - began:.0f} s in all.")

@@ -8,14 +8,15 @@ import numpy as np
 
 import magshell as ms
 
-from .model import CELL, FREQUENCY, LEG, ROOTS, TIME_STEP, Crawler, across
+from .model import CELL, FREQUENCY, LEG, ROOTS, THICKNESS, TIME_STEP, Crawler, across
 from .study import Row, advances
 
 COLORS = {"flat": "#3f9c7a", "bump": "#20639b", "slope": "#d98a1f"}
 RED, GREY, EARTH = "#c8442d", "#777777", "#d9d3c7"
+VIEW = (20, -65)
 
 
-def draw_side(axes, who: Crawler, motion: ms.Trajectory, name: str, shown: int = 4) -> None:
+def draw_side(axes, who: Crawler, motion: ms.Trajectory, name: str, shown: int = 3) -> None:
     """Body and feet from the side at a few times, above the ground."""
     mesh = who.scene.mesh
     x, y, _ = mesh.rest_positions.T
@@ -31,14 +32,14 @@ def draw_side(axes, who: Crawler, motion: ms.Trajectory, name: str, shown: int =
         positions = 1e3 * motion.positions[frame]
         axes.plot(*positions[spine][:, [0, 2]].T, color=COLORS[name], lw=2.5, alpha=alpha)
         for pair, leg in enumerate(feet):
-            color = RED if pair % 2 else GREY
-            axes.plot(*positions[leg][:, [0, 2]].T, color=color, lw=1, alpha=alpha)
+            color, way = (RED, "inwards") if pair % 2 else (GREY, "outwards")
+            label = f"leg magnetized {way}" if number == shown - 1 and pair < 2 else None
+            axes.plot(*positions[leg][:, [0, 2]].T, color=color, lw=1, alpha=alpha, label=label)
         axes.annotate(
             f"{motion.times[frame]:.3g} s",
-            (positions[spine, 0].mean(), positions[:, 2].max()),
-            xytext=(0, 4),
+            positions[spine[-1]][[0, 2]],
+            xytext=(3, 6),
             textcoords="offset points",
-            ha="center",
             fontsize=8,
             color=GREY,
         )
@@ -66,41 +67,54 @@ def draw_paths(axes, walks: dict) -> None:
     for name, (who, motion) in walks.items():
         x, _, z = who.centres(motion).T
         axes.plot(1e3 * x, 1e3 * (z - who.ground.height(x)), color=COLORS[name], label=name)
-    axes.set(xlabel="centre's x [mm]", ylabel="its height above the ground [mm]")
+    axes.set(xlabel="centre's x [mm]", ylabel="its height above ground [mm]")
+
+
+def picture(who: Crawler, motion: ms.Trajectory, shown: int = 9) -> ms.Picture:
+    """The last turn of the field."""
+    a_turn = round(1 / (FREQUENCY * (motion.times[1] - motion.times[0])))
+    chosen = np.linspace(len(motion) - 1 - a_turn, len(motion) - 1, shown).round().astype(int)
+    mesh, drawn = _on_the_floor(who, motion, chosen)
+    titles = [f"{time:.3f} s" for time in motion.times[chosen]]
+    return ms.plot(mesh, **drawn, titles=titles, view=VIEW, columns=3, arrows=False)
 
 
 def movie(who: Crawler, motion: ms.Trajectory, path: Path, title: str, **options) -> Path:
-    """The crawler with its magnetization on the ground, which is drawn as a second, unmagnetized sheet."""
-    mesh = who.scene.mesh
-    points, faces = _floor(who, motion)
-    drawn = ms.TriangleMesh(
-        np.concatenate([mesh.rest_positions, points]), np.concatenate([mesh.faces, mesh.n_vertices + faces])
-    )
-    magnetization = np.concatenate([who.remanent_magnetization, np.zeros((len(faces), 3))])
-    positions = np.concatenate(
-        [motion.positions, np.broadcast_to(points, (len(motion), *points.shape))], axis=1
-    )
+    mesh, drawn = _on_the_floor(who, motion, np.arange(len(motion)))
     return ms.animate(
-        drawn,
+        mesh,
         path,
-        positions=positions,
+        **drawn,
         times=motion.times,
-        remanent_magnetization=magnetization,
-        applied_flux_density=motion.applied_flux_density,
         title=title,
         arrows=False,
+        view=VIEW,
         progress=False,
-        **({"view": (18, -65), "width": 900, "fps": 12.5} | options),
+        **({"width": 800, "speed": 0.1, "fps": 20.0} | options),
     )
+
+
+def _on_the_floor(who: Crawler, motion: ms.Trajectory, chosen: np.ndarray) -> tuple[ms.TriangleMesh, dict]:
+    """The ground as a second sheet without magnetization beside the crawler: a mesh, and its states."""
+    mesh = who.scene.mesh
+    points, faces = _floor(who, motion)
+    both = ms.TriangleMesh(
+        np.concatenate([mesh.rest_positions, points]), np.concatenate([mesh.faces, mesh.n_vertices + faces])
+    )
+    resting = np.broadcast_to(points, (len(chosen), *points.shape))
+    return both, {
+        "positions": np.concatenate([motion.positions[chosen], resting], axis=1),
+        "remanent_magnetization": np.concatenate([who.remanent_magnetization, np.zeros((len(faces), 3))]),
+        "applied_flux_density": motion.applied_flux_density[chosen],
+    }
 
 
 def _floor(who: Crawler, motion: ms.Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """What of the ground is in the picture: vertices (n, 3) m, half a cell below it, and faces (m, 3)."""
+    """What of the ground is in the picture, as far below as the sheet's lower face: vertices (n, 3) m and faces (m, 3)."""
     low, high = motion.positions.min(axis=(0, 1)) - CELL, motion.positions.max(axis=(0, 1)) + CELL
-    cells = (40, 4)
-    floor = ms.meshes.rectangle(high[0] - low[0], high[1] - low[1], cells=cells)
+    floor = ms.meshes.rectangle(high[0] - low[0], high[1] - low[1], cells=(40, 4))
     points = floor.rest_positions + (low[0], low[1], 0.0)
-    points[:, 2] = who.ground.height(points[:, 0])
+    points[:, 2] = who.ground.height(points[:, 0]) - THICKNESS / 2
     return points, floor.faces
 
 
