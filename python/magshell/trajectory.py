@@ -38,14 +38,14 @@ class MotionState:
         lengths = np.array([len(each) for each in self.memory], dtype=np.int64)
         remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.memory)])
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        with open(path, "wb") as file:
+        with Path(path).open("wb") as file:  # a number would be an open file of somebody else's
             np.savez(file, time=self.time, memory=remembered, memory_lengths=lengths, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> MotionState:
         """Reads what `save` wrote. Raises ValueError if it is something else."""
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with np.load(Path(path), allow_pickle=False) as file:
                 time, remembered, lengths = (file[name] for name in ("time", "memory", "memory_lengths"))
                 arrays = {name: file[name] for name in _ARRAYS}
         except (KeyError, ValueError, EOFError) as error:
