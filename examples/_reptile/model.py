@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -67,10 +68,11 @@ class Crawler:
     start: np.ndarray
     ground: Ground | None
 
-    def crawl(
-        self, cycles: float, *, time_step=TIME_STEP, sense=1, frames=40, **options
-    ) -> ms.Trajectory:
-        """So many turns of the field, at least `frames` states of each recorded; sense: -1 turns it the other way."""
+    def crawl(self, cycles: float, *, time_step=TIME_STEP, sense=1, frames=40, **options) -> ms.Trajectory:
+        """So many turns of the field, at least `frames` states of each recorded.
+
+        sense: -1 turns it the other way.
+        """
         a_cycle = round(1 / (FREQUENCY * time_step))
         every = max(n for n in range(1, max(a_cycle // frames, 1) + 1) if a_cycle % n == 0)
         return ms.simulate(
@@ -130,11 +132,10 @@ def crawler(ground: Ground | None, **contact) -> Crawler:
 def lizard() -> ms.TriangleMesh:
     """A body with four pairs of legs: 496 faces and 326 vertices, mirrored left to right and front to back.
 
-    By Euler's formula a sheet of so many has 154 edges along its outline. Of rectangles cut in halves it has 248,
-    and of all bodies that can be made of them, with legs of one size on both sides, this one alone has several
-    pairs of legs with gaps of about their own number of cells between them.
+    By Euler's formula a sheet of so many has 154 edges along its outline, and of rectangles cut in halves it
+    has 248. Bodies of whole cells with legs of one size that have both are few; this one has four pairs.
     """
-    (columns, width), (thick, long) = BODY, LEG
+    (columns, width), long = BODY, LEG[1]
     x, on_leg = across()
     y = CELL * (np.arange(width + 2 * long + 1) - width / 2 - long)
     cells = [
@@ -164,14 +165,14 @@ def across() -> tuple[np.ndarray, np.ndarray]:
     for root in ROOTS:
         on_leg[root : root + thick] = True
     widths = np.full(columns, LEG_CELL)
-    for root, following in zip(ROOTS[:-1], ROOTS[1:], strict=True):
+    for root, following in pairwise(ROOTS):
         widths[root + thick : following] = GAP / (following - root - thick)
     x = np.append(0.0, np.cumsum(widths))
     return x - x[-1] / 2, on_leg
 
 
 def magnetization(mesh: ms.TriangleMesh) -> np.ndarray:
-    """(n_f, 3) A/m: legs along themselves, outwards in one pair and inwards in the next; the body has none."""
+    """(n_f, 3) A/m: legs along themselves, outwards in one pair, inwards in the next; the body has none."""
     x, y, _ = mesh.face_barycenters.T
     pair = np.searchsorted(across()[0][list(ROOTS)], x) - 1
     on_leg = np.abs(y) > CELL * BODY[1] / 2

@@ -110,10 +110,10 @@ def _on_the_floor(who: Crawler, motion: ms.Trajectory, chosen: np.ndarray) -> tu
 
 
 def _floor(who: Crawler, motion: ms.Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """What of the ground is in the picture, as far below as the sheet's lower face: vertices (n, 3) m and faces (m, 3)."""
+    """What is drawn of the ground, where the sheet's lower face touches: vertices (n, 3) m, faces (m, 3)."""
     low, high = motion.positions.min(axis=(0, 1)) - CELL, motion.positions.max(axis=(0, 1)) + CELL
     floor = ms.meshes.rectangle(high[0] - low[0], high[1] - low[1], cells=(40, 4))
-    points = floor.rest_positions + (low[0], low[1], 0.0)
+    points = floor.rest_positions + np.array([low[0], low[1], 0.0])
     points[:, 2] = who.ground.height(points[:, 0]) - THICKNESS / 2
     return points, floor.faces
 
@@ -131,7 +131,8 @@ def _walks(result: dict) -> str:
         ways = "  ".join(f"{1e3 * way:6.3f}" for way in advances(who, motion)[:, 0])
         lines.append(f"  {name:<7}{ways}")
         lines.append(
-            f"         {motion.iterations / motion.steps_done:.2f} iterations a step, {len(motion.halved)} in parts, "
+            f"         {motion.iterations / motion.steps_done:.2f} iterations a step, "
+            f"{len(motion.halved)} of {motion.steps_done} in parts, "
             f"{1e3 * motion.wall_time / motion.steps_done:.2f} ms of wall time a step"
         )
     back = 1e3 * advances(*result["back"])[0, 0]
@@ -143,12 +144,13 @@ def _study(rows: list[Row]) -> str:
     if not rows:
         return ""
     lines = [
-        "On flat ground, the second turn        step [ms]   advance [mm]   iterations   ms of processor a step"
+        "On flat ground, the second turn        step [ms]   advance [mm]   iterations   processor [ms a step]"
     ]
     for row in rows:
         advance = f"{'':>12}" if row.advance is None else f"{1e3 * row.advance:12.4f}"
         lines.append(
-            f"  {row.what:<36}{1e3 * row.time_step:10.1f}   {advance}   {row.iterations:10.2f}   {1e3 * row.cpu:10.2f}"
+            f"  {row.what:<36}{1e3 * row.time_step:10.1f}   {advance}   "
+            f"{row.iterations:10.2f}   {1e3 * row.cpu:10.2f}"
         )
     lines.append(f"  The paper's step is {1e3 * TIME_STEP:g} ms.")
     return "\n".join(lines)

@@ -14,7 +14,7 @@ from .model import FREQUENCY, TIME_STEP, Crawler, crawler, flat
 
 @dataclass(frozen=True)
 class Row:
-    """advance: m along x in the last cycle, or None where there is no ground; cpu: s of processor time a step."""
+    """advance: m along x in the last cycle, None without ground; cpu: s of processor time a step."""
 
     what: str
     time_step: float
@@ -31,7 +31,7 @@ def advances(who: Crawler, motion: ms.Trajectory) -> np.ndarray:
 
 
 def study(steps=(2e-3, 1e-3, TIME_STEP), cycles=2) -> list[Row]:
-    """On flat ground, in steps of ... s: friction exact, lagged and none, and a floating crawler without contact."""
+    """On flat ground, in steps [s]: friction exact, lagged and none; and floating, without contact."""
     ground = flat()
     exact, lagged = crawler(ground), crawler(ground, lagged_friction=True)
     slippery, floating = crawler(ground, friction_coefficient=0.0), crawler(None)
