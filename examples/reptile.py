@@ -19,8 +19,8 @@ over:
   2 ms 4.42 mm on flat ground, in 7.8.
 - Lagged friction gives 4.270 mm instead of 4.272 in steps of 0.1 ms, 4.363 instead of 4.376 in steps of 1
   ms and 4.457 instead of 4.422 in steps of 2 ms, in about as many iterations.
-- Floating, without contact, a step of 0.1 ms takes 2.0 iterations; an iteration with contact and friction costs
-  1.2 times as much as one without.
+- Floating, without contact, a step of 0.1 ms takes 2.0 iterations; an iteration with contact and friction
+  costs 1.2 times as much as one without.
 - Friction holds below a speed that is chosen: 0.5 mm/s, a fortieth of the walk's. With a twentieth of
   that, the library's default here, Newton's method fails in a step of the second turn, in whatever parts
   it is taken.
