@@ -81,6 +81,11 @@ def simulate(
     velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
     continuous, time_step, damping, start positions and velocities among them.
 
+    They are exact where the motion is differentiable: through impact, stick and slip on smooth obstacles too. It is not
+    where a point touches a kink of an obstacle (Trajectory.kinks says where), where a little more makes a step fail or
+    be taken in other parts (Trajectory.halved), and in water whose tables have kinks (Water.is_smooth); gradients there
+    are those of one side.
+
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
@@ -114,7 +119,9 @@ def simulate(
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if integrator is None:
         integrator = ImplicitEuler() if scene.contacts else TRBDF2()
-    inputs = Inputs(scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True, moving=True)
+    inputs = Inputs(
+        scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True, moving=True
+    )
     asked = MotionInputs(
         inputs,
         steps=steps,
@@ -190,6 +197,10 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         wall_time=wall_time,
         linear_time=found.linear_time,
         _field_factors=asked.recorded("field_factor", recorded),
+        _placed=[
+            (contact, [asked.inputs.values.current(each) for each in contact.obstacles])
+            for contact in scene.contacts
+        ],
     )
 
 

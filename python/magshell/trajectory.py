@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ._surroundings import near_kinks
+from ._tensors import detached
 from .integrators import Integrator
 from .scene import Scene
 
@@ -89,6 +91,7 @@ class Trajectory:
     wall_time: float
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
+    _placed: list = field(repr=False, default_factory=list)  # (contact, its obstacles where they were)
 
     @property
     def displacements(self):
@@ -102,6 +105,30 @@ class Trajectory:
     def energy(self) -> np.ndarray:
         """Kinetic and potential, (n,) J."""
         return self.kinetic_energy + sum(self.energies.values())
+
+    @property
+    def kinks(self) -> dict[int, np.ndarray]:
+        """{recorded state: vertices} that touch an obstacle where the motion is not differentiable, or within the
+        smoothing of there: by the sharp edge of a box or a mesh, in the middle of a body.
+
+        A small change may bring such a point to another side. A gradient is that of the side on which it is. Looked up
+        when asked for, in the recorded states only.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+        >>> ridge = ms.obstacles.Box((0.1, 0.1, 0.1), rotation=(0, np.pi / 4, 0), center=(0.01, 0.01, -0.0707105))
+        >>> scene = ms.Scene(sheet, contacts=[ms.Contact(ridge)], allow_rigid_motions=True)
+        >>> ms.simulate(scene, steps=1, time_step=1e-3, velocities=(0, 0, -1e-4)).kinks
+        {0: array([3, 4, 5], dtype=int32), 1: array([3, 4, 5], dtype=int32)}
+        """
+        positions = detached(self.positions)
+        found = {}
+        for k, time in enumerate(self.times):
+            near = [near_kinks(*each, self.scene.shell, positions[k], time) for each in self._placed]
+            if near and (every := np.unique(np.concatenate(near))).size:
+                found[k] = every
+        return found
 
     def __len__(self) -> int:
         return len(self.times)

@@ -50,7 +50,7 @@ void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool cautious
         const double coefficient = contact_.law(each.touch).friction;
         const Mat3& by_velocity = cautious ? each.friction.secant : each.friction.by_velocity;
         contact_.add_block(each.touch, -coefficient * at.rate * by_velocity, out);
-        if (each.lagged) continue;
+        if (each.lagged || cautious) continue;
         const Mat3 block = -coefficient * by_place(each.friction, each.touch, each.obstacle.spin());
         const ContactPoint& point = contact_.point(each.touch);
         if (point.nodes[1] < 0) {

@@ -255,7 +255,7 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
             q = from + share * step;
             evaluate(q, controls, anchor);
             if (share <= shortest || relative_residual(q, anchor) <= options_.tolerance) break;
-            if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.25 * share) * whole) break;
+            if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.05 * share) * whole) break;
         }
     }
 }
