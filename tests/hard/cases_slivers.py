@@ -44,17 +44,22 @@ X, Y = np.linspace(0.0, LENGTH, 21), np.linspace(0.0, WIDTH, 3)
 THIN_X, THIN_Y = X[1] / ASPECT, Y[1] / ASPECT
 
 
-def flat_triangles() -> ms.TriangleMesh:
-    """Each face cut into three at a point by its edge 0, so that one of them has an angle of almost 180 degrees."""
-    return cut_inside(strip((20, 2)), np.array([1.0 / ASPECT, 0.5, 0.5 - 1.0 / ASPECT]))
+def with_flat_triangles() -> ms.TriangleMesh:
+    """Every tenth face cut into three at a point by its edge 0, so that one of them has an angle of almost 180 degrees.
+
+    All of them would not do: elements of this kind need their angles to stay away from 180 degrees to converge.
+    """
+    return cut_inside(strip(), np.array([1.0 / ASPECT, 0.5, 0.5 - 1.0 / ASPECT]), every=10)
 
 
-def cut_inside(mesh: ms.TriangleMesh, weights: np.ndarray) -> ms.TriangleMesh:
-    """Each face cut into three at the point of these barycentric coordinates (3,)."""
-    corners, new = mesh.faces, mesh.n_vertices + np.arange(mesh.n_faces)
+def cut_inside(mesh: ms.TriangleMesh, weights: np.ndarray, every: int = 1) -> ms.TriangleMesh:
+    """Every n-th face cut into three at the point of these barycentric coordinates (3,)."""
+    corners = mesh.faces[::every]
+    new = mesh.n_vertices + np.arange(len(corners))
     points = np.einsum("c,fci->fi", weights, mesh.rest_positions[corners])
-    faces = [np.stack([corners[:, i], corners[:, (i + 1) % 3], new], axis=1) for i in range(3)]
-    return ms.TriangleMesh(np.concatenate([mesh.rest_positions, points]), np.concatenate(faces))
+    parts = [np.stack([corners[:, i], corners[:, (i + 1) % 3], new], axis=1) for i in range(3)]
+    whole = np.delete(mesh.faces, np.s_[::every], axis=0)
+    return ms.TriangleMesh(np.concatenate([mesh.rest_positions, points]), np.concatenate([whole, *parts]))
 
 
 def tiny_face(mesh: ms.TriangleMesh, face: int, size: float) -> ms.TriangleMesh:
@@ -94,13 +99,21 @@ def far_bent_strip_of_slivers():
 
 
 @case("faces with an angle of 179.8 degrees")
-def far_bent_strip_of_flat_triangles():
-    return bent(flat_triangles(), 5e-3)
+def far_bent_strip_with_flat_triangles():
+    return bent(with_flat_triangles(), 1e-2)
 
 
-@case("a face of {:g} times its neighbours' size", over=(1e-3, 1e-4, 1e-6))
+@case("a face of {:g} times its neighbours' size", over=(1e-3, 1e-4))
 def far_bent_strip_with_a_tiny_face(size):
     return bent(tiny_face(strip(), 39, size), 3e-3)
+
+
+@case("a face of 5 nm in a strip of 0.1 m, 0.25 mm thick: the round-off of its folds outweighs the load")
+def far_bent_strip_with_a_face_of_nanometres():
+    """Positions are known to 1e-17 m, its folds to 2e-9 rad; over its own size that is a force like the load's."""
+    return refused(
+        lambda: bent(tiny_face(strip(), 39, 1e-6), 1.0), "Load it in smaller|no stable", ms.NotConverged
+    )
 
 
 @case("a face of 1e-3 times its neighbours' size at the clamp, where the moment is largest")

@@ -287,6 +287,13 @@ bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor
     return true;
 }
 
+bool Newton::factor_serves(double contraction, double residual) const {
+    constexpr double worth = 4.0;  // steps with an old factorization, for one with its own
+    // The errors that a factorization leaves behind are those of its own place, twice what the last step left.
+    const double each = 2.0 * contraction;
+    return each < 0.1 && std::log(options_.tolerance / residual) >= worth * std::log(each);
+}
+
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                              bool mixed) {
     NewtonReport report;
@@ -316,14 +323,17 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (report.iterations == max_iterations)
             return fail("no convergence in " + std::to_string(max_iterations) + " iterations");
         Eigen::MatrixXd pull = move;
-        const bool cautious = report.residual > contracting * last_residual;
+        const double contraction = report.residual / last_residual;
         last_residual = report.residual;
-        const FactorReport factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
-        report.negative_pivots = factor.negative_pivots;
-        if (!factor.succeeded) return fail(factor.reason);
-        if (report.iterations == 0) first_negative_pivots = factor.negative_pivots;
-        report.lost = factor.negative_pivots > first_negative_pivots + most_new_negative_pivots;
-        if (mixed && report.lost) return fail("the iteration lost its way");
+        if (report.iterations == 0 || !factor_serves(contraction, report.residual)) {
+            const bool cautious = contraction > contracting;
+            const FactorReport factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
+            report.negative_pivots = factor.negative_pivots;
+            if (!factor.succeeded) return fail(factor.reason);
+            if (report.iterations == 0) first_negative_pivots = factor.negative_pivots;
+            report.lost = factor.negative_pivots > first_negative_pivots + most_new_negative_pivots;
+            if (mixed && report.lost) return fail("the iteration lost its way");
+        }
         const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
                                                        deserved(report.residual, options_.tolerance));
         move.setZero();

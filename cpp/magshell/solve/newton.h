@@ -110,6 +110,8 @@ class Newton {
                  NewtonReport& report);
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor,
                   bool cautious = false);
+    /// Whether steps with the last factorization will do, which are as good as free.
+    bool factor_serves(double contraction, double residual) const;
     void reduce_assembled(const Anchor& anchor);
     /// K p, or K^T p, of what was assembled last, free unknowns.
     VectorXd assembled_product(const VectorXd& reduced, bool transposed) const;
