@@ -345,6 +345,10 @@ void Model::add_cancelling_contact_forces(bool in_motion, VectorXd& out) const {
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_cancelling_forces(kinematics_, out);
 }
 
+void Model::hold_forces(bool held) {
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->hold(held);
+}
+
 void Model::assemble_forces(const Controls& controls, bool cautious) {
     remainder_.clear();
     for (const std::unique_ptr<ForceTerm>& force : forces_)

@@ -84,6 +84,7 @@ class Model {
                         const Controls& controls_at_end) const;
     void evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage);
     void assemble_forces(const Controls& controls, bool cautious = false);
+    void hold_forces(bool held);
     const Remainder& remainder() const { return remainder_; }
     /// Adds - lambda . df/dk to the scene's gradient; returns lambda . df by what else they depend on.
     KinematicsGradient forces_vjp(const Controls& controls, const VectorXd& lambda, SceneGradient& out) const;
