@@ -9,7 +9,7 @@ from scipy.interpolate import PchipInterpolator
 
 import magshell as ms
 
-KNOTS = 13  # of a tube: all that its outline needs, and each costs time
+KNOTS = 17  # of a tube: all that its outline needs, and each costs time
 
 
 @dataclass(frozen=True)
@@ -45,14 +45,16 @@ class Channel:
 def _channel(name: str, outline: dict[float, float], end: float, goal: float) -> Channel:
     """From lengths in mm."""
     return Channel(
-        name, tuple(1e-3 * x for x in outline), tuple(1e-3 * r for r in outline.values()), 1e-3 * end, 1e-3 * goal
+        name,
+        tuple(1e-3 * x for x in outline),
+        tuple(1e-3 * r for r in outline.values()),
+        1e-3 * end,
+        1e-3 * goal,
     )
 
 
 CHANNELS = {
-    "pipe I": _channel("pipe I", {-40: 21, -5: 21, 25: 10.5, 50: 10.5, 80: 21, 140: 21}, end=50, goal=85),
-    "pipe II": _channel("pipe II", {-40: 21, -5: 21, 15: 16, 80: 16, 100: 21, 140: 21}, end=80, goal=115),
-    "tunnel": _channel(
-        "tunnel", {-40: 21, -5: 21, 18: 12, 32: 17, 50: 10.5, 62: 12, 85: 21, 140: 21}, end=60, goal=95
-    ),
+    "pipe I": _channel("pipe I", {-40: 21, -5: 21, 15: 11, 24: 11, 44: 21, 100: 21}, end=24, goal=47),
+    "pipe II": _channel("pipe II", {-40: 21, -5: 21, 12: 16, 34: 16, 50: 21, 100: 21}, end=34, goal=57),
+    "tunnel": _channel("tunnel", {-40: 21, -5: 21, 12: 12, 22: 15, 32: 11, 52: 21, 100: 21}, end=32, goal=55),
 }

@@ -27,10 +27,12 @@ def draw_swimmer(axes, result: dict, positions: np.ndarray) -> None:
     colors = shade[:, None] * np.where(tentacle, to_rgb(TENTACLE), to_rgb(HEAD))
     from_the_back = np.argsort(-corners[:, :, 1].mean(axis=1))
     faces = 1e3 * corners[from_the_back][:, :, [0, 2]]
-    axes.add_collection(PolyCollection(faces, facecolors=colors[from_the_back], edgecolors=colors[from_the_back], lw=0.3))
+    axes.add_collection(
+        PolyCollection(faces, facecolors=colors[from_the_back], edgecolors=colors[from_the_back], lw=0.3)
+    )
     x, radius = 1e3 * result["outline"]
     axes.fill_between(x, -radius, radius, color=WATER, alpha=0.3, lw=0, zorder=3)
-    top = 1.25 * radius.max()
+    top = 1.35 * radius.max()
     for side in (-1, 1):
         axes.fill_between(x, side * radius, side * top, color=WALL, lw=0, zorder=4)
     axes.axvline(1e3 * result["channel"].end, color="k", lw=0.8, ls=":", zorder=5)
@@ -42,17 +44,33 @@ def draw_snapshot(axes, result: dict, name: str, time: float) -> None:
     motion = result[name]
     frame = int(np.argmin(np.abs(result["times"] - time)))
     draw_swimmer(axes, result, motion["positions"][frame])
-    axes.plot(1e3 * motion["centre"][: frame + 1, 0], 1e3 * motion["centre"][: frame + 1, 2], color="k", lw=0.8, zorder=6)
-    axes.text(BEGIN + 1, -23, f"{time:.2f} s", zorder=6, color="w", va="center", fontsize=8)
+    axes.plot(
+        1e3 * motion["centre"][: frame + 1, 0],
+        1e3 * motion["centre"][: frame + 1, 2],
+        color="k",
+        lw=0.8,
+        zorder=6,
+    )
+    axes.text(BEGIN + 2, -25, f"{time:.2f} s", zorder=6, color="w", va="center", fontsize=8)
 
 
 def draw_path(axes, result: dict) -> None:
     """Along the channel: the centre of mass beside the sample points, and the last tip beside the channel's end."""
     for name in ("guess", "found"):
         motion = result[name]
-        axes.plot(result["times"], 1e3 * motion["centre"][:, 0], color=COLORS[name], lw=1.6, label=f"centre, {LABELS[name]}")
-        axes.plot(result["times"], 1e3 * motion["tail"], color=COLORS[name], lw=0.9, ls="--", label="last tip")
-    axes.plot(result["sample_times"], 1e3 * result["samples"][:, 0], "o", color="k", ms=3.5, label="sample points")
+        axes.plot(
+            result["times"],
+            1e3 * motion["centre"][:, 0],
+            color=COLORS[name],
+            lw=1.6,
+            label=f"centre, {LABELS[name]}",
+        )
+        axes.plot(
+            result["times"], 1e3 * motion["tail"], color=COLORS[name], lw=0.9, ls="--", label="last tip"
+        )
+    axes.plot(
+        result["sample_times"], 1e3 * result["samples"][:, 0], "o", color="k", ms=3.5, label="sample points"
+    )
     axes.axhline(1e3 * result["channel"].end, color="k", lw=0.8, ls=":")
     axes.set(xlabel="time [s]", ylabel="x [mm]", xlim=(0, result["times"][-1]))
     axes.legend(frameon=False, fontsize=7)
@@ -69,7 +87,14 @@ def draw_field(axes, result: dict) -> None:
 
 def draw_convergence(axes, result: dict) -> None:
     iterations = [record.iteration for record in result["history"]]
-    axes.semilogy(iterations, [1e6 * record.objective for record in result["history"]], "o-", color="k", ms=3, label="objective")
+    axes.semilogy(
+        iterations,
+        [1e6 * record.objective for record in result["history"]],
+        "o-",
+        color="k",
+        ms=3,
+        label="objective",
+    )
     for name, color in (("distance", FOUND), ("strength", GUESS), ("low frequency", "#3d9970")):
         values = np.array([1e6 * record.terms[name] for record in result["history"]])
         axes.semilogy(iterations, np.where(values > 0, values, np.nan), color=color, lw=1.0, label=name)
@@ -90,7 +115,7 @@ def movie(result: dict, path, fps: int = 25, slower: float = 2.0) -> None:
             frame = int(np.argmin(np.abs(times - time)))
             draw_swimmer(axes, result, motion["positions"][frame])
             along = 1e3 * motion["field"][max(frame - 1, 0), 0]
-            tail, tip = (BEGIN + 40, -24), (BEGIN + 40 + along, -24)
+            tail, tip = (BEGIN + 40, -25), (BEGIN + 40 + along, -25)
             axes.annotate("", tip, tail, arrowprops={"color": "w", "width": 1.5, "headwidth": 6}, zorder=7)
             axes.set_title(f"{result['channel'].name}: {time:.2f} s, $B_x$ = {along:.1f} mT", fontsize=10)
             writer.grab_frame()

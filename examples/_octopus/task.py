@@ -16,6 +16,10 @@ from .channels import Channel
 TIME_STEP = 1e-3  # s, [Chen22] Table 1
 FIELD_LIMIT = 50e-3  # T, of every component, the same
 CONTACT_STIFFNESS, FRICTION = 1e4, 0.6  # N/m and 1, the same
+SMOOTHING, STICKING_SPEED = (
+    0.2e-3,
+    5e-3,
+)  # m and m/s: with sharper contacts small changes of the field throw it about
 WATER = 1e3  # kg/m3, [Chen22] 6.3: as heavy as the octopus, which therefore floats and needs no gravity
 
 SAMPLES = 12  # points of the path that the mass centre is asked for
@@ -76,6 +80,8 @@ class Swim:
                     self.channel.tube(),
                     contact_stiffness=CONTACT_STIFFNESS,
                     friction_coefficient=FRICTION,
+                    smoothing=SMOOTHING,
+                    sticking_speed=STICKING_SPEED,
                     offset=0.5 * float(self.body.shell.thickness.mean()),
                 )
             ]
@@ -144,8 +150,8 @@ class Swim:
             lower=[-FIELD_LIMIT, SLOWEST, -FIELD_LIMIT, -FIELD_LIMIT],
             upper=[FIELD_LIMIT, FASTEST, FIELD_LIMIT, FIELD_LIMIT],
             scale=list(SIZES),
-            first_step=0.3,
-            max_evaluations=5,
+            first_step=0.05,
+            max_evaluations=6,
         )
         found = ms.minimize(
             lambda *variables: self.objective(Variables(*variables)),
