@@ -13,11 +13,11 @@ pythons := $(wildcard python tests examples)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format stubs clean
+.PHONY: help demo test sanitize lint format stubs clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-7s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pictures, in out/
 	$(VENV)/bin/python examples/bistable_beam.py
@@ -25,6 +25,10 @@ demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pict
 
 test: $(VENV)/.with-test  ## every test, the notebooks and examples included
 	$(VENV)/bin/python -m pytest
+
+sanitize: $(VENV)/.with-test  ## tests against an extension that watches its memory, arithmetic and threads
+	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/sanitize.sh address,undefined
+	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/sanitize.sh thread
 
 lint: $(VENV)/.with-dev  ## ruff and clang-format, changing nothing
 	$(VENV)/bin/ruff check $(pythons)

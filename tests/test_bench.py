@@ -3,13 +3,16 @@
 import json
 import subprocess
 import sys
+from itertools import product
 
 import pytest
+from bench_figures import is_a_picture
 
 import magshell as ms
 from magshell.bench.__main__ import PARTS, main
 from magshell.bench.cases import CASES
 from magshell.bench.report import print_table
+from magshell.bench.work_precision import STUDIES, measure, print_points
 
 
 @pytest.fixture(autouse=True)
@@ -43,9 +46,9 @@ def test_table_has_columns_as_wide_as_they_need(capsys) -> None:
     ]
 
 
-def test_coarse_run_of_some_cases(tmp_path, capsys) -> None:
+def test_quick_run_of_some_cases(tmp_path, capsys) -> None:
     path = tmp_path / "new folder" / "accuracy.json"
-    assert main(["accuracy", "--coarse", "--only", "A1", "C4", "--json", str(path), "--threads", "1"]) == 0
+    assert main(["accuracy", "--quick", "--only", "A1", "C4", "--json", str(path), "--threads", "1"]) == 0
     printed = capsys.readouterr().out
     assert (
         "irregular 20x2" in printed
@@ -60,16 +63,22 @@ def test_coarse_run_of_some_cases(tmp_path, capsys) -> None:
     deflection = cases["A1"]["midedge"]["comparisons"][0]
     assert len(deflection["computed"]) == 20 and deflection["error"] < 0.01
     assert cases["A1"]["midedge"]["factorizations"] > cases["A1"]["midedge"]["solves"]
+    points = written["results"]["error against time"]
+    assert {point["case"] for point in points} == {"A1"}  # C4 has no curve
+    assert {(point["bending"], point["solver"], point["irregular"]) for point in points} == set(
+        product(("midedge", "hinge"), ("mixed", "plain"), (False, True))
+    )
+    assert all(0 < point["error"] < 0.2 and point["time"] > 0 and point["faces"] > 0 for point in points)
 
 
-def test_whole_coarse_run_draws_a_figure(tmp_path, capsys) -> None:
+def test_whole_quick_run_draws_a_figure(tmp_path, capsys) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "accuracy.png"
-    assert main(["accuracy", "--coarse", "--figure", str(picture)]) == 0
+    assert main(["accuracy", "--quick", "--figure", str(picture)]) == 0
     printed = capsys.readouterr().out
     assert all(case.name in printed for case in CASES)
     assert "Order of convergence" in printed and "MISSED" in printed  # coarse meshes do miss
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert is_a_picture(picture)
 
 
 def test_a_case_that_fails_is_a_row(monkeypatch, capsys) -> None:
@@ -79,7 +88,7 @@ def test_a_case_that_fails_is_a_row(monkeypatch, capsys) -> None:
     monkeypatch.setattr(
         "magshell.bench.accuracy.CASES", (type(CASES[0])("A1", "end shear", fail, None, None),)
     )
-    assert main(["accuracy", "--only", "A1"]) == 0
+    assert main(["accuracy", "--only", "A1", "--quick"]) == 0
     printed = capsys.readouterr().out
     assert (
         "0 of 1 rows with an allowed error are within it" in printed
@@ -104,3 +113,81 @@ def test_unknown_case(capsys) -> None:
 def test_impossible_number_of_threads() -> None:
     with pytest.raises(SystemExit, match="between 1 and 1024"):
         main(["accuracy", "--threads", "0"])
+
+
+@pytest.mark.parametrize(("part", "also"), [("accuracy", ["--only", "A1"]), ("kernels", [])])
+def test_without_matplotlib_the_numbers_are_there(monkeypatch, tmp_path, capsys, part: str, also) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    for name in [name for name in sys.modules if name.startswith(("matplotlib.", "magshell.bench.figures."))]:
+        monkeypatch.delitem(sys.modules, name)
+    path, picture = tmp_path / "numbers.json", tmp_path / "numbers.png"
+    assert main([part, "--quick", *also, "--json", str(path), "--figure", str(picture)]) == 3
+    printed = capsys.readouterr()
+    assert "midedge" in printed.out and json.loads(path.read_text())["part"] == part
+    assert 'pip install "magshell[plot]"' in printed.err and "numbers are above" in printed.err
+
+
+def test_without_torch(monkeypatch, capsys) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    assert main(["gradients", "--quick"]) == 3
+    assert 'pip install "magshell[torch]"' in capsys.readouterr().err
+
+
+def test_no_curve_to_draw_is_refused_at_once(tmp_path) -> None:
+    with pytest.raises(SystemExit, match="no curve of error against time to draw of C4"):
+        main(["accuracy", "--only", "C4", "--figure", str(tmp_path / "picture.png")])
+
+
+def test_a_point_that_does_not_converge_is_named(capsys) -> None:
+    def fail(mesh, bending, irregular, solver):
+        raise ms.NotConverged("it would not converge", found)
+
+    strip = ms.meshes.rectangle(0.1, 0.02, cells=(5, 1))
+    sheet = ms.Shell(strip, thickness=1e-3, young_modulus=1e5)
+    found = ms.equilibrium(ms.Scene(sheet, supports=[ms.Clamp(strip.edges_at(x=0.0))]))
+    points = measure([STUDIES[0]._replace(run=fail, meshes=((5, 1),))], rounds=1)
+    assert len(points) == 8 and all(point.error is None for point in points)
+    print_points(points)
+    assert "A1, irregular (5, 1), hinge, plain Newton: did not converge" in capsys.readouterr().out
+
+
+def test_figure_of_written_numbers(tmp_path, capsys) -> None:
+    pytest.importorskip("matplotlib")
+    path, picture = tmp_path / "kernels.json", tmp_path / "kernels.png"
+    assert main(["kernels", "--quick", "--rounds", "1", "--json", str(path)]) == 0
+    assert main(["figure", str(path), str(picture)]) == 0
+    assert is_a_picture(picture)
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (None, "cannot read"),
+        ("no", "is not JSON"),
+        ('{"part": 1}', "was not written by the bench"),
+        ('{"part": "speed", "setting": {}, "results": {}}', "there is no part 'speed'"),
+    ],
+)
+def test_figure_of_something_else(tmp_path, capsys, content, complaint: str) -> None:
+    path = tmp_path / "numbers.json"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(SystemExit):
+        main(["figure", str(path), str(tmp_path / "numbers.png")])
+    assert complaint in capsys.readouterr().err
+
+
+def test_all_parts_into_a_folder(monkeypatch, tmp_path, capsys) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr("magshell.bench.__main__.PARTS", {"kernels": PARTS["kernels"]})
+    folder = tmp_path / "new"
+    assert main(["all", str(folder), "--quick"]) == 0
+    assert json.loads((folder / "kernels.json").read_text())["part"] == "kernels"
+    assert is_a_picture(folder / "kernels.png")
+
+
+def test_all_parts_into_no_folder(tmp_path, capsys) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SystemExit):
+        main(["all", str(tmp_path / "file")])
+    assert "cannot write" in capsys.readouterr().err

@@ -278,7 +278,7 @@ def test_nearest_vertex_and_edges_between():
     ("select", "message"),
     [
         (lambda m: m.vertices_at(), "give at least one of x, y, z"),
-        (lambda m: m.vertices_at(x=np.nan), "coordinates .* must be finite, got x = nan"),
+        (lambda m: m.vertices_at(x=np.nan), r"x \[m\] must be finite, but x is nan"),
         (lambda m: m.vertices_at(x=0.0, tolerance=-1.0), "tolerance .* must not be negative, got -1"),
         (lambda m: m.vertices_at(x=2.2), r"no vertex at x = 2.2 m \(tolerance .*\): .* 16, has x = 2"),
         (lambda m: m.edges_at(x=2.2, y=0.0), "no edge at x = 2.2, y = 0 m .* has x = 2, y = 0"),

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+
+from ._quantity import real_numbers
 
 
 def index_array(name: str, values) -> np.ndarray:
@@ -16,9 +20,19 @@ def index_array(name: str, values) -> np.ndarray:
     return array.astype(np.int64)
 
 
+def named_values(name: str, values) -> Mapping:
+    """A dictionary, empty for None."""
+    if not isinstance(values, Mapping | None):
+        raise ValueError(f"{name} must be a dictionary of name: values, got {type(values).__name__}")
+    return values or {}
+
+
 def positive(name: str, value) -> float:
     """A positive finite float, or a ValueError that says the name."""
-    number = float(value)
+    array = real_numbers(name, value)
+    if array.ndim != 0:
+        raise ValueError(f"{name} must be a number, got shape {array.shape}")
+    number = float(array)
     if not (np.isfinite(number) and number > 0):
         raise ValueError(f"{name} must be positive and finite, got {value}")
     return number

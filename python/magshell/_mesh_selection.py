@@ -89,14 +89,16 @@ class MeshSelection:
         return found
 
     def _coordinates(self, x, y, z, tolerance) -> tuple[dict[int, float], float]:
-        wanted = {axis: float(value) for axis, value in enumerate((x, y, z)) if value is not None}
+        wanted = {
+            axis: float(quantity("xyz"[axis], "m", value, ()))
+            for axis, value in enumerate((x, y, z))
+            if value is not None
+        }
         if not wanted:
             raise ValueError("give at least one of x, y, z [m]")
-        if not all(np.isfinite(value) for value in wanted.values()):
-            raise ValueError(f"coordinates [m] must be finite, got {_describe(wanted)}")
         if tolerance is None:
             tolerance = RELATIVE_TOLERANCE * self.size
-        if not tolerance >= 0:
+        if not quantity("tolerance", "m", tolerance, ()) >= 0:
             raise ValueError(f"tolerance [m] must not be negative, got {tolerance}")
         return wanted, float(tolerance)
 

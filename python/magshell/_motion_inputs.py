@@ -186,16 +186,33 @@ class MotionInputs:
                 return start.end
             return MotionState(0.0, start._state, still, start._memory)
         if isinstance(start, MotionState):
-            if len(start.state) != model.size:
-                raise ValueError(
-                    f"start is a state of {len(start.state)} unknowns, but the scene has {model.size}"
-                )
-            return start
+            return _checked_state(start, model.size, mesh.n_faces)
         given = inputs.take("positions", start)
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
         check_faces(mesh, positions)
         check_outside(inputs.scene, inputs.values, positions, 0.0)
         return MotionState(0.0, model.state(positions, np.zeros(mesh.n_edges)), still, [])
+
+
+def _checked_state(start: MotionState, size: int, n_faces: int) -> MotionState:
+    """A MotionState as it is. Its arrays come from a file, or from a caller who made it."""
+    if np.ndim(start.state) == 1 and len(start.state) != size:
+        raise ValueError(f"start is a state of {len(start.state)} unknowns, but the scene has {size}")
+    given = {name: getattr(start, name) for name in ("state", "velocity", "acceleration")}
+    for name, values in given.items():
+        optional = name == "acceleration" and np.shape(values) == (0,)
+        quantity(f"start.{name}", "SI", values, (0,) if optional else (size,))
+    for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
+        values = getattr(start, name)
+        quantity(f"start.{name}", "SI", values, (2, 0 if np.size(values) == 0 else n_faces, 3))
+    if not isinstance(start.memory, list):
+        raise ValueError(
+            f"start.memory must be a list of lists of numbers, got {type(start.memory).__name__}"
+        )
+    for k, each in enumerate(start.memory):
+        quantity(f"start.memory[{k}]", "SI", each, ("n",))
+    quantity("start.time", "s", start.time, ())
+    return start
 
 
 def _count(name: str, value) -> int:

@@ -15,7 +15,7 @@ def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.n
     """
     label = f"{name} [{unit}]"
     array = real_numbers(label, values)
-    if not _fits(array.shape, shape):
+    if not fits(array.shape, shape):
         if shape == ():
             raise ValueError(f"{label} must be a number, got shape {array.shape}")
         wanted = ", ".join(str(size) for size in shape) + ("," if len(shape) == 1 else "")
@@ -44,7 +44,8 @@ def real_numbers(label: str, values) -> np.ndarray:
     return array.astype(np.float64)
 
 
-def _fits(actual: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+def fits(actual: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+    """Whether a shape is the wanted one: letters stand for any size, "..." in front for any leading axes."""
     if wanted[:1] == ("...",):
         wanted = wanted[1:]
         actual = actual[max(len(actual) - len(wanted), 0) :]

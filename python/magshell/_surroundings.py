@@ -39,6 +39,25 @@ def poses(obstacles, times: np.ndarray) -> np.ndarray:
     return rows
 
 
+KINKED = 0.3  # rad, by which normals of smooth bodies do not turn within the smoothing of a contact
+
+
+def near_kinks(contact, obstacles, shell, positions: np.ndarray, time: float) -> np.ndarray:
+    """Vertices (k,) of points that touch one of the obstacles closer than the smoothing to a kink of its distance."""
+    vertices, weights = contact.points(shell.mesh)
+    places = np.einsum("pk,pkc->pc", weights, positions[vertices])
+    reach = contact.law(shell)[1] * np.concatenate([np.eye(3), -np.eye(3)])
+    found = [np.zeros(0, dtype=vertices.dtype)]
+    for obstacle in obstacles:
+        touching = obstacle.signed_distance(places, time) < contact.offset
+        here = places[touching]
+        around = obstacle.normals(here[:, None, :] + reach, time)
+        turn = np.einsum("pc,pkc->pk", obstacle.normals(here, time), around).min(axis=1, initial=1.0)
+        found.append(vertices[touching][turn < np.cos(KINKED)].ravel())
+    every = np.unique(np.concatenate(found))
+    return every[every >= 0]
+
+
 def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
     """A body that starts deeper in an obstacle than half its thickness would be shot out of it."""
     for contact in scene.contacts:

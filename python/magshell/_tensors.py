@@ -6,6 +6,8 @@ import sys
 
 import numpy as np
 
+from ._quantity import fits, quantity, real_numbers
+
 
 def require_torch(what: str):
     """The torch module, or an ImportError that says how to get it."""
@@ -24,6 +26,29 @@ def is_tensor(value) -> bool:
 def tensor_of(values):
     """A tensor as it is; of arrays and lists a copy, because the mesh's own arrays cannot be written to."""
     return values if is_tensor(values) else require_torch("an objective").from_numpy(np.array(values))
+
+
+def real_tensor(name: str, values, shape: tuple[int | str, ...]):
+    """Real numbers of this shape as a floating tensor, in its graph; letters and "..." as in `quantity`."""
+    torch = require_torch(f"a function of {name}")
+    if is_tensor(values):
+        if values.is_complex() or values.dtype == torch.bool:
+            raise ValueError(f"{name} must hold real numbers, got {values.dtype}")
+        tensor = values if values.is_floating_point() else values.to(torch.float64)
+    else:
+        tensor = torch.from_numpy(real_numbers(name, values))
+    if not fits(tuple(tensor.shape), shape):
+        wanted = ", ".join(map(str, shape))
+        raise ValueError(f"{name} must have shape ({wanted}), got {tuple(tensor.shape)}")
+    return tensor
+
+
+def positive_number(name: str, unit: str, value):
+    """A positive float, or the tensor that holds one."""
+    number = float(quantity(name, unit, detached(value), ()))
+    if not number > 0:
+        raise ValueError(f"{name} [{unit}] must be positive, got {value}")
+    return value if is_tensor(value) else number
 
 
 def wants_gradient(value) -> bool:

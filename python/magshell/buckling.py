@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from . import _core
 from ._inputs import Inputs
@@ -152,7 +152,7 @@ def _lowest(
                 "under reversed ones it may"
             )
         inverses, vectors = eigsh(k=min(count, available), which="LA", **pencil)
-    except ArpackNoConvergence as error:
+    except ArpackError as error:
         raise NotConverged(f"the buckling modes did not converge: {error}. Ask for fewer modes.") from error
     order = np.argsort(-inverses)
     return 1.0 / inverses[order], vectors[:, order]

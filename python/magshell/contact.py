@@ -25,7 +25,7 @@ class Contact:
     contact_stiffness: N/m, of every point: a force that grows with the depth, from a short parabola on.
     friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
     sticking_speed: m/s. Below it friction holds: a point that carries a share r of its greatest friction creeps at
-        sticking_speed (1 - sqrt(1 - r)). By default a thousandth of the sheet's extent in a second.
+        sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's extent in a second.
     smoothing: m, the length of the parabola; by default a hundredth of the thickness.
     offset: m, the distance from the obstacle at which the force begins; half the thickness lets the face of the sheet
         touch instead of its middle surface.
@@ -123,7 +123,7 @@ class Contact:
             1e-2 * float(np.mean(shell.thickness)) if self.smoothing is None else self.smoothing,
             self.offset,
             self.friction_coefficient or 0.0,
-            1e-3 * extent if self.sticking_speed is None else self.sticking_speed,
+            1e-2 * extent if self.sticking_speed is None else self.sticking_speed,
         )
 
     def __repr__(self) -> str:

@@ -14,7 +14,7 @@ from ._progress import progress_bar
 from ._replacements import requested
 from ._tensors import like
 from .errors import Interrupted, NotConverged
-from .integrators import TRBDF2, Integrator
+from .integrators import TRBDF2, ImplicitEuler, Integrator
 from .scene import Scene
 from .solvers import MixedNewton, Newton
 from .trajectory import MotionState, Trajectory
@@ -66,7 +66,8 @@ def simulate(
         bits. By default the rest shape.
     velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
     remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density.
-    integrator: TRBDF2() by default; ImplicitEuler(), SDIRK2() or SDIRK3().
+    integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(). A method of higher
+        order makes an impact bounce, and each of its steps there is much work, unless the steps resolve it.
     record_every: steps between the states that come back, the start first.
     memory_budget: bytes that may be kept for gradients: all states if they fit; else checkpoints, between which the
         steps are taken again on the way back, some of them several times.
@@ -80,6 +81,11 @@ def simulate(
     velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
     continuous, time_step, damping, start positions and velocities among them.
 
+    They are exact where the motion is differentiable: through impact, stick and slip on smooth obstacles too. It is not
+    where a point touches a kink of an obstacle (Trajectory.kinks says where), where a little more makes a step fail or
+    be taken in other parts (Trajectory.halved), and in water whose tables have kinks (Water.is_smooth); gradients there
+    are those of one side.
+
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
@@ -89,9 +95,8 @@ def simulate(
     >>> move.positions.shape, bool(move.positions[-1, :, 2].max() > 1e-4)
     ((21, 33, 3), True)
     """
-    integrator = TRBDF2() if integrator is None else integrator
     solver = MixedNewton() if solver is None else solver
-    if not isinstance(integrator, Integrator):
+    if integrator is not None and not isinstance(integrator, Integrator):
         what = (
             f"the class {integrator.__name__}: call it" if isinstance(integrator, type) else repr(integrator)
         )
@@ -112,7 +117,11 @@ def simulate(
         curvature_scale=curvature_scale,
     )
     uniform = np.zeros(3) if scene.has_uniform_field else None
-    inputs = Inputs(scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True, moving=True)
+    if integrator is None:
+        integrator = ImplicitEuler() if scene.contacts else TRBDF2()
+    inputs = Inputs(
+        scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True, moving=True
+    )
     asked = MotionInputs(
         inputs,
         steps=steps,
@@ -188,6 +197,10 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         wall_time=wall_time,
         linear_time=found.linear_time,
         _field_factors=asked.recorded("field_factor", recorded),
+        _placed=[
+            (contact, [asked.inputs.values.current(each) for each in contact.obstacles])
+            for contact in scene.contacts
+        ],
     )
 
 

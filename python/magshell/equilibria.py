@@ -18,6 +18,9 @@ class Equilibria(Sequence):
 
     def __init__(self, cases: Iterable[Equilibrium]):
         self._cases = tuple(cases)
+        for case in self._cases:
+            if not isinstance(case, Equilibrium):
+                raise ValueError(f"cases must hold Equilibrium objects, got {type(case).__name__}")
         self.positions = _stacked([case.positions for case in self._cases])
         self.edge_rotations = _stacked([case.edge_rotations for case in self._cases])
 

@@ -8,7 +8,8 @@ from types import MappingProxyType
 import numpy as np
 
 from . import _core as core
-from ._quantity import quantity
+from ._quantity import quantity, real_numbers
+from ._tensors import is_tensor
 
 
 def residual_to_remanent(residual_flux_density):
@@ -19,9 +20,10 @@ def residual_to_remanent(residual_flux_density):
     >>> round(residual_to_remanent(0.1))
     79577
     """
-    if isinstance(residual_flux_density, list | tuple):
-        residual_flux_density = np.asarray(residual_flux_density, dtype=np.float64)
-    return residual_flux_density / core.vacuum_permeability
+    if is_tensor(residual_flux_density):
+        return residual_flux_density / core.vacuum_permeability
+    remanent = real_numbers("residual_flux_density [T]", residual_flux_density) / core.vacuum_permeability
+    return float(remanent) if remanent.ndim == 0 else remanent
 
 
 class AppliedField:

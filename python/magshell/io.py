@@ -11,11 +11,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ._arrays import named_values
 from ._mesh_selection import RELATIVE_TOLERANCE
 from ._obj import read_obj
 from ._ply import read_ply, write_ply
 from ._quantity import quantity
-from .mesh import TriangleMesh
+from .mesh import TriangleMesh, checked_mesh
 
 _MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
 _READABLE = (".obj", ".ply", *_MESHIO_MODULES)
@@ -71,7 +72,7 @@ def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, fac
     ending = path.suffix.lower()
     if ending not in _WRITERS:
         raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}")
-    points = mesh.rest_positions
+    points = checked_mesh(mesh).rest_positions
     if positions is not None:
         points = quantity("positions", "m", _detached(positions), (mesh.n_vertices, 3))
     on_vertices = _checked_fields("vertex", vertex_fields, mesh.n_vertices)
@@ -174,7 +175,7 @@ def _detached(values):
 
 def _checked_fields(kind: str, fields, rows: int) -> dict[str, np.ndarray]:
     checked = {}
-    for name, values in (fields or {}).items():
+    for name, values in named_values(f"{kind}_fields", fields).items():
         if not isinstance(name, str) or not name or any(character.isspace() for character in name):
             raise ValueError(f"{kind} field names must be words without spaces, got {name!r}")
         array = np.asarray(_detached(values))

@@ -192,6 +192,12 @@ class TriangleMesh(MeshSelection):
         return TriangleMesh(positions, self.faces)
 
 
+def checked_mesh(value, name: str = "mesh") -> TriangleMesh:
+    if not isinstance(value, TriangleMesh):
+        raise ValueError(f"{name} must be a TriangleMesh, got {type(value).__name__}")
+    return value
+
+
 def _frozen(array: np.ndarray) -> np.ndarray:
     array.setflags(write=False)
     return array

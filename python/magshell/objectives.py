@@ -6,7 +6,8 @@ A/m. Positions may be those of one equilibrium, (n_v, 3), or of several load cas
 
 from __future__ import annotations
 
-from ._tensors import require_torch, tensor_of
+from ._quantity import quantity
+from ._tensors import detached, positive_number, real_tensor, require_torch, tensor_of
 
 
 def shape_matching(positions, target, vertices=None, weights=None):
@@ -16,7 +17,8 @@ def shape_matching(positions, target, vertices=None, weights=None):
     vertices, in their order. vertices: (n_chosen,) indices, by default all.
     weights: one a distance, (n_chosen,) or (k, n_chosen), for example vertex areas; by default 1.
     """
-    chosen = positions if vertices is None else positions[..., _indices(vertices), :]
+    positions = real_tensor("positions", positions, ("...", "n_v", 3))
+    chosen = positions if vertices is None else _at(positions, vertices)
     return _weighted_sum(
         ((chosen - _like(target, chosen, "target", chosen.shape, axes=2)) ** 2).sum(-1), weights
     )
@@ -30,6 +32,8 @@ def height_map(positions, rest_positions, image, extent, weights=None):
     extent: (x_min, x_max, y_min, y_max) [m] of the centres of its outermost pixels; beyond, the nearest pixel counts.
     weights: (n_v,) or (k, n_v), by default 1.
     """
+    positions = real_tensor("positions", positions, ("...", "n_v", 3))
+    rest_positions = real_tensor("rest_positions", rest_positions, (positions.shape[-2], 3))
     heights = bilinear(image, rest_positions, extent)
     return _weighted_sum((positions[..., 2] - heights.to(positions)) ** 2, weights)
 
@@ -37,15 +41,17 @@ def height_map(positions, rest_positions, image, extent, weights=None):
 def bilinear(image, points, extent):
     """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in `height_map`."""
     torch = require_torch("objectives.bilinear")
-    image = tensor_of(image).to(torch.float64)
-    if image.ndim != 2 or min(image.shape) < 2:
+    image = real_tensor("image", image, ("rows", "columns")).to(torch.float64)
+    if min(image.shape) < 2:
         raise ValueError(f"image must have at least 2 rows and 2 columns, got shape {tuple(image.shape)}")
-    x_min, x_max, y_min, y_max = extent
+    x_min, x_max, y_min, y_max = quantity("extent", "m", detached(extent), (4,)).tolist()
     if not (x_min < x_max and y_min < y_max):
         raise ValueError(
             f"extent must be (x_min, x_max, y_min, y_max) with positive sizes, got {tuple(extent)}"
         )
-    points = tensor_of(points).to(torch.float64)
+    points = real_tensor("points", points, ("n", "2 or 3")).to(torch.float64)
+    if points.shape[1] not in (2, 3) or not points.detach().isfinite().all():
+        raise ValueError(f"points must be finite, (n, 2) or (n, 3), got shape {tuple(points.shape)}")
     rows, columns = image.shape
     column = ((points[:, 0] - x_min) / (x_max - x_min) * (columns - 1)).clamp(0, columns - 1)
     row = ((y_max - points[:, 1]) / (y_max - y_min) * (rows - 1)).clamp(0, rows - 1)
@@ -63,7 +69,8 @@ def extension(positions, vertices, direction):
     one a case, (k, 3).
     """
     torch = require_torch("objectives.extension")
-    chosen = positions[..., _indices(vertices).reshape(-1), :]
+    positions = real_tensor("positions", positions, ("...", "n_v", 3))
+    chosen = _at(positions, vertices)
     direction = _like(direction, positions, "direction", (*chosen.shape[:-2], 3), axes=1)
     lengths = torch.linalg.vector_norm(direction, dim=-1, keepdim=True)
     if not (lengths.detach() > 0).all():
@@ -73,7 +80,10 @@ def extension(positions, vertices, direction):
 
 def magnitude(values, areas=None):
     """Sum of squares, weighted by areas [m2] where given: of magnetizations (n_f, 3), or of any (n, ...)."""
-    squares = (values**2).reshape(len(values), -1).sum(-1)
+    values = real_tensor("values", values, ("...",))
+    if values.ndim == 0:
+        raise ValueError("values must have shape (n, ...), got a number")
+    squares = (values**2).reshape(len(values), -1).sum(-1) if len(values) else values.new_zeros(0)
     return _weighted_sum(squares, areas, "areas")
 
 
@@ -85,13 +95,21 @@ def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
     `TriangleMesh`. edge_lengths: (n_e,) [m], by default 1.
     smoothing eps > 0: in units of the values; jumps far below it count by their squares.
     """
-    if not smoothing > 0:
-        raise ValueError(f"smoothing must be positive, got {smoothing}")
+    smoothing = positive_number("smoothing", "as values", smoothing)
+    values = real_tensor("values", values, ("...",))
     edge_faces = _indices(edge_faces)
+    if values.ndim not in (1, 2) or edge_faces.ndim != 2 or edge_faces.shape[1] != 2:
+        raise ValueError(
+            f"values must have shape (n_f,) or (n_f, k) and edge_faces (n_e, 2), got {tuple(values.shape)} and "
+            f"{tuple(edge_faces.shape)}"
+        )
+    if edge_faces.numel() and not -1 <= int(edge_faces.min()) <= int(edge_faces.max()) < len(values):
+        raise ValueError(f"edge_faces must hold faces 0 to {len(values) - 1}, or -1")
     interior = (edge_faces >= 0).all(-1)
     first, second = edge_faces[interior].T
-    jumps = ((values[first] - values[second]) ** 2).reshape(len(first), -1).sum(-1)
-    rounded = (jumps + smoothing**2) ** 0.5 - smoothing
+    squares = (values[first] - values[second]) ** 2
+    jumps = squares if values.ndim == 1 else squares.sum(-1)
+    rounded = (jumps + smoothing * smoothing) ** 0.5 - smoothing
     if edge_lengths is None:
         return rounded.sum()
     return (_like(edge_lengths, rounded, "edge_lengths", interior.shape, axes=1)[interior] * rounded).sum()
@@ -104,11 +122,14 @@ def cap(remanent_magnetization, limit, sharpness=None):
     one, (1,), from the p-norm over all faces: for optimizers it costs one gradient instead of n_f, and it is never
     looser than the limit.
     """
-    if not float(limit) > 0:
-        raise ValueError(f"limit [A/m] must be positive, got {limit}")
+    remanent_magnetization = real_tensor("remanent_magnetization", remanent_magnetization, ("n_f", "k"))
+    limit = positive_number("limit", "A/m", limit)
     squares = ((remanent_magnetization / limit) ** 2).sum(-1)
     if sharpness is None:
         return squares - 1
+    if len(squares) == 0:
+        raise ValueError("remanent_magnetization has no faces")
+    sharpness = positive_number("sharpness", "1", sharpness)
     if not sharpness > 1:
         raise ValueError(f"sharpness must exceed 1, got {sharpness}")
     largest = squares.detach().max().clamp(min=1e-30)  # taken out: the powers neither overflow nor vanish
@@ -124,9 +145,12 @@ def printable(remanent_magnetization, directions, sharpness=None):
     sharpness: replaces the minimum over the rays by a smooth one, in 1 / (A2/m2).
     """
     torch = require_torch("objectives.printable")
-    rays = tensor_of(directions).to(remanent_magnetization)
-    if rays.ndim != 2 or rays.shape[1] != 3 or len(rays) == 0:
-        raise ValueError(f"directions must have shape (k, 3), got {tuple(rays.shape)}")
+    remanent_magnetization = real_tensor("remanent_magnetization", remanent_magnetization, ("n_f", 3))
+    rays = real_tensor("directions", directions, ("k", 3)).to(remanent_magnetization)
+    if len(rays) == 0:
+        raise ValueError("directions must hold at least one")
+    if sharpness is not None:
+        sharpness = positive_number("sharpness", "m2/A2", sharpness)
     lengths = torch.linalg.vector_norm(rays, dim=1, keepdim=True)
     if not (lengths > 0).all():
         raise ValueError("directions must not be zero")
@@ -143,17 +167,29 @@ def _weighted_sum(squares, weights, name="weights"):
     return (_like(weights, squares, name, squares.shape, axes=1) * squares).sum()
 
 
+def _at(positions, vertices):
+    """(..., n_chosen, 3): the positions of these vertices, an index or a row of them."""
+    indices = _indices(vertices).reshape(-1)
+    size = positions.shape[-2]
+    if len(indices) == 0 or not -size <= int(indices.min()) <= int(indices.max()) < size:
+        raise ValueError(f"vertices must be at least one, within {-size} ... {size - 1}")
+    return positions[..., indices, :]
+
+
 def _indices(values):
     torch = require_torch("an objective")
-    indices = tensor_of(values)
-    if indices.is_floating_point() or indices.dtype == torch.bool:
+    try:
+        indices = tensor_of(values)
+    except OverflowError as error:
+        raise ValueError(f"indices must be integers: {error}") from None
+    if indices.is_floating_point() or indices.is_complex() or indices.dtype == torch.bool:
         raise ValueError(f"indices must be integers, got {indices.dtype}")
     return indices.long()
 
 
 def _like(values, reference, name: str, shape, axes: int):
     """A tensor of the reference's dtype and shape; of its last axes only, it stands for every load case."""
-    tensor = tensor_of(values).to(reference)
+    tensor = real_tensor(name, values, ("...",)).to(reference)
     if tuple(tensor.shape) not in (tuple(shape), tuple(shape[-axes:])):
         raise ValueError(f"{name} must have shape {tuple(shape)}, got {tuple(tensor.shape)}")
     return tensor.broadcast_to(shape)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ._tensors import require_torch, tensor_of
+from ._quantity import quantity
+from ._tensors import detached, positive_number, real_tensor, require_torch, tensor_of
 
 
 def from_regions(values, regions):
@@ -13,8 +14,12 @@ def from_regions(values, regions):
     values: (n_regions, ...). regions: (n_f,) the region of each face, from 0.
     """
     torch = require_torch("parametrize.from_regions")
+    values = real_tensor("values", values, ("...",))
+    if values.ndim == 0:
+        raise ValueError("values must have shape (n_regions, ...), got a number")
     regions = tensor_of(regions)
-    if regions.ndim != 1 or regions.is_floating_point() or regions.dtype == torch.bool:
+    integral = not (regions.is_floating_point() or regions.is_complex() or regions.dtype == torch.bool)
+    if regions.ndim != 1 or not integral:
         raise ValueError(
             f"regions must be integers of shape (n_f,), got {regions.dtype} {tuple(regions.shape)}"
         )
@@ -31,12 +36,9 @@ def along(amplitude, directions):
     amplitude: (n_f,) A/m. directions: (3,) or (n_f, 3), of any length but zero.
     """
     torch = require_torch("parametrize.along")
-    directions = tensor_of(directions).to(amplitude)
-    if (
-        directions.shape[-1:] != (3,)
-        or directions.ndim > 2
-        or (directions.ndim == 2 and len(directions) != len(amplitude))
-    ):
+    amplitude = real_tensor("amplitude", amplitude, ("n_f",))
+    directions = real_tensor("directions", directions, ("...", 3)).to(amplitude)
+    if directions.ndim > 2 or (directions.ndim == 2 and len(directions) != len(amplitude)):
         raise ValueError(
             f"directions must have shape (3,) or ({len(amplitude)}, 3), got {tuple(directions.shape)}"
         )
@@ -52,33 +54,42 @@ def log_scaled(shares, lower, upper):
 
     Moduli over decades: young_modulus = log_scaled(s, 1e4, 1e8), with the bounds 0 and 1 of s left to the optimizer.
     """
-    if not 0 < lower < upper < math.inf:
-        raise ValueError(f"bounds must be positive and in order, got {lower} and {upper}")
-    return lower * (shares * math.log(upper / lower)).exp()
+    lower, ratio = _bounds(lower, upper)
+    return lower * (real_tensor("shares", shares, ("...",)) * math.log(ratio)).exp()
 
 
 def log_shares(values, lower, upper):
     """The shares of `log_scaled` that give these values."""
-    if not 0 < lower < upper < math.inf:
-        raise ValueError(f"bounds must be positive and in order, got {lower} and {upper}")
-    return (values / lower).log() / math.log(upper / lower)
+    lower, ratio = _bounds(lower, upper)
+    return (real_tensor("values", values, ("...",)) / lower).log() / math.log(ratio)
 
 
 def capped(vectors, limit):
     """Magnetizations (n_f, 3) below a limit [A/m], smoothly from any (n_f, 3): v / sqrt(1 + |v|^2 / limit^2)."""
-    if not float(limit) > 0:
-        raise ValueError(f"limit [A/m] must be positive, got {limit}")
+    vectors = real_tensor("vectors", vectors, ("...", 3))
+    limit = positive_number("limit", "A/m", limit)
     return vectors / (1 + ((vectors / limit) ** 2).sum(-1, keepdim=True)) ** 0.5
 
 
 def project_to_cap(vectors, limit):
     """The nearest magnetizations (n_f, 3) that do not exceed a limit [A/m]: longer ones are cut to it."""
     torch = require_torch("parametrize.project_to_cap")
-    if not float(limit) > 0:
-        raise ValueError(f"limit [A/m] must be positive, got {limit}")
+    vectors = real_tensor("vectors", vectors, ("...", 3))
+    limit = positive_number("limit", "A/m", limit)
     squares = (vectors**2).sum(-1, keepdim=True)
     # The root only where it is needed: its derivative at zero would make NaN of a zero vector's gradient.
-    longer = squares > limit**2
+    longer = squares > limit * limit
     return vectors * torch.where(
         longer, limit / torch.where(longer, squares, torch.ones_like(squares)) ** 0.5, 1.0
     )
+
+
+def _bounds(lower, upper) -> tuple[float, float]:
+    """The lower bound, and the upper over it."""
+    low, high = (
+        float(quantity(name, "as values", detached(each), ()))
+        for name, each in (("lower", lower), ("upper", upper))
+    )
+    if not 0 < low < high < math.inf or math.isinf(high / low):
+        raise ValueError(f"bounds must be positive and in order, got {lower} and {upper}")
+    return low, high / low

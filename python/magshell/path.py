@@ -63,6 +63,7 @@ class Path:
 
     def equilibrium(self, index: int) -> Equilibrium:
         """One of the points, stable or not, as an Equilibrium: to look at, or to start another solve from."""
+        index = range(len(self))[index]
         controls = self._from.towards(self._to, self.parameters[index])
         options = MixedNewton()._options()
         options.require_stable = False

@@ -11,6 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from tqdm import tqdm
 
+from ._arrays import named_values
 from ._quantity import quantity
 from ._tensors import detached
 from .io import write_mesh
@@ -97,7 +98,8 @@ def write_series(
 
 
 def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
-    given = {name: np.asarray(detached(values)) for name, values in (fields or {}).items()}
+    fields = named_values(f"{kind}_fields", fields)
+    given = {name: np.asarray(detached(values)) for name, values in fields.items()}
     mesh = states[0].mesh
     rows = mesh.n_vertices if kind == "vertex" else mesh.n_faces
     for name, values in given.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._quantity import quantity, real_numbers
-from .mesh import TriangleMesh
+from .mesh import TriangleMesh, checked_mesh
 
 BENDING = ("midedge", "hinge")
 
@@ -42,11 +42,9 @@ class Shell:
         curvature_scale=1.0,
         bending: str = "midedge",
     ):
-        if not isinstance(mesh, TriangleMesh):
-            raise ValueError(f"mesh must be a TriangleMesh, got {type(mesh).__name__}")
         if bending not in BENDING:
             raise ValueError(f"bending must be one of {BENDING}, got {bending!r}")
-        self.mesh = mesh
+        self.mesh = checked_mesh(mesh)
         self.bending = bending
         faces = ("n_f", mesh.n_faces)
         self.thickness = _positive("thickness", "m", thickness, faces)

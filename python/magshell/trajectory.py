@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ._surroundings import near_kinks
+from ._tensors import detached
 from .integrators import Integrator
 from .scene import Scene
 
@@ -38,14 +40,14 @@ class MotionState:
         lengths = np.array([len(each) for each in self.memory], dtype=np.int64)
         remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.memory)])
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        with open(path, "wb") as file:
+        with Path(path).open("wb") as file:  # a number would be an open file of somebody else's
             np.savez(file, time=self.time, memory=remembered, memory_lengths=lengths, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> MotionState:
         """Reads what `save` wrote. Raises ValueError if it is something else."""
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with np.load(Path(path), allow_pickle=False) as file:
                 time, remembered, lengths = (file[name] for name in ("time", "memory", "memory_lengths"))
                 arrays = {name: file[name] for name in _ARRAYS}
         except (KeyError, ValueError, EOFError) as error:
@@ -89,6 +91,7 @@ class Trajectory:
     wall_time: float
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
+    _placed: list = field(repr=False, default_factory=list)  # (contact, its obstacles where they were)
 
     @property
     def displacements(self):
@@ -102,6 +105,30 @@ class Trajectory:
     def energy(self) -> np.ndarray:
         """Kinetic and potential, (n,) J."""
         return self.kinetic_energy + sum(self.energies.values())
+
+    @property
+    def kinks(self) -> dict[int, np.ndarray]:
+        """{recorded state: vertices} that touch an obstacle where the motion is not differentiable, or within the
+        smoothing of there: by the sharp edge of a box or a mesh, in the middle of a body.
+
+        A small change may bring such a point to another side. A gradient is that of the side on which it is. Looked up
+        when asked for, in the recorded states only.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+        >>> ridge = ms.obstacles.Box((0.1, 0.1, 0.1), rotation=(0, np.pi / 4, 0), center=(0.01, 0.01, -0.0707105))
+        >>> scene = ms.Scene(sheet, contacts=[ms.Contact(ridge)], allow_rigid_motions=True)
+        >>> ms.simulate(scene, steps=1, time_step=1e-3, velocities=(0, 0, -1e-4)).kinks
+        {0: array([3, 4, 5], dtype=int32), 1: array([3, 4, 5], dtype=int32)}
+        """
+        positions = detached(self.positions)
+        found = {}
+        for k, time in enumerate(self.times):
+            near = [near_kinks(*each, self.scene.shell, positions[k], time) for each in self._placed]
+            if near and (every := np.unique(np.concatenate(near))).size:
+                found[k] = every
+        return found
 
     def __len__(self) -> int:
         return len(self.times)

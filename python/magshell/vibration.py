@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from . import _core
 from ._inputs import Inputs
@@ -172,7 +172,7 @@ class _Pencil:
         start = np.random.default_rng(seed).standard_normal(size)  # one that no symmetry is orthogonal to
         try:
             inverses, vectors = eigsh(inverse, count, which="LA", v0=start, ncv=min(space, size))
-        except ArpackNoConvergence as error:
+        except ArpackError as error:
             raise NotConverged(f"the vibration modes did not converge: {error}. Ask for fewer.") from error
         order = np.argsort(-inverses)
         modes = np.stack([moved_by(vectors[:, k]) for k in order], axis=1)

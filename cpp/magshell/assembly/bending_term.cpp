@@ -309,16 +309,19 @@ void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Sc
 }
 
 // A fold angle is exact to about one unit of round-off of a radian, and no better than the positions over the
-// heights of its faces.
-void BendingTerm::add_cancelling_forces(VectorXd& out) const {
+// heights of its faces. Its moments are forces at the corners, over the same heights.
+void BendingTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
-        const double angle = 1.0 + 0.25 * sheet_.largest_coordinate(f) / sheet_.smallest_height(f);
+        const double height = sheet_.smallest_height(f);
+        const double angle = 1.0 + 0.25 * (sheet_.largest_coordinate(f) + beyond) / height;
         for (int i = 0; i < 3; ++i) {
             const FaceSide& side = sheet_.sides[f][i];
             double moment = 0.0;
             for (int j = 0; j < 3; ++j)
                 moment += std::abs(stiffness_[f / Pack::width](i, j)[f % Pack::width]) * angle;
             if (side.rotation >= 0) out[3 * sheet_.n_nodes() + side.rotation] += moment;
+            for (const Index corner : sheet_.corners[f])
+                out.segment<3>(3 * corner).array() += moment / height;
         }
     }
 }

@@ -27,7 +27,7 @@ class BendingTerm final : public ElasticTerm {
                   SystemMatrix& out) const override;
     void extrapolate(const double* p) override;
     void vjp(const double* q, const Controls&, const double* lambda, SceneGradient& out) override;
-    void add_cancelling_forces(VectorXd& out) const override;
+    void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void strains(const double* q, Strains& out) override;
     void strain_rates(const double* p, Strains& out) override;
     void stresses(const Strains& strains, Strains& out) const override;

@@ -126,6 +126,17 @@ void ContactTerm::spread(const Touch& touch, const Vec3& force, Residual& out) c
             for (int axis = 0; axis < 3; ++axis) out.add(3 * p.nodes[k] + axis, p.weights[k] * force[axis]);
 }
 
+void ContactTerm::add_cancelling_force(const Touch& touch, double stiffness, VectorXd& out) const {
+    const ContactPoint& p = point(touch);
+    for (int k = 0; k < 3; ++k)
+        if (p.nodes[k] >= 0)
+            out.segment<3>(3 * p.nodes[k]).array() += p.weights[k] * stiffness * touch.place.norm();
+}
+
+void ContactTerm::add_cancelling_normal_forces(VectorXd& out) const {
+    for (const Touch& touch : touching_) add_cancelling_force(touch, touch.stiffness, out);
+}
+
 void ContactTerm::add_block(const Touch& touch, const Mat3& block, SystemMatrix& out) const {
     const Contact& contact = contacts_[touch.contact];
     const ContactPoint& p = point(touch);

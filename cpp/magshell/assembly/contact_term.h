@@ -54,6 +54,10 @@ class ContactTerm final : public Term {
     /// Adds a vector to a point's nodes, weighted.
     void spread(const Touch& touch, const Vec3& vector, VectorXd& out) const;
     void spread(const Touch& touch, const Vec3& force, Residual& out) const;
+    /// Adds the magnitude of forces that cancel inside one that depends on the point's place by a stiffness [N/m].
+    void add_cancelling_force(const Touch& touch, double stiffness, VectorXd& out) const;
+    /// Those inside the normal forces at the last evaluated state.
+    void add_cancelling_normal_forces(VectorXd& out) const;
 
     std::string_view name() const override { return "contact"; }
     bool driven() const override { return false; }

@@ -44,11 +44,13 @@ void FrictionTerm::evaluate(const Kinematics& at, const Controls& controls, Resi
         if (rubs_[touch.contact]) rub(touch, true);
 }
 
-void FrictionTerm::assemble(const Kinematics& at, const Controls&, SystemMatrix& out, Remainder& rest) const {
+void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool cautious, SystemMatrix& out,
+                            Remainder& rest) const {
     for (const Rub& each : rubbing_) {
         const double coefficient = contact_.law(each.touch).friction;
-        contact_.add_block(each.touch, -coefficient * at.rate * each.friction.by_velocity, out);
-        if (each.lagged) continue;
+        const Mat3& by_velocity = cautious ? each.friction.secant : each.friction.by_velocity;
+        contact_.add_block(each.touch, -coefficient * at.rate * by_velocity, out);
+        if (each.lagged || cautious) continue;
         const Mat3 block = -coefficient * by_place(each.friction, each.touch, each.obstacle.spin());
         const ContactPoint& point = contact_.point(each.touch);
         if (point.nodes[1] < 0) {
@@ -81,6 +83,14 @@ void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambd
         each.obstacle.vjp(touch.place, touch.at, -touch.stiffness * by_force,
                           -law.friction * (friction.by_normal.transpose() * along), -by_velocity,
                           out.obstacles[touch.obstacle]);
+    }
+}
+
+// A velocity is the difference of two places over a stage, and in what sticks a small one makes a large force.
+void FrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
+    for (const Rub& each : rubbing_) {
+        const double stiffness = at.rate * each.friction.by_velocity.norm();
+        contact_.add_cancelling_force(each.touch, contact_.law(each.touch).friction * stiffness, out);
     }
 }
 

@@ -19,10 +19,11 @@ class FrictionTerm final : public ForceTerm {
     std::string_view name() const override { return "friction"; }
     void begin_step(const VectorXd& q, const Controls& controls) override;
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
-    void assemble(const Kinematics& at, const Controls& controls, SystemMatrix& out,
+    void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
                   Remainder& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              SceneGradient& out) const override;
+    void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 
   private:
     struct Rub {

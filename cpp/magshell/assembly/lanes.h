@@ -65,13 +65,17 @@ inline void scatter_node(Residual& out, Index node, const Pack3& force, int lane
 template <int N>
 using PairSlots = std::array<SystemMatrix::Slot, N*(N - 1) / 2>;
 
+/// The slot of two places of an element that one node takes: across two sides of a face, at a vertex of three.
+constexpr SystemMatrix::Slot same_node = -2;
+
 template <int N, class Nodes>
 PairSlots<N> pair_slots(const SystemMatrix& matrix, const Nodes& nodes) {
     PairSlots<N> slots;
     for (int i = 1; i < N; ++i)
         for (int j = 0; j < i; ++j)
-            slots[lower_index(i - 1, j)] =
-                nodes[i] < 0 || nodes[j] < 0 ? -1 : matrix.node_slot(nodes[i], nodes[j]);
+            slots[lower_index(i - 1, j)] = nodes[i] < 0 || nodes[j] < 0 ? -1
+                                           : nodes[i] == nodes[j]       ? same_node
+                                                                        : matrix.node_slot(nodes[i], nodes[j]);
     return slots;
 }
 
@@ -87,6 +91,7 @@ inline void scatter_blocks(SystemMatrix& matrix, const Nodes& nodes, const PairS
         for (int j = 0; j < i; ++j) {
             const SystemMatrix::Slot slot = slots[lower_index(i - 1, j)];
             if (slot >= 0) matrix.add_block(slot, length[slot & 1 ? i : j], blocks[lower_index(i, j)], lane);
+            if (slot == same_node) matrix.add_block_and_transpose(nodes[i], blocks[lower_index(i, j)], lane);
         }
     }
 }

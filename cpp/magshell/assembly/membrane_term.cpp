@@ -136,16 +136,17 @@ void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {
 
 // |a|^2 carries its own round-off, and that of the positions whose difference a is: far from the origin, or
 // beside long radii, the larger one.
-void MembraneTerm::add_cancelling_forces(VectorXd& out) const {
+void MembraneTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const Membrane::Element& element = elements_[f / Pack::width];
         const int lane = f % Pack::width;
+        const double coordinate = sheet_.largest_coordinate(f) + beyond;
         for (int i = 0; i < 3; ++i) {
             double stress = 0.0;
             for (int j = 0; j < 3; ++j) {
                 const double squared_length = element.rest_squared_length[j][lane];
                 stress += std::abs(element.stiffness(i, j)[lane]) *
-                          (squared_length + 0.25 * std::sqrt(squared_length) * sheet_.largest_coordinate(f));
+                          (squared_length + 0.25 * std::sqrt(squared_length) * coordinate);
             }
             const double force = 2.0 * stress * std::sqrt(element.rest_squared_length[i][lane]);
             for (const int k : {(i + 1) % 3, (i + 2) % 3})

@@ -64,7 +64,8 @@ Model::Model(SceneInput input)
       schedule_(sheet_),
       faces_(sheet_, schedule_, matrix_),
       metric_(area_metric(sheet_)),
-      extent_(extent_of(input.mesh)) {
+      extent_(extent_of(input.mesh)),
+      rest_reach_(input.mesh.rest_positions().lpNorm<Eigen::Infinity>()) {
     add_terms(input);
     share_out_columns();
     set_values(input.values);
@@ -124,8 +125,23 @@ void Model::set_values(const SceneValues& values) {
     if (water_) water_->set_water(values.water);
     if (contact_) contact_->set_values(values.contacts, values.obstacles);
     reduction_.set_motions(values.motions);
-    cancelling_forces_ = VectorXd::Zero(size());
-    for (const std::unique_ptr<Term>& term : terms_) term->add_cancelling_forces(cancelling_forces_);
+    cancelling_forces_.resize(0);
+}
+
+// A sheet that has fallen or flown far knows its shape less exactly. By powers of two, so that most states
+// share what was computed once.
+VectorXd Model::cancelling_forces(const VectorXd& q) {
+    const double reach = q.head(3 * sheet_.n_vertices()).lpNorm<Eigen::Infinity>();
+    double beyond = 0.0;
+    if (std::isfinite(reach) && reach > 2.0 * rest_reach_)
+        beyond = std::exp2(std::ceil(std::log2(reach / rest_reach_))) * rest_reach_;
+    if (cancelling_forces_.size() == 0 || beyond != beyond_) {
+        beyond_ = beyond;
+        cancelling_forces_ = VectorXd::Zero(size());
+        for (const std::unique_ptr<Term>& term : terms_)
+            term->add_cancelling_forces(beyond, cancelling_forces_);
+    }
+    return history_scale_ * cancelling_forces_;
 }
 
 SceneGradient Model::vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda) {
@@ -323,10 +339,16 @@ void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const S
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
 }
 
-void Model::assemble_forces(const Controls& controls) {
+void Model::add_cancelling_contact_forces(bool in_motion, VectorXd& out) const {
+    if (contact_) contact_->add_cancelling_normal_forces(out);
+    if (!in_motion) return;
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_cancelling_forces(kinematics_, out);
+}
+
+void Model::assemble_forces(const Controls& controls, bool cautious) {
     remainder_.clear();
     for (const std::unique_ptr<ForceTerm>& force : forces_)
-        force->assemble(kinematics_, controls, matrix_, remainder_);
+        force->assemble(kinematics_, controls, cautious, matrix_, remainder_);
 }
 
 KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda,

@@ -41,8 +41,10 @@ class Model {
     Index size() const { return sheet_.n_unknowns(); }
     double extent() const { return extent_; }
     const VectorXd& metric() const { return metric_; }
-    /// The floor under every residual, to be multiplied by the unit of round-off.
-    VectorXd cancelling_forces() const { return history_scale_ * cancelling_forces_; }
+    /// The floor under every residual of a state, to be multiplied by the unit of round-off.
+    VectorXd cancelling_forces(const VectorXd& q);
+    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or without.
+    void add_cancelling_contact_forces(bool in_motion, VectorXd& out) const;
 
     VectorXd rest_state() const;
     /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,), and back.
@@ -81,7 +83,7 @@ class Model {
     std::string blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
                         const Controls& controls_at_end) const;
     void evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage);
-    void assemble_forces(const Controls& controls);
+    void assemble_forces(const Controls& controls, bool cautious = false);
     const Remainder& remainder() const { return remainder_; }
     /// Adds - lambda . df/dk to the scene's gradient; returns lambda . df by what else they depend on.
     KinematicsGradient forces_vjp(const Controls& controls, const VectorXd& lambda, SceneGradient& out) const;
@@ -144,8 +146,9 @@ class Model {
     Residual residual_;
     VectorXd metric_;             // area at each unknown of a vertex, zero for directions and rotations
     VectorXd cancelling_forces_;  // of the elastic terms, without history
+    double beyond_ = 0.0;         // [m] by how much coordinates were larger than at rest then
     double history_scale_ = 1.0;
-    double extent_;
+    double extent_, rest_reach_;  // [m]: of the bounding box; the largest coordinate at rest
     std::mutex in_use_;
 };
 

@@ -55,8 +55,9 @@ class Term {
     /// p).
     virtual void extrapolate(const double* /*p*/) {}
 
-    /// Adds the magnitude of forces that cancel inside the strains themselves, as for |a|^2 - |a~|^2 at rest.
-    virtual void add_cancelling_forces(VectorXd& /*out*/) const {}
+    /// Adds the magnitude of forces that cancel inside the strains themselves, as for |a|^2 - |a~|^2 at rest,
+    /// with coordinates larger than at rest by `beyond` [m].
+    virtual void add_cancelling_forces(double /*beyond*/, VectorXd& /*out*/) const {}
 
     /// Adds lambda . dg/dk at the last evaluated state q for every value k of the scene that the term's
     /// gradient g depends on; lambda is a vector of all unknowns. With dE/dC = 1/2 d d^T this is (J lambda)^T

@@ -17,7 +17,7 @@ class WaterTerm final : public ForceTerm {
 
     std::string_view name() const override { return "water"; }
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
-    void assemble(const Kinematics& at, const Controls& controls, SystemMatrix& out,
+    void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
                   Remainder& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              SceneGradient& out) const override;

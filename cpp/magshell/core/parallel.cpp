@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -24,11 +25,29 @@ int initial_threads() {
 
 std::atomic<int> thread_count{initial_threads()};
 
+// To wake a sleeping thread takes as long as a whole loop over a few thousand faces. Loops follow each other closely,
+// so threads look for the next one for a while (some 50 us) before they sleep.
+constexpr int looks = 1000;
+
+template <class Condition>
+bool look_for(const Condition& condition) {
+    for (int k = 0; k < looks; ++k) {
+        if (condition()) return true;
+#if defined(__x86_64__) || defined(__i386__)
+        __builtin_ia32_pause();
+#endif
+    }
+    return false;
+}
+
 // One parallel loop at a time runs on the pool; a nested or concurrent one runs on its caller's thread.
 class Pool {
   public:
-    explicit Pool(int workers) : owner_(getpid()) {
-        for (int i = 0; i < workers; ++i) threads_.emplace_back([this] { work(); });
+    explicit Pool(int wanted) : owner_(getpid()), wanted_(wanted) {
+        try {
+            while (static_cast<int>(threads_.size()) < wanted) threads_.emplace_back([this] { work(); });
+        } catch (const std::system_error&) {  // the system gives no more: those that run do the work
+        }
     }
 
     void stop() {
@@ -41,7 +60,7 @@ class Pool {
     }
 
     bool forked() const { return owner_ != getpid(); }
-    int workers() const { return static_cast<int>(threads_.size()); }
+    int wanted() const { return wanted_; }
 
     void run(int count, const std::function<void(int)>& body) {
         {
@@ -49,14 +68,16 @@ class Pool {
             body_ = &body;
             count_ = count;
             next_.store(0);
-            busy_ = static_cast<int>(threads_.size());
+            busy_.store(static_cast<int>(threads_.size()));
             error_ = nullptr;
             ++round_;
         }
         wake_.notify_all();
         drain(body, count);
+        const auto done = [this] { return busy_.load() == 0; };
+        look_for(done);
         std::unique_lock lock(mutex_);
-        done_.wait(lock, [this] { return busy_ == 0; });
+        done_.wait(lock, done);
         body_ = nullptr;
         if (error_) std::rethrow_exception(error_);
     }
@@ -79,36 +100,56 @@ class Pool {
         for (;;) {
             const std::function<void(int)>* body;
             int count;
+            const auto wanted = [&] { return stop_.load() || round_.load() != seen; };
+            look_for(wanted);
             {
                 std::unique_lock lock(mutex_);
-                wake_.wait(lock, [&] { return stop_ || round_ != seen; });
+                wake_.wait(lock, wanted);
                 if (stop_) return;
                 seen = round_;
                 body = body_;
                 count = count_;
             }
             drain(*body, count);
+            if (busy_.fetch_sub(1) > 1) continue;
             const std::lock_guard lock(mutex_);
-            if (--busy_ == 0) done_.notify_one();
+            done_.notify_one();
         }
     }
 
     const pid_t owner_;
+    const int wanted_;
     std::vector<std::thread> threads_;
     std::mutex mutex_;
     std::condition_variable wake_, done_;
     const std::function<void(int)>* body_ = nullptr;
     int count_ = 0;
     std::atomic<int> next_{0};
-    int busy_ = 0;
-    long round_ = 0;
-    bool stop_ = false;
+    std::atomic<int> busy_{0};
+    std::atomic<long> round_{0};
+    std::atomic<bool> stop_{false};
     std::exception_ptr error_;
 };
 
-std::mutex pool_in_use;
-Pool* pool =
-    nullptr;  // never destroyed at exit: after a fork, or while Python ends, its threads cannot be joined
+// Never destroyed at exit: after a fork, or while Python ends, its threads cannot be joined.
+Pool* pool = nullptr;
+std::atomic_flag pool_in_use;
+
+// The pool for one loop, if no other has it. A flag and not a mutex: the thread that has it may ask again,
+// from within its loop, which a mutex leaves undefined.
+class Claim {
+  public:
+    Claim() : granted_(!pool_in_use.test_and_set(std::memory_order_acquire)) {}
+    Claim(const Claim&) = delete;
+    Claim& operator=(const Claim&) = delete;
+    ~Claim() {
+        if (granted_) pool_in_use.clear(std::memory_order_release);
+    }
+    bool granted() const { return granted_; }
+
+  private:
+    const bool granted_;
+};
 
 void run_serially(int count, const std::function<void(int)>& body) {
     for (int i = 0; i < count; ++i) body(i);
@@ -125,13 +166,13 @@ void set_num_threads(int count) {
 }
 
 void parallel_for(int count, const std::function<void(int)>& body) {
-    const int workers = std::min(num_threads(), count) - 1;
-    const std::unique_lock lock(pool_in_use, std::try_to_lock);
-    if (workers < 1 || !lock.owns_lock()) return run_serially(count, body);
-
     const int wanted = num_threads() - 1;
+    if (wanted < 1 || count < 2) return run_serially(count, body);
+    const Claim claim;
+    if (!claim.granted()) return run_serially(count, body);
+
     if (pool && pool->forked()) pool = nullptr;  // its threads stayed in the parent
-    if (pool && pool->workers() != wanted) {
+    if (pool && pool->wanted() != wanted) {
         pool->stop();
         delete pool;
         pool = nullptr;

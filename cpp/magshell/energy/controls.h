@@ -12,6 +12,7 @@ struct ObstaclePose {
     Vec3 displacement = Vec3::Zero(), rotation_vector = Vec3::Zero();
     Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of its centre [m/s]; [rad/s], world axes
 
+    bool operator==(const ObstaclePose&) const = default;
     friend ObstaclePose operator+(const ObstaclePose& a, const ObstaclePose& b) {
         return {a.displacement + b.displacement, a.rotation_vector + b.rotation_vector,
                 a.velocity + b.velocity, a.spin + b.spin};
@@ -29,6 +30,7 @@ struct Controls {
     double motion = 0.0;               // how far prescribed motions have gone: 0 at rest, 1 at their end
     std::vector<ObstaclePose> obstacles;  // one each, or empty where none moves
 
+    bool operator==(const Controls&) const = default;
     friend Controls operator+(const Controls& a, const Controls& b) {
         Controls sum{a.flux_density + b.flux_density, a.field + b.field, a.load + b.load,
                      a.gravity + b.gravity, a.motion + b.motion, a.obstacles.empty() ? b.obstacles : a.obstacles};

@@ -4,6 +4,9 @@
 //
 // v is the velocity relative to the obstacle, N the normal force, e the sticking speed: what would stick creeps
 // slower than e, under a load that is a share r of mu N at e (1 - sqrt(1 - r)). s as in Li et al. 2020 (IPC).
+//
+// A Newton step from sliding knows nothing of sticking, as f does not change with u there, and overshoots. With
+// the secant s/u in place of the slope it never does: f is then bounded from above by a quadratic potential.
 #pragma once
 
 #include "magshell/core/types.h"
@@ -15,6 +18,7 @@ struct Friction {
     Vec3 force;
     Vec3 by_normal_force;  // df/dN
     Mat3 by_velocity;      // df/dv, symmetric and never positive
+    Mat3 secant;           // - mu N (s/u) (I - n n^T), with f = secant v
     Mat3 by_normal;        // df/dn
 
     Friction(double normal_force, const Vec3& normal, const Vec3& velocity, double sticking_speed) {
@@ -32,7 +36,8 @@ struct Friction {
         force = normal_force * by_normal_force;
         const Mat3 along_sliding = slope * sliding * sliding.transpose();
         const Mat3 turning = per_speed * Mat3::Identity() + along_sliding;
-        by_velocity = -normal_force * (turning - per_speed * normal * normal.transpose());
+        secant = -normal_force * per_speed * (Mat3::Identity() - normal * normal.transpose());
+        by_velocity = secant - normal_force * along_sliding;
         // dv_t/dn = -(n . v) I - n v^T
         by_normal = normal_force * turning * (along * Mat3::Identity() + normal * velocity.transpose());
     }

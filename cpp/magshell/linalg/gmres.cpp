@@ -56,12 +56,11 @@ GmresReport gmres(const std::function<VectorXd(const VectorXd&)>& product,
         report.converged = true;
         return report;
     }
-    std::vector<VectorXd> basis = {rhs / norm};
+    std::vector<VectorXd> basis = {rhs / norm}, preconditioned;
     HessenbergLeastSquares small(norm);
     for (; report.iterations < options.max_iterations && !report.converged; ++report.iterations) {
-        VectorXd next = basis.back();
-        precondition(next);
-        next = product(next);
+        precondition(preconditioned.emplace_back(basis.back()));
+        VectorXd next = product(preconditioned.back());
         std::vector<double> column(basis.size() + 1, 0.0);
         // Twice: once leaves the basis orthogonal only to the square root of round-off.
         for (int sweep = 0; sweep < 2; ++sweep)
@@ -80,8 +79,7 @@ GmresReport gmres(const std::function<VectorXd(const VectorXd&)>& product,
     }
     const std::vector<double> shares = small.solution();
     rhs.setZero();
-    for (std::size_t i = 0; i < shares.size(); ++i) rhs += shares[i] * basis[i];
-    precondition(rhs);
+    for (std::size_t i = 0; i < shares.size(); ++i) rhs += shares[i] * preconditioned[i];
     return report;
 }
 

@@ -28,8 +28,8 @@ MatrixXd generic_start(Index rows, int columns) {
 std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     const Model& model = newton.model();
     const VectorXd metric = model.reduction().weights(model.metric());
-    const Index massive = (metric.array() > 0.0).count();
-    const int columns = static_cast<int>(std::min<Index>(count + 3, massive));
+    const Index massive = static_cast<Index>((metric.array() > 0.0).count());
+    const int columns = std::min(count + 3, massive);
 
     // With X = K^-1 M Y: X^T K X = X^T M Y, so K itself is not needed. X = Q R is made orthonormal in M
     // first: next to a critical point all its columns are almost the same.
@@ -72,7 +72,7 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
 
 Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& controls, Index negative_pivots) {
     constexpr Index most = 12, spare = 6;
-    const int count = static_cast<int>(std::min(negative_pivots, most) + spare);
+    const int count = std::min(negative_pivots, most) + spare;
     std::vector<Mode> modes = modes_near_zero(newton, count);
     if (modes.front().eigenvalue < 0.0 || negative_pivots == 0) return modes.front();
 

@@ -28,9 +28,17 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
 constexpr Index most_new_negative_pivots = 10;
 constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
+// A residual that shrinks less makes the next step a cautious one.
+constexpr double contracting = 0.5;
 
-// Of linear solves with forces that make the matrix unsymmetric: within Newton's iteration, and for gradients.
-constexpr double inexact_solve = 1e-9, exact_solve = 1e-13;
+// How exactly to solve for a Newton step with an unsymmetric matrix: what its quadratic convergence deserves, and no
+// more than the end needs.
+double deserved(double residual, double tolerance) {
+    return std::max(0.1 * tolerance / residual, std::min(1e-2, residual));
+}
+
+// Of solves with an unsymmetric matrix for gradients.
+constexpr double exact_solve = 1e-13;
 constexpr int few_vectors = 30, many_vectors = 300;
 
 // Adds the time it lives to a sum.
@@ -62,16 +70,18 @@ VectorXd Newton::gradient(const VectorXd& q, const Anchor& anchor) const {
     return g;
 }
 
-double Newton::relative_residual(const VectorXd& q, const Anchor& anchor) const {
+double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool with_floor) const {
     const Reduction& reduction = model_.reduction();
     // Held components have no residual of their own; those of framed nodes are told apart in their frames.
     const VectorXd free = reduction.expand(reduction.vector(gradient(q, anchor)));
     const Index nodes = 3 * model_.sheet().n_nodes(), rotations = model_.sheet().n_rotations();
     VectorXd magnitude = model_.residual().magnitude;
     if (anchor.weights) magnitude += anchor.weights->cwiseProduct(q - *anchor.target).cwiseAbs();
-    VectorXd cancelling = model_.cancelling_forces();
+    VectorXd cancelling = model_.cancelling_forces(q);
     // In the inertia of a short step, positions cancel.
     if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q.cwiseAbs());
+    model_.add_cancelling_contact_forces(anchor.motion != nullptr, cancelling);
+    if (!with_floor) cancelling.setZero();
     return std::max(
         relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
         relative(free.tail(rotations), magnitude.tail(rotations), cancelling.tail(rotations),
@@ -109,10 +119,10 @@ void Newton::evaluate(const VectorXd& q, const Controls& controls, const Anchor&
 }
 
 void Newton::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
-                      const Anchor& anchor) {
+                      const Anchor& anchor, bool cautious) {
     model_.assemble(q, controls, extrapolated_stress);
     const bool forces = anchor.motion && model_.has_forces();
-    if (forces) model_.assemble_forces(controls);
+    if (forces) model_.assemble_forces(controls, cautious);
     unsymmetric_ = forces && !model_.remainder().empty();
 }
 
@@ -123,8 +133,8 @@ FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, c
 }
 
 FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
-                               const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves) {
-    assemble(q, controls, extrapolated_stress, anchor);
+                               const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves, bool cautious) {
+    assemble(q, controls, extrapolated_stress, anchor, cautious);
     for (Eigen::Index k = 0; k < moves.cols(); ++k) {
         if (moves.col(k).isZero(0.0)) continue;
         const VectorXd move = moves.col(k);
@@ -160,11 +170,11 @@ std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& 
     return std::nullopt;
 }
 
-VectorXd Newton::solve_with_factor(const VectorXd& rhs) const {
+VectorXd Newton::solve_with_factor(const VectorXd& rhs, double tolerance) const {
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
     if (unsymmetric_)
-        solve_unsymmetric(*factor_, false, {inexact_solve, many_vectors}, reduced);
+        solve_unsymmetric(*factor_, false, {tolerance, many_vectors}, reduced);
     else
         factor_->solve(reduced);
     return model_.reduction().expand(reduced);
@@ -194,6 +204,12 @@ GmresReport Newton::solve_unsymmetric(const Factor& factor, bool transposed, con
                  [&](VectorXd& x) { factor.solve(x); }, reduced, options);
 }
 
+bool Newton::still_holds(const VectorXd& q, const Controls& controls) {
+    evaluate(q, controls, {});
+    const bool in_place = model_.reduction().prescribed_increment(q, controls.motion).isZero(0.0);
+    return in_place && relative_residual(q, {}) <= options_.tolerance;
+}
+
 NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor) {
     return solve(q, controls, anchor, options_.max_iterations);
 }
@@ -202,14 +218,15 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
     return iterate(q, controls, anchor, max_iterations, options_.mixed);
 }
 
-NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls) {
-    return iterate(q, controls, {}, options_.max_iterations, false);
+NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    return iterate(q, controls, anchor, options_.max_iterations, false);
 }
 
 NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor) {
     constexpr int most_iterations = 60;
     constexpr double shortest = 1.0 / 4096.0;  // of a step
     NewtonReport report;
+    double last_residual = std::numeric_limits<double>::infinity();
     q += model_.reduction().prescribed_increment(q, controls.motion);
     evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
@@ -222,7 +239,9 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
             return report;
         }
         Eigen::MatrixXd no_moves(q.size(), 0);
-        const FactorReport factor = factorize(q, controls, false, anchor, no_moves);
+        const bool cautious = report.residual > contracting * last_residual;
+        last_residual = report.residual;
+        const FactorReport factor = factorize(q, controls, false, anchor, no_moves, cautious);
         if (!factor.succeeded) {
             report.reason = factor.reason;
             return report;
@@ -236,9 +255,16 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
             q = from + share * step;
             evaluate(q, controls, anchor);
             if (share <= shortest || relative_residual(q, anchor) <= options_.tolerance) break;
-            if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.25 * share) * whole) break;
+            if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.05 * share) * whole) break;
         }
     }
+}
+
+bool Newton::factor_serves(double contraction, double residual) const {
+    constexpr double worth = 4.0;  // steps with an old factorization, for one with its own
+    // The errors that a factorization leaves behind are those of its own place, twice what the last step left.
+    const double each = 2.0 * contraction;
+    return each < 0.1 && std::log(options_.tolerance / residual) >= worth * std::log(each);
 }
 
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
@@ -246,7 +272,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
     NewtonReport report;
     VectorXd move = model_.reduction().prescribed_increment(q, controls.motion);
     bool extrapolated = false;
-    double last_step = 0.0;
+    double last_step = 0.0, last_residual = std::numeric_limits<double>::infinity();
     Index first_negative_pivots = 0;
     const auto fail = [&](std::string reason) {
         report.reason = std::move(reason);
@@ -259,20 +285,29 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent())
             return fail("the iteration diverged");
         const bool in_place = move.isZero(0.0);
-        if (in_place && report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent()) {
+        const bool settled = report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent();
+        // Under the floor, small forces that move a thin sheet far are lost in larger ones: a step tells them.
+        if (in_place && settled &&
+            (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
             return report;
         }
         if (report.iterations == max_iterations)
             return fail("no convergence in " + std::to_string(max_iterations) + " iterations");
         Eigen::MatrixXd pull = move;
-        const FactorReport factor = factorize(q, controls, mixed && extrapolated, anchor, pull);
-        report.negative_pivots = factor.negative_pivots;
-        if (!factor.succeeded) return fail(factor.reason);
-        if (report.iterations == 0) first_negative_pivots = factor.negative_pivots;
-        report.lost = factor.negative_pivots > first_negative_pivots + most_new_negative_pivots;
-        if (mixed && report.lost) return fail("the iteration lost its way");
-        const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0));
+        const double contraction = report.residual / last_residual;
+        last_residual = report.residual;
+        if (report.iterations == 0 || !factor_serves(contraction, report.residual)) {
+            const bool cautious = contraction > contracting;
+            const FactorReport factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
+            report.negative_pivots = factor.negative_pivots;
+            if (!factor.succeeded) return fail(factor.reason);
+            if (report.iterations == 0) first_negative_pivots = factor.negative_pivots;
+            report.lost = factor.negative_pivots > first_negative_pivots + most_new_negative_pivots;
+            if (mixed && report.lost) return fail("the iteration lost its way");
+        }
+        const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
+                                                      deserved(report.residual, options_.tolerance));
         move.setZero();
         const double length = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&

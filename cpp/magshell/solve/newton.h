@@ -58,7 +58,7 @@ class Newton {
 
     /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
-    NewtonReport solve_plain(VectorXd& q, const Controls& controls);
+    NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
     /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity): slower, and
     /// sure of foot where contacts open and close.
     NewtonReport solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor);
@@ -70,19 +70,22 @@ class Newton {
     /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes,
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
-                           const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves);
+                           const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves, bool cautious = false);
     /// K^T p = rhs with the Hessian at q, by refinement with a factorization from nearby. Empty where that does
     /// not converge quickly.
     std::optional<VectorXd> solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
                                          const Factor& nearby, const VectorXd& rhs);
-    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held.
-    VectorXd solve_with_factor(const VectorXd& rhs) const;
+    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held. Only where forces make
+    /// K unsymmetric the tolerance counts: of the residual, over the norm of rhs.
+    VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
     /// K^T p = rhs likewise, to round-off. Throws InvalidInput where forces make K too unsymmetric for that.
     VectorXd solve_transposed(const VectorXd& rhs) const;
 
     /// The residual at the last evaluated state, relative to the forces that cancel in it and to their
-    /// round-off.
-    double relative_residual(const VectorXd& q, const Anchor& anchor) const;
+    /// round-off, if that is to count.
+    double relative_residual(const VectorXd& q, const Anchor& anchor, bool with_floor = true) const;
+    /// Whether nothing is left to do at q, which was found at these controls before.
+    bool still_holds(const VectorXd& q, const Controls& controls);
 
     Model& model() { return model_; }
     const std::shared_ptr<Factor>& factor() const { return factor_; }
@@ -101,7 +104,10 @@ class Newton {
   private:
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                          bool mixed);
-    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor);
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor,
+                  bool cautious = false);
+    /// Whether steps with the last factorization will do, which are as good as free.
+    bool factor_serves(double contraction, double residual) const;
     void reduce_assembled(const Anchor& anchor);
     /// K p, or K^T p, of what was assembled last, free unknowns.
     VectorXd assembled_product(const VectorXd& reduced, bool transposed) const;

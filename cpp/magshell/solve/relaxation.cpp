@@ -13,7 +13,7 @@ constexpr int iterations_a_step = 10, quick_iterations = 6;
 constexpr double above_instability = 1.3;  // the rate, over the most negative eigenvalue's size
 constexpr double rate_growth = 2.0, rate_decay = 4.0;
 constexpr double settled = 1e-4;  // of the extent: a step that moves less has come to rest, or to a saddle
-constexpr double smallest_step = 1e-9;  // of a rate, over the first one, before giving up
+constexpr double rigid = 1e4;  // a rate this many times the stiffness allows no step to speak of
 
 class Relaxation {
   public:
@@ -28,7 +28,7 @@ class Relaxation {
             if (!prepare()) return report_;
             while (!step()) {
                 rate_ *= rate_growth;
-                if (rate_ * smallest_step > first_rate_) {
+                if (rate_ > rigid * largest_stiffness()) {
                     report_.reason = "no step lowers the energy, however short";
                     return report_;
                 }
@@ -44,9 +44,10 @@ class Relaxation {
         const FactorReport factor = newton_.factorize_at(q_, controls_);
         if (!factor.succeeded) {  // as of a sheet that can still turn freely: the forces say how fast it may
             rate_ = std::max(rate_, forced_rate());
-            if (first_rate_ == 0.0) first_rate_ = rate_;
             report_.reason = factor.reason;
-            return rate_ > 0.0;
+            if (newton_.relative_residual(q_, {}) > newton_.options().tolerance) return rate_ > 0.0;
+            report_.reason = "the equilibrium is neutral: the sheet is free to move, or its Hessian is singular";
+            return false;
         }
         const bool convex = factor.negative_pivots == 0;
         if (!convex || rate_ == 0.0) {
@@ -54,7 +55,6 @@ class Relaxation {
             const Mode mode = most_unstable_mode(newton_, q_, controls_, factor.negative_pivots);
             // Not far below a rate that was needed a moment ago.
             rate_ = std::max(above_instability * std::abs(mode.eigenvalue), rate_);
-            if (first_rate_ == 0.0) first_rate_ = rate_;
             if (mode.eigenvalue < 0.0 && (at_rest || last_move_ < settled * model_.extent()))
                 leave_saddle(mode);
         }
@@ -71,6 +71,17 @@ class Relaxation {
         for (Index k = 0; k < reduction.size(); ++k)
             if (area[k] > 0.0) largest = std::max(largest, std::abs(force[k]) / area[k]);
         return largest / (0.05 * model_.extent());
+    }
+
+    // Of the last assembled Hessian, per area: a rate like it holds every vertex where it is.
+    double largest_stiffness() const {
+        const SystemMatrix& matrix = model_.matrix();
+        double largest = 0.0;
+        for (Index k = 0; k < 3 * model_.sheet().n_vertices(); ++k)
+            if (model_.metric()[k] > 0.0)
+                largest = std::max(largest, std::abs(matrix.values()[matrix.column_starts()[k]]) /
+                                                model_.metric()[k]);
+        return largest;
     }
 
     void leave_saddle(const Mode& mode) {
@@ -126,7 +137,7 @@ class Relaxation {
     VectorXd& q_;
     const Controls& controls_;
     RelaxationReport report_;
-    double energy_, rate_ = 0.0, first_rate_ = 0.0;
+    double energy_, rate_ = 0.0;
     double last_move_ = std::numeric_limits<double>::infinity();
 };
 

@@ -80,10 +80,13 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
         const Anchor anchor{&step.weights(), &target, &motion};
         const VectorXd predicted = q;
+        const Model::Memory memory = model.memory();
         NewtonReport report = newton_.solve(q, controls[i + 1], anchor);
-        if (!report.converged && model.has_contact()) {
+        if (!report.converged && (model.has_contact() || newton_.options().mixed)) {
             q = predicted;
-            report = newton_.solve_damped(q, controls[i + 1], anchor);
+            model.set_memory(memory);
+            report = model.has_contact() ? newton_.solve_damped(q, controls[i + 1], anchor)
+                                         : newton_.solve_plain(q, controls[i + 1], anchor);
         }
         if (!report.converged) {
             reason = model.not_finite(q, controls[i + 1]);

@@ -1,4 +1,4 @@
-"""python -m magshell.bench accuracy: cases against references, `midedge` and on the same mesh `hinge`."""
+"""python -m magshell.bench accuracy: cases against references, and their errors against time."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from .cases.hemisphere import large_deflection
 from .cases.magnetic_strip import field_across
 from .cases.shear_strip import end_shear
 from .convergence import COARSE_MESHES, MESHES, REQUIRED_ORDER, STUDIES, Convergence, converge
-from .report import print_table, writable_path
+from .report import add_rounds, print_table
+from .work_precision import BENDINGS, measure, print_points
+from .work_precision import STUDIES as CURVES
 
-BENDINGS = ("midedge", "hinge")
 # One call from rest at full load, and how many factorizations it may take, failed ones counted.
 SINGLE_SOLVES: dict[str, tuple[Callable[[], Outcome], int]] = {
     "A1, full load": (lambda: end_shear(loads=(1.0,)), 12),
@@ -28,39 +29,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only", nargs="+", choices=names, metavar="CASE", help=f"some of {', '.join(names)}"
     )
-    parser.add_argument(
-        "--coarse", action="store_true", help="coarse meshes: quick, and outside the allowed errors"
-    )
-    parser.add_argument(
-        "--figure", type=writable_path, metavar="PATH", help="draw the convergence there (matplotlib)"
-    )
+    add_rounds(parser, 3)
 
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the tables, returns their numbers."""
     cases = [case for case in CASES if options.only is None or case.name in options.only]
-    outcomes = {case.name: {b: _outcome(case, b, options.coarse) for b in BENDINGS} for case in cases}
+    curves = [curve for curve in CURVES if options.only is None or curve.name in options.only]
+    if options.figure and not curves:
+        raise SystemExit(f"there is no curve of error against time to draw of {', '.join(options.only)}")
+    outcomes = {case.name: {b: _outcome(case, b, options.quick) for b in BENDINGS} for case in cases}
     _print_cases(cases, outcomes)
     results: dict = {"cases": {name: _plain(each) for name, each in outcomes.items()}}
     if options.only is None:
         results["single solves"] = _single_solves()
-        meshes = COARSE_MESHES if options.coarse else MESHES
+        meshes = COARSE_MESHES if options.quick else MESHES
         studies = {
             (name, bending): converge(name, bending, meshes) for name in STUDIES for bending in BENDINGS
         }
         results["convergence"] = _print_orders(studies)
-        if options.figure:
-            from .figure import draw_convergence
-
-            draw_convergence(studies, options.figure)
-            print(f"\nThe figure is {options.figure}.")
+    points = measure(curves, quick=options.quick, rounds=options.rounds)
+    print_points(points)
+    results["error against time"] = [point._asdict() for point in points]
     return results
 
 
-def _outcome(case: Case, bending: str, coarse: bool) -> Outcome | str:
+def _outcome(case: Case, bending: str, quick: bool) -> Outcome | str:
     """Its outcome, or why there is none."""
     try:
-        return case.run(case.coarse if coarse else case.mesh, bending)
+        return case.run(case.coarse if quick else case.mesh, bending)
     except ms.NotConverged as error:
         return str(error)
 

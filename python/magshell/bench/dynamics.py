@@ -12,7 +12,7 @@ import magshell as ms
 from . import motion_costs
 from .oscillator import METHODS, vibration
 from .other_integrators import OTHERS, energy_kept
-from .report import print_table, writable_path
+from .report import add_rounds, print_table
 
 INTEGRATORS = {
     "ImplicitEuler": ms.ImplicitEuler(),
@@ -28,34 +28,25 @@ REQUIRED_ENERGY = 0.98
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--rounds", type=int, default=3, help="of each measurement of time (default 3)")
+    add_rounds(parser, 3)
     parser.add_argument(
         "--long", type=int, default=100_000, help="steps of the long run (default 100000; 0: none)"
-    )
-    parser.add_argument(
-        "--quick", action="store_true", help="fewer and smaller runs: what it prints, no more"
-    )
-    parser.add_argument(
-        "--figure", type=writable_path, metavar="PATH", help="draw error against time there (matplotlib)"
     )
 
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the tables, returns their numbers."""
-    if options.rounds < 1 or options.long < 0:
-        raise SystemExit("--rounds must be at least 1 and --long at least 0")
+    if options.long < 0:
+        raise SystemExit("--long must be at least 0")
+    periods = 2 if options.quick else PERIODS
     results = {
-        "errors": _errors(STEPS[:2] if options.quick else STEPS, 1 if options.quick else options.rounds),
-        "energies": _energies(2 if options.quick else PERIODS),
+        "periods": periods,
+        "errors": _errors(STEPS[:2] if options.quick else STEPS, options.rounds),
+        "energies": _energies(periods),
         **motion_costs.measure(options.rounds, options.quick),
     }
     if options.long:
         results["long run"] = motion_costs.long_run(options.long)
-    if options.figure:
-        from .figure import draw_integrators
-
-        draw_integrators(results["errors"], options.figure)
-        print(f"\nThe figure is {options.figure}.")
     return results
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import platform
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -13,6 +15,7 @@ import scipy
 
 import magshell as ms
 from magshell import _core
+from magshell._progress import progress_bar
 
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,7 +25,36 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         help="write the numbers there, with machine and versions",
     )
+    parser.add_argument(
+        "--figure", type=writable_path, metavar="PATH", help="draw them there, a PNG (matplotlib)"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="small and few: to see what it prints and draws, no more"
+    )
     parser.add_argument("--threads", type=int, default=1, help="threads of magshell's loops (default 1)")
+
+
+def add_rounds(parser: argparse.ArgumentParser, usual: int) -> None:
+    """Of a part that measures times several times."""
+    parser.add_argument(
+        "--rounds",
+        type=int,
+        help=f"of each measurement of time, the best counts (default {usual}, with --quick 1)",
+    )
+    parser.set_defaults(usual_rounds=usual)
+
+
+def settle_rounds(options: argparse.Namespace) -> None:
+    """Puts the number in place, where the part has one."""
+    if hasattr(options, "rounds"):
+        options.rounds = chosen(options.rounds, options.quick, 1, options.usual_rounds)
+        if options.rounds < 1:
+            raise SystemExit(f"--rounds must be at least 1, got {options.rounds}")
+
+
+def chosen(given, quick: bool, small, usual):
+    """What was asked for, or else what `--quick` or its lack says."""
+    return given if given is not None else small if quick else usual
 
 
 def set_threads(count: int) -> None:
@@ -42,6 +74,47 @@ def writable_path(text: str) -> Path:
     except OSError as error:
         raise argparse.ArgumentTypeError(f"cannot write {path}: {error.strerror}") from error
     return path
+
+
+def writable_folder(text: str) -> Path:
+    """A folder in which files can be written, made if need be."""
+    folder = Path(text)
+    trial = folder / ".written"
+    if not trial.exists():
+        writable_path(str(trial)).unlink()
+    return folder
+
+
+def read_results(text: str) -> dict:
+    """What write_json wrote."""
+    try:
+        content = json.loads(Path(text).read_text())
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"cannot read {text}: {error.strerror}") from error
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text} is not JSON: {error}") from error
+    if not isinstance(content, dict) or not {"part", "setting", "results"} <= content.keys():
+        raise argparse.ArgumentTypeError(
+            f"{text} was not written by the bench: it has no part, setting and results"
+        )
+    return content
+
+
+def as_json(results: dict) -> dict:
+    """The same as JSON would hold it: figures draw what a run hands over and what a file holds."""
+    return json.loads(json.dumps(results, default=_plain_number))
+
+
+def _plain_number(value):
+    """Of numpy's."""
+    if isinstance(value, numpy.ndarray | numpy.generic):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is no JSON")
+
+
+def bar(title: str, total: int):
+    """A progress bar, where someone looks on."""
+    return progress_bar(title, total, shown=sys.stderr.isatty(), leave=False, delay=2.0)
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -73,6 +146,7 @@ def setting() -> dict[str, str | int]:
     return {
         "machine": platform.machine(),
         "processor": _processor(),
+        "processors": os.cpu_count() or 1,
         "system": platform.platform(),
         "python": platform.python_version(),
         "numpy": numpy.__version__,

@@ -6,9 +6,11 @@ import statistics
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import magshell as ms
+
+Result = TypeVar("Result")
 
 
 class Timing(NamedTuple):
@@ -35,6 +37,46 @@ def measure(call: Callable[[], object], *, rounds: int = 7, seconds: float = 0.1
             call()
         times.append((clock() - began) / repeats)
     return Timing(min(times), statistics.median(times))
+
+
+class Clocked(NamedTuple):
+    """Seconds a call by both clocks. Beside other people's work that of the processor is the steadier one; what several
+    threads gain shows on the wall's only."""
+
+    processor: float
+    wall: float
+
+
+SHORT = 0.02  # s: what a call may take to be left alone for once
+LONG = 1.0  # s: a call that takes longer is measured once, without one that warms up
+
+
+def clocked(call: Callable[[], object], *, rounds: int = 3, seconds: float = 0.1) -> Clocked:
+    """The best of `rounds` rounds of about `seconds` each, by each clock."""
+    first = _timed(call, 1)
+    if first.processor > LONG:
+        return first
+    repeats = max(1, round(seconds / max(first.wall, 1e-6)))
+    runs = [_timed(call, repeats) for _ in range(rounds)]
+    return Clocked(min(run.processor for run in runs), min(run.wall for run in runs))
+
+
+def _timed(call: Callable[[], object], repeats: int) -> Clocked:
+    processor, wall = time.process_time(), time.perf_counter()
+    for _ in range(repeats):
+        call()
+    return Clocked((time.process_time() - processor) / repeats, (time.perf_counter() - wall) / repeats)
+
+
+def with_share(call: Callable[[], Result]) -> tuple[Result, float]:
+    """What it returns, and the share of the wall's time that this process had meanwhile: wall times that were measured
+    inside, times this, are what they would have been without other people's work. 1 on several threads, and for short
+    calls, of which one in a few goes undisturbed.
+    """
+    processor, wall = time.process_time(), time.perf_counter()
+    result = call()
+    processor, wall = time.process_time() - processor, time.perf_counter() - wall
+    return result, processor / wall if ms.num_threads() == 1 and wall > SHORT else 1.0
 
 
 def peak_memory() -> int | None:

@@ -17,13 +17,6 @@ def tensor(name: str, unit: str, value, shape: tuple[int | str, ...]):
     return value.to("cpu", torch.float64) if is_tensor(value) else torch.tensor(numbers)
 
 
-def positive(name: str, unit: str, value):
-    """A positive number, or a tensor that holds one."""
-    if not float(quantity(name, unit, detached(value), ())) > 0:
-        raise ValueError(f"{name} [{unit}] must be positive, got {value}")
-    return value
-
-
 def count(name: str, value, least: int = 1) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise ValueError(f"{name} must be an integer of at least {least}, got {value!r}")

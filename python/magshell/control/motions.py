@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from .._quantity import quantity
-from .._tensors import detached
-from ._arguments import indices, positive, tensor
+from .._tensors import detached, positive_number
+from ._arguments import indices, tensor
 from .curves import Curve
 
 
@@ -43,7 +43,7 @@ def track(positions, vertices, weights=None):
     if weights is None:
         return chosen.mean(1)
     weights = tensor("weights", "1", weights, (chosen.shape[1],))
-    total = positive("the sum of the weights", "1", weights.sum())
+    total = positive_number("the sum of the weights", "1", weights.sum())
     return (weights[:, None] * chosen).sum(1) / total
 
 
@@ -94,19 +94,23 @@ def successive_targets(targets, begin, times, delay: float = 0.0):
     return targets[np.maximum(last, 0)], targets.new_tensor(counts)
 
 
+def _checked_curve(curve) -> Curve:
+    if not isinstance(curve, Curve):
+        raise ValueError(f"curve must be one of ms.control, got {type(curve).__name__}")
+    return curve
+
+
 def curve_distance(track, curve: Curve, smoothing: float | None = None):
     """Sum over the frames of a track of its squared distance from a curve [m2].
 
     track: (n, 3) m. smoothing: m; with it the distances themselves are summed [m], smooth at zero:
     sqrt(d^2 + eps^2) - eps. They count small misses more, and large ones less.
     """
-    if not isinstance(curve, Curve):
-        raise ValueError(f"curve must be one of ms.control, got {type(curve).__name__}")
-    squares = curve.squared_distance(track)
+    squares = _checked_curve(curve).squared_distance(track)
     if smoothing is None:
         return squares.sum()
-    positive("smoothing", "m", smoothing)
-    return ((squares + smoothing**2) ** 0.5 - smoothing).sum()
+    smoothing = positive_number("smoothing", "m", smoothing)
+    return ((squares + smoothing * smoothing) ** 0.5 - smoothing).sum()
 
 
 def track_fitting(
@@ -126,6 +130,7 @@ def track_fitting(
     )
     if not first < last:
         raise ValueError(f"start_frame must come before end_frame, got {start_frame} and {end_frame}")
+    curve = _checked_curve(curve)
     to_start, to_end, to_curve = quantity("weights", "1", weights, (3,)).tolist()
     return {
         "start": to_start * ((track[first] - curve.start) ** 2).sum(),

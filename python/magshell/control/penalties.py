@@ -3,8 +3,9 @@ depend on its number of steps."""
 
 from __future__ import annotations
 
+from .._tensors import positive_number
 from ..objectives import cap
-from ._arguments import positive, tensor
+from ._arguments import tensor
 from .signals import oscillation
 
 
@@ -18,7 +19,7 @@ def field_rate(flux_density, time_step):
     flux_density = tensor("flux_density", "T", flux_density, ("n", 3))
     if len(flux_density) < 2:
         raise ValueError(f"flux_density [T] must have at least 2 rows, got {len(flux_density)}")
-    return ((flux_density.diff(dim=0) / positive("time_step", "s", time_step)) ** 2).sum(-1).mean()
+    return ((flux_density.diff(dim=0) / positive_number("time_step", "s", time_step)) ** 2).sum(-1).mean()
 
 
 def field_excess(flux_density, limit: float):
@@ -27,7 +28,7 @@ def field_excess(flux_density, limit: float):
     For optimizers without bounds; those of ms.optim hold them exactly. flux_density: (n, 3) T. limit: T.
     """
     flux_density = tensor("flux_density", "T", flux_density, ("n", 3))
-    return ((flux_density.abs() - positive("limit", "T", limit)).clamp(min=0) ** 2).sum(-1).mean()
+    return ((flux_density.abs() - positive_number("limit", "T", limit)).clamp(min=0) ** 2).sum(-1).mean()
 
 
 def field_cap(flux_density, limit: float, sharpness: float | None = None):
@@ -38,7 +39,7 @@ def field_cap(flux_density, limit: float, sharpness: float | None = None):
     caps |B|.
     """
     flux_density = tensor("flux_density", "T", flux_density, ("n", 3))
-    return cap(flux_density.reshape(-1, 1), positive("limit", "T", limit), sharpness)
+    return cap(flux_density.reshape(-1, 1), positive_number("limit", "T", limit), sharpness)
 
 
 def dmp(flux_density, times, angular_frequencies, cosine_amplitudes, sine_amplitudes):

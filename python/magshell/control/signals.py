@@ -12,14 +12,14 @@ import math
 import numpy as np
 
 from .._quantity import quantity
-from .._tensors import detached, require_torch
-from ._arguments import count, positive, tensor
+from .._tensors import detached, positive_number, require_torch
+from ._arguments import count, tensor
 
 
 def step_times(steps: int, time_step):
     """The times of the ends of all steps, the start first: (steps + 1,) s. time_step: s."""
     torch = require_torch("ms.control.step_times")
-    positive("time_step", "s", time_step)
+    time_step = positive_number("time_step", "s", time_step)
     return torch.arange(count("steps", steps) + 1, dtype=torch.float64) * time_step
 
 
@@ -37,7 +37,7 @@ def held(values, steps: int):
 def harmonics(number: int, duration):
     """The angular frequencies 2 pi j / duration, j = 1 ... number: (number,) rad/s. duration: s."""
     torch = require_torch("ms.control.harmonics")
-    positive("duration", "s", duration)
+    duration = positive_number("duration", "s", duration)
     return torch.arange(1, count("number", number) + 1, dtype=torch.float64) * (2 * math.pi / duration)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from .._quantity import quantity
-from .._tensors import detached, require_torch
-from ._arguments import count, positive, tensor
+from .._tensors import detached, positive_number, require_torch
+from ._arguments import count, tensor
 from .signals import at_times
 
 
@@ -33,7 +33,7 @@ def spline_weights(times, number: int, duration, degree: int = 3, periodic: bool
     torch = require_torch("ms.control.spline")
     degree = count("degree", degree)
     number = count("the number of control points", number, least=degree + 1)
-    shares = at_times(times) / positive("duration", "s", duration)
+    shares = at_times(times) / positive_number("duration", "s", duration)
     if periodic:
         shares = shares - shares.detach().floor()
         knots = (np.arange(number + 2 * degree + 1) - degree) / number
@@ -58,7 +58,8 @@ def fit_spline(
     torch = require_torch("ms.control.fit_spline")
     times = quantity("times", "s", detached(times), ("n",))
     values = quantity("values", "T", detached(values), (len(times), 3))
-    weights = spline_weights(times, number, float(detached(duration)), degree, periodic).numpy()
+    duration = float(quantity("duration", "s", detached(duration), ()))
+    weights = spline_weights(times, number, duration, degree, periodic).numpy()
     rank = np.linalg.matrix_rank(weights, tol=1e-10)
     if rank < number:
         raise ValueError(
@@ -66,7 +67,7 @@ def fit_spline(
         )
     if limit is None:
         return torch.tensor(np.linalg.lstsq(weights, values, rcond=None)[0])
-    bound = float(positive("limit", "T", limit))
+    bound = float(positive_number("limit", "T", limit))
     columns = [lsq_linear(weights, column / bound, (-1.0, 1.0), method="bvls").x for column in values.T]
     return torch.tensor(bound * np.stack(columns, axis=1))
 

@@ -74,11 +74,21 @@ def grid(
     return Grid(parameters, faces)
 
 
+MOST_FACES = (2**31 - 1) // 3
+
+
 def checked_cells(cells) -> tuple[int, int]:
     counts = np.asarray(cells)
     if counts.shape != (2,) or not np.issubdtype(counts.dtype, np.integer) or (counts < 1).any():
         raise ValueError(f"cells must be two integers of at least 1, got {cells!r}")
+    check_size(2 * int(counts[0]) * int(counts[1]))
     return int(counts[0]), int(counts[1])
+
+
+def check_size(n_faces: int, asked_by: str = "cells") -> None:
+    """Refuses more faces than 32-bit indices of their corners can count."""
+    if n_faces > MOST_FACES:
+        raise ValueError(f"{asked_by} asks for about {n_faces:.3g} faces; a mesh has at most {MOST_FACES}")
 
 
 def _vertex_numbers(n_u: int, n_v: int, periodic: bool, poles: tuple[bool, bool]) -> np.ndarray:

@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .._arrays import index_array
-from ..mesh import TriangleMesh
+from ..mesh import TriangleMesh, checked_mesh
 
 
 def cut(mesh: TriangleMesh, edges) -> TriangleMesh:
@@ -30,6 +30,7 @@ def cut(mesh: TriangleMesh, edges) -> TriangleMesh:
     >>> len(ms.meshes.cut(sheet, slit).boundary_loops)
     2
     """
+    checked_mesh(mesh)
     edges = np.unique(index_array("edges", edges))
     outside = edges[(edges < 0) | (edges >= mesh.n_edges)]
     if len(outside):

@@ -6,6 +6,7 @@ import numpy as np
 
 from .._arrays import positive
 from ..mesh import TriangleMesh
+from ._grid import check_size
 
 
 def disk(radius: float, cells: int) -> TriangleMesh:
@@ -19,6 +20,7 @@ def disk(radius: float, cells: int) -> TriangleMesh:
     radius = positive("radius [m]", radius)
     if not isinstance(cells, (int, np.integer)) or cells < 1:
         raise ValueError(f"cells is the number of rings, an integer of at least 1, got {cells!r}")
+    check_size(6 * int(cells) ** 2)
     rings = [np.zeros((1, 3))]
     for k in range(1, cells + 1):
         angle = 2 * np.pi * np.arange(6 * k) / (6 * k)

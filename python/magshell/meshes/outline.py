@@ -9,6 +9,7 @@ import numpy as np
 from .._arrays import positive
 from ..mesh import TriangleMesh
 from ._gmsh_session import gmsh_session
+from ._grid import check_size
 from ._polygon import (
     checked_polygon,
     checked_polyline,
@@ -53,9 +54,16 @@ def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -
 
     # gmsh's kernel has absolute tolerances: mesh in units of about the extent. A power of two is exact.
     unit = 2.0 ** np.round(np.log2(np.ptp(outer, axis=0).max()))
-    points, faces, slit_sides = _mesh_with_gmsh(
-        outer / unit, [hole / unit for hole in holes], [slit / unit for slit in slits], size / unit
-    )
+    cells = float(np.prod(np.ptp(outer, axis=0) / size))
+    check_size(2 * int(min(cells, 1e18)), "size [m]")
+    try:
+        points, faces, slit_sides = _mesh_with_gmsh(
+            outer / unit, [hole / unit for hole in holes], [slit / unit for slit in slits], size / unit
+        )
+    except Exception as error:
+        if type(error) is not Exception:  # gmsh raises no other
+            raise
+        raise ValueError(f"gmsh cannot mesh this outline: {error}") from error
     x, y = unit * points.T
     sheet = TriangleMesh(np.stack([x, y, np.zeros_like(x)], axis=1), _upwards(points, faces))
     if not slits:

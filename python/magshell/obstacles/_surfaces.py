@@ -30,10 +30,7 @@ def box_surface(size: np.ndarray, rounding: float) -> tuple[np.ndarray, np.ndarr
     for axis in range(3):
         u, v = lines[(axis + 1) % 3], lines[(axis + 2) % 3]
         grid = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
-        i, j = np.meshgrid(np.arange(len(u) - 1), np.arange(len(v) - 1), indexing="ij")
-        a = (i * len(v) + j).ravel()
-        b, c, d = a + len(v), a + len(v) + 1, a + 1
-        quads = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+        quads = grid_faces(len(u), len(v))
         for side in (1, -1):
             points = np.empty((len(grid), 3))
             points[:, axis] = side * half[axis]
@@ -88,6 +85,13 @@ def swept_surface(points: np.ndarray, radii: np.ndarray, closed: bool) -> tuple[
         faces.append(np.stack([there, here, np.full(AROUND, n)], axis=1))
         faces.append(np.stack([last + here, last + there, np.full(AROUND, n + 1)], axis=1))
     return vertices, np.concatenate(faces)
+
+
+def grid_faces(n_u: int, n_v: int) -> np.ndarray:
+    """Of a grid of points in C order; the normal is u x v."""
+    a = (n_v * np.arange(n_u - 1)[:, None] + np.arange(n_v - 1)).ravel()
+    b, c, d = a + n_v, a + n_v + 1, a + 1
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
 def _frames(tangents: np.ndarray) -> np.ndarray:

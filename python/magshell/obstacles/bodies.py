@@ -39,7 +39,7 @@ class Sphere(Obstacle):
         self.inside = flag("inside", inside)
         self._of(_sided(core.Obstacle.sphere(self.radius), inside), radius=self.radius, inside=inside)
 
-    def _surface(self, extent: float) -> Surface:
+    def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return sphere_surface(self.radius)
 
     def _summary(self) -> str:
@@ -86,7 +86,7 @@ class Box(Obstacle):
         shape = core.Obstacle.box(self.size / 2, self.rounding)
         self._of(_sided(shape, inside), size=self.size, rounding=self.rounding, inside=inside)
 
-    def _surface(self, extent: float) -> Surface:
+    def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return box_surface(self.size, self.rounding)
 
     def _summary(self) -> str:
@@ -131,7 +131,7 @@ class Capsule(Obstacle):
         shape = core.Obstacle.capsule(self.ends[0], self.ends[1], self.radius)
         self._of(_sided(shape, inside), ends=self.ends, radius=self.radius, inside=inside)
 
-    def _surface(self, extent: float) -> Surface:
+    def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return swept_surface(self.ends, np.full(2, self.radius), closed=True)
 
     def _summary(self) -> str:

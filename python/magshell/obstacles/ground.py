@@ -9,6 +9,7 @@ import numpy as np
 from .. import _core as core
 from .._quantity import quantity
 from ._checks import flag, positive
+from ._surfaces import grid_faces
 from .obstacle import Obstacle, Surface
 
 EVEN = 1e-6  # of a spacing: how far coordinates may be from equal ones
@@ -48,13 +49,10 @@ class HeightField(Obstacle):
         shape = core.Obstacle.height_field(origin, spacing, self.heights)
         self._of(shape, x=self.x, y=self.y, heights=self.heights)
 
-    def _surface(self, extent: float) -> Surface:
+    def _surface(self, extent: float, around: np.ndarray) -> Surface:
         x, y = np.meshgrid(self.x, self.y, indexing="ij")
-        n_y = len(self.y)
-        first = (np.arange(len(self.x) - 1)[:, None] * n_y + np.arange(n_y - 1)).ravel()
-        lower = np.stack([first, first + n_y, first + n_y + 1], axis=1)
-        upper = np.stack([first, first + n_y + 1, first + 1], axis=1)
-        return np.stack([x, y, self.heights], axis=-1).reshape(-1, 3), np.concatenate([lower, upper])
+        vertices = np.stack([x, y, self.heights], axis=-1).reshape(-1, 3)
+        return vertices, grid_faces(len(self.x), len(self.y))
 
     def _summary(self) -> str:
         width, depth = np.ptp(self.x), np.ptp(self.y)

@@ -66,7 +66,7 @@ class MeshObstacle(Obstacle):
             core.Obstacle.mesh(self.mesh._core, self.resolution), mesh=self.mesh, resolution=self.resolution
         )
 
-    def _surface(self, extent: float) -> Surface:
+    def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return self.mesh.rest_positions, self.mesh.faces
 
     def _summary(self) -> str:

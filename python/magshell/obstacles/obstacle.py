@@ -95,16 +95,18 @@ class Obstacle:
         """(..., 3) unit vectors away from the body, the gradient of the distance, at points (..., 3) m."""
         return self._distances(points, time)[1] @ self._frame(time)[0].T
 
-    def surface(self, time: float = 0.0, extent: float = 1.0) -> Surface:
+    def surface(self, time: float = 0.0, extent: float = 1.0, around=None) -> Surface:
         """A triangle mesh for pictures: vertices (n, 3) m in world coordinates, faces (m, 3).
 
-        extent: m, the side of the square that stands for a plane.
+        extent: m, the side of the square that stands for a plane. around: (3,) m, the point that the square is nearest
+        to; by default the center.
         """
         turn, origin = self._frame(time)
-        vertices, faces = self._surface(float(quantity("extent", "m", extent, ())))
+        middle = origin if around is None else quantity("around", "m", around, (3,))
+        vertices, faces = self._surface(float(quantity("extent", "m", extent, ())), (middle - origin) @ turn)
         return vertices @ turn.T + origin, faces
 
-    def _surface(self, extent: float) -> Surface:
+    def _surface(self, extent: float, around: np.ndarray) -> Surface:
         """In the body's own frame."""
         raise NotImplementedError
 

@@ -8,7 +8,10 @@ import numpy as np
 
 from .. import _core as core
 from .._quantity import quantity
+from ._surfaces import grid_faces
 from .obstacle import Obstacle, Surface
+
+CELLS = 16  # of the square that stands for a plane: painters sort small triangles well
 
 
 class Plane(Obstacle):
@@ -38,13 +41,16 @@ class Plane(Obstacle):
         self.normal = given / largest / np.linalg.norm(given / largest)
         self._of(core.Obstacle.plane(self.normal), normal=self.normal)
 
-    def _surface(self, extent: float) -> Surface:
+    def _surface(self, extent: float, around: np.ndarray) -> Surface:
         axis = np.eye(3)[np.argmin(np.abs(self.normal))]
         first = np.cross(axis, self.normal)
         first /= np.linalg.norm(first)
         second = np.cross(self.normal, first)
-        corners = [-first - second, first - second, first + second, second - first]
-        return 0.5 * extent * np.array(corners), np.array([[0, 1, 2], [0, 2, 3]])
+        places = extent * np.linspace(-0.5, 0.5, CELLS + 1)
+        u, v = np.meshgrid(places, places, indexing="ij")
+        middle = around - (around @ self.normal) * self.normal
+        vertices = middle + u.reshape(-1, 1) * first + v.reshape(-1, 1) * second
+        return vertices, grid_faces(CELLS + 1, CELLS + 1)
 
     def _summary(self) -> str:
         return f"normal ({', '.join(f'{x:.4g}' for x in self.normal + 0.0)})"

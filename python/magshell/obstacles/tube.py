@@ -71,7 +71,7 @@ class Tube(Obstacle):
             closed=closed,
         )
 
-    def _surface(self, extent: float) -> Surface:
+    def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return swept_surface(self.points, self.radius, self.closed)
 
     def _summary(self) -> str:

@@ -61,7 +61,7 @@ def option_tensors(label: str, value, parameters: list[torch.Tensor]) -> list[to
         try:
             tensor = torch.as_tensor(given, dtype=torch.float64).detach()
             torch.broadcast_to(tensor, parameter.shape)
-        except (TypeError, ValueError, RuntimeError):
+        except (TypeError, ValueError, RuntimeError, OverflowError):
             shape = getattr(given, "shape", None)
             came = f"{given!r:.60}" if shape is None else f"shape {tuple(shape)}"
             raise ValueError(

@@ -31,6 +31,7 @@ def animate(
     remanent_magnetization=None,
     applied_flux_density=None,
     field=None,
+    obstacles=None,
     speed: float | None = None,
     fps: float = 25.0,
     color="auto",
@@ -53,6 +54,7 @@ def animate(
         between states with times the frames go in straight lines.
     speed: seconds of the motion that one second of the movie shows, 0.1 for ten times slower. By default 1 for a motion
         of 3 to 20 s, else a round number that makes the movie about 8 s long. The movie says which.
+    obstacles: as in `plot`; a moving one moves.
     fps: frames a second; a .gif keeps a whole number of hundredths of a second a frame, and at most 50 a second.
     title: stands before the time. progress: show a bar once it has taken two seconds. The rest is as in `plot`.
 
@@ -77,6 +79,7 @@ def animate(
         remanent_magnetization=remanent_magnetization,
         applied_flux_density=applied_flux_density,
         field=field,
+        obstacles=obstacles,
     )
     if len(states) < 2:
         raise ValueError("a movie needs at least two states, got one; ms.plot makes a picture of it")

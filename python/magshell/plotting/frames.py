@@ -23,6 +23,7 @@ from .picture import paint, paint_panel, screen_of
 from .playing import SAMPLES, spread
 from .solids import arrows
 from .states import State
+from .surroundings import obstacle_solids, reach
 from .units import LengthUnit, prefixed
 from .view import View
 
@@ -49,6 +50,7 @@ class Scenery:
         if self.scalar is not None and values is not None:
             shades = colors.scale_colors(self.scalar.scale, values, self.scalar.limits)
         panel = Panel(title, sheet_solids(state, shades, self.view, self.size, self.options))
+        panel.solids += obstacle_solids([state], self.size)
         panel.solids += self._magnetization(state)
         self._add_fields(panel, state)
         return Drawing([panel], self.view, self.unit, self.scalar, self._legend(), self._hold)
@@ -74,6 +76,7 @@ class Scenery:
         points += [s.positions for state in spread(states, SAMPLES) for s in self._magnetization(state)]
         points += [states[0].mesh.rest_positions] if self.options.rest else []
         points += [self._points] if len(self._points) else []
+        points += reach(spread(states, SAMPLES), self.size)
         seen = [self.view.project(each) for each in points]
         return np.min([x.min(axis=0) for x in seen], axis=0), np.max([x.max(axis=0) for x in seen], axis=0)
 

@@ -12,6 +12,7 @@ from . import colors, glyphs
 from .colors import Scalar, rgb
 from .solids import Solid, arrows, ribbons, sheet
 from .states import State
+from .surroundings import obstacle_solids
 from .units import LengthUnit, with_unit
 from .view import View
 
@@ -98,6 +99,7 @@ def draw(
             plain = colors.SERIES[series] if len(group) > 1 else colors.SHEET
             shades = rgb(plain) if scalar is None else scalar.colors(first + index)
             panel.solids += _pale(sheet_solids(state, shades, view, size, options), paleness)
+        panel.solids += obstacle_solids(group, size)
         if len(group) > 1:
             labels = _series_labels(group, titles, view)
             panel.labels += _apart(labels, view, 0.1 * size) if options.fade else labels

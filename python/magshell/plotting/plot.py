@@ -25,6 +25,7 @@ def plot(
     remanent_magnetization=None,
     applied_flux_density=None,
     field=None,
+    obstacles=None,
     states=None,
     color="auto",
     color_label: str | None = None,
@@ -46,6 +47,7 @@ def plot(
     what: a mesh, a Shell, a Scene, a result, or a list of those.
     positions, remanent_magnetization, applied_flux_density, field: (n_v, 3) m, (n_f, 3) A/m, (3,) T and
         fields that vary in space: for a mesh, which has none, or instead of a result's own.
+    obstacles: what is around the sheet, one one sees through; by default what the contacts of a scene are about.
     states: numbers of those to draw, of a path or a motion; by default all, or nine evenly spread ones.
     color: "magnetization" (the component of M_r along the axis that all of it shares, else its angle or
         magnitude), "displacement", "magnetic_energy" (a rest volume), an array with a number a face or a
@@ -75,6 +77,7 @@ def plot(
         remanent_magnetization=remanent_magnetization,
         applied_flux_density=applied_flux_density,
         field=field,
+        obstacles=obstacles,
     )
     drawn = _chosen(drawn, states)
     titles = checked_titles(titles, drawn)

@@ -18,21 +18,23 @@ def paint(axes, panel: Panel, view: View) -> None:
     corners, colors, depths = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.argsort(depths, kind="stable")
     colors = colors[order]
-    # an edge in the colour of its face closes the hairline between neighbours
+    # an edge in the colour of its face closes the hairline between neighbours; under a clear face it would show
+    widths = np.where(colors[:, 3] < 1.0, 0.0, 0.25)
     axes.add_collection(
         PolyCollection(
-            corners[order], facecolors=colors, edgecolors=colors, linewidths=0.25, joinstyle="round"
+            corners[order], facecolors=colors, edgecolors=colors, linewidths=widths, joinstyle="round"
         )
     )
 
 
 def _triangles(solid: Solid, view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners on the screen (m, 3, 2), colours (m, 3), depths (m,)."""
+    """Corners on the screen (m, 3, 2), colours and opacities (m, 4), depths (m,)."""
     corners = view.project(solid.positions)[solid.faces]
     colors = solid.colors if solid.per_face else solid.colors[solid.faces].mean(axis=1)
     if solid.lit:
         colors = shade(colors, _normals(solid), view)
-    return corners[:, :, :2], np.clip(colors, 0.0, 1.0), corners[:, :, 2].mean(axis=1) + solid.lift
+    colors = np.column_stack([np.clip(colors, 0.0, 1.0), np.full(len(colors), solid.opacity)])
+    return corners[:, :, :2], colors, corners[:, :, 2].mean(axis=1) + solid.lift
 
 
 def _normals(solid: Solid) -> np.ndarray:

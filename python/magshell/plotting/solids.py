@@ -18,6 +18,7 @@ class Solid:
     positions: (n, 3), m. faces: (m, 3). colors: (m, 3) a face or (n, 3) a vertex, 0 to 1, as `per_face` says.
     smooth: shade with the normals averaged at the vertices. lit: shade at all.
     lift: m, towards the eye, which hides less of it and moves nothing in a parallel projection.
+    opacity: 0 to 1; less than 1 lets what is behind shine through.
     """
 
     positions: np.ndarray
@@ -27,6 +28,7 @@ class Solid:
     smooth: bool = False
     lit: bool = True
     lift: float = 0.0
+    opacity: float = 1.0
 
 
 def sheet(positions: np.ndarray, faces: np.ndarray, colors: np.ndarray) -> Solid:

@@ -12,6 +12,7 @@ from .._quantity import quantity
 from ..equilibria import Equilibria
 from ..field import UniformField
 from ..mesh import TriangleMesh
+from ..obstacles import Obstacle
 from ..path import Path
 from ..scene import Scene
 from ..shell import Shell
@@ -26,7 +27,7 @@ class State:
     positions: (n_v, 3), m. remanent_magnetization: (n_f, 3), A/m, at rest, or None.
     flux_density: (3,), T, the uniform field, or None without one.
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
-    title: what the result calls it. time: s, of a motion, or None.
+    title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
     """
 
     mesh: TriangleMesh
@@ -36,6 +37,7 @@ class State:
     sources: Callable[[np.ndarray], np.ndarray] | None = None
     title: str = ""
     time: float | None = None
+    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def magnetization(self) -> np.ndarray:
@@ -72,7 +74,13 @@ class State:
 
 
 def states_of(
-    what, *, positions=None, remanent_magnetization=None, applied_flux_density=None, field=None
+    what,
+    *,
+    positions=None,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    field=None,
+    obstacles=None,
 ) -> list[State]:
     """The states in a mesh, a Shell, a Scene, a result, or a list of those; keywords come before their own.
 
@@ -83,22 +91,27 @@ def states_of(
         "remanent_magnetization": remanent_magnetization,
         "applied_flux_density": applied_flux_density,
         "field": field,
+        "obstacles": obstacles,
     }
     if isinstance(what, TriangleMesh):
         return _states(what, given)
     if isinstance(what, Shell):
         return _states(what.mesh, given)
     if isinstance(what, Scene):
-        return _states(what.mesh, given, what.fields)
+        return _states(what.mesh, _with_own(given, what), what.fields)
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
     if is_result and not isinstance(what, Equilibria):
         own = _held_by(what)
-        merged = {name: own[name] if value is None else value for name, value in given.items()}
+        merged = {name: own.get(name) if value is None else value for name, value in given.items()}
+        merged = _with_own(merged, what.scene)
         states = _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
-        states = [state for item in what for state in states_of(item, **given)]
+        try:
+            states = [state for item in what for state in states_of(item, **given)]
+        except RecursionError:
+            raise ValueError("cannot draw a list that holds itself") from None
         if states:
             return states
         raise ValueError("there is nothing to draw: the list is empty")
@@ -151,6 +164,7 @@ def _states(
     magnetization = _magnetization(mesh, given["remanent_magnetization"])
     sources = [f for f in _listed(given["field"]) or fields if not isinstance(f, UniformField)]
     flux_densities = _flux_densities(given["applied_flux_density"], count)
+    obstacles = _obstacles(given["obstacles"])
     strengths, titles = (
         list(each) if len(each) == count else [each[0]] * count for each in (strengths, titles)
     )
@@ -162,6 +176,7 @@ def _states(
             flux,
             _sum_of(sources, strength) if sources and strength else None,
             title,
+            obstacles=obstacles,
         )
         for frame, flux, strength, title in zip(frames, flux_densities, strengths, titles, strict=True)
     ]
@@ -194,6 +209,19 @@ def _flux_densities(values, count: int) -> list[np.ndarray | None]:
     if array.shape not in ((3,), (count, 3)):
         raise ValueError(f"applied_flux_density [T] must have shape (3,) or ({count}, 3), got {array.shape}")
     return list(np.broadcast_to(array, (count, 3)))
+
+
+def _with_own(given: dict[str, Any], scene: Scene) -> dict[str, Any]:
+    """With the scene's obstacles, unless others are given."""
+    return {**given, "obstacles": scene.obstacles} if given["obstacles"] is None else given
+
+
+def _obstacles(values) -> tuple[Obstacle, ...]:
+    listed = (values,) if isinstance(values, Obstacle) else tuple(values or ())
+    for each in listed:
+        if not isinstance(each, Obstacle):
+            raise ValueError(f"obstacles must be obstacles of ms.obstacles, got a {type(each).__name__}")
+    return listed
 
 
 def _sum_of(fields, strength: float) -> Callable[[np.ndarray], np.ndarray]:

@@ -97,6 +97,7 @@ def _add(plotter, solid: Solid, eye: np.ndarray) -> None:
         surface,
         scalars="colors",
         rgb=True,
+        opacity=solid.opacity,
         lighting=solid.lit,
         smooth_shading=False if not solid.smooth else None,
         interpolation="Phong" if solid.smooth else "Flat",

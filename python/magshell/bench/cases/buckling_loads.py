@@ -6,7 +6,7 @@ import numpy as np
 
 import magshell as ms
 
-from .outcome import Comparison, Outcome, outcome
+from .outcome import Comparison, Outcome, mesh_name, outcome
 
 LENGTH, WIDTH, THICKNESS, YOUNG_MODULUS, POISSON_RATIO = 1.0, 0.1, 0.001, 1e9, 0.3
 
@@ -38,18 +38,22 @@ def column(mesh: ms.TriangleMesh, ends: str, bending: str) -> ms.Scene:
     return ms.Scene(sheet, supports=supports, loads=[] if ends == "clamped" else [force])
 
 
-def columns(cells: tuple[int, int] = (40, 4), bending: str = "midedge") -> Outcome:
+def columns(
+    cells: tuple[int, int] = (40, 4), bending: str = "midedge", *, irregular: float | None = 0.25
+) -> Outcome:
     """The four Euler columns: the computed load over each one's closed form, times that form."""
-    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=0.25)
+    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular)
     found = [ms.linear_buckling(column(mesh, ends, bending)) for ends in COLUMNS]
     loads = [factor * buckling.factors[0] for factor, buckling in zip(COLUMNS.values(), found, strict=True)]
     comparison = Comparison("P L2 / EI", loads, list(COLUMNS.values()), at=tuple(COLUMNS), allowed=0.01)
-    return outcome(f"irregular {cells[0]}x{cells[1]}", mesh, [comparison], found)
+    return outcome(mesh_name(cells, irregular), mesh, [comparison], found)
 
 
-def plate(cells: tuple[int, int] = (32, 32), bending: str = "midedge") -> Outcome:
+def plate(
+    cells: tuple[int, int] = (32, 32), bending: str = "midedge", *, irregular: float | None = None
+) -> Outcome:
     """A simply supported square under uniaxial compression."""
-    mesh = ms.meshes.rectangle(LENGTH, LENGTH, cells)
+    mesh = ms.meshes.rectangle(LENGTH, LENGTH, cells, irregular=irregular)
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
     )
@@ -63,4 +67,4 @@ def plate(cells: tuple[int, int] = (32, 32), bending: str = "midedge") -> Outcom
     load = ms.EdgeLoad(mesh.edges_at(x=LENGTH), (-unit, 0, 0))
     found = ms.linear_buckling(ms.Scene(sheet, supports=supports, loads=[load]))
     comparison = Comparison("k", found.factors[0], PLATE_FACTOR, allowed=0.01)
-    return outcome(f"{cells[0]}x{cells[1]}", mesh, [comparison], [found])
+    return outcome(mesh_name(cells, irregular), mesh, [comparison], [found])

@@ -6,19 +6,22 @@ import numpy as np
 
 import magshell as ms
 
-from .outcome import Comparison, Outcome, outcome
+from .outcome import Comparison, Outcome, mesh_name, outcome
 
 ROOF_RADIUS, ROOF_LENGTH, ROOF_HALF_ANGLE = 25.0, 50.0, np.radians(40.0)
 PINCHED_RADIUS, PINCHED_LENGTH = 300.0, 600.0
 
 
-def scordelis_lo(cells: tuple[int, int] = (48, 48), bending: str = "midedge") -> Outcome:
+def scordelis_lo(
+    cells: tuple[int, int] = (48, 48), bending: str = "midedge", *, irregular: float | None = None
+) -> Outcome:
     """B1: a barrel vault on rigid diaphragms, its straight edges free; a quarter of it.
 
     Reference: the free edge sinks by 0.3006 at mid-length in Kirchhoff-Love theory (isogeometric, PENGoLINS);
     the classical target of 0.3024 has shear in it.
     """
-    mesh = ms.meshes.cylinder(ROOF_RADIUS, ROOF_LENGTH / 2, (0.0, ROOF_HALF_ANGLE), cells=cells)
+    span = (0.0, ROOF_HALF_ANGLE)
+    mesh = ms.meshes.cylinder(ROOF_RADIUS, ROOF_LENGTH / 2, span, cells=cells, irregular=irregular)
     sheet = ms.Shell(mesh, thickness=0.25, young_modulus=4.32e8, poisson_ratio=0.0, bending=bending)
     middle = ROOF_LENGTH / 2
     supports = [
@@ -32,15 +35,17 @@ def scordelis_lo(cells: tuple[int, int] = (48, 48), bending: str = "midedge") ->
         (ROOF_RADIUS * np.sin(ROOF_HALF_ANGLE), middle, ROOF_RADIUS * np.cos(ROOF_HALF_ANGLE))
     )
     comparison = Comparison("w, free edge", -response.displacements[edge, 2], 0.3006, allowed=0.01)
-    return outcome(f"{cells[0]}x{cells[1]} a quarter", mesh, [comparison], [response])
+    return outcome(f"{mesh_name(cells, irregular)} a quarter", mesh, [comparison], [response])
 
 
-def pinched_cylinder(cells: tuple[int, int] = (64, 64), bending: str = "midedge") -> Outcome:
+def pinched_cylinder(
+    cells: tuple[int, int] = (64, 64), bending: str = "midedge", *, irregular: float | None = None
+) -> Outcome:
     """B2: a cylinder on rigid diaphragms, pinched by two opposite forces of 1 at mid-length; an eighth of it.
 
     Reference: 1.8248e-5 under the force (series solution: 164.24 P / (E h)).
     """
-    mesh = _eighth(cells)
+    mesh = _eighth(cells, irregular)
     sheet = ms.Shell(mesh, thickness=3.0, young_modulus=3e6, poisson_ratio=0.3, bending=bending)
     supports = [
         ms.Pin(mesh.vertices_at(y=PINCHED_LENGTH / 2), "xz"),
@@ -52,12 +57,12 @@ def pinched_cylinder(cells: tuple[int, int] = (64, 64), bending: str = "midedge"
     scene = ms.Scene(sheet, supports=supports, loads=[ms.PointLoad(loaded, (0, 0, -0.25))])
     response = ms.linear_response(scene)
     comparison = Comparison("w, force", -response.displacements[loaded, 2], 1.8248e-5, allowed=0.01)
-    return outcome(f"{cells[0]}x{cells[1]} graded, an eighth", mesh, [comparison], [response])
+    return outcome(f"{mesh_name(cells, irregular)} graded, an eighth", mesh, [comparison], [response])
 
 
-def _eighth(cells: tuple[int, int], grading: float = 1.8) -> ms.TriangleMesh:
+def _eighth(cells: tuple[int, int], irregular: float | None, grading: float = 1.8) -> ms.TriangleMesh:
     """An eighth of the cylinder, its cells smaller towards the force, where the deflection is."""
-    even = ms.meshes.cylinder(1.0, 1.0, (0.0, 1.0), cells=cells)
+    even = ms.meshes.cylinder(1.0, 1.0, (0.0, 1.0), cells=cells, irregular=irregular)
     x, y, z = even.rest_positions.T
     angle = (np.arctan2(x, z) ** grading) * np.pi / 2
     along = y**grading * PINCHED_LENGTH / 2

@@ -9,7 +9,7 @@ import numpy as np
 import magshell as ms
 
 from . import shear_strip
-from .outcome import Comparison, Outcome, outcome, sweep, tip
+from .outcome import Comparison, Outcome, mesh_name, outcome, sweep, tip
 
 LENGTH, WIDTH, YOUNG_MODULUS, MAGNETIZATION = 0.1, 0.01, 1e6, 1e5
 THICKNESS = LENGTH / 400  # thin, because the elastica does not stretch: 1e-5 of its length here
@@ -66,27 +66,34 @@ def field_across(
     cells: tuple[int, int] = (80, 8),
     bending: str = "midedge",
     *,
+    irregular: float | None = 0.25,
     seed: int = 0,
     betas: Sequence[float] = tuple(ACROSS),
+    solver: ms.Newton | None = None,
 ) -> Outcome:
     """C1-90: the end of the strip against the elastica, at every beta."""
-    return _against_elastica(cells, bending, seed, {beta: ACROSS[beta] for beta in betas}, (0.0, 0.0, 1.0))
+    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed)
+    references = {beta: ACROSS[beta] for beta in betas}
+    return _against_elastica(mesh_name(cells, irregular), mesh, bending, references, (0.0, 0.0, 1.0), solver)
 
 
 def field_against(
     cells: tuple[int, int] = (80, 8),
     bending: str = "midedge",
     *,
+    irregular: float | None = 0.25,
     seed: int = 0,
     betas: Sequence[float] = tuple(AGAINST),
+    solver: ms.Newton | None = None,
 ) -> Outcome:
     """C1-180: the same past the critical field, where the straight strip is a saddle that has to be left."""
-    return _against_elastica(cells, bending, seed, {beta: AGAINST[beta] for beta in betas}, (-1.0, 0.0, 0.0))
+    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed)
+    references = {beta: AGAINST[beta] for beta in betas}
+    return _against_elastica(mesh_name(cells, irregular), mesh, bending, references, (-1.0, 0.0, 0.0), solver)
 
 
-def _against_elastica(cells, bending: str, seed: int, references: dict, direction) -> Outcome:
-    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=0.25, seed=seed)
-    states = sweep(scene(mesh, bending), [controls(beta, direction) for beta in references])
+def _against_elastica(name: str, mesh, bending: str, references: dict, direction, solver) -> Outcome:
+    states = sweep(scene(mesh, bending), [controls(beta, direction) for beta in references], solver=solver)
     tips = np.array([tip(mesh, state.positions, x=LENGTH) for state in states]) / LENGTH
     x, y = np.array(list(references.values())).T
     at = [f"beta = {beta:g}" for beta in references]
@@ -94,7 +101,7 @@ def _against_elastica(cells, bending: str, seed: int, references: dict, directio
         Comparison("x / L", tips[:, 0], x, at=at, scale=1.0, allowed=0.001),
         Comparison("y / L", np.abs(tips[:, 2]), y, at=at, scale=1.0, allowed=0.001),
     ]
-    return outcome(f"irregular {cells[0]}x{cells[1]}", mesh, comparisons, states)
+    return outcome(name, mesh, comparisons, states)
 
 
 def magnetic_end_shear(
@@ -105,7 +112,7 @@ def magnetic_end_shear(
     For a tangential uniform M and a uniform B the magnetic energy is the work of the dead traction h (M . nu)
     B on the boundary (divergence theorem), nu its outward normal: here the end load P = h w M B.
     """
-    mesh = shear_strip.irregular_strip(cells, seed)
+    mesh = shear_strip.strip(cells, seed)
     sheet = shear_strip.shell(mesh, bending)
     strip = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
     flux_density = shear_strip.FULL_LOAD / (shear_strip.THICKNESS * shear_strip.WIDTH * MAGNETIZATION)
@@ -118,4 +125,4 @@ def magnetic_end_shear(
         Comparison(f"{name}, field = force", ends[0][axis], ends[1][axis], allowed=0.001)
         for name, axis in (("W", 2), ("U", 0))
     ]
-    return outcome(f"irregular {cells[0]}x{cells[1]}", mesh, comparisons, [magnetic, loaded])
+    return outcome(f"irregular {mesh_name(cells)}", mesh, comparisons, [magnetic, loaded])

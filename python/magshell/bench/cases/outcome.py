@@ -94,6 +94,10 @@ def sweep(scene: ms.Scene, controls: Iterable[dict], **common) -> list[ms.Equili
     return found
 
 
+def mesh_name(cells: tuple[int, int], irregular: float | None = None) -> str:
+    return f"{'irregular ' if irregular else ''}{cells[0]}x{cells[1]}"
+
+
 def tip(mesh: ms.TriangleMesh, displacements: np.ndarray, **at: float) -> np.ndarray:
     """The mean displacement (3,) m of the vertices at the given coordinates."""
     return displacements[mesh.vertices_at(**at)].mean(axis=0)

@@ -6,7 +6,7 @@ import numpy as np
 
 import magshell as ms
 
-from .outcome import Comparison, Outcome, outcome
+from .outcome import Comparison, Outcome, mesh_name, outcome
 
 POISSON_RATIO = 0.3
 THICKNESS = 0.01
@@ -31,34 +31,52 @@ CIRCULAR = {
 GRADING = 1.3  # a quarter's vertices at (i / n)^1.3 of its side: finer where the force is
 
 
-def square_plate(cells: tuple[int, int] = (32, 32), bending: str = "midedge") -> Outcome:
+def square_plate(
+    cells: tuple[int, int] = (32, 32), bending: str = "midedge", *, irregular: float | None = None
+) -> Outcome:
     """The four deflections of a unit square, on crossed and graded cells of a quarter of it."""
-    even = ms.meshes.rectangle(0.5, 0.5, cells, diagonals="crossed")
+    even = ms.meshes.rectangle(0.5, 0.5, cells, diagonals="crossed", irregular=irregular)
     positions = even.rest_positions.copy()
     positions[:, :2] = 0.5 * (2.0 * positions[:, :2]) ** GRADING
     mesh = ms.TriangleMesh(positions, even.faces)
-    return _quarter(mesh, bending, f"{cells[0]}x{cells[1]} crossed, graded, a quarter", allowed=0.005)
+    return _quarter(mesh, bending, f"{mesh_name(cells, irregular)} crossed, graded, a quarter", allowed=0.005)
 
 
-def even_plate(cells: tuple[int, int] = (32, 32), bending: str = "midedge") -> Outcome:
+def even_plate(
+    cells: tuple[int, int] = (32, 32), bending: str = "midedge", *, irregular: float | None = None
+) -> Outcome:
     """The same on an even mesh of the whole square, for information: Morley's errors there are larger.
 
     Computed on a quarter; the cells are those of the whole.
     """
     if cells[0] % 2 or cells[1] % 2:
         raise ValueError(f"a quarter needs even numbers of cells, got {cells}")
-    mesh = ms.meshes.rectangle(0.5, 0.5, (cells[0] // 2, cells[1] // 2))
-    return _quarter(mesh, bending, f"{cells[0]}x{cells[1]}", allowed=None)
+    mesh = ms.meshes.rectangle(0.5, 0.5, (cells[0] // 2, cells[1] // 2), irregular=irregular)
+    return _quarter(mesh, bending, mesh_name(cells, irregular), allowed=None)
 
 
-def circular_plate(rings: int = 48, bending: str = "midedge") -> Outcome:
+def circular_plate(rings: int = 48, bending: str = "midedge", *, irregular: float | None = None) -> Outcome:
     """The four deflections of a disk of radius 1.
 
     Its rim is a polygon, simply supported at its vertices. The lowest-order Hellan-Herrmann-Johnson element
     does not fall for Babuska's paradox there (Arnold and Walker 2020).
     """
+    mesh = _disk(rings, irregular)
+    name = f"{'irregular ' if irregular else ''}{rings} rings"
+    return _middle_deflections(mesh, mesh.boundary_edges, [], 1, bending, CIRCULAR, name, 0.005)
+
+
+def _disk(rings: int, irregular: float | None) -> ms.TriangleMesh:
+    """Of radius 1. irregular: by which share of a ring's width its vertices move, but for the rim's and the middle."""
     mesh = ms.meshes.disk(1.0, rings)
-    return _middle_deflections(mesh, mesh.boundary_edges, [], 1, bending, CIRCULAR, f"{rings} rings", 0.005)
+    if irregular is None:
+        return mesh
+    positions = mesh.rest_positions.copy()
+    radii = np.linalg.norm(positions, axis=1)
+    movable = (radii > 0.5 / rings) & (radii < 1.0 - 0.5 / rings)
+    moves = np.random.default_rng(0).uniform(-irregular, irregular, (len(positions), 2)) / rings
+    positions[:, :2] += moves * movable[:, None]
+    return ms.TriangleMesh(positions, mesh.faces)
 
 
 def _quarter(mesh: ms.TriangleMesh, bending: str, name: str, allowed: float | None) -> Outcome:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import magshell as ms
 
-from .outcome import Comparison, Outcome, outcome, sweep, tip
+from .outcome import Comparison, Outcome, mesh_name, outcome, sweep, tip
 
 LENGTH, WIDTH, THICKNESS, YOUNG_MODULUS = 10.0, 1.0, 0.1, 1.2e6
 FULL_LOAD = 4.0  # 4 EI / L^2, on the whole end
@@ -38,8 +38,8 @@ ELASTICA = {
 }
 
 
-def irregular_strip(cells: tuple[int, int], seed: int) -> ms.TriangleMesh:
-    return ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=0.25, seed=seed)
+def strip(cells: tuple[int, int], seed: int = 0, irregular: float | None = 0.25) -> ms.TriangleMesh:
+    return ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed)
 
 
 def shell(mesh: ms.TriangleMesh, bending: str) -> ms.Shell:
@@ -58,12 +58,14 @@ def end_shear(
     cells: tuple[int, int] = (40, 4),
     bending: str = "midedge",
     *,
+    irregular: float | None = 0.25,
     seed: int = 0,
     loads: Sequence[float] = tuple(ELASTICA),
+    solver: ms.Newton | None = None,
 ) -> Outcome:
     """Deflection and shortening of the end against the exact elastica, at every load."""
-    mesh = irregular_strip(cells, seed)
-    states = sweep(scene(mesh, bending), [{"load_factor": load} for load in loads])
+    mesh = strip(cells, seed, irregular)
+    states = sweep(scene(mesh, bending), [{"load_factor": load} for load in loads], solver=solver)
     tips = [tip(mesh, state.displacements, x=LENGTH) for state in states]
     at = [f"P/Pmax = {load:g}" for load in loads]
     comparisons = [
@@ -71,4 +73,4 @@ def end_shear(
     ]
     if loads[-1] == 1.0:
         comparisons.append(Comparison("U", -tips[-1][0], ELASTICA[1.0][0], at=at[-1:], allowed=0.003))
-    return outcome(f"irregular {cells[0]}x{cells[1]}", mesh, comparisons, states)
+    return outcome(mesh_name(cells, irregular), mesh, comparisons, states)

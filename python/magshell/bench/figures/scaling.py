@@ -1,0 +1,108 @@
+"""Times and memory against the number of faces, with the exponents they grow with; two threads over one."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter, NullLocator
+
+from ..scaling import ALLOWED_EXPONENT, ALLOWED_MEMORY, MEMORIES, TIMES
+from .style import (
+    BLUE,
+    COLOURS,
+    FAINT,
+    GREEN,
+    INK,
+    SKY,
+    VERMILION,
+    machine,
+    new_figure,
+    note,
+    panel_title,
+    tidy,
+)
+
+_TIME_COLOURS = dict(zip(TIMES, COLOURS, strict=True))
+_TIME_COLOURS["iteration"] = INK
+_MEMORY_COLOURS = dict(zip(MEMORIES, (GREEN, SKY, BLUE, VERMILION), strict=True))
+
+
+def draw(results: dict, setting: dict) -> Figure:
+    one, two = (results["sizes"][threads] for threads in ("1", "2"))
+    faces = [size["faces"] for size in one]
+    figure = new_figure(12.0, 4.4)
+    times, faster, memory = figure.subplots(1, 3, width_ratios=(1.35, 0.9, 1.1))
+    exponents = results["exponents"]
+    for name, label in TIMES.items():
+        _line(
+            times,
+            faces,
+            [size["processor"][name] for size in one],
+            _TIME_COLOURS[name],
+            label,
+            exponents[name],
+        )
+    times.set(xscale="log", yscale="log")
+    panel_title(
+        times,
+        "Seconds of one processor",
+        f"with exponents of the faces: at most {ALLOWED_EXPONENT} for an iteration",
+    )
+    _ends(times)
+
+    for name, label in TIMES.items():
+        ratios = [a["wall"][name] / b["wall"][name] for a, b in zip(one, two, strict=True)]
+        faster.plot(faces, ratios, color=_TIME_COLOURS[name], marker="o", markersize=4, label=label)
+    faster.axhline(1.0, color=FAINT, linewidth=0.8)
+    faster.set(xscale="log", ylim=(0, 2.3))
+    panel_title(faster, "Two threads over one", "how many times as fast; colours as on the left")
+
+    for name, label in MEMORIES.items():
+        values = [size[name] for size in one]
+        if all(value is not None for value in values):
+            megabytes = [value / 1e6 for value in values]
+            _line(memory, faces, megabytes, _MEMORY_COLOURS[name], label, exponents[name])
+    memory.set(xscale="log", yscale="log")
+    panel_title(memory, "MB", f"with exponents; the process at most {ALLOWED_MEMORY} times the factor")
+    _ends(memory)
+    for axes in (times, faster, memory):
+        tidy(axes)
+        axes.set_xticks(faces, [f"{count:,}" for count in faces], rotation=35, ha="right")
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.set_xlabel("faces", fontsize=9)
+    note(
+        figure,
+        f"a square sheet bent by a field, {results['bending']}; {machine(setting).replace('1 thread, ', '')}",
+    )
+    return figure
+
+
+def _line(axes, faces, values, colour: str, label: str, exponent: float | None) -> None:
+    """With its name and exponent at its end."""
+    text = label if exponent is None else f"{label}  {exponent:.2f}"
+    axes.plot(faces, values, color=colour, marker="o", markersize=4, linewidth=1.6, label=text)
+
+
+def _ends(axes) -> None:
+    """Names at the ends of the lines, pushed apart where they would lie on each other."""
+    lines = sorted(
+        (line for line in axes.lines if not line.get_label().startswith("_")),
+        key=lambda line: line.get_ydata()[-1],
+    )
+    apart = 0.062
+    low, high = (axes.transData.transform((1, y))[1] for y in axes.get_ylim())
+    places = [(axes.transData.transform((1, line.get_ydata()[-1]))[1] - low) / (high - low) for line in lines]
+    for k in range(1, len(places)):
+        places[k] = max(places[k], places[k - 1] + apart)
+    places[-1] = min(places[-1], 1.0)
+    for k in reversed(range(len(places) - 1)):
+        places[k] = min(places[k], places[k + 1] - apart)
+    for line, place in zip(lines, places, strict=True):
+        axes.annotate(
+            line.get_label(),
+            (1.02, place),
+            xycoords="axes fraction",
+            fontsize=8,
+            color=line.get_color(),
+            va="center",
+        )

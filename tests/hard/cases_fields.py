@@ -1,0 +1,113 @@
+"""Fields and weights a thousand times too strong for the sheet, from rest in one call."""
+
+from __future__ import annotations
+
+import numpy as np
+from answers import Answer, at_rest, both, near
+from registry import case
+from sheets import (
+    LENGTH,
+    MAGNETIZATION,
+    YOUNG_MODULUS,
+    cantilever,
+    end_position,
+    field_for,
+    graded,
+    shell,
+    strip,
+)
+from theory import along_a_strong_force, hanging, stretch
+
+import magshell as ms
+
+NARROW = 4e-4  # m: where it bends at the clamp alone, its cells must not be wider than the bend
+
+
+def in_field(number: float, angle: float, rel: float) -> Answer:
+    """The end along a field at this angle to the strip, of M B h w L^2 / (E I) = number."""
+    mesh = graded(strip((80, 2), width=NARROW))
+    sheet = shell(mesh, thickness=1e-4 * LENGTH)  # the elastica does not stretch
+    direction = np.array([np.cos(angle), 0.0, np.sin(angle)])
+    found = ms.equilibrium(
+        cantilever(sheet, field=ms.UniformField()),
+        remanent_magnetization=(MAGNETIZATION, 0, 0),
+        applied_flux_density=field_for(number, sheet, LENGTH) * direction,
+    )
+    got = end_position(mesh, found.positions) @ direction / LENGTH
+    return both(near("end along B", got, along_a_strong_force(number, angle), rel=rel), at_rest(found))
+
+
+@case("a field across of {:g} E I / (M h w L^2): it bends at the clamp alone", over=(1e3, 1e4))
+def across(number):
+    return in_field(number, np.pi / 2, 2e-3)
+
+
+@case("a field obliquely from behind, 1e4 E I / (M h w L^2)")
+def from_behind():
+    return in_field(1e4, np.radians(150.0), 3e-3)
+
+
+@case("a field a thousand times the one that buckles it, from behind: the flat strip is a saddle")
+def against():
+    return in_field(1e3 * np.pi**2 / 4.0, np.pi, 5e-3)
+
+
+def guided(field_over_modulus: float) -> ms.Equilibrium:
+    """A strip that may only get longer, in a field along it; M B over E."""
+    mesh = strip((8, 2))
+    sheet = shell(mesh)
+    vertices = np.arange(mesh.n_vertices)
+    supports = [ms.Pin(vertices, "yz"), ms.Pin(mesh.vertices_at(x=0.0), "x")]
+    return ms.equilibrium(
+        ms.Scene(sheet, supports=supports, field=ms.UniformField()),
+        remanent_magnetization=(MAGNETIZATION, 0, 0),
+        applied_flux_density=(field_over_modulus * YOUNG_MODULUS / MAGNETIZATION, 0, 0),
+    )
+
+
+@case("M B of {:g} E along a guided strip", over=(1.0, 100.0))
+def pulled(strength):
+    found = guided(strength)
+    got = np.ptp(found.positions[:, 0]) / LENGTH
+    return both(near("stretch", got, stretch(strength), rel=1e-9), at_rest(found))
+
+
+@case("M B of 100 E against a guided strip: no length is left to it but that of the strip turned round")
+def pushed():
+    found = guided(-100.0)
+    end = end_position(found.scene.mesh, found.positions)[0] / LENGTH
+    return both(near("end x / L", end, -stretch(100.0), rel=1e-9), at_rest(found))
+
+
+@case("a weight of {:g} E I / L^3: it hangs from its clamp", over=(1e2, 1e4))
+def heavy_strip(number):
+    mesh = graded(strip((80, 2), width=NARROW))
+    sheet = shell(mesh, thickness=1e-4 * LENGTH, mass_density=1e3)
+    weight = 1e3 * sheet.thickness[0]  # kg/m2
+    gravity = number * YOUNG_MODULUS * sheet.thickness[0] ** 3 / 12.0 / LENGTH**3 / weight
+    found = ms.equilibrium(cantilever(sheet, gravity=(0, 0, -gravity)))
+    end = end_position(mesh, found.positions) / LENGTH
+    expected = hanging(number)
+    return both(near("end x, z", end[[0, 2]], expected, rel=2e-3, scale=1.0), at_rest(found))
+
+
+@case("a strip on a dipole that pulls 1e3 times harder than it can bear, in a scene that keeps them apart")
+def close_to_a_dipole():
+    """Pinned to a line below the dipole it can only stretch; by symmetry its middle stays."""
+    mesh = strip((20, 2))
+    sheet = shell(mesh)
+    dipole = ms.Dipoles([[LENGTH / 2, 0.005, 0.02]], [[0.0, 0.0, 50.0]])
+    vertices = np.arange(mesh.n_vertices)
+    supports = [ms.Pin(vertices, "yz"), ms.Pin(mesh.vertices_at(x=LENGTH / 2), "x")]
+    scene = ms.Scene(sheet, supports=supports, field=dipole)
+    found = ms.equilibrium(scene, remanent_magnetization=(0, 0, MAGNETIZATION))
+    mirrored = LENGTH - found.positions[mesh_mirror(mesh), 0]
+    return both(
+        near("x of the mirrored vertices", mirrored, found.positions[:, 0], rel=1e-8, scale=LENGTH),
+        at_rest(found),
+    )
+
+
+def mesh_mirror(mesh: ms.TriangleMesh) -> np.ndarray:
+    """The vertex at (L - x, y) for each at (x, y)."""
+    return np.array([mesh.nearest_vertex((LENGTH - x, y, z)) for x, y, z in mesh.rest_positions])

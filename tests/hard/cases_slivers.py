@@ -1,0 +1,169 @@
+"""Faces that are long and thin, flat and obtuse, or tiny beside their neighbours: the answers of the plain strip."""
+
+from __future__ import annotations
+
+import numpy as np
+from answers import Answer, at_rest, both, near, refused
+from registry import case
+from sheets import (
+    LENGTH,
+    MAGNETIZATION,
+    WIDTH,
+    cantilever,
+    end_position,
+    field_for,
+    force_for,
+    shell,
+    strip,
+)
+from theory import elastica
+
+import magshell as ms
+
+NUMBER = 4.0  # P L^2 / (E I): an end that rises by two thirds of the length
+ASPECT = 1000
+
+
+def bent(mesh: ms.TriangleMesh, rel: float, thickness: float = LENGTH / 400) -> Answer:
+    """The end of a cantilever of this mesh under a force that bends it far, against the elastica."""
+    sheet = shell(mesh, thickness=thickness)
+    found = ms.equilibrium(cantilever(sheet, (0, 0, force_for(NUMBER, sheet, LENGTH))))
+    end = end_position(mesh, found.positions) / LENGTH
+    return both(near("end x, z", end[[0, 2]], elastica(NUMBER), rel=rel, scale=1.0), at_rest(found))
+
+
+def lines(x: np.ndarray, y: np.ndarray) -> ms.TriangleMesh:
+    """A rectangle with its cells between these coordinates."""
+    mesh = ms.meshes.rectangle(1.0, 1.0, cells=(len(x) - 1, len(y) - 1))
+    u, v, z = mesh.rest_positions.T
+    places = [np.interp(w, np.linspace(0.0, 1.0, len(at)), at) for w, at in ((u, x), (v, y))]
+    return ms.TriangleMesh(np.stack([*places, z], axis=1), mesh.faces)
+
+
+X, Y = np.linspace(0.0, LENGTH, 21), np.linspace(0.0, WIDTH, 3)
+THIN_X, THIN_Y = X[1] / ASPECT, Y[1] / ASPECT
+
+
+def with_flat_triangles() -> ms.TriangleMesh:
+    """Every tenth face cut into three at a point by its edge 0, so that one of them has an angle of almost 180 degrees.
+
+    All of them would not do: elements of this kind need their angles to stay away from 180 degrees to converge.
+    """
+    return cut_inside(strip(), np.array([1.0 / ASPECT, 0.5, 0.5 - 1.0 / ASPECT]), every=10)
+
+
+def cut_inside(mesh: ms.TriangleMesh, weights: np.ndarray, every: int = 1) -> ms.TriangleMesh:
+    """Every n-th face cut into three at the point of these barycentric coordinates (3,)."""
+    corners = mesh.faces[::every]
+    new = mesh.n_vertices + np.arange(len(corners))
+    points = np.einsum("c,fci->fi", weights, mesh.rest_positions[corners])
+    parts = [np.stack([corners[:, i], corners[:, (i + 1) % 3], new], axis=1) for i in range(3)]
+    whole = np.delete(mesh.faces, np.s_[::every], axis=0)
+    return ms.TriangleMesh(np.concatenate([mesh.rest_positions, points]), np.concatenate([whole, *parts]))
+
+
+def tiny_face(mesh: ms.TriangleMesh, face: int, size: float) -> ms.TriangleMesh:
+    """One face gets a triangle of `size` of its own at its middle, joined to its corners by six others."""
+    corners = mesh.faces[face]
+    x = mesh.rest_positions[corners]
+    small = x.mean(axis=0) + size * (x - x.mean(axis=0))
+    a, b, c = corners
+    d, e, f = mesh.n_vertices + np.arange(3)
+    ring = [(a, b, e), (a, e, d), (b, c, f), (b, f, e), (c, a, d), (c, d, f), (d, e, f)]
+    faces = np.concatenate([np.delete(mesh.faces, face, axis=0), ring])
+    return ms.TriangleMesh(np.concatenate([mesh.rest_positions, small]), faces)
+
+
+@case("a column of faces 1000 times as long across as along, {}", over=("at the clamp", "in the middle"))
+def far_bent_with_a_column_of_slivers(where):
+    beside = X[0 if where == "at the clamp" else 10] + THIN_X
+    return bent(lines(np.sort([*X, beside]), Y), 2e-3)
+
+
+@case("a row of faces 1000 times as long along as across, {}", over=("at the border", "in the middle"))
+def far_bent_with_a_row_of_slivers(where):
+    beside = Y[0 if where == "at the border" else 1] + THIN_Y
+    return bent(lines(X, np.sort([*Y, beside])), 2e-3)
+
+
+@case("rows and columns of slivers, thickness over length {:g}", over=(1e-5, 1e-2))
+def far_bent_with_slivers_both_ways(ratio):
+    """Beside the thickness they are five thousandths, or five times as wide."""
+    mesh = lines(np.sort([*X, X[10] + THIN_X]), np.sort([*Y, Y[1] + THIN_Y]))
+    return bent(mesh, 2e-3, thickness=ratio * LENGTH)
+
+
+@case("nothing but faces 1000 times as long across as along, 20,000 of them")
+def far_bent_strip_of_slivers():
+    return bent(strip((10_000, 1)), 4e-3)
+
+
+@case("faces with an angle of 179.8 degrees")
+def far_bent_strip_with_flat_triangles():
+    return bent(with_flat_triangles(), 1e-2)
+
+
+@case("a face of {:g} times its neighbours' size", over=(1e-3, 1e-4))
+def far_bent_strip_with_a_tiny_face(size):
+    return bent(tiny_face(strip(), 39, size), 3e-3)
+
+
+@case("a face of 5 nm in a strip of 0.1 m, 0.25 mm thick: the round-off of its folds outweighs the load")
+def far_bent_strip_with_a_face_of_nanometres():
+    """Positions are known to 1e-17 m, its folds to 2e-9 rad; over its own size that is a force like the load's."""
+    return refused(
+        lambda: bent(tiny_face(strip(), 39, 1e-6), 1.0), "Load it in smaller|no stable", ms.NotConverged
+    )
+
+
+@case("a face of 1e-3 times its neighbours' size at the clamp, where the moment is largest")
+def far_bent_strip_with_a_tiny_face_at_the_clamp():
+    return bent(tiny_face(strip(), 0, 1e-3), 5e-3)
+
+
+@case("slivers, and hinges instead of directors")
+def small_deflection_of_hinges_on_slivers():
+    """Hinges are soft by what their mesh makes of it: as soft without the slivers."""
+
+    def response(mesh):
+        sheet = shell(mesh, bending="hinge")
+        scene = cantilever(sheet, (0, 0, force_for(1e-3, sheet, LENGTH)))
+        return end_position(mesh, ms.linear_response(scene).displacements)[2]
+
+    got, expected = response(lines(np.sort([*X, X[10] + THIN_X]), Y)), response(lines(X, Y))
+    return near("end z, with and without them", got, expected, rel=2e-2)
+
+
+@case("slivers both ways, and a field")
+def magnetized_strip_of_slivers():
+    mesh = lines(np.sort([*X, X[10] + THIN_X]), np.sort([*Y, Y[1] + THIN_Y]))
+    sheet = shell(mesh, thickness=LENGTH / 400)
+    found = ms.equilibrium(
+        cantilever(sheet, field=ms.UniformField()),
+        remanent_magnetization=(MAGNETIZATION, 0, 0),
+        applied_flux_density=(0, 0, field_for(10.0, sheet, LENGTH)),
+    )
+    end = end_position(mesh, found.positions) / LENGTH
+    return both(near("end x, z", end[[0, 2]], elastica(10.0), rel=5e-3, scale=1.0), at_rest(found))
+
+
+@case("time steps 1e6 times the time a wave takes to cross the smallest face")
+def vibration_with_a_tiny_face():
+    plain, refined = strip((10, 1)), tiny_face(strip((10, 1)), 10, 1e-4)
+    ends_ = []
+    for mesh in (plain, refined):
+        sheet = shell(mesh, mass_density=1e3)
+        motion = ms.simulate(
+            cantilever(sheet, (0, 0, force_for(1.0, sheet, LENGTH))), steps=40, time_step=5e-3, progress=False
+        )
+        ends_.append([end_position(mesh, x)[2] for x in motion.positions])
+    return near("end z(t), with and without the face", ends_[1], ends_[0], rel=2e-2)
+
+
+@case("a vertex 1e-11 of an edge off that edge")
+def a_face_that_is_none():
+    points = [[0, 0, 0], [1, 0, 0], [0.5, 1e-11, 0], [0.5, 1, 0]]
+    return refused(
+        lambda: ms.TriangleMesh(points, [[0, 1, 2], [0, 2, 3]]),
+        "degenerate: .* vertices coincide or lie on a line",
+    )

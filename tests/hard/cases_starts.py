@@ -1,0 +1,102 @@
+"""Starts that are nowhere near: random, folded, inverted, blown up. Where there is one equilibrium, it is found."""
+
+from __future__ import annotations
+
+import numpy as np
+from answers import Answer, at_rest, below, both, near, refused
+from registry import case
+from sheets import LENGTH, WIDTH, cantilever, shell, strip
+
+import magshell as ms
+
+
+def idle_strip() -> ms.Scene:
+    """Nothing acts on it: all of its energy goes, whatever it starts from."""
+    return cantilever(shell(strip((20, 2)), thickness=1e-3))
+
+
+def found_again(start_from) -> Answer:
+    """From start_from(rest positions) back to the rest shape."""
+    scene = idle_strip()
+    rest = np.array(scene.mesh.rest_positions)
+    found = ms.equilibrium(scene, start=start_from(rest))
+    return both(near("positions", found.positions, rest, rel=1e-7, scale=LENGTH), at_rest(found))
+
+
+@case("positions off by a {}th of a cell at random", over=(10, 3))
+def noise(part):
+    rng = np.random.default_rng(1)
+    return found_again(lambda x: x + LENGTH / 20 / part * rng.normal(size=x.shape))
+
+
+@case("folded over at its middle, back onto itself")
+def folded():
+    def fold(x):
+        # By 180 degrees but for a hair: a sheet in its own plane has no side to unfold to.
+        x, beyond = x.copy(), x[:, 0] > LENGTH / 2
+        x[beyond] = np.stack([LENGTH - x[beyond, 0], x[beyond, 1], 1e-4 + 0 * x[beyond, 0]], axis=1)
+        return x
+
+    return found_again(fold)
+
+
+@case("turned end to end: it starts where its clamp is not")
+def inverted():
+    return found_again(lambda x: x * (-1, 1, 1) + (LENGTH, 0, 0))
+
+
+@case("turned about its own axis by {} degrees, away from its clamp", over=(60, 120))
+def turned(degrees):
+    rotation = ms.supports.rotation_matrix(np.array([np.radians(degrees), 0, 0]))
+    return found_again(lambda x: (x - (0, WIDTH / 2, 0)) @ rotation.T + (0, WIDTH / 2, 0))
+
+
+@case("upside down: folded over sharply at its clamp, where creases can hold each other")
+def upside_down():
+    """Between the clamp and the first cells it crumples, and may stay so: a stable equilibrium will do."""
+    scene = idle_strip()
+    start = (0, WIDTH, 0) + scene.mesh.rest_positions * (1, -1, -1)
+    return at_rest(ms.equilibrium(scene, start=start))
+
+
+@case("{:g} times its size", over=(0.5, 100.0))
+def blown_up(factor):
+    return found_again(lambda x: factor * x)
+
+
+@case("rolled into a scroll of three turns")
+def rolled():
+    def roll(x):
+        angle = 6.0 * np.pi * x[:, 0] / LENGTH
+        radius = LENGTH / (6.0 * np.pi) * (1.0 + 0.3 * angle / (6.0 * np.pi))
+        return np.stack([radius * np.sin(angle), x[:, 1], radius * (1.0 - np.cos(angle))], axis=1)
+
+    return found_again(roll)
+
+
+@case("every vertex anywhere in a box: knots, inverted faces, strains of hundreds")
+def random_positions():
+    """Any stable equilibrium will do, as a crumpled sheet has many; but its energy must have come down."""
+    scene = idle_strip()
+    start = np.random.default_rng(7).uniform(-0.5, 0.5, size=scene.mesh.rest_positions.shape) * LENGTH
+    found = ms.equilibrium(scene, start=start)
+    before = scene._model.energy(scene._model.state(start, np.zeros(scene.mesh.n_edges)), found._controls)
+    return both(below("energy over that of the start", found.energy / before, 1e-2), at_rest(found))
+
+
+@case("a hundredth of its size: it bursts into crumples of single faces, which nothing keeps from collapsing")
+def squeezed():
+    """St. Venant-Kirchhoff material resists no collapse to zero area, where bending forces have no limit."""
+    scene = idle_strip()
+    return refused(
+        lambda: ms.equilibrium(scene, start=0.01 * scene.mesh.rest_positions),
+        "Start from positions closer to an equilibrium",
+        ms.NotConverged,
+    )
+
+
+@case("all vertices in one point: faces without area have no normals, so there is nothing to start from")
+def collapsed():
+    scene = idle_strip()
+    start = np.zeros_like(scene.mesh.rest_positions)
+    return refused(lambda: ms.equilibrium(scene, start=start), r"start \[m\] leaves face 0 without area")

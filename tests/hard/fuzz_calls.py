@@ -1,0 +1,399 @@
+"""Every public function and class of magshell with arguments that work, for the fuzzing to spoil."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+import magshell as ms
+
+
+@dataclass
+class Call:
+    """What is called, with arguments that it takes. cost: how many times rarer than others it is drawn."""
+
+    name: str
+    function: Callable
+    arguments: dict = field(default_factory=dict)
+    cost: int = 1
+
+
+# What users do not make themselves, but get as results, catch, or are told.
+NOT_CALLED = {
+    "Buckling": "a result",
+    "CriticalPoint": "a result",
+    "DesignRejected": "an error",
+    "EquilibriumJumped": "an error",
+    "Equilibrium": "a result",
+    "Interrupted": "an error",
+    "LinearResponse": "a result",
+    "Minimum": "a result",
+    "Multistart": "a result",
+    "MultistartFailed": "an error",
+    "NoGradient": "an error",
+    "NotConverged": "an error",
+    "ObjectiveFailed": "an error",
+    "Path": "a result",
+    "Picture": "a result",
+    "Trajectory": "a result",
+    "VibrationModes": "a result",
+    "Weld": "a result",
+    "AppliedField": "abstract",
+    "control.Curve": "abstract",
+    "obstacles.Obstacle": "abstract",
+    "SDIRK2": "takes nothing",
+    "SDIRK3": "takes nothing",
+    "TRBDF2": "takes nothing",
+    "ImplicitEuler": "takes nothing",
+    "UniformField": "takes nothing",
+    "num_threads": "takes nothing",
+    "show_config": "takes nothing",
+}
+
+
+class Sample:
+    """A small scene, and what was computed with it, to call everything else with."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.mesh = ms.meshes.rectangle(0.1, 0.05, cells=(3, 2))
+        self.shell = ms.Shell(self.mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+        self.clamp = ms.Clamp(self.mesh.edges_at(x=0.0), displacement=(0, 0, 1e-4))
+        self.load = ms.EdgeLoad(self.mesh.edges_at(x=0.1), (0, 0, 0.01))
+        self.dipoles = ms.Dipoles([(0.05, 0, 0.1)], [(0, 0, 0.1)])
+        self.grid = ms.SampledField((-1, -1, -1), (1, 1, 1), np.full((3, 3, 3, 3), 1e-3))
+        self.scene = ms.Scene(self.shell, supports=[self.clamp], loads=[self.load], gravity=(0, 0, -0.1))
+        field = [ms.UniformField(), self.dipoles, self.grid]
+        self.magnetic = ms.Scene(self.shell, supports=[self.clamp], loads=[self.load], field=field)
+        self.magnetization = np.tile((1e4, 0.0, 2e3), (self.mesh.n_faces, 1))
+        self.field = np.array((0.0, 0.0, 1e-3))
+        self.rest = ms.equilibrium(self.scene)
+        self.state = ms.simulate(self.scene, steps=1, time_step=1e-3, progress=False).end
+        self.path = ms.follow(self.scene, progress=False, max_points=5, largest_step=1.0, first_step=1.0)
+        self.positions = np.array(self.rest.positions)
+        self.track = 1e-2 * np.cumsum(np.ones((6, 3)), axis=0)
+        self.times = np.linspace(0.0, 1.0, 6)
+        ms.write_mesh(folder / "mesh.ply", self.mesh)
+
+
+def calls(s: Sample) -> Iterator[Call]:
+    """All of them."""
+    yield from _meshes(s)
+    yield from _scenes(s)
+    yield from _fields(s)
+    yield from _solves(s)
+    yield from _files(s)
+
+
+def _meshes(s: Sample) -> Iterator[Call]:
+    mesh, cells = s.mesh, (3, 2)
+    grid = {"cells": cells, "diagonals": "alternating", "irregular": 0.1, "seed": 0}
+    yield Call("TriangleMesh", ms.TriangleMesh, {"rest_positions": mesh.rest_positions, "faces": mesh.faces})
+    yield Call("meshes.rectangle", ms.meshes.rectangle, {"length": 1.0, "width": 0.5, **grid})
+    yield Call(
+        "meshes.annulus",
+        ms.meshes.annulus,
+        {"inner_radius": 0.5, "outer_radius": 1.0, **grid, "cells": (2, 5)},
+    )
+    sector = {"inner_radius": 0.5, "outer_radius": 1.0, "angle": (0.1, 1.0), **grid}
+    yield Call("meshes.sector", ms.meshes.sector, sector)
+    yield Call("meshes.cylinder", ms.meshes.cylinder, {"radius": 1.0, "length": 1.0, "angle": 1.0, **grid})
+    cap = {"radius": 1.0, "angle_from": 0.2, "angle_to": 1.0, "sector_angle": 1.0, **grid}
+    yield Call("meshes.spherical_cap", ms.meshes.spherical_cap, cap)
+    yield Call("meshes.disk", ms.meshes.disk, {"radius": 1.0, "cells": 3})
+    yield Call("meshes.cut", ms.meshes.cut, {"mesh": mesh, "edges": mesh.interior_edges[:1]})
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1.0)])
+    hole, slit = 0.3 + 0.2 * square, np.array([(0.7, 0.2), (0.8, 0.8)])
+    outline = {"outer": square, "holes": [hole], "slits": [slit], "size": 0.5}
+    yield Call("meshes.outline", ms.meshes.outline, outline, cost=20)
+    apart = mesh.transformed(translation=(0.1, 0, 0))
+    yield Call(
+        "weld",
+        lambda meshes, tolerance: ms.weld(*meshes, tolerance=tolerance),
+        {"meshes": [mesh, apart], "tolerance": 1e-6},
+    )
+    yield Call(
+        "TriangleMesh.transformed", mesh.transformed, {"rotation": np.eye(3), "translation": (1, 0, 0)}
+    )
+    yield Call("TriangleMesh.scaled", mesh.scaled, {"factor": 2.0})
+    at = {"x": 0.0, "y": 0.0, "z": 0.0, "tolerance": 1e-6}
+    yield Call("TriangleMesh.vertices_at", mesh.vertices_at, at)
+    yield Call("TriangleMesh.edges_at", mesh.edges_at, {"x": 0.0, "tolerance": 1e-6})
+    yield Call("TriangleMesh.faces_at", mesh.faces_at, {"z": 0.0, "tolerance": 1e-6})
+    left = {"predicate": lambda points: points[:, 0] < 0.05}
+    yield Call("TriangleMesh.vertices_where", mesh.vertices_where, left)
+    yield Call("TriangleMesh.edges_where", mesh.edges_where, {**left, "boundary_only": True})
+    yield Call("TriangleMesh.faces_where", mesh.faces_where, left)
+    yield Call("TriangleMesh.nearest_vertex", mesh.nearest_vertex, {"point": (0, 0, 0)})
+    yield Call("TriangleMesh.edges_between", mesh.edges_between, {"vertex_indices": np.arange(5)})
+
+
+def _scenes(s: Sample) -> Iterator[Call]:
+    mesh = s.mesh
+    n_f, n_e = mesh.n_faces, mesh.n_edges
+    material = {
+        "mesh": mesh,
+        "thickness": np.full(n_f, 1e-3),
+        "young_modulus": 1e6,
+        "poisson_ratio": np.full(n_f, 0.4),
+        "mass_density": 1e3,
+        "curvature_scale": np.full(n_e, 1.0),
+        "bending": "midedge",
+    }
+    yield Call("Shell", ms.Shell, material)
+    moved = {"displacement": (0, 0, 1e-3), "rotation": (0.1, 0, 0), "center": (0, 0, 0)}
+    edges = mesh.edges_at(x=0.0)
+
+    def scene(**arguments):
+        return ms.Scene(s.shell, **arguments)
+
+    yield Call(
+        "Pin",
+        lambda **a: scene(supports=[s.clamp, ms.Pin(**a)]),
+        {"vertices": [11], "components": "xyz", **moved},
+    )
+    yield Call("Clamp", lambda **a: scene(supports=ms.Clamp(**a)), {"edges": edges, **moved})
+    plane = {"normal": (1, 0, 0), "point": (0, 0, 0), "tolerance": 1e-9}
+    yield Call(
+        "SymmetryPlane", lambda **a: scene(supports=[ms.SymmetryPlane(**a)], allow_rigid_motions=True), plane
+    )
+
+    def loaded(kind):
+        return lambda **a: scene(supports=s.clamp, loads=kind(**a))
+
+    yield Call("PointLoad", loaded(ms.PointLoad), {"vertices": np.arange(4), "force": np.ones((4, 3))})
+    far = mesh.edges_at(x=0.1)
+    yield Call("EdgeLoad", loaded(ms.EdgeLoad), {"edges": far, "force_per_length": (0, 0, 1)})
+    yield Call("AreaLoad", loaded(ms.AreaLoad), {"force_per_area": (0, 0, 1), "faces": np.arange(3)})
+    yield Call("EdgeCouple", loaded(ms.EdgeCouple), {"edges": far, "couple_per_length": 1e-3})
+    whole = {
+        "shell": s.shell,
+        "supports": [s.clamp],
+        "loads": [s.load],
+        "field": [s.dipoles],
+        "gravity": (0, 0, -9.81),
+        "allow_rigid_motions": True,
+    }
+    yield Call("Scene", ms.Scene, whole)
+
+
+def _fields(s: Sample) -> Iterator[Call]:
+    points = s.mesh.rest_positions
+    yield Call("Dipoles", ms.Dipoles, {"positions": np.ones((2, 3)), "moments": np.ones((2, 3))})
+    sampled = {"origin": (0, 0, 0), "spacing": (1, 1, 1), "flux_density": np.ones((2, 3, 4, 3))}
+    yield Call("SampledField", ms.SampledField, sampled)
+    function = {"function": lambda x: 0.1 * x, "lower": (0, 0, 0), "upper": (1, 1, 1), "counts": (2, 2, 3)}
+    yield Call("SampledField.from_function", ms.SampledField.from_function, function)
+
+    def custom(**arguments):
+        return ms.CustomField(**arguments).gradient(points)
+
+    gradient = {"gradient": lambda x: np.tile(0.1 * np.eye(3), (len(x), 1, 1))}
+    yield Call("CustomField", custom, {"function": lambda x: 0.1 * x, "length_scale": 0.1, **gradient})
+    yield Call("MagpylibField", _magpylib_field, {"diameter": 0.01, "length_scale": 0.1}, cost=5)
+    for name, each in (("Dipoles", s.dipoles), ("SampledField", s.grid)):
+        yield Call(f"{name}.flux_density", each.flux_density, {"points": points})
+        yield Call(f"{name}.gradient", each.gradient, {"points": points})
+    yield Call("SampledField.contains", s.grid.contains, {"points": points})
+    yield Call("residual_to_remanent", ms.residual_to_remanent, {"residual_flux_density": np.ones((2, 3))})
+
+
+def _magpylib_field(diameter, length_scale):
+    import magpylib
+
+    ball = magpylib.magnet.Sphere(polarization=(0, 0, 1), diameter=diameter)
+    return ms.MagpylibField([ball], length_scale=length_scale)
+
+
+def _solves(s: Sample) -> Iterator[Call]:
+    n_v, n_f, n_e = s.mesh.n_vertices, s.mesh.n_faces, s.mesh.n_edges
+    magnetic = {
+        "scene": s.magnetic,
+        "remanent_magnetization": s.magnetization,
+        "applied_flux_density": s.field,
+        "load_factor": 0.5,
+        "gravity_factor": 1.0,
+        "field_factor": 0.5,
+        "motion_factor": 0.5,
+    }
+    replaced = {
+        "thickness": np.full(n_f, 1.1e-3),
+        "young_modulus": 1.1e6,
+        "poisson_ratio": 0.3,
+        "mass_density": None,
+        "curvature_scale": np.full(n_e, 1.1),
+        "vertex_loads": np.zeros((n_v, 3)),
+        "values": {s.clamp: {"displacement": (0, 0, 2e-4)}, s.dipoles: {"moments": [(0, 0, 0.2)]}},
+    }
+    quick = ms.MixedNewton(max_iterations=10, max_relaxation_steps=5)
+    search = {"start": s.positions, "require_stable": True, "solver": quick, "progress": None}
+    yield Call("equilibrium", ms.equilibrium, {**magnetic, **replaced, **search})
+    yield Call(
+        "equilibrium of cases",
+        ms.equilibrium,
+        {**magnetic, "applied_flux_density": [s.field, -s.field], "solver": quick},
+    )
+    options = {"start": None, "until": None, "first_step": 0.5, "largest_step": 0.5, "lowest_parameter": -1.0}
+    yield Call(
+        "follow",
+        ms.follow,
+        {**magnetic, **options, "max_points": 3, "locate_critical": True, "solver": quick, "progress": False},
+        cost=2,
+    )
+    yield Call("linear_response", ms.linear_response, magnetic)
+    yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "modes": 1}, cost=2)
+    yield Call(
+        "vibration_modes", ms.vibration_modes, {"scene": s.scene, "equilibrium": s.rest, "count": 2}, cost=2
+    )
+    viscous = {"damping": 1e-3, "stiffness_damping": 1e-4, "maxwell_modulus": 0.1, "maxwell_time": 1e-2}
+    motion = {
+        **magnetic,
+        "applied_flux_density": np.tile(s.field, (3, 1)),
+        "steps": 2,
+        "time_step": 1e-3,
+        **viscous,
+        "start": s.positions,
+        "velocities": np.zeros((n_v, 3)),
+        **replaced,
+        "integrator": ms.TRBDF2(),
+        "record_every": 1,
+        "memory_budget": 1e6,
+        "keep": "stages",
+        "solver": quick,
+        "progress": False,
+    }
+    yield Call("simulate", ms.simulate, motion)
+    yield Call(
+        "simulate on",
+        ms.simulate,
+        {"scene": s.scene, "steps": 1, "time_step": 1e-3, "start": s.state, "progress": False},
+    )
+    newton = {
+        "tolerance": 1e-9,
+        "max_iterations": 5,
+        "first_load_step": 1.0,
+        "smallest_load_step": 0.1,
+        "max_relaxation_steps": 50,
+    }
+    for kind in (ms.Newton, ms.MixedNewton):
+        yield Call(kind.__name__, lambda kind=kind, **a: ms.equilibrium(s.scene, solver=kind(**a)), newton)
+    yield Call(
+        "WarmStart",
+        lambda start, **a: ms.WarmStart(s.magnetic, start=start, solver=quick)(**a),
+        {"start": None, **{k: v for k, v in magnetic.items() if k != "scene"}},
+    )
+    yield Call("Path.equilibrium", s.path.equilibrium, {"index": 0})
+    yield Call("Equilibria", ms.Equilibria, {"cases": [s.rest, s.rest]})
+    state = {
+        "time": 0.0,
+        "state": s.state.state,
+        "velocity": s.state.velocity,
+        "memory": s.state.memory,
+        "acceleration": s.state.acceleration,
+    }
+    yield Call(
+        "MotionState",
+        lambda **a: ms.simulate(s.scene, steps=1, time_step=1e-3, start=ms.MotionState(**a), progress=False),
+        state,
+    )
+    yield Call("set_num_threads", ms.set_num_threads, {"count": 1})
+    yield Call("random_starts", ms.random_starts, {"count": 3, "lower": (0, 0), "upper": (1, 1), "seed": 0})
+    yield Call(
+        "multistart",
+        ms.multistart,
+        {
+            "run": math.sqrt,
+            "starts": [1.0, 2.0],
+            "executor": _here(),
+            "workers": None,
+            "attempts": 1,
+            "feasibility": 1e-6,
+            "checkpoint": None,
+            "resume": False,
+            "progress": False,
+        },
+    )
+
+
+def _here():
+    from concurrent.futures import ThreadPoolExecutor
+
+    return ThreadPoolExecutor(1)
+
+
+def _files(s: Sample) -> Iterator[Call]:
+    n_v, n_f = s.mesh.n_vertices, s.mesh.n_faces
+    there = s.folder / "mesh.ply"
+    yield Call("read_mesh", ms.read_mesh, {"path": there, "drop_unused": False})
+    yield Call("read_fields", ms.read_fields, {"path": there, "drop_unused": False})
+    fields = {"vertex_fields": {"u": np.zeros(n_v)}, "face_fields": {"m": np.zeros((n_f, 3))}}
+    yield Call(
+        "write_mesh",
+        ms.write_mesh,
+        {"path": s.folder / "out.ply", "mesh": s.mesh, "positions": s.positions, **fields},
+    )
+    states = {"positions": np.stack([s.positions] * 2), "times": (0.0, 1.0)}
+    yield Call(
+        "write_series",
+        ms.write_series,
+        {
+            "path": s.folder / "out.pvd",
+            "what": s.mesh,
+            **states,
+            "velocities": np.zeros((2, n_v, 3)),
+            "vertex_fields": {"u": np.zeros((2, n_v))},
+            "face_fields": {"m": np.zeros((2, n_f, 3))},
+            "progress": False,
+        },
+        cost=3,
+    )
+    look = {
+        "remanent_magnetization": None,
+        "applied_flux_density": None,
+        "color_label": None,
+        "color_range": None,
+        "view": None,
+    }
+    yield Call(
+        "plot",
+        ms.plot,
+        {
+            "what": s.mesh,
+            "positions": s.positions,
+            **look,
+            "color": np.zeros(n_f),
+            "width": 400,
+            "columns": 1,
+            "backend": "matplotlib",
+        },
+        cost=30,
+    )
+    yield Call(
+        "write_page",
+        ms.write_page,
+        {"what": s.mesh, "path": s.folder / "out.html", **states, **look, "color": None, "size_limit": 1e7},
+        cost=10,
+    )
+    yield Call(
+        "animate",
+        ms.animate,
+        {
+            "what": s.mesh,
+            "path": s.folder / "out.gif",
+            **states,
+            **look,
+            "fps": 5.0,
+            "speed": 1.0,
+            "width": 400,
+            "backend": "matplotlib",
+            "progress": False,
+        },
+        cost=60,
+    )
+    s.state.save(s.folder / "saved.npz")
+    yield Call("MotionState.load", ms.MotionState.load, {"path": s.folder / "saved.npz"})
+    yield Call("MotionState.save", s.state.save, {"path": s.folder / "state.npz"})

@@ -1,0 +1,226 @@
+"""What of magshell needs torch, with arguments that work: objectives, controls, parametrizations, optimizers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+from fuzz_calls import Call, Sample
+
+import magshell as ms
+from magshell import control, objectives, optim, parametrize
+
+
+def torch_calls(s: Sample) -> Iterator[Call]:
+    yield from _objectives(s)
+    yield from _controls(s)
+    yield from _optimizers()
+
+
+def _objectives(s: Sample) -> Iterator[Call]:
+    n_v, n_f = s.mesh.n_vertices, s.mesh.n_faces
+    x, tips = s.positions, np.array([0, 3])
+    image = np.arange(12.0).reshape(3, 4)
+    extent = (0.0, 0.1, 0.0, 0.05)
+    vectors = np.ones((n_f, 3))
+    yield Call(
+        "objectives.shape_matching",
+        objectives.shape_matching,
+        {"positions": x, "target": x, "vertices": np.arange(n_v), "weights": np.ones(n_v)},
+    )
+    yield Call(
+        "objectives.height_map",
+        objectives.height_map,
+        {"positions": x, "rest_positions": x, "image": image, "extent": extent, "weights": np.ones(n_v)},
+    )
+    yield Call(
+        "objectives.bilinear",
+        objectives.bilinear,
+        {"image": image, "points": x, "extent": extent},
+    )
+    yield Call(
+        "objectives.extension",
+        objectives.extension,
+        {"positions": x, "vertices": tips, "direction": (1, 0, 0)},
+    )
+    yield Call("objectives.magnitude", objectives.magnitude, {"values": vectors, "areas": np.ones(n_f)})
+    variation = {
+        "values": vectors,
+        "edge_faces": s.mesh.edge_faces,
+        "edge_lengths": np.ones(s.mesh.n_edges),
+        "smoothing": 1e-3,
+    }
+    yield Call("objectives.total_variation", objectives.total_variation, variation)
+    yield Call(
+        "objectives.cap", objectives.cap, {"remanent_magnetization": vectors, "limit": 1.0, "sharpness": 4.0}
+    )
+    yield Call(
+        "objectives.printable",
+        objectives.printable,
+        {"remanent_magnetization": vectors, "directions": np.eye(3), "sharpness": 4.0},
+    )
+    yield Call(
+        "parametrize.from_regions",
+        parametrize.from_regions,
+        {"values": np.ones((2, 3)), "regions": np.arange(n_f) % 2},
+    )
+    yield Call("parametrize.along", parametrize.along, {"amplitude": np.ones(n_f), "directions": vectors})
+    yield Call(
+        "parametrize.log_scaled",
+        parametrize.log_scaled,
+        {"shares": np.full(n_f, 0.5), "lower": 1.0, "upper": 10.0},
+    )
+    yield Call(
+        "parametrize.log_shares",
+        parametrize.log_shares,
+        {"values": np.full(n_f, 2.0), "lower": 1.0, "upper": 10.0},
+    )
+    yield Call("parametrize.capped", parametrize.capped, {"vectors": vectors, "limit": 1.0})
+    yield Call("parametrize.project_to_cap", parametrize.project_to_cap, {"vectors": vectors, "limit": 1.0})
+
+
+def _controls(s: Sample) -> Iterator[Call]:
+    fields, times, track = np.ones((6, 3)), s.times, s.track
+    line = control.Polyline([(0, 0, 0), (1, 0, 0)])
+    waves = {
+        "angular_frequencies": (1.0, 2.0),
+        "cosine_amplitudes": np.ones((2, 3)),
+        "sine_amplitudes": np.ones((2, 3)),
+    }
+    yield Call(
+        "control.Arc",
+        lambda **a: control.Arc(**a).at((0.5,)),
+        {"centre": (0, 0, 0), "start": (1, 0, 0), "axis": (0, 0, 1), "angle": 1.0},
+    )
+    yield Call("control.Polyline", lambda **a: control.Polyline(**a).at((0.5,)), {"points": np.eye(3)})
+    yield Call(
+        "control.Chain",
+        lambda **a: control.Chain(**a).at((0.5,)),
+        {"pieces": [line, control.Polyline([(1, 0, 0), (2, 0, 0)])]},
+    )
+    yield Call("Polyline.nearest", line.nearest, {"points": track})
+    yield Call("Polyline.at", line.at, {"shares": (0.0, 0.5)})
+    yield Call("Curve.squared_distance", line.squared_distance, {"points": track})
+    yield Call(
+        "control.curve_distance", control.curve_distance, {"track": track, "curve": line, "smoothing": 1e-3}
+    )
+    yield Call("control.dmp", control.dmp, {"flux_density": fields, "times": times, **waves})
+    yield Call(
+        "control.field_cap", control.field_cap, {"flux_density": fields, "limit": 1.0, "sharpness": 4.0}
+    )
+    yield Call("control.field_excess", control.field_excess, {"flux_density": fields, "limit": 1.0})
+    yield Call("control.field_rate", control.field_rate, {"flux_density": fields, "time_step": 0.1})
+    yield Call("control.field_strength", control.field_strength, {"flux_density": fields})
+    yield Call(
+        "control.fit_fourier",
+        control.fit_fourier,
+        {"values": fields, "times": times, "angular_frequencies": (1.0,)},
+    )
+    fit = {
+        "values": fields,
+        "times": times,
+        "number": 5,
+        "duration": 1.0,
+        "degree": 3,
+        "periodic": False,
+        "limit": 2.0,
+    }
+    yield Call("control.fit_spline", control.fit_spline, fit)
+    yield Call("control.fourier", control.fourier, {"times": times, **waves, "mean": (0, 0, 0)})
+    yield Call("control.frames_at", control.frames_at, {"times": times, "wanted": (0.2, 0.4)})
+    yield Call("control.harmonics", control.harmonics, {"number": 2, "duration": 1.0})
+    yield Call("control.held", control.held, {"values": fields, "steps": 12})
+    frames = {
+        "positions": np.ones((6, 4, 3)),
+        "frames": (1, 5),
+        "targets": np.ones((2, 2, 3)),
+        "vertices": (0, 1),
+        "weights": np.ones((2, 2)),
+    }
+    yield Call("control.key_frames", control.key_frames, frames)
+    yield Call(
+        "control.path_following",
+        control.path_following,
+        {"track": track, "targets": track, "weights": np.ones(6)},
+    )
+    turning = {
+        "times": times,
+        "magnitude": 1.0,
+        "axis": (0, 0, 1),
+        "angular_frequency": 1.0,
+        "start": (1, 0, 0),
+    }
+    yield Call("control.rotating", control.rotating, turning)
+    spline = {"times": times, "control_points": fields, "duration": 1.0, "degree": 3, "periodic": False}
+    yield Call("control.spline", control.spline, spline)
+    yield Call("control.step_times", control.step_times, {"steps": 5, "time_step": 0.1})
+    yield Call(
+        "control.successive_targets",
+        control.successive_targets,
+        {"targets": np.eye(3), "begin": (0.0, 0.3, 0.6), "times": times, "delay": 0.1},
+    )
+    yield Call(
+        "control.track",
+        control.track,
+        {"positions": np.ones((6, 4, 3)), "vertices": (0, 1), "weights": (1.0, 1.0)},
+    )
+    fitting = {
+        "track": track,
+        "curve": line,
+        "start_frame": 0,
+        "end_frame": 5,
+        "weights": (1.0, 1.0, 1.0),
+        "smoothing": 1e-3,
+    }
+    yield Call("control.track_fitting", control.track_fitting, fitting)
+
+
+def _optimizers() -> Iterator[Call]:
+    box = {"lower": -1.0, "upper": 1.0, "scale": 1.0}
+    asymptotes = {
+        "move": 1.0,
+        "asymptote_initial": 0.5,
+        "asymptote_shrink": 0.7,
+        "asymptote_grow": 1.2,
+        "penalty": 1e3,
+        "max_shortenings": 2,
+    }
+
+    def stepped(kind):
+        def run(**arguments):
+            x = torch.ones(3, dtype=torch.float64, requires_grad=True)
+            return kind([x], **arguments).step(lambda: (x**2).sum())
+
+        return run
+
+    yield Call("optim.MMA", stepped(optim.MMA), {**box, **asymptotes})
+    yield Call("optim.GCMMA", stepped(optim.GCMMA), {**box, **asymptotes})
+    limits = {"memory": 3, "first_step": 1.0, "max_evaluations": 5, "max_shortenings": 2}
+    yield Call("optim.LBFGS", stepped(optim.LBFGS), {**box, **limits})
+
+    x = torch.ones(3, dtype=torch.float64, requires_grad=True)
+    options = {
+        "max_iterations": 2,
+        "tolerance": 0.0,
+        "patience": 1,
+        "feasibility": 1e-6,
+        "on_jump": "cross",
+        "stateful": (),
+        "callback": None,
+        "progress": False,
+        "checkpoint": None,
+        "checkpoint_every": 1,
+        "resume": False,
+    }
+    yield Call(
+        "minimize",
+        ms.minimize,
+        {
+            "objective": lambda x: (x**2).sum(),
+            "parameters": [x],
+            "optimizer": lambda parameters: optim.MMA(parameters, scale=1.0),
+            **options,
+        },
+        cost=2,
+    )

@@ -1,0 +1,79 @@
+"""10,000 calls of every public function with spoilt arguments: no crash, no hang, no error but the documented ones.
+
+Calls run in other processes, so that one that crashes is named. `python fuzz_run.py NUMBER 1 --trace` repeats one.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from fuzz_calls import NOT_CALLED, Sample, calls
+from fuzz_contact_calls import contact_calls
+
+import magshell as ms
+
+HERE = Path(__file__).parent
+CALLS, PROCESSES = 10_000, 4
+
+
+def public_names(module, prefix="") -> set[str]:
+    """What users call, modules opened."""
+    names = set()
+    for name in module.__all__ if hasattr(module, "__all__") else _defined_in(module):
+        each = getattr(module, name)
+        if name.startswith("_"):
+            continue
+        if hasattr(each, "__path__") or each.__class__.__name__ == "module":
+            names |= public_names(each, f"{prefix}{name}.")
+        else:
+            names.add(prefix + name)
+    return names
+
+
+def _defined_in(module) -> list[str]:
+    return [
+        name for name, each in vars(module).items() if getattr(each, "__module__", None) == module.__name__
+    ]
+
+
+@pytest.fixture
+def table(tmp_path):
+    pytest.importorskip("torch")
+    from fuzz_torch_calls import torch_calls
+
+    sample = Sample(tmp_path)
+    return [*calls(sample), *contact_calls(sample), *torch_calls(sample)]
+
+
+def test_every_public_name_is_called(table):
+    assert public_names(ms) - {call.name for call in table} - set(NOT_CALLED) == set()
+    assert set(NOT_CALLED) <= public_names(ms)
+
+
+def test_what_is_spoilt_works(table):
+    """Or else nothing but the first refusal would be tested."""
+    pytest.importorskip("magpylib")
+    for call in table:
+        call.function(**call.arguments)
+
+
+@pytest.mark.parametrize("part", range(PROCESSES))
+def test_spoilt_arguments_are_refused(part, tmp_path):
+    pytest.importorskip("torch")
+    pytest.importorskip("matplotlib")
+    count = CALLS // PROCESSES
+    now = tmp_path / "now"
+    command = [sys.executable, HERE / "fuzz_run.py", str(part * count), str(count), "--now", now]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=300.0)
+    except subprocess.TimeoutExpired:
+        pytest.fail(f"hangs in call {now.read_text()}")
+    assert done.returncode == 0, f"crashed in call {now.read_text()}\n{done.stderr[-3000:]}"
+    *defects, summary = [json.loads(line) for line in done.stdout.splitlines()]
+    assert defects == []
+    assert summary["done"] == count
+    assert count / 2 < summary["refused"] < count  # spoilt enough, and not everything refused

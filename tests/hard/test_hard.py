@@ -1,0 +1,20 @@
+"""Every hard case reaches its answer, or raises its error; `python tests/hard/table.py` prints them."""
+
+from collections import Counter
+
+import pytest
+from registry import TIME_LIMIT, all_cases, judge
+
+CASES = all_cases()
+
+
+@pytest.mark.parametrize("case", [pytest.param(case, id=case.id) for case in CASES])
+def test_answer(case):
+    verdict = judge(case)
+    assert verdict.answer.right, f"expected {verdict.answer.expected}, got {verdict.answer.got}"
+    assert verdict.seconds < TIME_LIMIT
+
+
+def test_there_are_enough_of_them():
+    assert sum(case.family not in ("contact", "water") for case in CASES) >= 60
+    assert max(Counter(case.id for case in CASES).values()) == 1
