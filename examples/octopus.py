@@ -38,8 +38,6 @@ from _octopus.channels import CHANNELS
 from _octopus.report import draw_convergence, draw_field, draw_path, draw_snapshot, movie, summary
 from _octopus.task import Swim, Variables
 
-import magshell as ms
-
 STEPS, ITERATIONS = 1500, 10
 SNAPSHOTS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the time set
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def _sheet() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         rings.append(len(points) + np.arange(number))
         points.extend(np.stack([np.full(number, x), r * np.cos(angle), r * np.sin(angle)], axis=1))
     faces += [(0, *pair) for pair in zip(rings[0], np.roll(rings[0], -1), strict=True)]
-    for before, after in zip(rings[:-1], rings[1:], strict=True):
+    for before, after in pairwise(rings):
         for j in range(TENTACLES):
             faces += _band(_part(before, j), _part(after, j))
     owner += [-1] * len(faces)

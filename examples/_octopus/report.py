@@ -124,29 +124,33 @@ def movie(result: dict, path, fps: int = 25, slower: float = 2.0) -> None:
 
 def summary(results: dict[str, dict]) -> str:
     """What a person would ask first."""
-    lines = []
-    for name, result in results.items():
-        first, last, steps = result["history"][0], result["history"][-1], len(result["times"]) - 1
-        lines += [
-            f"{name}: {steps} steps, {result['variables']} variables; passed at x = {1e3 * result['channel'].end:.0f} mm",
-        ]
-        for which in ("guess", "found"):
-            motion = result[which]
-            passed = "does not pass" if motion["passed"] is None else f"passes after {motion['passed']:.2f} s"
-            lines.append(
-                f"  {LABELS[which]:<20} {passed}; the centre ends at {1e3 * motion['centre'][-1, 0]:.1f} mm, the last tip at "
-                f"{1e3 * motion['tail'][-1]:.1f} mm; field {1e3 * motion['rms']:.1f} mT rms, {1e3 * motion['strongest']:.1f} mT "
-                f"at most; {motion['halved']} steps in parts"
-            )
-        iterations, motions = max(result["iterations"], 1), last.evaluations
-        forward = 1e3 * result["found"]["processor_time"] / steps
-        both = 1e3 * result["processor_time"] / (motions * steps)
-        paper = PAPER[name]
-        lines += [
-            f"  objective {1e6 * first.objective:.2f} to {1e6 * result['objective']:.2f} mm2 in {result['iterations']} iterations, "
-            f"{motions} motions ({result['reason']})",
-            f"  {last.seconds / iterations:.1f} s an iteration, {result['processor_time'] / iterations:.1f} s of processor time; "
-            f"a motion {forward:.2f} ms a step ({result['found']['newton']:.1f} Newton iterations), with its gradient {both:.2f} ms",
-            f"  [Chen22] Table 1: {paper[0]} iterations, {paper[1] / paper[0]:.0f} s each on six cores",
-        ]
-    return "\n".join(lines)
+    return "\n".join(_about(name, result) for name, result in results.items())
+
+
+def _about(name: str, result: dict) -> str:
+    steps, iterations = len(result["times"]) - 1, max(result["iterations"], 1)
+    first, last = result["history"][0], result["history"][-1]
+    forward = 1e3 * result["found"]["processor_time"] / steps
+    both = 1e3 * result["processor_time"] / (last.evaluations * steps)
+    theirs, seconds = PAPER[name]
+    end = 1e3 * result["channel"].end
+    return "\n".join(
+        (
+            f"{name}: {steps} steps, {result['variables']} variables; passed when all is beyond {end:.0f} mm",
+            *(_about_motion(LABELS[which], result[which]) for which in ("guess", "found")),
+            f"  objective {1e6 * first.objective:.1f} to {1e6 * result['objective']:.1f} mm2 in {result['iterations']} "
+            f"iterations, {last.evaluations} motions ({result['reason']})",
+            f"  {last.seconds / iterations:.1f} s an iteration, {result['processor_time'] / iterations:.1f} s of processor "
+            f"time; a motion {forward:.2f} ms a step, {both:.2f} ms with its gradient",
+            f"  [Chen22] Table 1: {theirs} iterations, {seconds / theirs:.0f} s each on six cores",
+        )
+    )
+
+
+def _about_motion(label: str, motion: dict) -> str:
+    passed = "does not pass" if motion["passed"] is None else f"passes after {motion['passed']:.2f} s"
+    return (
+        f"  {label:<20} {passed}; centre at {1e3 * motion['centre'][-1, 0]:.1f} mm in the end, last tip at "
+        f"{1e3 * motion['tail'][-1]:.1f} mm; field {1e3 * motion['rms']:.1f} mT rms, at most "
+        f"{1e3 * motion['strongest']:.1f} mT; {motion['halved']} steps in parts"
+    )
