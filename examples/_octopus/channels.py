@@ -1,0 +1,60 @@
+"""Where the octopus is to swim: three channels along x, each narrower in its middle than at its mouths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+import magshell as ms
+
+KNOTS = 17  # of a tube: all that its outline needs, and each costs time
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A tube with mouths. stations, radii: (k,) m, its outline.
+
+    end: m, where its narrow part ends: it is passed once all of the octopus is beyond.
+    goal: m, where along x the mass centre is asked to be when the time set is over.
+    """
+
+    name: str
+    stations: tuple[float, ...]
+    radii: tuple[float, ...]
+    end: float
+    goal: float
+
+    def outline(self) -> np.ndarray:
+        """(2, n) m: x along the tube and its radius there."""
+        tube = self.tube()
+        x = np.linspace(self.stations[0], self.stations[-1], 181)
+        on_axis = np.stack([x, 0 * x, 0 * x], axis=1)
+        offset = np.zeros_like(x)
+        for _ in range(60):  # outwards, until the wall is there
+            offset += tube.signed_distance(on_axis + offset[:, None] * [0.0, 0.0, 1.0])
+        return np.stack([x, offset])
+
+    def tube(self) -> ms.obstacles.Tube:
+        x = np.linspace(self.stations[0], self.stations[-1], KNOTS)
+        radius = PchipInterpolator(self.stations, self.radii)(x)
+        return ms.obstacles.Tube(np.stack([x, 0 * x, 0 * x], axis=1), radius, inside=True)
+
+
+def _channel(name: str, outline: dict[float, float], end: float, goal: float) -> Channel:
+    """From lengths in mm."""
+    return Channel(
+        name,
+        tuple(1e-3 * x for x in outline),
+        tuple(1e-3 * r for r in outline.values()),
+        1e-3 * end,
+        1e-3 * goal,
+    )
+
+
+CHANNELS = {
+    "pipe I": _channel("pipe I", {-40: 21, -5: 21, 14: 13, 24: 13, 44: 21, 100: 21}, end=24, goal=47),
+    "pipe II": _channel("pipe II", {-40: 21, -5: 21, 12: 16, 34: 16, 50: 21, 100: 21}, end=34, goal=57),
+    "tunnel": _channel("tunnel", {-40: 21, -5: 21, 11: 13, 21: 17, 32: 12.5, 52: 21, 100: 21}, end=32, goal=55),
+}
