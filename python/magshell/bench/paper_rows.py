@@ -42,6 +42,13 @@ def bending_and_twisting(iterations: int) -> Run:
     return Run(motion.wall_time / motion.steps_done, motion.steps_done)
 
 
+def reptile(iterations: int) -> Run:
+    from reptile import TIME_STEP, walk
+
+    _, motion = walk("flat", iterations / 20, TIME_STEP)
+    return Run(motion.wall_time / motion.steps_done, motion.steps_done)
+
+
 def hexagram(iterations: int) -> Run:
     from hexagram import design, from_beam_theory, optimized
 
@@ -94,6 +101,7 @@ def reaching(iterations: int) -> Run:
 ROWS = (
     Row("2", "Bending and twisting", "bending_twisting", bending_and_twisting, of="time step"),
     Row("4", "Hexagram", "hexagram", hexagram, 1.6e4, 50, 6.7e-2),
+    Row("5", "Reptile on flat ground", "reptile", reptile, of="time step"),
     Row("7", "Track fitting (L)", "track_fitting", track("L"), 4.4e4, 463, 3.8e-5),
     Row("7", "Track fitting (C)", "track_fitting", track("C"), 1.6e4, 241, 2.3e-5),
     Row("8", "Letters", "letters", letter, 3.0e4, 90, 2.5),
