@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "magshell/assembly/friction_term.h"
+#include "magshell/core/errors.h"
 #include "magshell/strain/fold_angle.h"
 
 namespace magshell {
@@ -356,6 +357,10 @@ Model::Memory Model::memory() const {
 }
 
 void Model::set_memory(const Memory& memory) {
+    bool fits = memory.empty() || memory.size() == terms_.size();
+    for (std::size_t k = 0; fits && k < memory.size(); ++k)
+        fits = memory[k].size() == terms_[k]->memory().size();
+    if (!fits) throw InvalidInput("the start remembers a motion of another scene: start from its positions");
     for (std::size_t k = 0; k < terms_.size(); ++k)
         terms_[k]->set_memory(memory.empty() ? std::vector<double>(terms_[k]->memory().size(), 0.0)
                                              : memory[k]);
