@@ -289,7 +289,8 @@ bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor
 
 bool Newton::factor_serves(double contraction, double residual) const {
     constexpr double worth = 4.0;  // steps with an old factorization, for one with its own
-    // The errors that a factorization leaves behind are those of its own place, twice what the last step left.
+    // The errors that a factorization leaves behind are those of its own place, twice what the last step
+    // left.
     const double each = 2.0 * contraction;
     return each < 0.1 && std::log(options_.tolerance / residual) >= worth * std::log(each);
 }

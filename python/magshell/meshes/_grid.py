@@ -88,7 +88,9 @@ def checked_cells(cells) -> tuple[int, int]:
 def check_size(n_faces: int, asked_by: str = "cells") -> None:
     """Refuses more faces than 32-bit indices of their corners can count."""
     if n_faces > MOST_FACES:
-        raise ValueError(f"{asked_by} asks for about {min(n_faces, 10**18):.3g} faces; a mesh has at most {MOST_FACES}")
+        raise ValueError(
+            f"{asked_by} asks for about {min(n_faces, 10**18):.3g} faces; a mesh has at most {MOST_FACES}"
+        )
 
 
 def _vertex_numbers(n_u: int, n_v: int, periodic: bool, poles: tuple[bool, bool]) -> np.ndarray:
