@@ -194,7 +194,7 @@ def _fields(s: Sample) -> Iterator[Call]:
 
     gradient = {"gradient": lambda x: np.tile(0.1 * np.eye(3), (len(x), 1, 1))}
     yield Call("CustomField", custom, {"function": lambda x: 0.1 * x, "length_scale": 0.1, **gradient})
-    yield Call("MagpylibField", _magpylib_field, {"diameter": 0.01, "length_scale": 0.1}, cost=5)
+    yield Call("MagpylibField", _magpylib_field, {"length_scale": 0.1}, cost=5)
     for name, each in (("Dipoles", s.dipoles), ("SampledField", s.grid)):
         yield Call(f"{name}.flux_density", each.flux_density, {"points": points})
         yield Call(f"{name}.gradient", each.gradient, {"points": points})
@@ -202,10 +202,10 @@ def _fields(s: Sample) -> Iterator[Call]:
     yield Call("residual_to_remanent", ms.residual_to_remanent, {"residual_flux_density": np.ones((2, 3))})
 
 
-def _magpylib_field(diameter, length_scale):
+def _magpylib_field(length_scale):
     import magpylib
 
-    ball = magpylib.magnet.Sphere(polarization=(0, 0, 1), diameter=diameter)
+    ball = magpylib.magnet.Sphere(polarization=(0, 0, 1), diameter=0.01)
     return ms.MagpylibField([ball], length_scale=length_scale)
 
 

@@ -20,6 +20,8 @@ def tensor(name: str, unit: str, value, shape: tuple[int | str, ...]):
 def count(name: str, value, least: int = 1) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise ValueError(f"{name} must be an integer of at least {least}, got {value!r}")
+    if value >= 2**31:
+        raise ValueError(f"{name} must be below 2^31, got {value!r}")
     return int(value)
 
 

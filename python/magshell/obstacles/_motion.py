@@ -24,6 +24,7 @@ def matrix(rotation_vector: np.ndarray) -> np.ndarray:
 
 def pose(motion: Callable | None, time: float) -> tuple[np.ndarray, np.ndarray]:
     """Displacement (3,) m and rotation vector (3,) rad at a time [s], (,). Raises ValueError on anything else."""
+    time = float(quantity("time", "s", time, ()))
     if motion is None:
         return np.zeros(3), np.zeros(3)
     found = motion(time)
