@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_examples import load
 
-ITERATIONS = 22
+ITERATIONS = 30
 
 
 @pytest.fixture(scope="module")

@@ -69,7 +69,7 @@ def test_gradient(differentiated, name):
     rng = np.random.default_rng(11)
     value = INPUTS[name]
     direction = rng.standard_normal(value.shape) * np.abs(value).max()
-    size = 1e-3 if name in ("damping", "maxwell_time") else 1e-5  # which do little here
+    size = 1e-3 if name in ("damping", "stiffness_damping", "maxwell_time") else 1e-5  # which do little here
 
     def at(step):
         return float(loss(scene, {**INPUTS, name: value + step * direction}, integrator=integrator))

@@ -144,7 +144,8 @@ def test_the_counters_make_sense():
     scene = cantilever(strip())
     found = in_field(scene, (0, 0, 5.0 * CRITICAL))
     assert found.iterations >= 3 and found.load_steps >= 1
-    assert found.factorizations >= found.iterations  # one an iteration, and one to judge stability
+    # At most one an iteration, as the last ones may share one; and one to judge stability.
+    assert 3 <= found.factorizations <= found.iterations + 1
     assert found.failed_factorizations == 0 and found.relaxation_steps == 0 and found.saddles_left == 0
     assert found.residual <= ms.MixedNewton().tolerance
     assert found.wall_time > 0.0 and found.memory > 1e4 and found.progress == 1.0

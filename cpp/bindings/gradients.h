@@ -50,11 +50,11 @@ inline py::dict to_dict(const Model& model, const SceneGradient& g) {
     result["couples"] = g.couples;
     result["motions"] = rows_of(g.motions);
     result["field_sources"] = g.field_sources;
-    result["water"] = py::dict(py::arg("fluid_density") = g.water.fluid_density,
-                               py::arg("velocity") = g.water.velocity,
-                               py::arg("drag_coefficient") = g.water.drag_coefficient,
-                               py::arg("thrust_coefficient") = g.water.thrust_coefficient,
-                               py::arg("added_mass") = g.water.added_mass);
+    result["water"] =
+        py::dict(py::arg("fluid_density") = g.water.fluid_density, py::arg("velocity") = g.water.velocity,
+                 py::arg("drag_coefficient") = g.water.drag_coefficient,
+                 py::arg("thrust_coefficient") = g.water.thrust_coefficient,
+                 py::arg("added_mass") = g.water.added_mass);
     result["contacts"] = rows_of(g.contacts);
     result["placements"] = rows_of(g.obstacles);
     result["applied_flux_density"] = g.controls.flux_density;

@@ -152,8 +152,8 @@ class Swim:
             lower=[-FIELD_LIMIT, SLOWEST, -FIELD_LIMIT, -FIELD_LIMIT],
             upper=[FIELD_LIMIT, FASTEST, FIELD_LIMIT, FIELD_LIMIT],
             scale=list(SIZES),
-            first_step=0.05,
-            max_evaluations=6,
+            first_step=0.1,
+            max_evaluations=3,
         )
         found = ms.minimize(
             lambda *variables: self.objective(Variables(*variables)),

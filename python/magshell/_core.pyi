@@ -12,6 +12,7 @@ import numpy.typing
 
 __all__: list[str] = [
     "AppliedField",
+    "AttackCurve",
     "Controls",
     "CriticalKind",
     "CriticalPoint",
@@ -23,6 +24,7 @@ __all__: list[str] = [
     "MotionInput",
     "MotionResult",
     "NewtonOptions",
+    "Obstacle",
     "Outcome",
     "PathOptions",
     "PathPoint",
@@ -32,8 +34,12 @@ __all__: list[str] = [
     "StaticsOptions",
     "StaticsResult",
     "TriangleMesh",
+    "Water",
     "analyze",
     "build_info",
+    "distances",
+    "drag_faces",
+    "drag_gradients",
     "factor_backends",
     "find_equilibrium",
     "first_order_change",
@@ -149,6 +155,92 @@ class SampledField(AppliedField):
 
 class PythonField(AppliedField):
     def __init__(self, sampler: collections.abc.Callable) -> None: ...
+
+class Obstacle:
+    @staticmethod
+    def box(
+        half_extents: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        rounding: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> Obstacle: ...
+    @staticmethod
+    def capsule(
+        start: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        end: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        radius: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> Obstacle: ...
+    @staticmethod
+    def height_field(
+        origin: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"
+        ],
+        spacing: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"
+        ],
+        heights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> Obstacle: ...
+    @staticmethod
+    def mesh(mesh: TriangleMesh, resolution: typing.SupportsInt | typing.SupportsIndex) -> Obstacle: ...
+    @staticmethod
+    def plane(
+        normal: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+    ) -> Obstacle: ...
+    @staticmethod
+    def sphere(radius: typing.SupportsFloat | typing.SupportsIndex) -> Obstacle: ...
+    @staticmethod
+    def tube(
+        points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        radii: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        closed: bool,
+    ) -> Obstacle: ...
+    def inverted(self) -> Obstacle:
+        """
+        The space around the body, as a body.
+        """
+
+class AttackCurve:
+    @typing.overload
+    def __init__(self) -> None:
+        """
+        2 sin^2 phi
+        """
+    @typing.overload
+    def __init__(
+        self,
+        knots: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        cubics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> None:
+        """
+        Cubics (n, 4) of (phi - knot), the highest power first, between n + 1 knots [rad].
+        """
+    def samples(
+        self, angles: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Value and slope at angles (n,) [rad] in [0, pi/2]: (n, 2).
+        """
+
+class Water:
+    def __init__(
+        self,
+        *,
+        fluid_density: typing.SupportsFloat | typing.SupportsIndex,
+        velocity: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        drag_coefficient: typing.SupportsFloat | typing.SupportsIndex,
+        thrust_coefficient: typing.SupportsFloat | typing.SupportsIndex,
+        added_mass: typing.SupportsFloat | typing.SupportsIndex,
+        drag_curve: AttackCurve,
+        thrust_curve: AttackCurve,
+    ) -> None: ...
 
 class Controls:
     def __init__(
@@ -530,6 +622,32 @@ def analyze(
     """
 
 def build_info() -> list[tuple[str, str]]: ...
+def distances(obstacle: Obstacle, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple:
+    """
+    At points (n, 3) [m] of the obstacle's own frame: signed distances (n,) [m], normals (n, 3) and second derivatives (n, 3, 3) [1/m].
+    """
+
+def drag_faces(
+    water: Water,
+    positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    accelerations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> dict:
+    """
+    The force of water on each corner of every face (n, 3) [N], and its derivatives by the position of each corner (n, 3, 3, 3) as [face, corner, force, position], by the mean velocity and by the mean acceleration of the corners (n, 3, 3). All arguments are (n, 3, 3), a row a corner.
+    """
+
+def drag_gradients(
+    water: Water,
+    positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    accelerations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    multipliers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> dict:
+    """
+    For each face the gradient of multiplier . f by what describes the water; f is the force on the face, multipliers are (n, 3).
+    """
+
 def factor_backends() -> list[str]: ...
 def find_equilibrium(
     model: Model,

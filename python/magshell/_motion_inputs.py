@@ -102,7 +102,9 @@ class MotionInputs:
         if any(leaf.name == "time_step" for leaf in self.inputs.leaves) and any(
             values.current(each).motion is not None for each in scene.obstacles
         ):
-            raise ValueError("time_step cannot have a gradient where obstacles move by a function of the time")
+            raise ValueError(
+                "time_step cannot have a gradient where obstacles move by a function of the time"
+            )
         times = self.start.time + self.time_step * (np.arange(self.steps)[:, None] + shares).ravel()
         return poses([values.current(each) for each in scene.obstacles], times)
 

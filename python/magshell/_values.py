@@ -41,7 +41,9 @@ class Values:
             "vertex_loads": own.get("vertex_loads", self._vertex_loads()),
             "couples": couples,
             "motions": np.array([motion[:3] for motion in self._constraints.motions]).reshape(-1, 3, 3),
-            "contacts": np.array([self.current(each).law(self.shell) for each in scene.contacts]).reshape(-1, 5),
+            "contacts": np.array([self.current(each).law(self.shell) for each in scene.contacts]).reshape(
+                -1, 5
+            ),
             "placements": np.array([(now.center, now.rotation) for now in obstacles]).reshape(-1, 2, 3),
             "obstacles": [now._core for now in obstacles],
             "water": None if scene.water is None else self.current(scene.water)._core,

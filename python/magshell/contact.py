@@ -68,9 +68,13 @@ class Contact:
         self.obstacles = tuple(listed)
         self.contact_stiffness = _positive("contact_stiffness", "N/m", contact_stiffness)
         self.friction_coefficient = (
-            None if friction_coefficient is None else _not_negative("friction_coefficient", "1", friction_coefficient)
+            None
+            if friction_coefficient is None
+            else _not_negative("friction_coefficient", "1", friction_coefficient)
         )
-        self.sticking_speed = None if sticking_speed is None else _positive("sticking_speed", "m/s", sticking_speed)
+        self.sticking_speed = (
+            None if sticking_speed is None else _positive("sticking_speed", "m/s", sticking_speed)
+        )
         self.smoothing = None if smoothing is None else _positive("smoothing", "m", smoothing)
         self.offset = _not_negative("offset", "m", offset)
         if not isinstance(lagged_friction, bool):
@@ -84,7 +88,9 @@ class Contact:
     def replaced(self, **values) -> Contact:
         """The same contact with another contact_stiffness or friction_coefficient."""
         if "friction_coefficient" in values and self.friction_coefficient is None:
-            raise ValueError("a Contact without friction cannot get some in a solve: give it some, zero will do")
+            raise ValueError(
+                "a Contact without friction cannot get some in a solve: give it some, zero will do"
+            )
         return Contact(
             self.obstacles,
             **{

@@ -149,7 +149,9 @@ class Scene:
     @property
     def has_forces_of_motion(self) -> bool:
         """Whether forces act on it that no energy has: friction, water."""
-        return self.water is not None or any(contact.friction_coefficient is not None for contact in self.contacts)
+        return self.water is not None or any(
+            contact.friction_coefficient is not None for contact in self.contacts
+        )
 
     @property
     def n_unknowns(self) -> int:

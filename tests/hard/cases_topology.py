@@ -82,7 +82,9 @@ def bow_tie():
 @case("two sheets that touch in one vertex, and nothing keeps the second from turning about the vertical")
 def spinning_bow_tie():
     return refused(
-        lambda: ms.equilibrium(joined_at_a_vertex()), "neutral: the sheet is free|rigid motion", ms.NotConverged
+        lambda: ms.equilibrium(joined_at_a_vertex()),
+        "neutral: the sheet is free|rigid motion",
+        ms.NotConverged,
     )
 
 

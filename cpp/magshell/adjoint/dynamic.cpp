@@ -119,8 +119,7 @@ class Backward {
             by_x.head(coordinates) += by_vi.head(coordinates) / adt;
             by_x_hat.head(coordinates) = -by_vi.head(coordinates) / adt;
 
-            const auto [lambda, by_forces] =
-                back_through(algebra, at, i, record, step, part, by_x, viscous);
+            const auto [lambda, by_forces] = back_through(algebra, at, i, record, step, part, by_x, viscous);
             const VectorXd accelerated = lambda.cwiseProduct(w), moved = lambda.cwiseProduct(v);
             g_.mass += accelerated;
             g_.damping += moved;
@@ -179,8 +178,8 @@ class Backward {
     // controls.
     std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const Rates& at, int i,
                                                          const PartRecord& record, Index step,
-                                                         const std::pair<double, double>& part, VectorXd& by_x,
-                                                         ViscousAdjoint& viscous) {
+                                                         const std::pair<double, double>& part,
+                                                         VectorXd& by_x, ViscousAdjoint& viscous) {
         const StageState& stage = record.stages[i];
         const ElasticAfterwards elastic_afterwards(model_);
         const double share = part.first + algebra.tableau().time(i) * (part.second - part.first);

@@ -65,8 +65,7 @@ void ContactTerm::set_values(std::vector<ContactLaw> laws, std::vector<PlacedObs
 }
 
 StandingObstacle ContactTerm::standing(Index obstacle, const Controls& controls) const {
-    return {obstacles_[obstacle],
-            controls.obstacles.empty() ? ObstaclePose() : controls.obstacles[obstacle]};
+    return {obstacles_[obstacle], controls.obstacles.empty() ? ObstaclePose() : controls.obstacles[obstacle]};
 }
 
 std::vector<ContactTerm::Touch> ContactTerm::touches(const double* q, const Controls& controls) const {
@@ -167,7 +166,8 @@ void ContactTerm::evaluate(const double* q, const Controls& controls, Residual& 
 void ContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix& out) const {
     for (const Touch& touch : touching_) {
         const Distance& at = touch.at;
-        add_block(touch, touch.stiffness * at.normal * at.normal.transpose() - touch.force * at.curvature, out);
+        add_block(touch, touch.stiffness * at.normal * at.normal.transpose() - touch.force * at.curvature,
+                  out);
     }
 }
 

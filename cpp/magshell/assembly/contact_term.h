@@ -36,12 +36,14 @@ class ContactTerm final : public Term {
     /// Those at the last evaluated state.
     const std::vector<Touch>& touching() const { return touching_; }
 
-    /// The first vertex of a point that comes out on another side of an obstacle than it went in, on its straight
-    /// way from q to `end` as the obstacle sees it; -1 where none does.
+    /// The first vertex of a point that comes out on another side of an obstacle than it went in, on its
+    /// straight way from q to `end` as the obstacle sees it; -1 where none does.
     Index passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
                          const Controls& controls_at_end) const;
 
-    const ContactPoint& point(const Touch& touch) const { return contacts_[touch.contact].points[touch.point]; }
+    const ContactPoint& point(const Touch& touch) const {
+        return contacts_[touch.contact].points[touch.point];
+    }
     const ContactLaw& law(const Touch& touch) const { return laws_[touch.contact]; }
     StandingObstacle standing(Index obstacle, const Controls& controls) const;
     std::size_t contacts() const { return contacts_.size(); }
@@ -54,7 +56,8 @@ class ContactTerm final : public Term {
     /// Adds a vector to a point's nodes, weighted.
     void spread(const Touch& touch, const Vec3& vector, VectorXd& out) const;
     void spread(const Touch& touch, const Vec3& force, Residual& out) const;
-    /// Adds the magnitude of forces that cancel inside one that depends on the point's place by a stiffness [N/m].
+    /// Adds the magnitude of forces that cancel inside one that depends on the point's place by a stiffness
+    /// [N/m].
     void add_cancelling_force(const Touch& touch, double stiffness, VectorXd& out) const;
     /// Those inside the normal forces at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
@@ -71,7 +74,8 @@ class ContactTerm final : public Term {
     struct Contact {
         std::vector<Index> obstacles;
         std::vector<ContactPoint> points;  // with our nodes
-        std::vector<PairSlots<3>> slots;   // of the points with several nodes, from the first on: they come last
+        std::vector<PairSlots<3>>
+            slots;  // of the points with several nodes, from the first on: they come last
         Index first_on_face = 0;
     };
 

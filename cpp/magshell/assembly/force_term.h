@@ -42,8 +42,8 @@ class ForceTerm {
     /// Subtracts the force, once all energies were evaluated at the same state.
     virtual void evaluate(const Kinematics& at, const Controls& controls, Residual& out) = 0;
 
-    /// Adds K at the last evaluated state. Cautious: what keeps an iteration from overshooting instead of the exact
-    /// derivatives, where there is such a thing.
+    /// Adds K at the last evaluated state. Cautious: what keeps an iteration from overshooting instead of the
+    /// exact derivatives, where there is such a thing.
     virtual void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
                           Remainder& rest) const = 0;
 
@@ -51,6 +51,10 @@ class ForceTerm {
     /// - lambda . df/dk to the scene.
     virtual void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda,
                      KinematicsGradient& by, SceneGradient& out) const = 0;
+
+    /// From now on, what makes the force unsymmetric stays as it was at the last evaluated state, or does
+    /// not.
+    virtual void hold(bool /*held*/) {}
 
     /// Adds the magnitude of forces that cancel inside velocities at the last evaluated state.
     virtual void add_cancelling_forces(const Kinematics& /*at*/, VectorXd& /*out*/) const {}

@@ -34,14 +34,19 @@ void FrictionTerm::evaluate(const Kinematics& at, const Controls& controls, Resi
             contact_.standing(touch.obstacle, lagged ? controls_before_ : controls);
         const Vec3 velocity = contact_.at_point(touch, at.v.data()) - obstacle.velocity(touch.place);
         const ContactLaw& law = contact_.law(touch);
-        rubbing_.push_back({touch, lagged, obstacle,
-                            Friction(touch.force, touch.at.normal, velocity, law.sticking_speed)});
+        rubbing_.push_back(
+            {touch, lagged, obstacle, Friction(touch.force, touch.at.normal, velocity, law.sticking_speed)});
         contact_.spread(touch, -law.friction * rubbing_.back().friction.force, out);
     };
-    for (const ContactTerm::Touch& touch : contact_.touching())
+    for (const ContactTerm::Touch& touch : holds_ ? held_ : contact_.touching())
         if (rubs_[touch.contact] && !lagged_[touch.contact]) rub(touch, false);
     for (const ContactTerm::Touch& touch : before_)
         if (rubs_[touch.contact]) rub(touch, true);
+}
+
+void FrictionTerm::hold(bool held) {
+    if (held) held_ = contact_.touching();
+    holds_ = held;
 }
 
 void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool cautious, SystemMatrix& out,
@@ -50,7 +55,7 @@ void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool cautious
         const double coefficient = contact_.law(each.touch).friction;
         const Mat3& by_velocity = cautious ? each.friction.secant : each.friction.by_velocity;
         contact_.add_block(each.touch, -coefficient * at.rate * by_velocity, out);
-        if (each.lagged || cautious) continue;
+        if (each.lagged || holds_) continue;
         const Mat3 block = -coefficient * by_place(each.friction, each.touch, each.obstacle.spin());
         const ContactPoint& point = contact_.point(each.touch);
         if (point.nodes[1] < 0) {
@@ -86,7 +91,8 @@ void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambd
     }
 }
 
-// A velocity is the difference of two places over a stage, and in what sticks a small one makes a large force.
+// A velocity is the difference of two places over a stage, and in what sticks a small one makes a large
+// force.
 void FrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
     for (const Rub& each : rubbing_) {
         const double stiffness = at.rate * each.friction.by_velocity.norm();

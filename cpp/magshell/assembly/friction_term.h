@@ -1,7 +1,8 @@
 // Friction at the points that touch an obstacle.                                        force/friction.h
 //
-// Exact: with the normal force and the normal at the end of the stage. Lagged: with those at the beginning of the
-// step, which leaves a symmetric matrix, as for a potential of the velocities.           [Geilinger et al. 2020]
+// Exact: with the normal force and the normal at the end of the stage. Lagged: with those at the beginning of
+// the step, which leaves a symmetric matrix, as for a potential of the velocities.           [Geilinger et
+// al. 2020]
 #pragma once
 
 #include "magshell/assembly/contact_term.h"
@@ -23,6 +24,9 @@ class FrictionTerm final : public ForceTerm {
                   Remainder& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              SceneGradient& out) const override;
+    /// Normal forces and normals: with held ones, friction is the slope of a convex potential of the
+    /// velocities.
+    void hold(bool held) override;
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 
   private:
@@ -36,8 +40,10 @@ class FrictionTerm final : public ForceTerm {
     const ContactTerm& contact_;
     std::vector<bool> rubs_, lagged_;
     std::vector<ContactTerm::Touch> before_;  // of lagged contacts, when the step began
+    std::vector<ContactTerm::Touch> held_;
+    bool holds_ = false;
     Controls controls_before_;
-    std::vector<Rub> rubbing_;                // at the last evaluated state
+    std::vector<Rub> rubbing_;  // at the last evaluated state
 };
 
 }  // namespace magshell

@@ -65,7 +65,8 @@ inline void scatter_node(Residual& out, Index node, const Pack3& force, int lane
 template <int N>
 using PairSlots = std::array<SystemMatrix::Slot, N*(N - 1) / 2>;
 
-/// The slot of two places of an element that one node takes: across two sides of a face, at a vertex of three.
+/// The slot of two places of an element that one node takes: across two sides of a face, at a vertex of
+/// three.
 constexpr SystemMatrix::Slot same_node = -2;
 
 template <int N, class Nodes>
@@ -74,8 +75,8 @@ PairSlots<N> pair_slots(const SystemMatrix& matrix, const Nodes& nodes) {
     for (int i = 1; i < N; ++i)
         for (int j = 0; j < i; ++j)
             slots[lower_index(i - 1, j)] = nodes[i] < 0 || nodes[j] < 0 ? -1
-                                           : nodes[i] == nodes[j]       ? same_node
-                                                                        : matrix.node_slot(nodes[i], nodes[j]);
+                                           : nodes[i] == nodes[j] ? same_node
+                                                                  : matrix.node_slot(nodes[i], nodes[j]);
     return slots;
 }
 

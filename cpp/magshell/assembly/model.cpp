@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "magshell/assembly/friction_term.h"
+#include "magshell/core/errors.h"
 #include "magshell/strain/fold_angle.h"
 
 namespace magshell {
@@ -317,48 +318,6 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
     for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
 }
 
-void Model::begin_step(const VectorXd& q, const Controls& controls) {
-    for (const std::unique_ptr<ForceTerm>& force : forces_) force->begin_step(q, controls);
-}
-
-std::string Model::blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
-                           const Controls& controls_at_end) const {
-    const Index node = contact_ ? contact_->passes_through(q, controls, end, controls_at_end) : -1;
-    if (node < 0) return {};
-    return "vertex " + std::to_string(sheet_.vertices.user[node]) + " passes through an obstacle within a step";
-}
-
-void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage) {
-    const Index coordinates = 3 * sheet_.n_vertices();
-    kinematics_.q = q;
-    kinematics_.rate = 1.0 / stage.time;
-    kinematics_.v.setZero(size());
-    kinematics_.w.setZero(size());
-    kinematics_.v.head(coordinates) = kinematics_.rate * (q - *stage.x_hat).head(coordinates);
-    kinematics_.w.head(coordinates) = kinematics_.rate * (kinematics_.v - *stage.v_hat).head(coordinates);
-    for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
-}
-
-void Model::add_cancelling_contact_forces(bool in_motion, VectorXd& out) const {
-    if (contact_) contact_->add_cancelling_normal_forces(out);
-    if (!in_motion) return;
-    for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_cancelling_forces(kinematics_, out);
-}
-
-void Model::assemble_forces(const Controls& controls, bool cautious) {
-    remainder_.clear();
-    for (const std::unique_ptr<ForceTerm>& force : forces_)
-        force->assemble(kinematics_, controls, cautious, matrix_, remainder_);
-}
-
-KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda,
-                                     SceneGradient& out) const {
-    KinematicsGradient by{VectorXd::Zero(size()), VectorXd::Zero(size()), VectorXd::Zero(size())};
-    for (const std::unique_ptr<ForceTerm>& force : forces_)
-        force->vjp(kinematics_, controls, lambda, by, out);
-    return by;
-}
-
 void Model::share_out_columns() {
     const std::vector<Part> parts = schedule_.in_order();
     std::vector<bool> node_taken(sheet_.n_nodes(), false), rotation_taken(sheet_.n_rotations(), false);
@@ -398,6 +357,10 @@ Model::Memory Model::memory() const {
 }
 
 void Model::set_memory(const Memory& memory) {
+    bool fits = memory.empty() || memory.size() == terms_.size();
+    for (std::size_t k = 0; fits && k < memory.size(); ++k)
+        fits = memory[k].size() == terms_[k]->memory().size();
+    if (!fits) throw InvalidInput("the start remembers a motion of another scene: start from its positions");
     for (std::size_t k = 0; k < terms_.size(); ++k)
         terms_[k]->set_memory(memory.empty() ? std::vector<double>(terms_[k]->memory().size(), 0.0)
                                              : memory[k]);

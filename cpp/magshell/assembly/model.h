@@ -43,7 +43,8 @@ class Model {
     const VectorXd& metric() const { return metric_; }
     /// The floor under every residual of a state, to be multiplied by the unit of round-off.
     VectorXd cancelling_forces(const VectorXd& q);
-    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or without.
+    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or
+    /// without.
     void add_cancelling_contact_forces(bool in_motion, VectorXd& out) const;
 
     VectorXd rest_state() const;
@@ -73,9 +74,9 @@ class Model {
     /// them.
     VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
 
-    /// Forces that no energy has act only within the stages of time steps. A step begins at q; at a stage, after
-    /// evaluate and after assemble at the same q, they add to the residual and to matrix(), and leave the rest
-    /// of their Jacobian in remainder().
+    /// Forces that no energy has act only within the stages of time steps. A step begins at q; at a stage,
+    /// after evaluate and after assemble at the same q, they add to the residual and to matrix(), and leave
+    /// the rest of their Jacobian in remainder().
     bool has_forces() const { return !forces_.empty(); }
     void begin_step(const VectorXd& q, const Controls& controls);
     bool has_contact() const { return contact_ != nullptr; }
@@ -84,6 +85,7 @@ class Model {
                         const Controls& controls_at_end) const;
     void evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage);
     void assemble_forces(const Controls& controls, bool cautious = false);
+    void hold_forces(bool held);
     const Remainder& remainder() const { return remainder_; }
     /// Adds - lambda . df/dk to the scene's gradient; returns lambda . df by what else they depend on.
     KinematicsGradient forces_vjp(const Controls& controls, const VectorXd& lambda, SceneGradient& out) const;

@@ -5,7 +5,8 @@ namespace magshell {
 void Remainder::add_product(const VectorXd& p, bool transposed, VectorXd& out) const {
     for (const Point& each : points_) {
         const Vec3 at = p.segment<3>(3 * each.node);
-        out.segment<3>(3 * each.node) += transposed ? Vec3(each.block.transpose() * at) : Vec3(each.block * at);
+        out.segment<3>(3 * each.node) +=
+            transposed ? Vec3(each.block.transpose() * at) : Vec3(each.block * at);
     }
     for (const Shared& each : shared_) {
         Vec3 at[3];

@@ -7,8 +7,8 @@
 #include "magshell/assembly/motion.h"
 #include "magshell/assembly/placed_obstacle.h"
 #include "magshell/energy/contact.h"
-#include "magshell/force/drag.h"
 #include "magshell/energy/controls.h"
+#include "magshell/force/drag.h"
 
 namespace magshell {
 

@@ -32,7 +32,8 @@ struct ContactPoint {
 struct ContactInput {
     std::vector<Index> obstacles;  // of SceneValues::obstacles
     std::vector<ContactPoint> points;
-    bool rubs = false, lagged = false;  // whether there is friction, and whether with the normal force of before
+    bool rubs = false,
+         lagged = false;  // whether there is friction, and whether with the normal force of before
 };
 
 /// What may differ from solve to solve.

@@ -86,8 +86,8 @@ class SystemMatrix {
         to[length - 1] += from[8 * w];
     }
 
-    /// Adds lane `lane` of the block (i, j) of two places i > j of an element that are both taken by one node,
-    /// and of its transpose, the block (j, i).
+    /// Adds lane `lane` of the block (i, j) of two places i > j of an element that are both taken by one
+    /// node, and of its transpose, the block (j, i).
     void add_block_and_transpose(Index node, const Pack33& block, int lane) {
         const Pack33 sum = block + transpose(block);
         add_diagonal_block(node, sum, lane);

@@ -24,8 +24,8 @@ void WaterTerm::evaluate(const Kinematics& at, const Controls&, Residual& out) {
     });
 }
 
-// Every corner feels the same force. Into the symmetric matrix goes what the symmetric part of its derivative by
-// the motion of the face as a whole has; it never lets the matrix lose its definiteness.
+// Every corner feels the same force. Into the symmetric matrix goes what the symmetric part of its derivative
+// by the motion of the face as a whole has; it never lets the matrix lose its definiteness.
 void WaterTerm::assemble(const Kinematics& at, const Controls&, bool, SystemMatrix& out,
                          Remainder& rest) const {
     Remainder::Shared* const shared = rest.extend(sheet_.n_faces());

@@ -3,7 +3,8 @@
 //   E = k_n S(d),   N = k_n S'(d),   d = offset - distance                                       [J], [N]
 //
 // The force N pushes along the obstacle's normal. It is linear in the depth d, but for a short parabola that
-// makes its derivative continuous:  S' = d^2/(2 e) up to d = e, d - e/2 from there on.   [Geilinger et al. 2020]
+// makes its derivative continuous:  S' = d^2/(2 e) up to d = e, d - e/2 from there on.   [Geilinger et al.
+// 2020]
 #pragma once
 
 namespace magshell {

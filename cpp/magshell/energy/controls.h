@@ -23,24 +23,29 @@ struct ObstaclePose {
 };
 
 struct Controls {
-    Vec3 flux_density = Vec3::Zero();  // uniform applied flux density [T]
-    double field = 0.0;                // factor on the field sources (dipoles, sampled fields)
-    double load = 0.0;                 // factor on point, edge and area loads and on edge couples
-    double gravity = 0.0;              // factor on gravity
-    double motion = 0.0;               // how far prescribed motions have gone: 0 at rest, 1 at their end
+    Vec3 flux_density = Vec3::Zero();     // uniform applied flux density [T]
+    double field = 0.0;                   // factor on the field sources (dipoles, sampled fields)
+    double load = 0.0;                    // factor on point, edge and area loads and on edge couples
+    double gravity = 0.0;                 // factor on gravity
+    double motion = 0.0;                  // how far prescribed motions have gone: 0 at rest, 1 at their end
     std::vector<ObstaclePose> obstacles;  // one each, or empty where none moves
 
     bool operator==(const Controls&) const = default;
     friend Controls operator+(const Controls& a, const Controls& b) {
-        Controls sum{a.flux_density + b.flux_density, a.field + b.field, a.load + b.load,
-                     a.gravity + b.gravity, a.motion + b.motion, a.obstacles.empty() ? b.obstacles : a.obstacles};
+        Controls sum{a.flux_density + b.flux_density,
+                     a.field + b.field,
+                     a.load + b.load,
+                     a.gravity + b.gravity,
+                     a.motion + b.motion,
+                     a.obstacles.empty() ? b.obstacles : a.obstacles};
         if (!a.obstacles.empty())
             for (std::size_t k = 0; k < b.obstacles.size(); ++k)
                 sum.obstacles[k] = a.obstacles[k] + b.obstacles[k];
         return sum;
     }
     friend Controls operator*(double s, const Controls& a) {
-        Controls scaled{s * a.flux_density, s * a.field, s * a.load, s * a.gravity, s * a.motion, a.obstacles};
+        Controls scaled{s * a.flux_density, s * a.field,  s * a.load,
+                        s * a.gravity,      s * a.motion, a.obstacles};
         for (ObstaclePose& pose : scaled.obstacles) pose = s * pose;
         return scaled;
     }

@@ -1,12 +1,15 @@
 // Coulomb friction of a point, made smooth where it sticks.
 //
-//   f = - mu N s(u/e) t,   v_t = (I - n n^T) v,   u = |v_t|,   t = v_t/u,   s(y) = 2 y - y^2 up to y = 1, 1 beyond
+//   f = - mu N s(u/e) t,   v_t = (I - n n^T) v,   u = |v_t|,   t = v_t/u,   s(y) = 2 y - y^2 up to y = 1, 1
+//   beyond
 //
-// v is the velocity relative to the obstacle, N the normal force, e the sticking speed: what would stick creeps
-// slower than e, under a load that is a share r of mu N at e (1 - sqrt(1 - r)). s as in Li et al. 2020 (IPC).
+// v is the velocity relative to the obstacle, N the normal force, e the sticking speed: what would stick
+// creeps slower than e, under a load that is a share r of mu N at e (1 - sqrt(1 - r)). s as in Li et al. 2020
+// (IPC).
 //
-// A Newton step from sliding knows nothing of sticking, as f does not change with u there, and overshoots. With
-// the secant s/u in place of the slope it never does: f is then bounded from above by a quadratic potential.
+// A Newton step from sliding knows nothing of sticking, as f does not change with u there, and overshoots.
+// With the secant s/u in place of the slope it never does: f is then bounded from above by a quadratic
+// potential.
 #pragma once
 
 #include "magshell/core/types.h"

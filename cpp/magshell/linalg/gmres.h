@@ -23,6 +23,7 @@ struct GmresOptions {
 
 /// Replaces the right-hand side by the solution. `product` gives A x, `precondition` replaces x by P^-1 x.
 GmresReport gmres(const std::function<VectorXd(const VectorXd&)>& product,
-                  const std::function<void(VectorXd&)>& precondition, VectorXd& rhs, const GmresOptions& options);
+                  const std::function<void(VectorXd&)>& precondition, VectorXd& rhs,
+                  const GmresOptions& options);
 
 }  // namespace magshell

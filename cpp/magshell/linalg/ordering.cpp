@@ -58,9 +58,9 @@ AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, Ordering orderi
     if (ordering != Ordering::best)
         return assembly_tree(pattern, order_unknowns(pattern, quotient, ordering));
 
-    // With three unknowns a vertex METIS saves a fifth of the operations. With one an edge besides, it has to order
-    // the unknowns themselves: that takes longer than many factorizations of 30,000 faces, of which it saves a third,
-    // and as long as three of 130,000, of which it saves half (measured).
+    // With three unknowns a vertex METIS saves a fifth of the operations. With one an edge besides, it has to
+    // order the unknowns themselves: that takes longer than many factorizations of 30,000 faces, of which it
+    // saves a third, and as long as three of 130,000, of which it saves half (measured).
     constexpr double many_operations = 2.5e5;  // an unknown
     AssemblyTree amd = assembly_tree(pattern, order_unknowns(pattern, quotient, Ordering::amd));
     if (!quotient.is_even() && amd.flops() < many_operations * pattern.size) return amd;

@@ -17,8 +17,8 @@ class Obstacle {
   public:
     virtual ~Obstacle() = default;
 
-    /// The signed distance at a point [m]. To be called from any thread. Where it has no derivatives (corners, the
-    /// middle of a body), the limit from one side.
+    /// The signed distance at a point [m]. To be called from any thread. Where it has no derivatives
+    /// (corners, the middle of a body), the limit from one side.
     virtual Distance distance(const Vec3& point) const = 0;
 };
 

@@ -31,8 +31,8 @@ constexpr double shrinking = 0.7;
 // A residual that shrinks less makes the next step a cautious one.
 constexpr double contracting = 0.5;
 
-// How exactly to solve for a Newton step with an unsymmetric matrix: what its quadratic convergence deserves, and no
-// more than the end needs.
+// How exactly to solve for a Newton step with an unsymmetric matrix: what its quadratic convergence deserves,
+// and no more than the end needs.
 double deserved(double residual, double tolerance) {
     return std::max(0.1 * tolerance / residual, std::min(1e-2, residual));
 }
@@ -222,21 +222,47 @@ NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const An
     return iterate(q, controls, anchor, options_.max_iterations, false);
 }
 
+// With friction held, the stage is a minimization, which damped steps do not leave. Normal forces follow,
+// until Newton finds the rest of the way.
 NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor) {
-    constexpr int most_iterations = 60;
-    constexpr double shortest = 1.0 / 4096.0;  // of a step
+    constexpr int most_rounds = 12, most_steps = 20, last_steps = 8;
+    constexpr double closer = 1e-2;  // than a round began, it ends at least
     NewtonReport report;
-    double last_residual = std::numeric_limits<double>::infinity();
     q += model_.reduction().prescribed_increment(q, controls.motion);
     evaluate(q, controls, anchor);
-    for (;; ++report.iterations, ++iterations_) {
+    for (int round = 0; round < most_rounds; ++round) {
+        const double enough = std::max(options_.tolerance, closer * relative_residual(q, anchor));
+        model_.hold_forces(true);
+        const bool held = descend(q, controls, anchor, enough, most_steps, report);
+        model_.hold_forces(false);
+        if (!held) return report;
+        VectorXd end = q;
+        const NewtonReport last = iterate(end, controls, anchor, last_steps, false);
+        report.iterations += last.iterations;
+        if (last.converged) {
+            q = std::move(end);
+            report.converged = true;
+            report.residual = last.residual;
+            return report;
+        }
+        evaluate(q, controls, anchor);
+    }
+    report.residual = relative_residual(q, anchor);
+    report.reason = "no convergence in " + std::to_string(most_rounds) + " rounds of shortened steps";
+    return report;
+}
+
+bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor, double enough,
+                     int most_steps, NewtonReport& report) {
+    constexpr double shortest = 1.0 / 4096.0;  // of a step
+    double last_residual = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < most_steps; ++k, ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);
         watch(report.residual);
-        report.converged = report.residual <= options_.tolerance;
-        if (report.converged) return report;
-        if (!std::isfinite(report.residual) || report.iterations == most_iterations) {
-            report.reason = "no convergence in " + std::to_string(most_iterations) + " shortened steps";
-            return report;
+        if (report.residual <= enough) return true;
+        if (!std::isfinite(report.residual)) {
+            report.reason = "the iteration diverged";
+            return false;
         }
         Eigen::MatrixXd no_moves(q.size(), 0);
         const bool cautious = report.residual > contracting * last_residual;
@@ -244,7 +270,7 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
         const FactorReport factor = factorize(q, controls, false, anchor, no_moves, cautious);
         if (!factor.succeeded) {
             report.reason = factor.reason;
-            return report;
+            return false;
         }
         const VectorXd step = solve_with_factor(-gradient(q, anchor)), from = q;
         const auto length = [&](const VectorXd& p) {
@@ -254,15 +280,17 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
         for (double share = 1.0;; share *= 0.5) {
             q = from + share * step;
             evaluate(q, controls, anchor);
-            if (share <= shortest || relative_residual(q, anchor) <= options_.tolerance) break;
-            if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.05 * share) * whole) break;
+            if (share <= shortest || relative_residual(q, anchor) <= enough) break;
+            if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.25 * share) * whole) break;
         }
     }
+    return true;
 }
 
 bool Newton::factor_serves(double contraction, double residual) const {
     constexpr double worth = 4.0;  // steps with an old factorization, for one with its own
-    // The errors that a factorization leaves behind are those of its own place, twice what the last step left.
+    // The errors that a factorization leaves behind are those of its own place, twice what the last step
+    // left.
     const double each = 2.0 * contraction;
     return each < 0.1 && std::log(options_.tolerance / residual) >= worth * std::log(each);
 }
@@ -286,7 +314,8 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             return fail("the iteration diverged");
         const bool in_place = move.isZero(0.0);
         const bool settled = report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent();
-        // Under the floor, small forces that move a thin sheet far are lost in larger ones: a step tells them.
+        // Under the floor, small forces that move a thin sheet far are lost in larger ones: a step tells
+        // them.
         if (in_place && settled &&
             (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
@@ -307,7 +336,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             if (mixed && report.lost) return fail("the iteration lost its way");
         }
         const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
-                                                      deserved(report.residual, options_.tolerance));
+                                                       deserved(report.residual, options_.tolerance));
         move.setZero();
         const double length = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&

@@ -59,8 +59,8 @@ class Newton {
     /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
     NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
-    /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity): slower, and
-    /// sure of foot where contacts open and close.
+    /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity), in rounds
+    /// of held normal forces: slower, and sure of foot where contacts open and close, stick and slip.
     NewtonReport solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor);
 
     /// The residual's parts at q, with the forces of a time step.
@@ -71,12 +71,12 @@ class Newton {
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
                            const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves, bool cautious = false);
-    /// K^T p = rhs with the Hessian at q, by refinement with a factorization from nearby. Empty where that does
-    /// not converge quickly.
+    /// K^T p = rhs with the Hessian at q, by refinement with a factorization from nearby. Empty where that
+    /// does not converge quickly.
     std::optional<VectorXd> solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
                                          const Factor& nearby, const VectorXd& rhs);
-    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held. Only where forces make
-    /// K unsymmetric the tolerance counts: of the residual, over the norm of rhs.
+    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held. Only where
+    /// forces make K unsymmetric the tolerance counts: of the residual, over the norm of rhs.
     VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
     /// K^T p = rhs likewise, to round-off. Throws InvalidInput where forces make K too unsymmetric for that.
     VectorXd solve_transposed(const VectorXd& rhs) const;
@@ -104,6 +104,10 @@ class Newton {
   private:
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                          bool mixed);
+    /// Shortened steps from the last evaluated state until the residual is small enough or so many are done;
+    /// false where none can be taken, and the report says why. The end is evaluated.
+    bool descend(VectorXd& q, const Controls& controls, const Anchor& anchor, double enough, int most_steps,
+                 NewtonReport& report);
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor,
                   bool cautious = false);
     /// Whether steps with the last factorization will do, which are as good as free.

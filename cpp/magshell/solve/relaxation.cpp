@@ -13,7 +13,7 @@ constexpr int iterations_a_step = 10, quick_iterations = 6;
 constexpr double above_instability = 1.3;  // the rate, over the most negative eigenvalue's size
 constexpr double rate_growth = 2.0, rate_decay = 4.0;
 constexpr double settled = 1e-4;  // of the extent: a step that moves less has come to rest, or to a saddle
-constexpr double rigid = 1e4;  // a rate this many times the stiffness allows no step to speak of
+constexpr double rigid = 1e4;     // a rate this many times the stiffness allows no step to speak of
 
 class Relaxation {
   public:
@@ -46,7 +46,8 @@ class Relaxation {
             rate_ = std::max(rate_, forced_rate());
             report_.reason = factor.reason;
             if (newton_.relative_residual(q_, {}) > newton_.options().tolerance) return rate_ > 0.0;
-            report_.reason = "the equilibrium is neutral: the sheet is free to move, or its Hessian is singular";
+            report_.reason =
+                "the equilibrium is neutral: the sheet is free to move, or its Hessian is singular";
             return false;
         }
         const bool convex = factor.negative_pivots == 0;
@@ -79,8 +80,8 @@ class Relaxation {
         double largest = 0.0;
         for (Index k = 0; k < 3 * model_.sheet().n_vertices(); ++k)
             if (model_.metric()[k] > 0.0)
-                largest = std::max(largest, std::abs(matrix.values()[matrix.column_starts()[k]]) /
-                                                model_.metric()[k]);
+                largest = std::max(largest,
+                                   std::abs(matrix.values()[matrix.column_starts()[k]]) / model_.metric()[k]);
         return largest;
     }
 

@@ -68,8 +68,9 @@ class Stepper {
   public:
     Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity);
 
-    /// Takes the state over a step with these controls at its beginning and at its stages. On failure the state stays, and the
-    /// reason tells why. `kept`, if given, gets the step; with_factors: Newton's last factorizations too.
+    /// Takes the state over a step with these controls at its beginning and at its stages. On failure the
+    /// state stays, and the reason tells why. `kept`, if given, gets the step; with_factors: Newton's last
+    /// factorizations too.
     bool step(MotionState& state, double dt, std::span<const Controls> controls, PartRecord* kept,
               bool with_factors, std::string& reason);
 

@@ -88,7 +88,9 @@ def checked_cells(cells) -> tuple[int, int]:
 def check_size(n_faces: int, asked_by: str = "cells") -> None:
     """Refuses more faces than 32-bit indices of their corners can count."""
     if n_faces > MOST_FACES:
-        raise ValueError(f"{asked_by} asks for about {n_faces:.3g} faces; a mesh has at most {MOST_FACES}")
+        raise ValueError(
+            f"{asked_by} asks for about {min(n_faces, 10**18):.3g} faces; a mesh has at most {MOST_FACES}"
+        )
 
 
 def _vertex_numbers(n_u: int, n_v: int, periodic: bool, poles: tuple[bool, bool]) -> np.ndarray:
@@ -134,5 +136,8 @@ def _shaken(
     # moved by a fraction a, the doubled area of half a cell is at least 1 - 4 a of what it was
     if not 0 <= irregular <= 0.25:
         raise ValueError(f"irregular is a fraction of the spacing in [0, 0.25], got {irregular}")
+    # numpy's generator takes more, and crashes on a list that holds itself
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"seed must be an integer of at least 0, got {seed!r:.60}")
     moves = np.random.default_rng(seed).uniform(-irregular, irregular, parameters.shape)
     return parameters + moves * spacing * movable[:, None]

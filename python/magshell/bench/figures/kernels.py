@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from ..kernels import ALLOWED
-from .style import BLUE, FAINT, INK, SKY, machine, new_figure, note, panel_title, tidy
+from .style import BLUE, FAINT, INK, SKY, label_bars, machine, new_figure, note, panel_title, tidy
 
 
 def draw(results: dict, setting: dict) -> Figure:
@@ -20,16 +20,7 @@ def draw(results: dict, setting: dict) -> Figure:
         gradient = [1e6 * cost["gradient"][0] / cost["faces"] for cost in costs]
         axes.barh(places, both, color=SKY, height=0.66, label="gradient and Hessian")
         axes.barh(places, gradient, color=BLUE, height=0.3, label="gradient")
-        for place, value in zip(places, both, strict=True):
-            axes.annotate(
-                f"{value:.2f}",
-                (value, place),
-                (4, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=8,
-                color=INK,
-            )
+        label_bars(axes, places, both, ".2f")
         axes.axvline(ALLOWED, color=FAINT, linestyle="--", linewidth=1.0)
         axes.margins(x=0.12)
         tidy(axes, grid="x")

@@ -5,7 +5,18 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from ..statics import CASES, SOLVERS
-from .style import BENDING_COLOURS, COLOURS, FAINT, INK, machine, new_figure, note, panel_title, tidy
+from .style import (
+    BENDING_COLOURS,
+    COLOURS,
+    FAINT,
+    INK,
+    label_bars,
+    machine,
+    new_figure,
+    note,
+    panel_title,
+    tidy,
+)
 
 STEPS = ("analysis", "factorization", "solve")
 
@@ -58,16 +69,7 @@ def _backends(axes, backends: dict) -> None:
         places = [row + (k - 1) * width for row in range(len(backends))]
         values = [1e3 * times[step] for times in backends.values()]
         axes.barh(places, values, height=width, color=colour, label=step)
-        for place, value in zip(places, values, strict=True):
-            axes.annotate(
-                f"{value:.3g}",
-                (value, place),
-                (4, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=8,
-                color=INK,
-            )
+        label_bars(axes, places, values, ".3g")
     axes.set_yticks(range(len(backends)), list(backends))
     axes.invert_yaxis()
     axes.margins(x=0.12)

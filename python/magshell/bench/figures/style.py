@@ -50,3 +50,17 @@ def machine(setting: dict) -> str:
     """On what the numbers were made, in a line."""
     threads = setting["threads"]
     return f"{setting['processor']}, {threads} thread{'s' if threads != 1 else ''}, magshell {setting['magshell']}"
+
+
+def label_bars(axes, places, values, form: str) -> None:
+    """Writes each value at the end of its horizontal bar."""
+    for place, value in zip(places, values, strict=True):
+        axes.annotate(
+            format(value, form),
+            (value, place),
+            (4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=8,
+            color=INK,
+        )

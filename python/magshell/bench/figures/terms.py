@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from .style import BLUE, FAINT, GREEN, INK, VERMILION, machine, new_figure, note, panel_title, tidy
+from .style import BLUE, FAINT, GREEN, VERMILION, label_bars, machine, new_figure, note, panel_title, tidy
 
 PANELS = {
     "assembly": ("Gradient and Hessian", BLUE),
@@ -24,16 +24,7 @@ def draw(results: dict, setting: dict) -> Figure:
         axes.barh(places, same, color=colour, alpha=0.3, height=0.66)
         more = [max(0.0, a - b) for a, b in zip(values, before, strict=True)]
         axes.barh(places, more, left=same, color=colour, height=0.66)
-        for place, value in zip(places, values, strict=True):
-            axes.annotate(
-                f"{value:.3g}",
-                (value, place),
-                (4, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=8,
-                color=INK,
-            )
+        label_bars(axes, places, values, ".3g")
         axes.set_xlim(0.0, 1.16 * max(values))
         tidy(axes, grid="x")
         panel_title(axes, title, "ms; dark: more than the line above")
