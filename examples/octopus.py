@@ -8,16 +8,15 @@ five oscillations whose frequencies and amplitudes are looked for too (the DMP t
 
 What comes out, the objective in mm2, after as many motions with their gradients:
 
-              the guess     found    motions    passes after
-    pipe I       209           48       31.29 s
-    pipe II      314           86       3          1.49 s
-    tunnel       235           60       -          1.46 s, in the field found for pipe II
+              guess    found    motions    passes after
+    pipe I      209       48          3    1.29 s
+    pipe II     314       86          3    1.49 s
+    tunnel      235       60               1.46 s, in the field found for pipe II
 
 The tunnel's own searches found little: from the guess 185 mm2 after ten motions, which does not pass; from pipe II's
-field nothing lower. A motion and its gradient take 9 to 13 s of processor time on a busy machine, 6 to 9 ms a step (the paper: 500 to 900 s an
-iteration on six cores, for twice as many steps), but an iteration may take several: the searches end where the
-objective becomes too rough for their lines, pipe I's and II's with six
-motions in vain, 30 s an iteration in all.
+field nothing lower. All searches end where the objective becomes too rough for their lines, those in the pipes after
+six more motions in vain. A motion and its gradient take 9 to 14 s of processor time on a busy machine, 6 to 9 ms a
+step, but an iteration may take several. The paper: 500 to 900 s an iteration on six cores, for twice as many steps.
 
 - As in the paper: 492 faces and 313 vertices, Y, nu, thickness, density, time step, contact stiffness and friction,
   water, implicit Euler, hinges for bending, the field's limit. The octopus weighs what its water weighs: no gravity.
@@ -27,10 +26,11 @@ motions in vain, 30 s an iteration in all.
   tentacles folded forward, past the head. The channels' ends were chosen for the start of the search, 6 mT that swing
   at 4 Hz, not to pass, and for some more speed to be enough: they show that a search by gradients does its work, not
   through what an octopus can squeeze. Nothing keeps tentacles and head from going through each other.
-- The start is a guess of how it might swim, which the paper says its search goes without. From 2 mT, in open
-  water, seven iterations took half a second of motion from 144 to 91 mm2 only.
+- The start is a guess of how it might swim, which the paper says its search goes without. From 2 mT, in open water,
+  seven iterations took half a second of motion from 144 to 91 mm2 only.
 - The field is written as oscillations and a rest, of which the DMP term is the square: the same objective and unknowns,
-  but a change of an oscillation changes all steps at once. The rest stays below 0.4 mT, so the field found is all but the oscillations.
+  but a change of an oscillation changes all steps at once. The rest stays below 0.4 mT: the fields found are all but
+  sums of oscillations.
 - By symmetry a field across the channel does nothing to first order, so it stays zero, and the octopus on the axis
   but for rounding, which grows: a field that opens the tentacles would rather turn it around. After 1.5 s in strong
   fields it leans, and with 0.1 mT across from the start its way bends so soon that gradients tell little of it.
