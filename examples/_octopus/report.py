@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgb
 FOUND, GUESS, GREY = "#20639b", "#c8442d", "#777777"
 HEAD, TENTACLE, WATER, WALL = "#e8a87c", "#b5485d", "#9cc9e0", "#8a8f98"
 COLORS = {"guess": GUESS, "found": FOUND}
-LABELS = {"guess": "start of the search", "found": "found"}
+LABELS = {"guess": "guess", "found": "found"}
 EYE = np.radians(20.0)  # by which the eye is turned about the channel's axis: the outline of a tube stays
 LIGHT = np.array([0.45, -0.7, 0.55])  # along the channel, from the eye to the sheet, up
 BEGIN = -34  # mm, of the pictures
@@ -78,7 +78,7 @@ def draw_path(axes, result: dict) -> None:
 
 def draw_field(axes, result: dict) -> None:
     times = result["times"][1:]
-    axes.plot(times, 1e3 * result["guess"]["field"][:, 0], color=GUESS, lw=0.7, label="$B_x$, start")
+    axes.plot(times, 1e3 * result["guess"]["field"][:, 0], color=GUESS, lw=0.7, label="$B_x$, guess")
     for name, color, k in (("y", "#3d9970", 1), ("z", "#b07aa1", 2), ("x", FOUND, 0)):
         axes.plot(times, 1e3 * result["found"]["field"][:, k], color=color, lw=1.0, label=f"$B_{name}$")
     axes.set(xlabel="time [s]", ylabel="B [mT]", xlim=(0, times[-1]))
@@ -107,7 +107,7 @@ def movie(result: dict, path, fps: int = 25, slower: float = 2.0) -> None:
     from matplotlib import pyplot as plt
     from matplotlib.animation import PillowWriter
 
-    figure, axes = plt.subplots(figsize=(9, 2.6))
+    figure, axes = plt.subplots(figsize=(6, 3.2))
     writer, times, motion = PillowWriter(fps=fps), result["times"], result["found"]
     with writer.saving(figure, str(path), dpi=80):
         for time in np.arange(0.0, times[-1], 1 / (fps * slower)):
@@ -116,7 +116,10 @@ def movie(result: dict, path, fps: int = 25, slower: float = 2.0) -> None:
             draw_swimmer(axes, result, motion["positions"][frame])
             along = 1e3 * motion["field"][max(frame - 1, 0), 0]
             tail, tip = (BEGIN + 40, -25), (BEGIN + 40 + along, -25)
-            axes.annotate("", tip, tail, arrowprops={"color": "w", "width": 1.5, "headwidth": 6}, zorder=7)
+            if abs(along) > 1.0:
+                axes.annotate(
+                    "", tip, tail, arrowprops={"color": "w", "width": 1.5, "headwidth": 6}, zorder=7
+                )
             axes.set_title(f"{result['channel'].name}: {time:.2f} s, $B_x$ = {along:.1f} mT", fontsize=10)
             writer.grab_frame()
     plt.close(figure)

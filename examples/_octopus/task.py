@@ -142,16 +142,18 @@ class Swim:
         rest = torch.zeros(self.steps, 3, dtype=torch.float64)
         return Variables(rest, torch.tensor(FREQUENCIES), torch.zeros_like(sines), sines)
 
-    def solve(self, iterations: int, callback=None, progress: bool = False) -> tuple[Variables, ms.Minimum]:
+    def solve(
+        self, start: Variables, iterations: int, callback=None, progress: bool = False
+    ) -> tuple[Variables, ms.Minimum]:
         """What was found, and how."""
-        variables = [each.requires_grad_() for each in self.guess()]
+        variables = [each.clone().requires_grad_() for each in start]
         optimizer = ms.optim.LBFGS(
             variables,
             lower=[-FIELD_LIMIT, SLOWEST, -FIELD_LIMIT, -FIELD_LIMIT],
             upper=[FIELD_LIMIT, FASTEST, FIELD_LIMIT, FIELD_LIMIT],
             scale=list(SIZES),
-            first_step=0.05,
-            max_evaluations=6,
+            first_step=0.1,
+            max_evaluations=3,
         )
         found = ms.minimize(
             lambda *variables: self.objective(Variables(*variables)),
