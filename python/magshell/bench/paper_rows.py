@@ -67,6 +67,16 @@ def track(curve: str) -> Callable[[int], Run]:
     return run
 
 
+def octopus(channel: str) -> Callable[[int], Run]:
+    def run(iterations: int) -> Run:
+        from octopus import main
+
+        found = main((channel,), iterations=iterations)[channel]
+        return _of_history(found["history"], "mean square distance / m2, and prices")
+
+    return run
+
+
 def letter(iterations: int) -> Run:
     from letters import Task, designed
 
@@ -106,6 +116,9 @@ ROWS = (
     Row("7", "Track fitting (C)", "track_fitting", track("C"), 1.6e4, 241, 2.3e-5),
     Row("8", "Letters", "letters", letter, 3.0e4, 90, 2.5),
     Row("8", "Banner of eight letters", "banner", banner, of="equilibrium"),
+    Row("10", "Octopus (pipe I)", "octopus", octopus("pipe I"), 3.6e4, 72, 9.8e-4),
+    Row("10", "Octopus (pipe II)", "octopus", octopus("pipe II"), 2.2e4, 41, 3.9e-3),
+    Row("11", "Octopus (tunnel)", "octopus", octopus("tunnel"), 4.4e4, 49, 8.8e-3),
     Row("13", "Kirigami at rest", "kirigami_tower", tower, 3.9e2, 95, -2.8),
     Row("13", "Kirigami moving", "kirigami_reaching", reaching, 4.1e4, 486, 4.9e-4),
 )
