@@ -71,6 +71,10 @@ def test_dynamics(tmp_path, capsys) -> None:
     assert results["energies"]["TR-BDF2"]["kept"]["0.001"] > 0.999
     assert 0 < results["memory"]["checkpoints, 100"]["bytes"] < 1e6
     assert results["long run"]["TRBDF2"]["steps"] == 200
+    assert "With contact and friction" in printed
+    (surroundings,) = results["surroundings"].values()
+    assert min(row["step"] for row in surroundings.values()) > 0
+    assert surroundings["contact"]["way"] != surroundings["contact, friction"]["way"]
 
 
 def test_scaling(tmp_path, capsys) -> None:

@@ -161,3 +161,36 @@ def test_ctrl_c_hands_back_the_last_good_state(solve):
     good = caught.value.last_good
     assert isinstance(good, ms.Equilibrium) and np.isfinite(good.positions).all()
     assert 0.0 <= good.progress < 1.0
+
+
+def slides_into_the_floor() -> ms.Scene:
+    mesh = ms.meshes.rectangle(0.04, 0.02, cells=(40, 20), irregular=0.2)
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5, mass_density=1e3)
+    floor = ms.Contact(ms.obstacles.Plane(center=(0, 0, -1e-3)), friction_coefficient=0.6)
+    return ms.Scene(sheet, contacts=[floor], gravity=(0, 0, -9.81), allow_rigid_motions=True)
+
+
+def slide(scene: ms.Scene, **options) -> np.ndarray:
+    velocities = np.tile((1.0, 0.0, -1.0), (scene.mesh.n_vertices, 1))
+    integrator = ms.ImplicitEuler()
+    return ms.simulate(
+        scene, steps=6, time_step=1e-3, velocities=velocities, integrator=integrator, **options
+    ).positions
+
+
+@pytest.mark.parametrize("call", [3, 5, 7, 9])
+def test_an_interrupted_motion_leaves_nothing_behind(monkeypatch, call):
+    """No iterations but damped ones, which hold normal forces meanwhile."""
+    scene = slides_into_the_floor()
+    calls = []
+
+    def interrupt(*_):
+        calls.append(None)
+        if len(calls) == call:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("magshell.dynamics._advance", lambda bar: interrupt)
+        with pytest.raises(ms.Interrupted):
+            slide(scene, solver=ms.Newton(max_iterations=1))
+    np.testing.assert_array_equal(slide(scene), slide(slides_into_the_floor()))

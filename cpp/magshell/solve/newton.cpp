@@ -41,6 +41,18 @@ double deserved(double residual, double tolerance) {
 constexpr double exact_solve = 1e-13;
 constexpr int few_vectors = 30, many_vectors = 300;
 
+// Friction keeps its normal forces while it lives, also where an interruption ends that.
+class HeldForces {
+  public:
+    explicit HeldForces(Model& model) : model_(model) { model_.hold_forces(true); }
+    HeldForces(const HeldForces&) = delete;
+    HeldForces& operator=(const HeldForces&) = delete;
+    ~HeldForces() { model_.hold_forces(false); }
+
+  private:
+    Model& model_;
+};
+
 // Adds the time it lives to a sum.
 class Stopwatch {
   public:
@@ -232,10 +244,7 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
     evaluate(q, controls, anchor);
     for (int round = 0; round < most_rounds; ++round) {
         const double enough = std::max(options_.tolerance, closer * relative_residual(q, anchor));
-        model_.hold_forces(true);
-        const bool held = descend(q, controls, anchor, enough, most_steps, report);
-        model_.hold_forces(false);
-        if (!held) return report;
+        if (!descend(q, controls, anchor, enough, most_steps, report)) return report;
         VectorXd end = q;
         const NewtonReport last = iterate(end, controls, anchor, last_steps, false);
         report.iterations += last.iterations;
@@ -255,6 +264,7 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
 bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor, double enough,
                      int most_steps, NewtonReport& report) {
     constexpr double shortest = 1.0 / 4096.0;  // of a step
+    const HeldForces held(model_);
     double last_residual = std::numeric_limits<double>::infinity();
     for (int k = 0; k < most_steps; ++k, ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);

@@ -104,8 +104,8 @@ class Newton {
   private:
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                          bool mixed);
-    /// Shortened steps from the last evaluated state until the residual is small enough or so many are done;
-    /// false where none can be taken, and the report says why. The end is evaluated.
+    /// Shortened steps with held normal forces, from the last evaluated state until the residual is small
+    /// enough or so many are done; false where none can be taken, and the report says why.
     bool descend(VectorXd& q, const Controls& controls, const Anchor& anchor, double enough, int most_steps,
                  NewtonReport& report);
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor,

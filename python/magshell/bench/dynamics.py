@@ -9,7 +9,7 @@ import numpy as np
 
 import magshell as ms
 
-from . import motion_costs
+from . import motion_costs, surrounding_costs
 from .oscillator import METHODS, vibration
 from .other_integrators import OTHERS, energy_kept
 from .report import add_rounds, print_table
@@ -44,6 +44,7 @@ def run(options: argparse.Namespace) -> dict:
         "errors": _errors(STEPS[:2] if options.quick else STEPS, options.rounds),
         "energies": _energies(periods),
         **motion_costs.measure(options.rounds, options.quick),
+        "surroundings": surrounding_costs.measure(options.rounds, options.quick),
     }
     if options.long:
         results["long run"] = motion_costs.long_run(options.long)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -14,7 +15,7 @@ from . import _motion
 Surface = tuple[np.ndarray, np.ndarray]
 
 
-class Obstacle:
+class Obstacle(ABC):
     """A rigid body that sheets touch; make one of its subclasses.
 
     A point x of the world is R^T (x - center) in the body's own frame, R = exp(rotation). At a time t the motion moves
@@ -106,9 +107,9 @@ class Obstacle:
         vertices, faces = self._surface(float(quantity("extent", "m", extent, ())), (middle - origin) @ turn)
         return vertices @ turn.T + origin, faces
 
+    @abstractmethod
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
         """In the body's own frame."""
-        raise NotImplementedError
 
     def _frame(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Rotation matrix (3, 3) and origin (3,) m of the body's own frame at a time [s]."""
@@ -131,6 +132,6 @@ class Obstacle:
             parts.append("moving")
         return f"{type(self).__name__}({', '.join(parts)})"
 
+    @abstractmethod
     def _summary(self) -> str:
         """The shape in a few words."""
-        raise NotImplementedError
