@@ -116,7 +116,7 @@ py::dict energies(const Model& model, const VectorXd& q, const Controls& control
 
 // The lower triangle as (size, column starts, rows, values): of all unknowns, or of the free ones.
 py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, bool reduced) {
-    std::vector<double> values;
+    LargeVector<double> values;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());

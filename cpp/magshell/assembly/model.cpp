@@ -114,6 +114,7 @@ void Model::set_values(const SceneValues& values) {
     const std::vector<SheetMaterial> materials = renumbered(values.materials, sheet_);
     thickness_.clear();
     for (const SheetMaterial& m : materials) thickness_.push_back(m.thickness);
+    thinnest_ = *std::min_element(thickness_.begin(), thickness_.end());
     membrane_->set_material(materials);
     bending_->set_material(materials, values.curvature_scale);
     if (magnetic_) {

@@ -40,6 +40,7 @@ class Model {
     const Residual& residual() const { return residual_; }
     Index size() const { return sheet_.n_unknowns(); }
     double extent() const { return extent_; }
+    double thinnest() const { return thinnest_; }
     const VectorXd& metric() const { return metric_; }
     /// The floor under every residual of a state, to be multiplied by the unit of round-off.
     VectorXd cancelling_forces(const VectorXd& q);
@@ -145,6 +146,7 @@ class Model {
     std::unique_ptr<Factor> analysed_;
     int analyses_ = 0;
     std::vector<double> thickness_;  // in our numbering
+    double thinnest_ = 0.0;
     Residual residual_;
     VectorXd metric_;             // area at each unknown of a vertex, zero for directions and rotations
     VectorXd cancelling_forces_;  // of the elastic terms, without history

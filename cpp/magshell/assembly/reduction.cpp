@@ -145,7 +145,7 @@ void Reduction::turn_blocks(SystemMatrix& full) const {
     }
 }
 
-void Reduction::matrix(SystemMatrix& full, std::vector<double>& values) const {
+void Reduction::matrix(SystemMatrix& full, LargeVector<double>& values) const {
     if (!frame_of_.empty()) turn_blocks(full);
     values.resize(source_.size());
     const double* from = full.values().data();

@@ -49,7 +49,7 @@ class Reduction {
     double largest_turn() const;
 
     /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first.
-    void matrix(SystemMatrix& full, std::vector<double>& values) const;
+    void matrix(SystemMatrix& full, LargeVector<double>& values) const;
     VectorXd vector(const VectorXd& full) const;
     /// A diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses,
     /// areas.

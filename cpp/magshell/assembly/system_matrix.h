@@ -10,6 +10,7 @@
 #include <array>
 #include <vector>
 
+#include "magshell/core/large_memory.h"
 #include "magshell/core/types.h"
 #include "magshell/core/vector3.h"
 
@@ -35,8 +36,8 @@ class SystemMatrix {
     Index size() const { return 3 * nodes_ + rotations_; }
     const std::vector<Index>& column_starts() const { return column_starts_; }
     const std::vector<Index>& rows() const { return rows_; }
-    const std::vector<double>& values() const { return values_; }
-    std::vector<double>& values() { return values_; }
+    const LargeVector<double>& values() const { return values_; }
+    LargeVector<double>& values() { return values_; }
     /// Clears the three columns of a node, or the column of a rotation.
     void clear_node(Index node) { clear(3 * node, 3 * node + 3); }
     void clear_rotation(Index rotation) { clear(3 * nodes_ + rotation, 3 * nodes_ + rotation + 1); }
@@ -112,7 +113,7 @@ class SystemMatrix {
 
     Index nodes_ = 0, rotations_ = 0;
     std::vector<Index> column_starts_, rows_;
-    std::vector<double> values_;
+    LargeVector<double> values_;
 };
 
 }  // namespace magshell

@@ -129,21 +129,24 @@ class Line {
     std::ptrdiff_t extent_ = 0;
 };
 
-// Work space from `base` on for fronts handled one after another: an update lives until its parent has taken
-// it. Returns where it ends.
-std::ptrdiff_t place_work(AssemblyPlan& plan, const std::vector<Index>& sequence, std::ptrdiff_t base) {
+// Where the updates of fronts that are handled one after another lie: an update lives until its parent has
+// taken it. Those of `waiting` are there from the beginning, for parents in the sequence. Returns where all
+// of them end.
+std::ptrdiff_t place_work(AssemblyPlan& plan, const std::vector<Index>& waiting,
+                          const std::vector<Index>& sequence) {
     Line line;
-    for (const Index s : sequence) {
+    const auto take = [&](Index s) {
         FrontPlan& front = plan.fronts[s];
         if (front.shape.below > 0)
-            front.update = base + line.take(Triangle::offset(slabs::count(front.shape.below)));
-        for (const Index child : front.children) {
-            // The children of a top front may be roots of subtrees, which have work space of their own.
-            if (std::binary_search(sequence.begin(), sequence.end(), child))
-                line.give_back(plan.fronts[child].update - base);
-        }
+            front.update = line.take(Triangle::offset(slabs::count(front.shape.below)));
+    };
+    std::for_each(waiting.begin(), waiting.end(), take);
+    for (const Index s : sequence) {
+        take(s);
+        for (const Index child : plan.fronts[s].children)
+            if (plan.fronts[child].shape.below > 0) line.give_back(plan.fronts[child].update);
     }
-    return base + line.extent();
+    return line.extent();
 }
 
 // Splits the tree into subtrees of at most 1/16 of the work and the fronts above them.
@@ -196,12 +199,14 @@ AssemblyPlan assembly_plan(const SparsePattern& pattern, AssemblyTree tree) {
     place_entries(pattern, plan);
     place_updates(plan);
     split(plan, subtree_flops, tree.flops());
+    std::vector<Index> roots, inner;
     for (const FrontRange& subtree : plan.subtrees) {
-        std::vector<Index> sequence(subtree.end - subtree.begin);
-        std::iota(sequence.begin(), sequence.end(), subtree.begin);
-        plan.work_doubles = place_work(plan, sequence, plan.work_doubles);
+        roots.push_back(subtree.end - 1);
+        inner.resize(subtree.end - 1 - subtree.begin);
+        std::iota(inner.begin(), inner.end(), subtree.begin);
+        plan.subtree_doubles = std::max(plan.subtree_doubles, place_work(plan, {}, inner));
     }
-    plan.work_doubles = place_work(plan, plan.top, plan.work_doubles);
+    plan.shared_doubles = place_work(plan, roots, plan.top);
     return plan;
 }
 

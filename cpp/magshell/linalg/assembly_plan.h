@@ -1,5 +1,5 @@
 // Where everything goes during a factorization, worked out once for a pattern: matrix entries into fronts,
-// updates into parents, and which part of the work space each update occupies while it lives.
+// updates into parents, and which part of a work space each update occupies while it lives.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ struct PlacedEntry {
 struct FrontPlan {
     FrontShape shape;
     std::ptrdiff_t panel = 0;   // its columns of L in the factor's storage [doubles]
-    std::ptrdiff_t update = 0;  // its update in the work space [doubles]
+    std::ptrdiff_t update = 0;  // its update in the shared work space, or in that of its subtree [doubles]
     Index first_entry = 0, first_transfer = 0;
     Index rows_in_parent_pivots = 0;  // how many of its rows below are pivots of the parent
     std::vector<Index> children;
@@ -49,7 +49,9 @@ struct AssemblyPlan {
     std::vector<Transfer> transfers;
     std::vector<FrontRange> subtrees;  // independent of the number of threads
     std::vector<Index> top;            // the fronts above them, in order
-    std::ptrdiff_t factor_doubles = 0, work_doubles = 0;
+    // Updates of top fronts and of the roots of subtrees lie in one work space that all threads share, those
+    // within a subtree in one that its thread has to itself.
+    std::ptrdiff_t factor_doubles = 0, shared_doubles = 0, subtree_doubles = 0;
 
     Index front_count() const { return static_cast<Index>(fronts.size()) - 1; }
 };

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "magshell/core/large_memory.h"
 #include "magshell/linalg/factor.h"
 
 namespace magshell {
@@ -11,6 +12,6 @@ namespace magshell {
 /// each row of the result is between 1/4 and 4 in most rows. Returns the largest of all. Throws InvalidInput
 /// when a value is not finite.
 double equilibrate(const SparsePattern& pattern, const double* values, std::vector<double>& scale,
-                   std::vector<double>& scaled);
+                   LargeVector<double>& scaled);
 
 }  // namespace magshell

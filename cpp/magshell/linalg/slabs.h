@@ -8,8 +8,8 @@
 #include <cstddef>
 #include <cstring>
 #include <memory>
-#include <new>
 
+#include "magshell/core/large_memory.h"
 #include "magshell/core/types.h"
 
 namespace magshell::slabs {
@@ -123,17 +123,17 @@ class Buffer {
   public:
     Buffer() = default;
     explicit Buffer(std::ptrdiff_t doubles)
-        : size_(doubles), data_(static_cast<double*>(::operator new(sizeof(double) * doubles, alignment))) {}
+        : size_(doubles), data_(static_cast<double*>(take_memory(sizeof(double) * doubles)), {doubles}) {}
     double* data() const { return data_.get(); }
     std::ptrdiff_t size() const { return size_; }
 
   private:
-    static constexpr std::align_val_t alignment{64};
-    struct Free {
-        void operator()(double* data) const { ::operator delete(data, alignment); }
+    struct GiveBack {
+        std::ptrdiff_t doubles;
+        void operator()(double* data) const { give_back_memory(data, sizeof(double) * doubles); }
     };
     std::ptrdiff_t size_ = 0;
-    std::unique_ptr<double, Free> data_;
+    std::unique_ptr<double, GiveBack> data_;
 };
 
 }  // namespace magshell::slabs

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <string>
 
 #include "magshell/core/errors.h"
@@ -20,6 +21,44 @@ using slabs::width;
 namespace {
 
 constexpr double doubtful_growth = 1e8;  // half of the digits are gone: check before claiming success
+
+// Equal parts of a buffer, one for each thread at a time.
+class WorkSpaces {
+  public:
+    WorkSpaces(double* data, std::ptrdiff_t doubles, std::ptrdiff_t each) {
+        for (std::ptrdiff_t begin = 0; each > 0 && begin + each <= doubles; begin += each)
+            idle_.push_back(data + begin);
+    }
+
+    class Lease {
+      public:
+        explicit Lease(WorkSpaces& spaces) : spaces_(spaces), data_(spaces.take()) {}
+        Lease(const Lease&) = delete;
+        Lease& operator=(const Lease&) = delete;
+        ~Lease() { spaces_.give_back(data_); }
+        double* data() const { return data_; }
+
+      private:
+        WorkSpaces& spaces_;
+        double* const data_;
+    };
+
+  private:
+    double* take() {
+        const std::lock_guard lock(mutex_);
+        if (idle_.empty()) return nullptr;  // where no subtree needs any
+        double* const data = idle_.back();
+        idle_.pop_back();
+        return data;
+    }
+    void give_back(double* data) {
+        const std::lock_guard lock(mutex_);
+        if (data) idle_.push_back(data);
+    }
+
+    std::mutex mutex_;
+    std::vector<double*> idle_;
+};
 
 }  // namespace
 
@@ -52,19 +91,26 @@ FactorReport SupernodalLdlt::factorize(const double* values) {
     report_.reason = "the last factorize() did not finish";
     if (factor_.size() == 0) {  // an analysis that only has siblings needs none
         factor_ = slabs::Buffer(plan_.factor_doubles);
-        work_ = slabs::Buffer(plan_.work_doubles);
+        shared_work_ = slabs::Buffer(plan_.shared_doubles);
     }
+    const int subtrees = static_cast<int>(plan_.subtrees.size());
+    const std::ptrdiff_t subtree_doubles = std::min(num_threads(), subtrees) * plan_.subtree_doubles;
+    if (subtree_work_.size() < subtree_doubles) subtree_work_ = slabs::Buffer(subtree_doubles);
+    WorkSpaces spaces(subtree_work_.data(), subtree_work_.size(), plan_.subtree_doubles);
     largest_scaled_ = equilibrate(pattern_, values, scale_, scaled_values_);
-    values_.assign(values, values + pattern_.rows.size());
 
-    std::vector<PivotTally> tallies(plan_.subtrees.size());
-    parallel_for(static_cast<int>(plan_.subtrees.size()), [&](int task) {
+    double* const shared = shared_work_.data();
+    std::vector<PivotTally> tallies(subtrees);
+    parallel_for(subtrees, [&](int task) {
         const FrontRange& subtree = plan_.subtrees[task];
-        for (Index s = subtree.begin; s < subtree.end; ++s) tallies[task].add(process(s));
+        const Index root = subtree.end - 1;
+        const WorkSpaces::Lease own(spaces);
+        for (Index s = subtree.begin; s < root; ++s) tallies[task].add(process(s, own.data(), own.data()));
+        tallies[task].add(process(root, own.data(), shared));
     });
     PivotTally tally;
     for (const PivotTally& each : tallies) tally.add(each);
-    for (const Index s : plan_.top) tally.add(process(s));
+    for (const Index s : plan_.top) tally.add(process(s, shared, shared));
 
     report_.negative_pivots = tally.negative;
     report_.perturbed_pivots = tally.perturbed;
@@ -85,7 +131,7 @@ FactorReport SupernodalLdlt::factorize(const double* values) {
     return report_;
 }
 
-PivotTally SupernodalLdlt::process(Index s) {
+PivotTally SupernodalLdlt::process(Index s, double* from, double* to) {
     const FrontPlan& front = plan_.fronts[s];
     const FrontShape& shape = front.shape;
     double* data = factor_.data() + front.panel;
@@ -94,21 +140,22 @@ PivotTally SupernodalLdlt::process(Index s) {
         data[plan_.entries[k].place] = scaled_values_[plan_.entries[k].entry];
     }
     const Panel panel(data, shape.pivots);
-    for (const Index child : front.children) add_to_panel(plan_, child, work_.data(), panel);
+    for (const Index child : front.children) add_to_panel(plan_, child, from, panel);
 
     const Pivots pivots{diagonal_.data() + shape.first, coupling_.data() + shape.first};
     const Index below_slabs = slabs::count(shape.below);
     PivotTally tally;
     eliminate_pivots(panel, shape.pivots, below_slabs, {pivots, pivot_order_.data() + shape.first}, tally);
 
-    const Triangle update{work_.data() + front.update};
+    const Triangle update{to + front.update};
     form_update(panel, shape.pivots, below_slabs, pivots, update);
-    for (const Index child : front.children) add_to_update(plan_, child, work_.data(), update);
+    for (const Index child : front.children) add_to_update(plan_, child, from, update);
     return tally;
 }
 
 std::size_t SupernodalLdlt::bytes() const {
-    const std::size_t doubles = factor_.size() + work_.size() + 2 * pattern_.rows.size() + 3 * pattern_.size;
+    const std::size_t doubles = factor_.size() + shared_work_.size() + subtree_work_.size() +
+                                pattern_.rows.size() + 3 * pattern_.size;
     return sizeof(double) * doubles + sizeof(Index) * (pattern_.rows.size() + 2 * plan_.rows.size()) +
            sizeof(PlacedEntry) * plan_.entries.size() + sizeof(Transfer) * plan_.transfers.size();
 }

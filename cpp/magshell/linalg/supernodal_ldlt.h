@@ -44,8 +44,10 @@ class SupernodalLdlt : public Factor {
     explicit SupernodalLdlt(std::shared_ptr<const Analysis> analysis);
     static std::shared_ptr<const Analysis> analysed(const SparsePattern& pattern, Ordering ordering);
 
-    PivotTally process(Index front);
+    /// Of a front: the work spaces that the updates of its children lie in, and that its own goes to.
+    PivotTally process(Index front, double* from, double* to);
     void solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const;
+    VectorXd image(const VectorXd& x) const;
     VectorXd refined_solution(const VectorXd& rhs) const;
     bool recovers_known_solution() const;
 
@@ -53,9 +55,10 @@ class SupernodalLdlt : public Factor {
     const SparsePattern& pattern_ = analysis_->pattern;
     const AssemblyPlan& plan_ = analysis_->plan;
 
-    std::vector<double> values_, scaled_values_, scale_;  // of A, of S A S, of S
-    double largest_scaled_ = 0.0;                         // |entry| of S A S
-    slabs::Buffer factor_, work_;
+    LargeVector<double> scaled_values_;  // of S A S
+    std::vector<double> scale_;          // S
+    double largest_scaled_ = 0.0;        // |entry| of S A S
+    slabs::Buffer factor_, shared_work_, subtree_work_;
     std::vector<double> diagonal_, coupling_;  // D
     std::vector<Index> pivot_order_;           // within each front
     FactorReport report_;

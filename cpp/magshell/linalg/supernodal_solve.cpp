@@ -52,6 +52,12 @@ void SupernodalLdlt::solve(Eigen::Ref<Eigen::MatrixXd> rhs) const {
     for (Index j = 0; j < rhs.cols(); ++j) rhs.col(j) = refined_solution(rhs.col(j));
 }
 
+// A x. S is of powers of two: nothing is lost by taking them out again.
+VectorXd SupernodalLdlt::image(const VectorXd& x) const {
+    const Eigen::Map<const VectorXd> scale(scale_.data(), size());
+    return product(pattern_, scaled_values_.data(), x.cwiseQuotient(scale)).cwiseQuotient(scale);
+}
+
 // x += (L D L^T)^-1 (b - A x), until the residual is down to rounding or does not fall any more.
 VectorXd SupernodalLdlt::refined_solution(const VectorXd& rhs) const {
     // Norms in the scaled unknowns, where rows are comparable.
@@ -67,14 +73,14 @@ VectorXd SupernodalLdlt::refined_solution(const VectorXd& rhs) const {
     };
     VectorXd solution = rhs;
     solve_factored(solution);
-    VectorXd residual = rhs - product(pattern_, values_.data(), solution);
+    VectorXd residual = rhs - image(solution);
     double norm = residual_norm(residual);
     for (int step = 0; step < most_refinements; ++step) {
         if (norm <= rounding * (largest_scaled_ * solution_norm(solution) + residual_norm(rhs))) break;
         VectorXd candidate = residual;
         solve_factored(candidate);
         candidate += solution;
-        residual = rhs - product(pattern_, values_.data(), candidate);
+        residual = rhs - image(candidate);
         const double candidate_norm = residual_norm(residual);
         if (!(candidate_norm < norm)) break;
         std::swap(solution, candidate);
@@ -91,7 +97,7 @@ bool SupernodalLdlt::recovers_known_solution() const {
         const std::uint32_t hash = static_cast<std::uint32_t>(j + 1) * 2654435769u;  // golden-ratio hashing
         known[j] = scale_[j] * (hash / 2147483648.0 - 1.0);
     }
-    const VectorXd found = refined_solution(product(pattern_, values_.data(), known));
+    const VectorXd found = refined_solution(image(known));
     for (Index j = 0; j < size(); ++j) {
         if (!(std::abs(found[j] - known[j]) <= 1e-3 * scale_[j])) return false;
     }

@@ -6,7 +6,8 @@
 
 namespace magshell {
 
-/// The part of a child's update that falls on the parent's pivot columns. `work` holds all updates.
+/// The part of a child's update that falls on the parent's pivot columns. `work` is the space that the update
+/// lies in.
 void add_to_panel(const AssemblyPlan& plan, Index child, double* work, const slabs::Panel& parent);
 
 /// The rest, which falls on the update the parent itself leaves behind.

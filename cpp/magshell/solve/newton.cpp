@@ -37,6 +37,10 @@ double deserved(double residual, double tolerance) {
     return std::max(0.1 * tolerance / residual, std::min(1e-2, residual));
 }
 
+// A Hessian changes as much as the sheet has moved, of its thickness. A mixed step's stresses are off by the
+// square of the step before.
+constexpr double nothing = 1e-7, little = 1e-4;
+
 // Of solves with an unsymmetric matrix for gradients.
 constexpr double exact_solve = 1e-13;
 constexpr int few_vectors = 30, many_vectors = 300;
@@ -311,6 +315,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
     VectorXd move = model_.reduction().prescribed_increment(q, controls.motion);
     bool extrapolated = false;
     double last_step = 0.0, last_residual = std::numeric_limits<double>::infinity();
+    double moved = std::numeric_limits<double>::infinity();  // since the last factorization
     Index first_negative_pivots = 0;
     const auto fail = [&](std::string reason) {
         report.reason = std::move(reason);
@@ -329,6 +334,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (in_place && settled &&
             (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
+            report.in_place = moved <= nothing * model_.thinnest();
             return report;
         }
         if (report.iterations == max_iterations)
@@ -338,12 +344,13 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         last_residual = report.residual;
         if (report.iterations == 0 || !factor_serves(contraction, report.residual)) {
             const bool cautious = contraction > contracting;
-            const FactorReport factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
-            report.negative_pivots = factor.negative_pivots;
-            if (!factor.succeeded) return fail(factor.reason);
-            if (report.iterations == 0) first_negative_pivots = factor.negative_pivots;
-            report.lost = factor.negative_pivots > first_negative_pivots + most_new_negative_pivots;
+            report.factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
+            if (!report.factor.succeeded) return fail(report.factor.reason);
+            const Index negative_pivots = report.factor.negative_pivots;
+            if (report.iterations == 0) first_negative_pivots = negative_pivots;
+            report.lost = negative_pivots > first_negative_pivots + most_new_negative_pivots;
             if (mixed && report.lost) return fail("the iteration lost its way");
+            moved = last_step <= little * model_.thinnest() ? 0.0 : std::numeric_limits<double>::infinity();
         }
         const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
                                                        deserved(report.residual, options_.tolerance));
@@ -355,6 +362,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (mixed) model_.extrapolate(step);
         extrapolated = true;
         last_step = length;
+        moved += length;
         q += step;
         evaluate(q, controls, anchor);
     }

@@ -31,9 +31,10 @@ struct NewtonReport {
     bool converged = false;
     int iterations = 0;
     double residual = 0.0;
-    Index negative_pivots = 0;  // of the last matrix factorized
-    bool lost = false;          // far from any solution: a step half as long will hardly do
-    std::string reason;         // why not converged
+    FactorReport factor;    // of the last matrix factorized
+    bool in_place = false;  // whether that may stand for the solution's own, nothing having moved since
+    bool lost = false;      // far from any solution: a step half as long will hardly do
+    std::string reason;     // why not converged
 };
 
 /// A quadratic pull, 1/2 sum w_i (q_i - target_i)^2: the inertia of a time step, or one implicit Euler step
@@ -126,7 +127,7 @@ class Newton {
     NewtonOptions options_;
     Watch watch_;
     std::shared_ptr<Factor> factor_;
-    std::vector<double> values_;
+    LargeVector<double> values_;
     bool unsymmetric_ = false;  // whether what was assembled last has a remainder
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     mutable double linear_time_ = 0.0;

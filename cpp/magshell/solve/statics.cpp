@@ -32,6 +32,7 @@ class Statics {
         double step = options_.first_step, failed_step = 2.0;
         const double turn = std::abs(to_.motion - from_.motion) * newton_.model().reduction().largest_turn();
         const double longest_step = turn > longest_turn ? longest_turn / turn : 1.0;
+        FactorReport factor;  // at the last load step
         while (result_.progress < 1.0) {
             step = std::min(step, longest_step);
             const double target = std::min(1.0, result_.progress + step);
@@ -40,6 +41,7 @@ class Statics {
             const NewtonReport report = newton_.solve(trial, controls);
             if (report.converged) {
                 accept(trial, controls, target, report.residual);
+                factor = report.in_place ? report.factor : FactorReport();
                 if (report.iterations <= quick_iterations) step = std::min(2.0 * step, 0.75 * failed_step);
                 failed_step *= forgetting;
                 continue;
@@ -50,11 +52,12 @@ class Statics {
             step = (report.lost ? 0.25 : 0.5) * failed_step;
             if (step >= options_.smallest_step * longest_step && options_.start_at_rest) continue;
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
+            factor = {};
             const double end = longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0;
             if (!plain_steps(end) && !descend(end)) return false;
             step = longest_step;
         }
-        return check_stability();
+        return factor.succeeded ? judge(factor) : check_stability();
     }
 
     // A sheet bent far already may be too much for the mixed steps, and not for plain ones.
@@ -80,8 +83,9 @@ class Statics {
     }
 
     // The factorization at the solution itself, with its own stresses, decides.
-    bool check_stability() {
-        const FactorReport factor = newton_.factorize_at(result_.state, result_.controls);
+    bool check_stability() { return judge(newton_.factorize_at(result_.state, result_.controls)); }
+
+    bool judge(const FactorReport& factor) {
         result_.unstable_directions = factor.negative_pivots;
         result_.stable = factor.succeeded && factor.negative_pivots == 0 && factor.perturbed_pivots == 0;
         if (!factor.succeeded) result_.reason = factor.reason;
