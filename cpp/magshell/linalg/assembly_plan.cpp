@@ -164,8 +164,31 @@ void split(AssemblyPlan& plan, const std::vector<double>& subtree_flops, double 
             plan.top.push_back(s);
             begin = s + 1;
         } else if (parent == -1 || in_top[parent]) {
-            plan.subtrees.push_back({begin, s + 1});
+            const FrontShape& root = plan.fronts[s].shape;
+            const Index first = plan.fronts[begin].shape.first;
+            plan.subtrees.push_back({begin, s + 1, first, root.first + root.pivots - first});
             begin = s + 1;
+        }
+    }
+    // The largest first, so that threads end together.
+    const auto flops = [&](const Subtree& subtree) { return subtree_flops[subtree.end - 1]; };
+    std::stable_sort(plan.subtrees.begin(), plan.subtrees.end(),
+                     [&](const Subtree& a, const Subtree& b) { return flops(a) > flops(b); });
+}
+
+void place_vectors(AssemblyPlan& plan) {
+    plan.targets = plan.rows;
+    std::vector<Index> place(plan.order.size());
+    for (Subtree& subtree : plan.subtrees) {
+        subtree.local = plan.local_doubles;
+        const FrontShape& root = plan.fronts[subtree.end - 1].shape;
+        plan.local_doubles += subtree.unknowns + root.below;
+        std::iota(place.begin() + subtree.first, place.begin() + subtree.first + subtree.unknowns, 0);
+        for (Index k = 0; k < root.below; ++k) place[plan.rows[root.rows + k]] = subtree.unknowns + k;
+        for (Index s = subtree.begin; s < subtree.end; ++s) {
+            const FrontShape& front = plan.fronts[s].shape;
+            for (Index k = 0; k < front.below; ++k)
+                plan.targets[front.rows + k] = place[plan.rows[front.rows + k]];
         }
     }
 }
@@ -183,6 +206,8 @@ AssemblyPlan assembly_plan(const SparsePattern& pattern, AssemblyTree tree) {
         const FrontShape& shape = tree.fronts[s];
         plan.fronts[s].shape = shape;
         plan.fronts[s].panel = plan.factor_doubles;
+        plan.most_pivots = std::max(plan.most_pivots, shape.pivots);
+        plan.most_below = std::max(plan.most_below, shape.below);
         const std::ptrdiff_t doubles = Panel::doubles(shape.pivots, shape.below);
         if (doubles > std::numeric_limits<Index>::max()) {
             throw InvalidInput(
@@ -199,8 +224,9 @@ AssemblyPlan assembly_plan(const SparsePattern& pattern, AssemblyTree tree) {
     place_entries(pattern, plan);
     place_updates(plan);
     split(plan, subtree_flops, tree.flops());
+    place_vectors(plan);
     std::vector<Index> roots, inner;
-    for (const FrontRange& subtree : plan.subtrees) {
+    for (const Subtree& subtree : plan.subtrees) {
         roots.push_back(subtree.end - 1);
         inner.resize(subtree.end - 1 - subtree.begin);
         std::iota(inner.begin(), inner.end(), subtree.begin);

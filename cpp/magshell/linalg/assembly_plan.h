@@ -35,9 +35,11 @@ struct FrontPlan {
     std::vector<Index> children;
 };
 
-/// A contiguous range of fronts that depends on no other: subtrees, one thread each.
-struct FrontRange {
-    Index begin, end;
+/// Fronts that depend on no others, for one thread.
+struct Subtree {
+    Index begin, end;          // its fronts, the root last
+    Index first, unknowns;     // what they eliminate
+    std::ptrdiff_t local = 0;  // where its vector stands among those of all subtrees [doubles]
 };
 
 struct AssemblyPlan {
@@ -45,12 +47,16 @@ struct AssemblyPlan {
     std::vector<FrontPlan> fronts;  // and one more, for the ends of entries and transfers
     std::vector<Index> rows;        // below the pivots of each front, from shape.rows on
     std::vector<Index> places;      // of those rows in the parent: among its pivots, or among its rows below
+    std::vector<Index> targets;     // of those rows in the vector of the subtree, or for top fronts of all
     std::vector<PlacedEntry> entries;
     std::vector<Transfer> transfers;
-    std::vector<FrontRange> subtrees;  // independent of the number of threads
-    std::vector<Index> top;            // the fronts above them, in order
+    std::vector<Subtree> subtrees;  // independent of the number of threads
+    std::vector<Index> top;         // the fronts above them, in order
     // Updates of top fronts and of the roots of subtrees lie in one work space that all threads share, those
     // within a subtree in one that its thread has to itself.
+    Index most_pivots = 0, most_below = 0;
+    // The vector of a subtree: its unknowns, then one number for each row below its root.
+    std::ptrdiff_t local_doubles = 0;
     std::ptrdiff_t factor_doubles = 0, shared_doubles = 0, subtree_doubles = 0;
 
     Index front_count() const { return static_cast<Index>(fronts.size()) - 1; }

@@ -183,9 +183,9 @@ void solve_rows(double* const (&slab)[S], const PivotBlock& block, const Inverse
 // depend on the range alone.
 template <class Body>
 void for_parts(Range range, Body&& body) {
-    constexpr Index part = 36;
+    constexpr Index part = 12;
     const Index parts = (range.end - range.begin + part - 1) / part;
-    if (parts <= 2) return body(range);
+    if (parts <= 1) return body(range);
     parallel_for(parts, [&](int k) {
         const Index begin = range.begin + part * k;
         body(Range{begin, std::min(begin + part, range.end)});

@@ -15,6 +15,23 @@ struct Pivots {
     double* coupling;
 };
 
+// D z = y for the 1x1 or 2x2 pivot that begins at k; T is a number or eight of them. Returns how many rows it
+// has.
+template <class T>
+Index divide_by_pivot(const Pivots& d, Index k, T& first, T* second) {
+    const double a = d.diagonal[k], b = d.coupling[k];
+    if (b == 0.0) {
+        first = first / a;
+        return 1;
+    }
+    const double c = d.diagonal[k + 1];
+    const double determinant = a * c - b * b;
+    const T y = first, z = *second;
+    first = (y * c - z * b) / determinant;
+    *second = (z * a - y * b) / determinant;
+    return 2;
+}
+
 struct PivotTally {
     Index negative = 0, perturbed = 0;
     double growth = 0.0;  // max |l_ik w_ik|, w = L D

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <string>
 
 #include "magshell/core/errors.h"
@@ -11,6 +10,7 @@
 #include "magshell/linalg/front.h"
 #include "magshell/linalg/ordering.h"
 #include "magshell/linalg/transfer.h"
+#include "magshell/linalg/work_spaces.h"
 
 namespace magshell {
 
@@ -21,44 +21,6 @@ using slabs::width;
 namespace {
 
 constexpr double doubtful_growth = 1e8;  // half of the digits are gone: check before claiming success
-
-// Equal parts of a buffer, one for each thread at a time.
-class WorkSpaces {
-  public:
-    WorkSpaces(double* data, std::ptrdiff_t doubles, std::ptrdiff_t each) {
-        for (std::ptrdiff_t begin = 0; each > 0 && begin + each <= doubles; begin += each)
-            idle_.push_back(data + begin);
-    }
-
-    class Lease {
-      public:
-        explicit Lease(WorkSpaces& spaces) : spaces_(spaces), data_(spaces.take()) {}
-        Lease(const Lease&) = delete;
-        Lease& operator=(const Lease&) = delete;
-        ~Lease() { spaces_.give_back(data_); }
-        double* data() const { return data_; }
-
-      private:
-        WorkSpaces& spaces_;
-        double* const data_;
-    };
-
-  private:
-    double* take() {
-        const std::lock_guard lock(mutex_);
-        if (idle_.empty()) return nullptr;  // where no subtree needs any
-        double* const data = idle_.back();
-        idle_.pop_back();
-        return data;
-    }
-    void give_back(double* data) {
-        const std::lock_guard lock(mutex_);
-        if (data) idle_.push_back(data);
-    }
-
-    std::mutex mutex_;
-    std::vector<double*> idle_;
-};
 
 }  // namespace
 
@@ -96,17 +58,17 @@ FactorReport SupernodalLdlt::factorize(const double* values) {
     const int subtrees = static_cast<int>(plan_.subtrees.size());
     const std::ptrdiff_t subtree_doubles = std::min(num_threads(), subtrees) * plan_.subtree_doubles;
     if (subtree_work_.size() < subtree_doubles) subtree_work_ = slabs::Buffer(subtree_doubles);
-    WorkSpaces spaces(subtree_work_.data(), subtree_work_.size(), plan_.subtree_doubles);
+    WorkSpaces spaces(subtree_work_, plan_.subtree_doubles);
     largest_scaled_ = equilibrate(pattern_, values, scale_, scaled_values_);
 
     double* const shared = shared_work_.data();
     std::vector<PivotTally> tallies(subtrees);
     parallel_for(subtrees, [&](int task) {
-        const FrontRange& subtree = plan_.subtrees[task];
+        const Subtree& subtree = plan_.subtrees[task];
         const Index root = subtree.end - 1;
-        const WorkSpaces::Lease own(spaces);
-        for (Index s = subtree.begin; s < root; ++s) tallies[task].add(process(s, own.data(), own.data()));
-        tallies[task].add(process(root, own.data(), shared));
+        double* const own = spaces.of_this_thread();
+        for (Index s = subtree.begin; s < root; ++s) tallies[task].add(process(s, own, own));
+        tallies[task].add(process(root, own, shared));
     });
     PivotTally tally;
     for (const PivotTally& each : tallies) tally.add(each);
@@ -156,7 +118,7 @@ PivotTally SupernodalLdlt::process(Index s, double* from, double* to) {
 std::size_t SupernodalLdlt::bytes() const {
     const std::size_t doubles = factor_.size() + shared_work_.size() + subtree_work_.size() +
                                 pattern_.rows.size() + 3 * pattern_.size;
-    return sizeof(double) * doubles + sizeof(Index) * (pattern_.rows.size() + 2 * plan_.rows.size()) +
+    return sizeof(double) * doubles + sizeof(Index) * (pattern_.rows.size() + 3 * plan_.rows.size()) +
            sizeof(PlacedEntry) * plan_.entries.size() + sizeof(Transfer) * plan_.transfers.size();
 }
 
