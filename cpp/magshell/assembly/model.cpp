@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "magshell/assembly/friction_term.h"
 #include "magshell/core/errors.h"
@@ -191,12 +192,18 @@ SheetStrains Model::stresses(const SheetStrains& strains) const {
     return stresses;
 }
 
-std::unique_ptr<Factor> Model::new_factor() {
+std::shared_ptr<Factor> Model::new_factor() {
+    if (spare_) return std::exchange(spare_, nullptr);
     if (!analysed_) {
         analysed_ = analyze(reduction_.pattern());
         ++analyses_;
     }
     return analysed_->sibling();
+}
+
+void Model::keep_spare(std::shared_ptr<Factor> factor) {
+    constexpr std::size_t large = std::size_t{1} << 28;
+    if (factor && factor.use_count() == 1 && factor->bytes() <= large) spare_ = std::move(factor);
 }
 
 void Model::add_couples(const SceneInput& input) {

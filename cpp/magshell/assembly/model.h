@@ -104,7 +104,10 @@ class Model {
     SheetStrains stresses(const SheetStrains& strains) const;
 
     /// A factorization for the reduced Hessian, analysed once for all of them.
-    std::unique_ptr<Factor> new_factor();
+    std::shared_ptr<Factor> new_factor();
+    /// One that nobody else holds, for the next who asks: fresh memory costs page faults. What is large goes
+    /// back to the system.
+    void keep_spare(std::shared_ptr<Factor> factor);
     /// How often the pattern was analysed.
     int analyses() const { return analyses_; }
 
@@ -144,6 +147,7 @@ class Model {
     Kinematics kinematics_;  // where the forces were evaluated last
     Remainder remainder_;
     std::unique_ptr<Factor> analysed_;
+    std::shared_ptr<Factor> spare_;
     int analyses_ = 0;
     std::vector<double> thickness_;  // in our numbering
     double thinnest_ = 0.0;

@@ -36,14 +36,16 @@ void check_pattern(const SparsePattern& pattern) {
         }
         Index previous = -1;
         for (Index k = starts[j]; k < starts[j + 1]; ++k) {
-            const std::string where = "rows[" + text(k) + "] = " + text(rows[k]) + " in column " + text(j);
+            const auto where = [&] {
+                return "rows[" + text(k) + "] = " + text(rows[k]) + " in column " + text(j);
+            };
             if (rows[k] < 0 || rows[k] >= pattern.size) {
-                throw InvalidInput(where + " is outside the matrix, whose size is " + text(pattern.size));
+                throw InvalidInput(where() + " is outside the matrix, whose size is " + text(pattern.size));
             }
             if (rows[k] < j) {
-                throw InvalidInput(where + " is above the diagonal; only the lower triangle is wanted");
+                throw InvalidInput(where() + " is above the diagonal; only the lower triangle is wanted");
             }
-            if (rows[k] <= previous) throw InvalidInput(where + " is not greater than the row before it");
+            if (rows[k] <= previous) throw InvalidInput(where() + " is not greater than the row before it");
             previous = rows[k];
         }
         if (starts[j] == starts[j + 1] || rows[starts[j]] != j) {

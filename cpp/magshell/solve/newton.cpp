@@ -114,10 +114,11 @@ FactorReport Newton::factorize_assembled(const Anchor& anchor) {
     ++factorizations_;
     const Stopwatch running(linear_time_);
     FactorReport report;
-    if (std::all_of(values_.begin(), values_.end(), [](double value) { return std::isfinite(value); }))
+    try {
         report = factor_->factorize(values_.data());
-    else
+    } catch (const InvalidInput&) {
         report.reason = "the forces are not finite: a face has no area, or lies where a field has no value";
+    }
     if (!report.succeeded) ++failed_factorizations_;
     return report;
 }

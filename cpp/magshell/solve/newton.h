@@ -52,6 +52,9 @@ class Newton {
     using Watch = std::function<void(double residual)>;
 
     Newton(Model& model, const NewtonOptions& options, Watch watch = {});
+    Newton(const Newton&) = delete;
+    Newton& operator=(const Newton&) = delete;
+    ~Newton() { model_.keep_spare(std::move(factor_)); }
 
     /// From q to a stationary point at the controls, or to where it failed. Held nodes are moved to where the
     /// controls want them, in the first iteration and with its linearization.
