@@ -39,13 +39,13 @@ class SharedFactor {
   public:
     SharedFactor(Index size, const IndexArray& column_starts, const IndexArray& rows,
                  const std::string& backend, const std::string& ordering) {
-        const SparsePattern pattern{size, to_indices(column_starts, "column_starts"),
-                                    to_indices(rows, "rows")};
+        auto pattern = std::make_shared<const SparsePattern>(
+            SparsePattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")});
         const FactorOptions options{chosen(backend, "backend", backends),
                                     chosen(ordering, "ordering", orderings)};
-        entries_ = static_cast<py::ssize_t>(pattern.rows.size());
+        entries_ = static_cast<py::ssize_t>(pattern->rows.size());
         const py::gil_scoped_release release;
-        factor_ = analyze(pattern, options);
+        factor_ = analyze(std::move(pattern), options);
     }
 
     FactorReport factorize(const Array& values) {
@@ -56,7 +56,8 @@ class SharedFactor {
         }
         const py::gil_scoped_release release;
         const std::unique_lock lock(mutex_);
-        return factor_->factorize(values.data());
+        std::copy_n(values.data(), values.size(), factor_->values().begin());
+        return factor_->factorize();
     }
 
     py::array solve(const Array& rhs) const {

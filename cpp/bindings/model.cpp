@@ -127,7 +127,7 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
         else
             values = model.matrix().values();
     }
-    const SparsePattern& pattern = model.reduction().pattern();
+    const SparsePattern& pattern = *model.reduction().pattern();
     const auto& starts = reduced ? pattern.column_starts : model.matrix().column_starts();
     const auto& rows = reduced ? pattern.rows : model.matrix().rows();
     return py::make_tuple(starts.size() - 1, py::array_t<Index>(starts.size(), starts.data()),

@@ -29,17 +29,22 @@ Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, con
             reduced[u] = static_cast<Index>(free_unknowns_.size());
             free_unknowns_.push_back(u);
         }
-    pattern_.size = static_cast<Index>(free_unknowns_.size());
-    pattern_.column_starts.push_back(0);
+    SparsePattern pattern;
+    pattern.size = static_cast<Index>(free_unknowns_.size());
+    pattern.column_starts.reserve(free_unknowns_.size() + 1);
+    pattern.rows.reserve(matrix.rows().size());
+    source_.reserve(matrix.rows().size());
+    pattern.column_starts.push_back(0);
     for (const Index u : free_unknowns_) {
         for (Index k = matrix.column_starts()[u]; k < matrix.column_starts()[u + 1]; ++k) {
             const Index row = reduced[matrix.rows()[k]];
             if (row < 0) continue;
-            pattern_.rows.push_back(row);
+            pattern.rows.push_back(row);
             source_.push_back(k);
         }
-        pattern_.column_starts.push_back(static_cast<Index>(pattern_.rows.size()));
+        pattern.column_starts.push_back(static_cast<Index>(pattern.rows.size()));
     }
+    pattern_ = std::make_shared<const SparsePattern>(std::move(pattern));
 }
 
 bool Reduction::axis_aligned(const HeldNode& h) const {
@@ -180,8 +185,8 @@ VectorXd Reduction::expand(const VectorXd& reduced) const {
 }
 
 std::size_t Reduction::bytes() const {
-    return (frame_of_.capacity() + free_unknowns_.capacity() + source_.capacity() + pattern_.rows.capacity() +
-            pattern_.column_starts.capacity()) *
+    return (frame_of_.capacity() + free_unknowns_.capacity() + source_.capacity() +
+            pattern_->rows.capacity() + pattern_->column_starts.capacity()) *
            sizeof(Index);
 }
 

@@ -5,6 +5,7 @@
 // is held along the first one or two axes. Nodes without supports cost nothing here.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "magshell/assembly/motion.h"
@@ -31,8 +32,8 @@ class Reduction {
     void set_motions(std::vector<Motion> motions) { motions_ = std::move(motions); }
     bool moves() const { return !motions_.empty(); }
 
-    Index size() const { return pattern_.size; }
-    const SparsePattern& pattern() const { return pattern_; }
+    Index size() const { return pattern_->size; }
+    const std::shared_ptr<const SparsePattern>& pattern() const { return pattern_; }
 
     /// Where the supports want their nodes at this progress of their motion, less where they are: zero
     /// elsewhere.
@@ -73,7 +74,7 @@ class Reduction {
     Index n_vertices_, full_size_;
     std::vector<Index> frame_of_;       // per node: index into held_ where turned, else -1; empty if none is
     std::vector<Index> free_unknowns_;  // reduced -> full, ascending
-    SparsePattern pattern_;
+    std::shared_ptr<const SparsePattern> pattern_;
     std::vector<Index> source_;  // reduced entry -> position in the full matrix
 };
 

@@ -11,7 +11,7 @@
 
 namespace magshell {
 
-std::unique_ptr<Factor> make_cholmod_factor(const SparsePattern&, Ordering) {
+std::unique_ptr<Factor> make_cholmod_factor(std::shared_ptr<const SparsePattern>, Ordering) {
     throw InvalidInput("magshell was built without CHOLMOD; use the backend \"supernodal\" or \"eigen\"");
 }
 
@@ -28,9 +28,10 @@ namespace {
 
 class CholmodFactor : public Factor {
   public:
-    CholmodFactor(const SparsePattern& pattern, Ordering ordering) : pattern_(pattern), ordering_(ordering) {
+    CholmodFactor(std::shared_ptr<const SparsePattern> pattern, Ordering ordering)
+        : Factor(std::move(pattern)), ordering_(ordering) {
         report_.reason = "factorize() has not been called";
-        if (pattern_.size == 0) return;
+        if (pattern_->size == 0) return;
         const SingleThreaded guard;
         common_->supernodal = CHOLMOD_SUPERNODAL;
         common_->nmethods = 0;
@@ -39,7 +40,7 @@ class CholmodFactor : public Factor {
             common_->method[common_->nmethods++].ordering =
                 each == Ordering::amd ? CHOLMOD_AMD : CHOLMOD_METIS;
         }
-        cholmod_sparse view = cholmod_view(pattern_, nullptr);
+        cholmod_sparse view = cholmod_view(*pattern_, nullptr);
         factor_ = cholmod_analyze(&view, common_);
         if (!factor_) throw InvalidInput("CHOLMOD could not analyse the matrix" + status());
         nonzeros_ = static_cast<std::int64_t>(common_->lnz);
@@ -48,13 +49,13 @@ class CholmodFactor : public Factor {
 
     ~CholmodFactor() override { cholmod_free_factor(&factor_, common_); }
 
-    FactorReport factorize(const double* values) override {
-        check_finite(values, pattern_.rows.size());
+    FactorReport factorize() override {
+        check_finite(values_);
         report_ = {};
         report_.succeeded = true;
-        if (pattern_.size == 0) return report_;
+        if (pattern_->size == 0) return report_;
         const SingleThreaded guard;
-        cholmod_sparse view = cholmod_view(pattern_, values);
+        cholmod_sparse view = cholmod_view(*pattern_, values_.data());
         const bool done = cholmod_factorize(&view, factor_, common_);
         if (!done || common_->status != CHOLMOD_OK) {
             report_.succeeded = false;
@@ -67,7 +68,7 @@ class CholmodFactor : public Factor {
     }
 
     void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const override {
-        check_solvable(report_, pattern_.size, rhs);
+        check_solvable(report_, pattern_->size, rhs);
         if (rhs.size() == 0) return;
         const SingleThreaded guard;
         CholmodCommon common;  // a workspace of this call's own, so that threads may solve at the same time
@@ -90,19 +91,17 @@ class CholmodFactor : public Factor {
         return std::make_unique<CholmodFactor>(pattern_, ordering_);
     }
     std::string name() const override { return "cholmod"; }
-    Index size() const override { return pattern_.size; }
     std::int64_t nonzeros() const override { return nonzeros_; }
     double flops() const override { return flops_; }
     std::size_t bytes() const override {
         const std::size_t factor =
             factor_ ? factor_->xsize * sizeof(double) + factor_->ssize * sizeof(int) : 0;
-        return factor + pattern_.rows.size() * sizeof(Index);
+        return factor + values_.size() * sizeof(double) + pattern_->rows.size() * sizeof(Index);
     }
 
   private:
     std::string status() const { return " (its status is " + std::to_string(common_.status()) + ")"; }
 
-    SparsePattern pattern_;
     Ordering ordering_;
     CholmodCommon common_;
     ::cholmod_factor* factor_ = nullptr;
@@ -113,8 +112,8 @@ class CholmodFactor : public Factor {
 
 }  // namespace
 
-std::unique_ptr<Factor> make_cholmod_factor(const SparsePattern& pattern, Ordering ordering) {
-    return std::make_unique<CholmodFactor>(pattern, ordering);
+std::unique_ptr<Factor> make_cholmod_factor(std::shared_ptr<const SparsePattern> pattern, Ordering ordering) {
+    return std::make_unique<CholmodFactor>(std::move(pattern), ordering);
 }
 
 }  // namespace magshell

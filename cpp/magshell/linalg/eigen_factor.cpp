@@ -11,18 +11,18 @@ namespace {
 
 class EigenFactor : public Factor {
   public:
-    explicit EigenFactor(const SparsePattern& pattern) : pattern_(pattern) {
-        const std::vector<double> values(pattern_.rows.size(), 1.0);
-        if (pattern_.size > 0) solver_.analyzePattern(view(values.data()));
+    explicit EigenFactor(std::shared_ptr<const SparsePattern> pattern) : Factor(std::move(pattern)) {
+        const std::vector<double> values(pattern_->rows.size(), 1.0);
+        if (pattern_->size > 0) solver_.analyzePattern(view(values.data()));
         report_.reason = "factorize() has not been called";
     }
 
-    FactorReport factorize(const double* values) override {
-        check_finite(values, pattern_.rows.size());
+    FactorReport factorize() override {
+        check_finite(values_);
         report_ = {};
         report_.succeeded = true;
-        if (pattern_.size == 0) return report_;
-        solver_.factorize(view(values));
+        if (pattern_->size == 0) return report_;
+        solver_.factorize(view(values_.data()));
         if (solver_.info() != Eigen::Success) {
             report_.succeeded = false;
             report_.reason =
@@ -30,12 +30,12 @@ class EigenFactor : public Factor {
             return report_;
         }
         const VectorXd pivots = solver_.vectorD();
-        for (Index j = 0; j < pattern_.size; ++j) report_.negative_pivots += pivots[j] < 0.0;
+        for (Index j = 0; j < pattern_->size; ++j) report_.negative_pivots += pivots[j] < 0.0;
         return report_;
     }
 
     void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const override {
-        check_solvable(report_, pattern_.size, rhs);
+        check_solvable(report_, pattern_->size, rhs);
         if (rhs.size() == 0) return;
         const Eigen::MatrixXd solution = solver_.solve(rhs);
         rhs = solution;
@@ -43,19 +43,18 @@ class EigenFactor : public Factor {
 
     std::unique_ptr<Factor> sibling() const override { return std::make_unique<EigenFactor>(pattern_); }
     std::string name() const override { return "eigen"; }
-    Index size() const override { return pattern_.size; }
 
     // Eigen tells neither before the first factorization.
     std::int64_t nonzeros() const override {
-        return report_.succeeded && pattern_.size > 0
-                   ? solver_.matrixL().nestedExpression().nonZeros() + pattern_.size
+        return report_.succeeded && pattern_->size > 0
+                   ? solver_.matrixL().nestedExpression().nonZeros() + pattern_->size
                    : 0;
     }
     double flops() const override {
         if (nonzeros() == 0) return 0.0;
         const auto* starts = solver_.matrixL().nestedExpression().outerIndexPtr();
         double sum = 0.0;
-        for (Index j = 0; j < pattern_.size; ++j) {
+        for (Index j = 0; j < pattern_->size; ++j) {
             const double entries = starts[j + 1] - starts[j];
             sum += entries * (entries + 2.0);
         }
@@ -63,30 +62,29 @@ class EigenFactor : public Factor {
     }
     std::size_t bytes() const override {
         return static_cast<std::size_t>(nonzeros()) * (sizeof(double) + sizeof(Index)) +
-               pattern_.rows.size() * (sizeof(double) + sizeof(Index));
+               pattern_->rows.size() * (sizeof(double) + sizeof(Index));
     }
 
   private:
     using Matrix = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
 
     Eigen::Map<const Matrix> view(const double* values) const {
-        return {pattern_.size,
-                pattern_.size,
-                static_cast<Index>(pattern_.rows.size()),
-                pattern_.column_starts.data(),
-                pattern_.rows.data(),
+        return {pattern_->size,
+                pattern_->size,
+                static_cast<Index>(pattern_->rows.size()),
+                pattern_->column_starts.data(),
+                pattern_->rows.data(),
                 values};
     }
 
-    SparsePattern pattern_;
     Eigen::SimplicialLDLT<Matrix, Eigen::Lower> solver_;
     FactorReport report_;
 };
 
 }  // namespace
 
-std::unique_ptr<Factor> make_eigen_factor(const SparsePattern& pattern) {
-    return std::make_unique<EigenFactor>(pattern);
+std::unique_ptr<Factor> make_eigen_factor(std::shared_ptr<const SparsePattern> pattern) {
+    return std::make_unique<EigenFactor>(std::move(pattern));
 }
 
 }  // namespace magshell

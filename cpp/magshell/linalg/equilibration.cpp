@@ -9,9 +9,8 @@ namespace magshell {
 
 // Ruiz (2001): divide rows and columns by the square root of their largest entry, repeatedly; twice is enough
 // for pivoting.
-double equilibrate(const SparsePattern& pattern, const double* values, std::vector<double>& scale,
-                   LargeVector<double>& scaled) {
-    check_finite(values, pattern.rows.size());
+double equilibrate(const SparsePattern& pattern, LargeVector<double>& values, std::vector<double>& scale) {
+    check_finite(values);
     std::fill(scale.begin(), scale.end(), 1.0);
     std::vector<double> largest(pattern.size);
     for (int sweep = 0; sweep < 2; ++sweep) {
@@ -32,8 +31,8 @@ double equilibrate(const SparsePattern& pattern, const double* values, std::vect
     double largest_of_all = 0.0;
     for (Index j = 0; j < pattern.size; ++j) {
         for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
-            scaled[k] = values[k] * (scale[j] * scale[pattern.rows[k]]);
-            largest_of_all = std::max(largest_of_all, std::abs(scaled[k]));
+            values[k] *= scale[j] * scale[pattern.rows[k]];
+            largest_of_all = std::max(largest_of_all, std::abs(values[k]));
         }
     }
     return largest_of_all;

@@ -7,15 +7,15 @@
 
 namespace magshell {
 
-std::unique_ptr<Factor> analyze(const SparsePattern& pattern, const FactorOptions& options) {
-    check_pattern(pattern);
+std::unique_ptr<Factor> analyze(std::shared_ptr<const SparsePattern> pattern, const FactorOptions& options) {
+    check_pattern(*pattern);
     switch (options.backend) {
         case Backend::supernodal:
-            return std::make_unique<SupernodalLdlt>(pattern, options.ordering);
+            return std::make_unique<SupernodalLdlt>(std::move(pattern), options.ordering);
         case Backend::cholmod:
-            return make_cholmod_factor(pattern, options.ordering);
+            return make_cholmod_factor(std::move(pattern), options.ordering);
         case Backend::eigen:
-            return make_eigen_factor(pattern);
+            return make_eigen_factor(std::move(pattern));
     }
     throw InvalidInput("unknown backend");
 }

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "magshell/core/large_memory.h"
 #include "magshell/core/types.h"
 
 namespace magshell {
@@ -54,11 +55,20 @@ struct FactorReport {
 /// may solve.
 class Factor {
   public:
+    explicit Factor(std::shared_ptr<const SparsePattern> pattern) : pattern_(std::move(pattern)) {}
     virtual ~Factor() = default;
 
-    /// Factorizes the matrix with these values, in the order of the pattern. Throws InvalidInput on NaN or
-    /// infinity.
-    virtual FactorReport factorize(const double* values) = 0;
+    /// The matrix, in the order of the pattern: to be written before each factorize(), which uses it up.
+    LargeVector<double>& values() {
+        values_.resize(pattern_->rows.size());
+        return values_;
+    }
+
+    /// Factorizes the matrix that was written. Throws InvalidInput on NaN or infinity.
+    virtual FactorReport factorize() = 0;
+
+    /// A x with the matrix factorized last.
+    virtual VectorXd image(const VectorXd& x) const { return product(*pattern_, values_.data(), x); }
 
     /// Replaces each column of `rhs` (size, k) by the solution. Throws InvalidInput unless the last
     /// factorize() succeeded.
@@ -68,15 +78,20 @@ class Factor {
     virtual std::unique_ptr<Factor> sibling() const = 0;
 
     virtual std::string name() const = 0;
-    virtual Index size() const = 0;
+    Index size() const { return pattern_->size; }
     virtual std::int64_t nonzeros() const = 0;  // entries of L, its diagonal included
     virtual double flops() const = 0;           // of one factorization, additions and multiplications
     virtual std::size_t bytes() const = 0;      // of the factor and its work space
+
+  protected:
+    const std::shared_ptr<const SparsePattern> pattern_;
+    LargeVector<double> values_;
 };
 
 /// Orders and analyses a pattern. Throws InvalidInput when the pattern is malformed or the backend was not
 /// built.
-std::unique_ptr<Factor> analyze(const SparsePattern& pattern, const FactorOptions& options = {});
+std::unique_ptr<Factor> analyze(std::shared_ptr<const SparsePattern> pattern,
+                                const FactorOptions& options = {});
 
 /// Whether this build contains the backend.
 bool is_built(Backend backend);

@@ -55,12 +55,12 @@ void check_pattern(const SparsePattern& pattern) {
     }
 }
 
-void check_finite(const double* values, std::size_t count) {
+void check_finite(const LargeVector<double>& values) {
     bool all_finite = true;  // without a branch, so that the usual case is one vectorized pass
-    for (std::size_t k = 0; k < count; ++k)
+    for (std::size_t k = 0; k < values.size(); ++k)
         all_finite &= std::abs(values[k]) <= std::numeric_limits<double>::max();
     if (all_finite) return;
-    for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t k = 0; k < values.size(); ++k) {
         if (std::isfinite(values[k])) continue;
         throw InvalidInput("values[" + std::to_string(k) + "] is " + std::to_string(values[k]) +
                            "; the entries of a matrix to factorize must be finite");

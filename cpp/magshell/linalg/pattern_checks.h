@@ -9,7 +9,7 @@ namespace magshell {
 void check_pattern(const SparsePattern& pattern);
 
 /// Throws InvalidInput naming the first value that is not finite.
-void check_finite(const double* values, std::size_t count);
+void check_finite(const LargeVector<double>& values);
 
 /// Throws InvalidInput when there is no factorization, or the right-hand side has the wrong number of rows.
 void check_solvable(const FactorReport& report, Index size, const Eigen::Ref<Eigen::MatrixXd>& rhs);

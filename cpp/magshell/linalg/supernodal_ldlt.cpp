@@ -24,31 +24,32 @@ constexpr double doubtful_growth = 1e8;  // half of the digits are gone: check b
 
 }  // namespace
 
-SupernodalLdlt::SupernodalLdlt(const SparsePattern& pattern, Ordering ordering)
-    : SupernodalLdlt(analysed(pattern, ordering)) {}
+SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, Ordering ordering)
+    : SupernodalLdlt(pattern, analysed(*pattern, ordering)) {}
 
 std::shared_ptr<const SupernodalLdlt::Analysis> SupernodalLdlt::analysed(const SparsePattern& pattern,
                                                                          Ordering ordering) {
     AssemblyTree tree = ordered_assembly_tree(pattern, ordering);
-    Analysis analysis{pattern, {}, tree.nonzeros(), tree.flops()};
+    Analysis analysis{{}, tree.nonzeros(), tree.flops()};
     analysis.plan = assembly_plan(pattern, std::move(tree));
     return std::make_shared<const Analysis>(std::move(analysis));
 }
 
-SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const Analysis> analysis) : analysis_(std::move(analysis)) {
-    scaled_values_.resize(pattern_.rows.size());
-    scale_.resize(pattern_.size);
-    diagonal_.resize(pattern_.size);
-    coupling_.resize(pattern_.size);
-    pivot_order_.resize(pattern_.size);
+SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern,
+                               std::shared_ptr<const Analysis> analysis)
+    : Factor(std::move(pattern)), analysis_(std::move(analysis)) {
+    scale_.resize(size());
+    diagonal_.resize(size());
+    coupling_.resize(size());
+    pivot_order_.resize(size());
     report_.reason = "factorize() has not been called";
 }
 
 std::unique_ptr<Factor> SupernodalLdlt::sibling() const {
-    return std::unique_ptr<Factor>(new SupernodalLdlt(analysis_));
+    return std::unique_ptr<Factor>(new SupernodalLdlt(pattern_, analysis_));
 }
 
-FactorReport SupernodalLdlt::factorize(const double* values) {
+FactorReport SupernodalLdlt::factorize() {
     report_ = {};
     report_.reason = "the last factorize() did not finish";
     if (factor_.size() == 0) {  // an analysis that only has siblings needs none
@@ -59,7 +60,7 @@ FactorReport SupernodalLdlt::factorize(const double* values) {
     const std::ptrdiff_t subtree_doubles = std::min(num_threads(), subtrees) * plan_.subtree_doubles;
     if (subtree_work_.size() < subtree_doubles) subtree_work_ = slabs::Buffer(subtree_doubles);
     WorkSpaces spaces(subtree_work_, plan_.subtree_doubles);
-    largest_scaled_ = equilibrate(pattern_, values, scale_, scaled_values_);
+    largest_scaled_ = equilibrate(*pattern_, values_, scale_);
 
     double* const shared = shared_work_.data();
     std::vector<PivotTally> tallies(subtrees);
@@ -99,7 +100,7 @@ PivotTally SupernodalLdlt::process(Index s, double* from, double* to) {
     double* data = factor_.data() + front.panel;
     std::fill_n(data, Panel::doubles(shape.pivots, shape.below), 0.0);
     for (Index k = front.first_entry; k < plan_.fronts[s + 1].first_entry; ++k) {
-        data[plan_.entries[k].place] = scaled_values_[plan_.entries[k].entry];
+        data[plan_.entries[k].place] = values_[plan_.entries[k].entry];
     }
     const Panel panel(data, shape.pivots);
     for (const Index child : front.children) add_to_panel(plan_, child, from, panel);
@@ -116,9 +117,9 @@ PivotTally SupernodalLdlt::process(Index s, double* from, double* to) {
 }
 
 std::size_t SupernodalLdlt::bytes() const {
-    const std::size_t doubles = factor_.size() + shared_work_.size() + subtree_work_.size() +
-                                pattern_.rows.size() + 3 * pattern_.size;
-    return sizeof(double) * doubles + sizeof(Index) * (pattern_.rows.size() + 3 * plan_.rows.size()) +
+    const std::size_t doubles =
+        factor_.size() + shared_work_.size() + subtree_work_.size() + values_.size() + 3 * size();
+    return sizeof(double) * doubles + sizeof(Index) * (pattern_->rows.size() + 3 * plan_.rows.size()) +
            sizeof(PlacedEntry) * plan_.entries.size() + sizeof(Transfer) * plan_.transfers.size();
 }
 

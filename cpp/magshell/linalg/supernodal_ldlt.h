@@ -21,43 +21,40 @@ namespace magshell {
 
 class SupernodalLdlt : public Factor {
   public:
-    SupernodalLdlt(const SparsePattern& pattern, Ordering ordering);
+    SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, Ordering ordering);
 
     std::unique_ptr<Factor> sibling() const override;
-    FactorReport factorize(const double* values) override;
+    FactorReport factorize() override;
+    VectorXd image(const VectorXd& x) const override;
     void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const override;
 
     std::string name() const override { return "supernodal"; }
-    Index size() const override { return pattern_.size; }
     std::int64_t nonzeros() const override { return analysis_->nonzeros; }
     double flops() const override { return analysis_->flops; }
     std::size_t bytes() const override;
 
   private:
     struct Analysis {
-        SparsePattern pattern;
         AssemblyPlan plan;
         std::int64_t nonzeros;
         double flops;
     };
 
-    explicit SupernodalLdlt(std::shared_ptr<const Analysis> analysis);
+    SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, std::shared_ptr<const Analysis> analysis);
     static std::shared_ptr<const Analysis> analysed(const SparsePattern& pattern, Ordering ordering);
 
     /// Of a front: the work spaces that the updates of its children lie in, and that its own goes to.
     PivotTally process(Index front, double* from, double* to);
     void solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const;
-    VectorXd image(const VectorXd& x) const;
     VectorXd refined_solution(const VectorXd& rhs) const;
     bool recovers_known_solution() const;
 
     std::shared_ptr<const Analysis> analysis_;
-    const SparsePattern& pattern_ = analysis_->pattern;
     const AssemblyPlan& plan_ = analysis_->plan;
 
-    LargeVector<double> scaled_values_;  // of S A S
-    std::vector<double> scale_;          // S
-    double largest_scaled_ = 0.0;        // |entry| of S A S
+    // Once factorized, values_ are those of S A S.
+    std::vector<double> scale_;    // S
+    double largest_scaled_ = 0.0;  // |entry| of S A S
     slabs::Buffer factor_, shared_work_, subtree_work_;
     std::vector<double> diagonal_, coupling_;  // D
     std::vector<Index> pivot_order_;           // within each front

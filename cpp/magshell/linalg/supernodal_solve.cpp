@@ -21,7 +21,7 @@ void SupernodalLdlt::solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const {
                           factor_.data(),
                           {const_cast<double*>(diagonal_.data()), const_cast<double*>(coupling_.data())},
                           pivot_order_.data()};
-    const Index size = pattern_.size;
+    const Index size = this->size();
     for (Index first = 0; first < rhs.cols();) {
         const Index count = std::min<Index>(slabs::width, static_cast<Index>(rhs.cols()) - first);
         const Index stride = count == 1 ? 1 : slabs::width;
@@ -55,7 +55,7 @@ void SupernodalLdlt::solve(Eigen::Ref<Eigen::MatrixXd> rhs) const {
 // A x. S is of powers of two: nothing is lost by taking them out again.
 VectorXd SupernodalLdlt::image(const VectorXd& x) const {
     const Eigen::Map<const VectorXd> scale(scale_.data(), size());
-    return product(pattern_, scaled_values_.data(), x.cwiseQuotient(scale)).cwiseQuotient(scale);
+    return product(*pattern_, values_.data(), x.cwiseQuotient(scale)).cwiseQuotient(scale);
 }
 
 // x += (L D L^T)^-1 (b - A x), until the residual is down to rounding or does not fall any more.

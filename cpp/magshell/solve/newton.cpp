@@ -104,30 +104,26 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
                  options_.tolerance));
 }
 
-void Newton::reduce_assembled(const Anchor& anchor) {
-    model_.reduction().matrix(model_.matrix(), values_);
-    add_weights(anchor);
+void Newton::reduce_assembled(const Anchor& anchor, LargeVector<double>& values) {
+    model_.reduction().matrix(model_.matrix(), values);
+    if (!anchor.weights) return;
+    const std::vector<Index>& column_starts = model_.reduction().pattern()->column_starts;
+    const VectorXd weights = model_.reduction().weights(*anchor.weights);
+    for (Index k = 0; k < weights.size(); ++k) values[column_starts[k]] += weights[k];
 }
 
 FactorReport Newton::factorize_assembled(const Anchor& anchor) {
-    reduce_assembled(anchor);
+    reduce_assembled(anchor, factor_->values());
     ++factorizations_;
     const Stopwatch running(linear_time_);
     FactorReport report;
     try {
-        report = factor_->factorize(values_.data());
+        report = factor_->factorize();
     } catch (const InvalidInput&) {
         report.reason = "the forces are not finite: a face has no area, or lies where a field has no value";
     }
     if (!report.succeeded) ++failed_factorizations_;
     return report;
-}
-
-void Newton::add_weights(const Anchor& anchor) {
-    if (!anchor.weights) return;
-    const SparsePattern& pattern = model_.reduction().pattern();
-    const VectorXd weights = model_.reduction().weights(*anchor.weights);
-    for (Index k = 0; k < pattern.size; ++k) values_[pattern.column_starts[k]] += weights[k];
 }
 
 void Newton::evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
@@ -170,11 +166,15 @@ std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& 
     constexpr double exact = 1e-13;  // of the right-hand side
     evaluate(q, controls, anchor);
     assemble(q, controls, false, anchor);
-    reduce_assembled(anchor);
+    reduce_assembled(anchor, nearby_values_);
+    const auto symmetric_part = [this](const VectorXd& x) {
+        return product(*model_.reduction().pattern(), nearby_values_.data(), x);
+    };
     const Stopwatch running(linear_time_);
     VectorXd b = model_.reduction().vector(rhs);
     if (unsymmetric_) {
-        if (!solve_unsymmetric(nearby, true, {exact_solve, few_vectors}, b).converged) return std::nullopt;
+        if (!solve_unsymmetric(nearby, symmetric_part, true, {exact_solve, few_vectors}, b).converged)
+            return std::nullopt;
         return model_.reduction().expand(b);
     }
     VectorXd solution = VectorXd::Zero(b.size()), left = b;
@@ -182,7 +182,7 @@ std::optional<VectorXd> Newton::solve_nearby(const VectorXd& q, const Controls& 
         if (left.norm() <= exact * b.norm()) return model_.reduction().expand(solution);
         nearby.solve(left);
         solution += left;
-        left = b - product(model_.reduction().pattern(), values_.data(), solution);
+        left = b - symmetric_part(solution);
     }
     return std::nullopt;
 }
@@ -191,7 +191,7 @@ VectorXd Newton::solve_with_factor(const VectorXd& rhs, double tolerance) const 
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
     if (unsymmetric_)
-        solve_unsymmetric(*factor_, false, {tolerance, many_vectors}, reduced);
+        solve_unsymmetric(false, {tolerance, many_vectors}, reduced);
     else
         factor_->solve(reduced);
     return model_.reduction().expand(reduced);
@@ -201,24 +201,27 @@ VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
     if (!unsymmetric_) return solve_with_factor(rhs);
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
-    const GmresReport report = solve_unsymmetric(*factor_, true, {exact_solve, many_vectors}, reduced);
+    const GmresReport report = solve_unsymmetric(true, {exact_solve, many_vectors}, reduced);
     if (!report.converged)
         throw InvalidInput("a linear solve with friction or water stopped at a residual of " +
                            std::to_string(report.residual));
     return model_.reduction().expand(reduced);
 }
 
-VectorXd Newton::assembled_product(const VectorXd& reduced, bool transposed) const {
-    const Reduction& reduction = model_.reduction();
-    VectorXd rest = VectorXd::Zero(model_.size());
-    model_.remainder().add_product(reduction.expand(reduced), transposed, rest);
-    return product(reduction.pattern(), values_.data(), reduced) + reduction.vector(rest);
+GmresReport Newton::solve_unsymmetric(bool transposed, const GmresOptions& options, VectorXd& reduced) const {
+    const auto symmetric_part = [this](const VectorXd& x) { return factor_->image(x); };
+    return solve_unsymmetric(*factor_, symmetric_part, transposed, options, reduced);
 }
 
-GmresReport Newton::solve_unsymmetric(const Factor& factor, bool transposed, const GmresOptions& options,
-                                      VectorXd& reduced) const {
-    return gmres([&](const VectorXd& x) { return assembled_product(x, transposed); },
-                 [&](VectorXd& x) { factor.solve(x); }, reduced, options);
+GmresReport Newton::solve_unsymmetric(const Factor& factor, const LinearMap& symmetric_part, bool transposed,
+                                      const GmresOptions& options, VectorXd& reduced) const {
+    const Reduction& reduction = model_.reduction();
+    const auto assembled = [&](const VectorXd& x) {
+        VectorXd rest = VectorXd::Zero(model_.size());
+        model_.remainder().add_product(reduction.expand(x), transposed, rest);
+        return VectorXd(symmetric_part(x) + reduction.vector(rest));
+    };
+    return gmres(assembled, [&](VectorXd& x) { factor.solve(x); }, reduced, options);
 }
 
 bool Newton::still_holds(const VectorXd& q, const Controls& controls) {

@@ -116,22 +116,22 @@ class Newton {
                   bool cautious = false);
     /// Whether steps with the last factorization will do, which are as good as free.
     bool factor_serves(double contraction, double residual) const;
-    void reduce_assembled(const Anchor& anchor);
-    /// K p, or K^T p, of what was assembled last, free unknowns.
-    VectorXd assembled_product(const VectorXd& reduced, bool transposed) const;
-    /// As solve_with_factor with an unsymmetric K.
-    GmresReport solve_unsymmetric(const Factor& factor, bool transposed, const GmresOptions& options,
-                                  VectorXd& reduced) const;
+    /// What was assembled last, of the free unknowns, with the anchor's weights.
+    void reduce_assembled(const Anchor& anchor, LargeVector<double>& values);
+    /// As solve_with_factor with an unsymmetric K, or K^T, free unknowns.
+    GmresReport solve_unsymmetric(bool transposed, const GmresOptions& options, VectorXd& reduced) const;
+    using LinearMap = std::function<VectorXd(const VectorXd&)>;
+    GmresReport solve_unsymmetric(const Factor& factor, const LinearMap& symmetric_part, bool transposed,
+                                  const GmresOptions& options, VectorXd& reduced) const;
     FactorReport factorize_assembled(const Anchor& anchor);
     VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
-    void add_weights(const Anchor& anchor);
 
     Model& model_;
     NewtonOptions options_;
     Watch watch_;
     std::shared_ptr<Factor> factor_;
-    LargeVector<double> values_;
-    bool unsymmetric_ = false;  // whether what was assembled last has a remainder
+    LargeVector<double> nearby_values_;  // of the matrix that solve_nearby() solves with
+    bool unsymmetric_ = false;           // whether what was assembled last has a remainder
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     mutable double linear_time_ = 0.0;
 };
