@@ -33,14 +33,14 @@ Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, con
     pattern.size = static_cast<Index>(free_unknowns_.size());
     pattern.column_starts.reserve(free_unknowns_.size() + 1);
     pattern.rows.reserve(matrix.rows().size());
-    source_.reserve(matrix.rows().size());
     pattern.column_starts.push_back(0);
     for (const Index u : free_unknowns_) {
         for (Index k = matrix.column_starts()[u]; k < matrix.column_starts()[u + 1]; ++k) {
             const Index row = reduced[matrix.rows()[k]];
             if (row < 0) continue;
             pattern.rows.push_back(row);
-            source_.push_back(k);
+            if (pieces_.empty() || pieces_.back().from + pieces_.back().count != k) pieces_.push_back({k, 0});
+            ++pieces_.back().count;
         }
         pattern.column_starts.push_back(static_cast<Index>(pattern.rows.size()));
     }
@@ -152,9 +152,9 @@ void Reduction::turn_blocks(SystemMatrix& full) const {
 
 void Reduction::matrix(SystemMatrix& full, LargeVector<double>& values) const {
     if (!frame_of_.empty()) turn_blocks(full);
-    values.resize(source_.size());
-    const double* from = full.values().data();
-    for (std::size_t k = 0; k < source_.size(); ++k) values[k] = from[source_[k]];
+    values.resize(pattern_->rows.size());
+    double* to = values.data();
+    for (const Piece& piece : pieces_) to = std::copy_n(full.values().data() + piece.from, piece.count, to);
 }
 
 VectorXd Reduction::vector(const VectorXd& full) const {
@@ -185,9 +185,10 @@ VectorXd Reduction::expand(const VectorXd& reduced) const {
 }
 
 std::size_t Reduction::bytes() const {
-    return (frame_of_.capacity() + free_unknowns_.capacity() + source_.capacity() +
-            pattern_->rows.capacity() + pattern_->column_starts.capacity()) *
-           sizeof(Index);
+    return pieces_.capacity() * sizeof(Piece) +
+           (frame_of_.capacity() + free_unknowns_.capacity() + pattern_->rows.capacity() +
+            pattern_->column_starts.capacity()) *
+               sizeof(Index);
 }
 
 }  // namespace magshell

@@ -75,7 +75,11 @@ class Reduction {
     std::vector<Index> frame_of_;       // per node: index into held_ where turned, else -1; empty if none is
     std::vector<Index> free_unknowns_;  // reduced -> full, ascending
     std::shared_ptr<const SparsePattern> pattern_;
-    std::vector<Index> source_;  // reduced entry -> position in the full matrix
+    // What is left of the full matrix, in pieces without a gap: supports take little away.
+    struct Piece {
+        Index from, count;
+    };
+    std::vector<Piece> pieces_;
 };
 
 }  // namespace magshell

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
@@ -32,6 +35,10 @@ std::shared_ptr<const SupernodalLdlt::Analysis> SupernodalLdlt::analysed(const S
     AssemblyTree tree = ordered_assembly_tree(pattern, ordering);
     Analysis analysis{{}, tree.nonzeros(), tree.flops()};
     analysis.plan = assembly_plan(pattern, std::move(tree));
+#ifdef __GLIBC__
+    constexpr std::size_t large = 1000000;  // entries: what orderings leave behind then counts
+    if (pattern.rows.size() > large) malloc_trim(0);
+#endif
     return std::make_shared<const Analysis>(std::move(analysis));
 }
 
