@@ -52,11 +52,11 @@ struct AssemblyPlan {
     std::vector<Transfer> transfers;
     std::vector<Subtree> subtrees;  // independent of the number of threads
     std::vector<Index> top;         // the fronts above them, in order
+    Index most_pivots = 0, most_below = 0;  // of a front
+    // Of the vectors of all subtrees: their unknowns, then one number for each row below their roots.
+    std::ptrdiff_t local_doubles = 0;
     // Updates of top fronts and of the roots of subtrees lie in one work space that all threads share, those
     // within a subtree in one that its thread has to itself.
-    Index most_pivots = 0, most_below = 0;
-    // The vector of a subtree: its unknowns, then one number for each row below its root.
-    std::ptrdiff_t local_doubles = 0;
     std::ptrdiff_t factor_doubles = 0, shared_doubles = 0, subtree_doubles = 0;
 
     Index front_count() const { return static_cast<Index>(fronts.size()) - 1; }
