@@ -124,11 +124,11 @@ def test_exponents() -> None:
 
 
 @pytest.mark.parametrize("long", [True, False])
-def test_a_long_call_is_measured_twice(monkeypatch, long: bool) -> None:
+def test_a_long_call_is_measured_in_one_round(monkeypatch, long: bool) -> None:
     calls = []
     monkeypatch.setattr(timing, "LONG", -1.0 if long else 1e9)
     measured = timing.clocked(lambda: calls.append(time.sleep(2e-3)), rounds=2, seconds=6e-3)
-    assert len(calls) == 2 if long else 3 <= len(calls) <= 1 + 2 * 3
+    assert 1 < len(calls) <= 1 + (1 if long else 2) * 3
     assert measured.wall >= 2e-3 and 0 <= measured.processor < measured.wall
 
 

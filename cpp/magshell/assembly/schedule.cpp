@@ -2,20 +2,27 @@
 
 #include <algorithm>
 
+#include "magshell/core/pack.h"
 #include "magshell/core/parallel.h"
 
 namespace magshell {
 namespace {
 
-constexpr Index part_length = 512;  // faces: about 600 kB of Hessian, slots and element data
+// Faces of a part: 512 are about 600 kB of Hessian, slots and element data; small sheets are to have a few
+// parts of each colour, too. Whole packs.
+Index part_length(Index faces) {
+    constexpr Index shortest = 128, longest = 512, parts = 8;
+    return std::clamp(faces / parts / Pack::width * Pack::width, shortest, longest);
+}
 
 }  // namespace
 
 Schedule::Schedule(const Sheet& sheet) {
     Index fold = 0;
     const Index folds = static_cast<Index>(sheet.folds.size());
-    for (Index first = 0; first < sheet.n_faces(); first += part_length) {
-        const Index last = std::min(sheet.n_faces(), first + part_length);
+    const Index length = part_length(sheet.n_faces());
+    for (Index first = 0; first < sheet.n_faces(); first += length) {
+        const Index last = std::min(sheet.n_faces(), first + length);
         const Index first_fold = fold;
         while (fold < folds && sheet.folds[fold].first_face() < last) ++fold;
         parts_.push_back({static_cast<Index>(parts_.size()), first, last, first_fold, fold});

@@ -26,8 +26,8 @@ int initial_threads() {
 std::atomic<int> thread_count{initial_threads()};
 
 // To wake a sleeping thread takes as long as a whole loop over a few thousand faces. Loops follow each other
-// closely, so threads look for the next one for a while (some 50 us) before they sleep.
-constexpr int looks = 1000;
+// closely, so threads look for the next one for a while (some 200 us) before they sleep.
+constexpr int looks = 4000;
 
 template <class Condition>
 bool look_for(const Condition& condition) {

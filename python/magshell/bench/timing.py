@@ -48,14 +48,13 @@ class Clocked(NamedTuple):
 
 
 SHORT = 0.02  # s: what a call may take to be left alone for once
-LONG = 1.0  # s: a call that takes longer is measured twice, without rounds
+LONG = 1.0  # s: a call that takes longer is measured in one round, after one that takes its memory from the system
 
 
 def clocked(call: Callable[[], object], *, rounds: int = 3, seconds: float = 0.1) -> Clocked:
     """The best of `rounds` rounds of about `seconds` each, by each clock."""
     first = _timed(call, 1)
     repeats = max(1, round(seconds / max(first.wall, 1e-6)))
-    # The first call of all takes its memory from the system.
     runs = [_timed(call, repeats) for _ in range(1 if first.processor > LONG else rounds)]
     return Clocked(min(run.processor for run in runs), min(run.wall for run in runs))
 
