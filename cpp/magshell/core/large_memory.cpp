@@ -4,13 +4,18 @@
 #include <unistd.h>
 
 #include <cstdint>
+#include <limits>
 #include <new>
 
 namespace magshell {
 namespace {
 
 constexpr std::size_t huge_page = std::size_t{1} << 21;
+#ifdef __SANITIZE_ADDRESS__  // which watches only what comes from new
+constexpr std::size_t large = std::numeric_limits<std::size_t>::max();
+#else
 constexpr std::size_t large = 2 * huge_page;
+#endif
 constexpr std::align_val_t alignment{64};
 
 std::size_t whole_pages(std::size_t bytes) {
