@@ -58,7 +58,11 @@ PARTS = (
     Part("field of a dipole", scene=lambda mesh: {"field": [_dipole(1)]}),
     Part("of nine more dipoles", scene=lambda mesh: {"field": [_dipole(9)]}),
     Part("contact with a plane", scene=lambda mesh: {"contacts": (_floor(),)}),
-    Part("friction there", in_motion=lambda mesh: {"contacts": (_floor(friction_coefficient=0.6),)}),
+    Part(
+        "friction by the forces of the step before",
+        in_motion=lambda mesh: {"contacts": (_floor(friction_coefficient=0.6, lagged_friction=True),)},
+    ),
+    Part("exact friction instead", in_motion=lambda mesh: {"contacts": (_floor(friction_coefficient=0.6),)}),
     Part("water", in_motion=lambda mesh: {"water": ms.Water()}),
     Part("viscous damping", motion={"damping": 1e-6}),
     Part("stiffness damping", motion={"stiffness_damping": 1e-4}),

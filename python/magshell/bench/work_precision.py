@@ -14,7 +14,7 @@ from .cases.buckling_loads import columns, plate
 from .cases.cylinder_roof import snap_through
 from .cases.hemisphere import large_deflection, small_deflection
 from .cases.linear_cylinders import pinched_cylinder, scordelis_lo
-from .cases.magnetic_strip import field_across, field_against
+from .cases.magnetic_strip import field_across, field_against, shear_against_elastica
 from .cases.plates import circular_plate, even_plate, square_plate
 from .cases.rolled_strip import end_moment
 from .cases.shear_strip import end_shear
@@ -84,6 +84,7 @@ STUDIES = (
         "elastica, exact",
         nonlinear=True,
     ),
+    Study("C4", "end shear by a field", shear_against_elastica, STRIPS, "elastica, exact", nonlinear=True),
     Study("B1", "Scordelis-Lo roof", scordelis_lo, SQUARES[1:], "isogeometric", known_to=1e-4),
     Study("B2", "pinched cylinder", pinched_cylinder, SQUARES[1:], "series", known_to=1e-5),
     Study(

@@ -113,12 +113,7 @@ def magnetic_end_shear(
     B on the boundary (divergence theorem), nu its outward normal: here the end load P = h w M B.
     """
     mesh = shear_strip.strip(cells, seed)
-    sheet = shear_strip.shell(mesh, bending)
-    strip = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
-    flux_density = shear_strip.FULL_LOAD / (shear_strip.THICKNESS * shear_strip.WIDTH * MAGNETIZATION)
-    magnetic = ms.equilibrium(
-        strip, remanent_magnetization=(MAGNETIZATION, 0, 0), applied_flux_density=(0, 0, flux_density)
-    )
+    magnetic = _sheared_by_a_field(mesh, bending)
     loaded = ms.equilibrium(shear_strip.scene(mesh, bending))
     ends = [tip(mesh, state.displacements, x=shear_strip.LENGTH) for state in (magnetic, loaded)]
     comparisons = [
@@ -126,3 +121,36 @@ def magnetic_end_shear(
         for name, axis in (("W", 2), ("U", 0))
     ]
     return outcome(f"irregular {mesh_name(cells)}", mesh, comparisons, [magnetic, loaded])
+
+
+def shear_against_elastica(
+    cells: tuple[int, int] = (40, 4),
+    bending: str = "midedge",
+    *,
+    irregular: float | None = 0.25,
+    seed: int = 0,
+    solver: ms.Newton | None = None,
+) -> Outcome:
+    """C4 against the exact elastica under the force that the field stands for."""
+    mesh = shear_strip.strip(cells, seed, irregular)
+    state = _sheared_by_a_field(mesh, bending, solver)
+    end = tip(mesh, state.displacements, x=shear_strip.LENGTH)
+    shortening, deflection = shear_strip.ELASTICA[1.0]
+    comparisons = [
+        Comparison("W", end[2], deflection, allowed=0.002),
+        Comparison("U", -end[0], shortening, allowed=0.003),
+    ]
+    return outcome(mesh_name(cells, irregular), mesh, comparisons, [state])
+
+
+def _sheared_by_a_field(mesh, bending: str, solver: ms.Newton | None = None) -> ms.Equilibrium:
+    """The strip of A1 in the field that stands for its full load."""
+    sheet = shear_strip.shell(mesh, bending)
+    strip = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    flux_density = shear_strip.FULL_LOAD / (shear_strip.THICKNESS * shear_strip.WIDTH * MAGNETIZATION)
+    return ms.equilibrium(
+        strip,
+        remanent_magnetization=(MAGNETIZATION, 0, 0),
+        applied_flux_density=(0, 0, flux_density),
+        solver=solver,
+    )

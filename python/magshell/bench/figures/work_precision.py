@@ -18,14 +18,13 @@ _SMALLEST, _LARGEST = 2e-5, 1.5  # errors that the panels show
 def draw(results: dict, setting: dict) -> Figure:
     points = results["error against time"]
     studies = [study for study in STUDIES if any(point["case"] == study.name for point in points)]
-    panels = len(studies) + 1
-    columns = min(COLUMNS, panels)
-    rows = -(-panels // columns)
+    columns = min(COLUMNS, len(studies))
+    rows = -(-len(studies) // columns)
     figure = new_figure(2.5 * columns + 0.4, 2.35 * rows + 0.7)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes, study in zip(grid.flat, studies, strict=False):
         _panel(axes, study, [point for point in points if point["case"] == study.name])
-    _legend(grid.flat[len(studies)])
+    _legend(figure)
     for axes in list(grid.flat)[len(studies) :]:
         axes.axis("off")
     for k, axes in enumerate(list(grid.flat)[: len(studies)]):
@@ -87,7 +86,7 @@ def _look(colour: str, irregular: bool, plain: bool) -> dict:
     }
 
 
-def _legend(axes) -> None:
+def _legend(figure: Figure) -> None:
     lines = [
         (f"{bending}, {'irregular' if irregular else 'regular'} mesh", _look(colour, irregular, plain=False))
         for bending, colour in BENDING_COLOURS.items()
@@ -96,8 +95,8 @@ def _legend(axes) -> None:
     lines.append(("the same by plain Newton", _look(INK, irregular=False, plain=True)))
     handles = [Line2D([], [], label=label, **look) for label, look in lines]
     handles.append(Patch(color=SHADE, label="below what the reference tells"))
-    axes.legend(
-        handles=handles, loc="upper left", frameon=False, fontsize=8.5, labelcolor=INK, borderaxespad=0
+    figure.legend(
+        handles=handles, loc="outside upper left", ncols=3, frameon=False, fontsize=8.5, labelcolor=INK
     )
 
 
