@@ -23,7 +23,8 @@ _SUPPORTS = (Pin, Clamp, SymmetryPlane)
 
 
 class Scene:
-    """What is modelled. What a scene lacks costs nothing; it can be solved many times.
+    """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
+    needs and, up to 256 MB, the memory of its last factorization.
 
     shell: Shell.
     supports: Pin, Clamp and SymmetryPlane objects.

@@ -203,7 +203,9 @@ std::shared_ptr<Factor> Model::new_factor() {
 
 void Model::keep_spare(std::shared_ptr<Factor> factor) {
     constexpr std::size_t large = std::size_t{1} << 28;
-    if (factor && factor.use_count() == 1 && factor->bytes() <= large) spare_ = std::move(factor);
+    if (!factor || factor.use_count() > 1 || factor->bytes() > large) return;
+    factor->forget();
+    spare_ = std::move(factor);
 }
 
 void Model::add_couples(const SceneInput& input) {

@@ -50,8 +50,8 @@ struct AssemblyPlan {
     std::vector<Index> targets;     // of those rows in the vector of the subtree, or for top fronts of all
     std::vector<PlacedEntry> entries;
     std::vector<Transfer> transfers;
-    std::vector<Subtree> subtrees;  // independent of the number of threads
-    std::vector<Index> top;         // the fronts above them, in order
+    std::vector<Subtree> subtrees;          // independent of the number of threads
+    std::vector<Index> top;                 // the fronts above them, in order
     Index most_pivots = 0, most_below = 0;  // of a front
     // Of the vectors of all subtrees: their unknowns, then one number for each row below their roots.
     std::ptrdiff_t local_doubles = 0;

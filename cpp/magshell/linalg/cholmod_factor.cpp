@@ -30,7 +30,6 @@ class CholmodFactor : public Factor {
   public:
     CholmodFactor(std::shared_ptr<const SparsePattern> pattern, Ordering ordering)
         : Factor(std::move(pattern)), ordering_(ordering) {
-        report_.reason = "factorize() has not been called";
         if (pattern_->size == 0) return;
         const SingleThreaded guard;
         common_->supernodal = CHOLMOD_SUPERNODAL;
@@ -107,7 +106,6 @@ class CholmodFactor : public Factor {
     ::cholmod_factor* factor_ = nullptr;
     std::int64_t nonzeros_ = 0;
     double flops_ = 0.0;
-    FactorReport report_;
 };
 
 }  // namespace

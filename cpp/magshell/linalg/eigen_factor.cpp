@@ -14,7 +14,6 @@ class EigenFactor : public Factor {
     explicit EigenFactor(std::shared_ptr<const SparsePattern> pattern) : Factor(std::move(pattern)) {
         const std::vector<double> values(pattern_->rows.size(), 1.0);
         if (pattern_->size > 0) solver_.analyzePattern(view(values.data()));
-        report_.reason = "factorize() has not been called";
     }
 
     FactorReport factorize() override {
@@ -78,7 +77,6 @@ class EigenFactor : public Factor {
     }
 
     Eigen::SimplicialLDLT<Matrix, Eigen::Lower> solver_;
-    FactorReport report_;
 };
 
 }  // namespace

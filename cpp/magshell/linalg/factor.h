@@ -55,7 +55,7 @@ struct FactorReport {
 /// may solve.
 class Factor {
   public:
-    explicit Factor(std::shared_ptr<const SparsePattern> pattern) : pattern_(std::move(pattern)) {}
+    explicit Factor(std::shared_ptr<const SparsePattern> pattern) : pattern_(std::move(pattern)) { forget(); }
     virtual ~Factor() = default;
 
     /// The matrix, in the order of the pattern: to be written before each factorize(), which uses it up.
@@ -66,6 +66,12 @@ class Factor {
 
     /// Factorizes the matrix that was written. Throws InvalidInput on NaN or infinity.
     virtual FactorReport factorize() = 0;
+
+    /// As if factorize() had not been called; its memory stays.
+    void forget() {
+        report_ = {};
+        report_.reason = "factorize() has not been called";
+    }
 
     /// A x with the matrix factorized last.
     virtual VectorXd image(const VectorXd& x) const { return product(*pattern_, values_.data(), x); }
@@ -86,6 +92,7 @@ class Factor {
   protected:
     const std::shared_ptr<const SparsePattern> pattern_;
     LargeVector<double> values_;
+    FactorReport report_;
 };
 
 /// Orders and analyses a pattern. Throws InvalidInput when the pattern is malformed or the backend was not

@@ -49,7 +49,6 @@ SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern,
     diagonal_.resize(size());
     coupling_.resize(size());
     pivot_order_.resize(size());
-    report_.reason = "factorize() has not been called";
 }
 
 std::unique_ptr<Factor> SupernodalLdlt::sibling() const {

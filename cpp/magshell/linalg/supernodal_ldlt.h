@@ -58,7 +58,6 @@ class SupernodalLdlt : public Factor {
     slabs::Buffer factor_, shared_work_, subtree_work_;
     std::vector<double> diagonal_, coupling_;  // D
     std::vector<Index> pivot_order_;           // within each front
-    FactorReport report_;
 };
 
 }  // namespace magshell
