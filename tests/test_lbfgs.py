@@ -183,6 +183,24 @@ def test_a_line_search_asks_no_more_often_than_it_may(most):
         ms.optim.LBFGS([x], max_evaluations=0)
 
 
+def test_a_line_search_that_was_cut_short_is_not_called_a_minimum():
+    """The first step is far too long, and there may be no second."""
+
+    def end(**options) -> str:
+        x = torch.tensor([1.0], dtype=torch.float64, requires_grad=True)
+        optimizer = ms.optim.LBFGS([x], scale=1.0, first_step=100.0, **options)
+        return ms.minimize(
+            lambda x: x.square().sum() + 1e-3 * x.abs().sum(),
+            [x],
+            optimizer,
+            max_iterations=50,
+            progress=False,
+        ).reason
+
+    assert "no lower design in as many evaluations of a line search" in end(max_evaluations=1)
+    assert "max_evaluations" not in end()
+
+
 def test_stopped_and_resumed_gives_the_same_bits():
     def run(stops):
         x = torch.linspace(-1, 0.7, 6, dtype=torch.float64).requires_grad_()

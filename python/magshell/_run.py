@@ -12,7 +12,7 @@ from ._answer import Answer
 from ._checkpoint import decoded, encoded
 from ._tensors import is_tensor, require_torch
 from .errors import DesignRejected, EquilibriumJumped
-from .minimum import Minimum, Record
+from .minimum import STANDSTILL, Minimum, Record
 
 
 class Run:
@@ -80,6 +80,11 @@ class Run:
         moved = any(not a.equal(b) for a, b in zip(before, self._values(), strict=True))
         self._record(self.iteration + 1, self.optimizer.evaluate(self.closure), jumped)
         return moved
+
+    @property
+    def standstill(self) -> str:
+        """What it means that a step moved nothing."""
+        return getattr(self.optimizer, "standstill", STANDSTILL)
 
     def minimum(self, reason: str) -> Minimum | None:
         """The best design, which the parameters are set to. None before there is any."""

@@ -94,7 +94,7 @@ def _loop(run: Run, ends: _Ends, bar, checkpoints: _Checkpoints) -> str:
     """Iterates; returns the reason of the end."""
     if not run.history:
         run.begin()
-        reason = ends.reason(run.history, moved=True)
+        reason = ends.reason(run.history)
     else:
         reason = ends.spent(run.history)
     while reason is None:
@@ -106,7 +106,7 @@ def _loop(run: Run, ends: _Ends, bar, checkpoints: _Checkpoints) -> str:
             checkpoints.save(run)
             bar.update()
             bar.set_postfix_str(f"objective {run.history[-1].objective:.6g}")
-            reason = ends.reason(run.history, moved)
+            reason = ends.reason(run.history, None if moved else run.standstill)
     checkpoints.save(run, last=True)
     return reason
 
@@ -128,12 +128,12 @@ class _Ends:
         if self.patience < 1:
             raise ValueError(f"patience must be positive, got {self.patience}")
 
-    def reason(self, history: list[Record], moved: bool) -> str | None:
-        """Why to end after the last iteration, if there is a reason."""
+    def reason(self, history: list[Record], standstill: str | None = None) -> str | None:
+        """Why to end after the last iteration, if there is a reason; one may be that its step moved nothing."""
         if self.callback is not None and self.callback(history[-1]) is True:
             return "stopped by the callback"
-        if not moved:
-            return "the optimizer finds no lower design, to rounding"
+        if standstill is not None:
+            return standstill
         if self._settled(history):
             return "the objective has settled"
         return self.spent(history)

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+STANDSTILL = (
+    "the optimizer finds no lower design, to rounding"  # the reason of an end where a step moves nothing
+)
+
 
 @dataclass(frozen=True)
 class Record:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import torch
 
+from ..minimum import STANDSTILL
 from . import box as boxes
 from .box import Box
 from .iterate import Iterate, Restoring, as_array, as_tensor
@@ -31,6 +32,8 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         "_sample_x",
         "max_shortenings",
     )  # what a copy takes along, beyond torch's own
+
+    standstill = STANDSTILL  # what it means when a step moves nothing
 
     def __init__(self, params, defaults: dict, max_shortenings: int):
         if not (isinstance(max_shortenings, int) and max_shortenings >= 0):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import DesignRejected
+from ..minimum import STANDSTILL
 from .base import BoxOptimizer
 from .box import Box
 from .cauchy import cauchy_step, subspace_step
@@ -68,6 +69,7 @@ class LBFGS(BoxOptimizer):
             raise ValueError("LBFGS has bounds but no other constraints: use MMA or GCMMA, or add a penalty")
 
     def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
+        self.standstill = STANDSTILL
         # A model may be stale: once more along the gradient then.
         for run in (self._run, {}) if self._run else ({},):
             line = self._line(sample, box, x, run)
@@ -113,8 +115,11 @@ class LBFGS(BoxOptimizer):
     def _search(self, line: _Line, objective: float) -> tuple[np.ndarray, Sample] | None:
         """A lower design on the line and its sample. The last rejection, if nothing short enough was accepted."""
         rejections = []
+        probes = 0
 
         def probe(length: float) -> Probe:
+            nonlocal probes
+            probes += 1
             try:
                 moved, trial = self._trial(line.at(length))
             except DesignRejected as error:
@@ -127,9 +132,15 @@ class LBFGS(BoxOptimizer):
         start = Probe(0.0, objective, line.slope)
         limits = {"limit": self.max_evaluations - 1, "max_rejected": self.max_shortenings}  # beside the first
         best = strong_wolfe(probe, start, 1.0, line.longest, **limits)
-        if best is None and len(rejections) > self.max_shortenings:
+        if best is not None:
+            return best.found
+        if len(rejections) > self.max_shortenings:
             raise rejections[-1]
-        return None if best is None else best.found
+        if probes == self.max_evaluations:
+            self.standstill = (
+                f"no lower design in as many evaluations of a line search as max_evaluations allows, {probes}"
+            )
+        return None
 
     def _learned(self, run: dict, box: Box, step: np.ndarray, change: np.ndarray) -> dict:
         """The last steps and changes of the gradient, (k, n) in units of the sizes, and the model before them."""
