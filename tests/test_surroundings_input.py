@@ -54,7 +54,11 @@ test_contacts_refuse = refused(
     [
         ("no obstacle", lambda: contact(obstacles=[]), "at least one obstacle"),
         ("something else", lambda: contact(obstacles="floor"), r"objects of ms\.obstacles, got str"),
-        ("a class", lambda: contact(obstacles=Plane), r"objects of ms\.obstacles, got type"),
+        (
+            "a class",
+            lambda: contact(obstacles=Plane),
+            r"objects of ms\.obstacles, got the class Plane: call it",
+        ),
         ("twice the same", lambda: contact(obstacles=[GROUND, GROUND]), "each of them once"),
         (
             "negative stiffness",

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
+from ._checked_list import checked_list
 from ._quantity import quantity
 from ._selections import indices, selection
 from .mesh import TriangleMesh
@@ -59,13 +58,10 @@ class Contact:
         vertices=None,
         face_samples: int = 0,
     ):
-        listed = list(obstacles) if isinstance(obstacles, Iterable) else [obstacles]
-        for item in listed:
-            if not isinstance(item, Obstacle):
-                raise ValueError(f"obstacles must hold objects of ms.obstacles, got {type(item).__name__}")
+        listed = checked_list("obstacles", obstacles, (Obstacle,), "objects of ms.obstacles")
         if not listed or len({id(item) for item in listed}) < len(listed):
             raise ValueError("obstacles must hold at least one obstacle, and each of them once")
-        self.obstacles = tuple(listed)
+        self.obstacles = listed
         self.contact_stiffness = _positive("contact_stiffness", "N/m", contact_stiffness)
         self.friction_coefficient = (
             None

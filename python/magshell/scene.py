@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
 from contextlib import contextmanager
 
 import numpy as np
 
 from . import _constraints, _core, _surroundings
+from ._checked_list import checked_list
 from ._quantity import quantity
 from ._values import Values
 from .contact import Contact
@@ -57,10 +57,10 @@ class Scene:
         if not isinstance(shell, Shell):
             raise ValueError(f"shell must be a Shell, got {type(shell).__name__}")
         self.shell = shell
-        self.supports = _checked_list("supports", supports, _SUPPORTS)
-        self.loads = _checked_list("loads", loads, _LOADS)
-        self.fields = () if field is None else _checked_list("field", field, (AppliedField,))
-        self.contacts = _checked_list("contacts", contacts, (Contact,))
+        self.supports = checked_list("supports", supports, _SUPPORTS)
+        self.loads = checked_list("loads", loads, _LOADS)
+        self.fields = () if field is None else checked_list("field", field, (AppliedField,))
+        self.contacts = checked_list("contacts", contacts, (Contact,))
         self.obstacles = _surroundings.obstacles_of(self.contacts)
         if water is not None and not isinstance(water, Water):
             raise ValueError(f"water must be a Water, got {type(water).__name__}")
@@ -171,16 +171,6 @@ class Scene:
             lines.append(f"  under gravity {tuple(self.gravity.tolist())} m/s2")
         lines.append(f"  {self.n_unknowns} unknowns")
         return "\n".join(lines)
-
-
-def _checked_list(name: str, items, kinds: tuple[type, ...]) -> tuple:
-    wanted = ", ".join(kind.__name__ for kind in kinds)
-    listed = [items] if isinstance(items, (*kinds, type)) or not isinstance(items, Iterable) else list(items)
-    for item in listed:
-        if not isinstance(item, kinds):
-            what = f"the class {item.__name__}: call it" if isinstance(item, type) else type(item).__name__
-            raise ValueError(f"{name} must hold {wanted} objects, got {what}")
-    return tuple(listed)
 
 
 def _couple_edges(mesh, loads) -> np.ndarray:

@@ -1,8 +1,7 @@
-#include "magshell/linalg/triangular_solves.h"
-
 #include <algorithm>
 
 #include "magshell/linalg/slab_kernels.h"
+#include "magshell/linalg/triangular_solves.h"
 
 namespace magshell {
 namespace {

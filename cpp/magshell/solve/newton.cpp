@@ -305,11 +305,11 @@ bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor
     return true;
 }
 
-bool Newton::factor_serves(double contraction, double residual) const {
+bool Newton::factor_serves(double contraction, double residual, double last_step) const {
     constexpr double worth = 4.0;  // steps with an old factorization, for one with its own
     // The errors that a factorization leaves behind are those of its own place, twice what the last step
-    // left.
-    const double each = 2.0 * contraction;
+    // left; in bending, as much as the sheet has moved since, of its thickness.
+    const double each = std::max(2.0 * contraction, last_step / model_.thinnest());
     return each < 0.1 && std::log(options_.tolerance / residual) >= worth * std::log(each);
 }
 
@@ -346,7 +346,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         Eigen::MatrixXd pull = move;
         const double contraction = report.residual / last_residual;
         last_residual = report.residual;
-        if (report.iterations == 0 || !factor_serves(contraction, report.residual)) {
+        if (report.iterations == 0 || !factor_serves(contraction, report.residual, last_step)) {
             const bool cautious = contraction > contracting;
             report.factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
             if (!report.factor.succeeded) return fail(report.factor.reason);

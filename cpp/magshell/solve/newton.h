@@ -115,7 +115,7 @@ class Newton {
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor,
                   bool cautious = false);
     /// Whether steps with the last factorization will do, which are as good as free.
-    bool factor_serves(double contraction, double residual) const;
+    bool factor_serves(double contraction, double residual, double last_step) const;
     /// What was assembled last, of the free unknowns, with the anchor's weights.
     void reduce_assembled(const Anchor& anchor, LargeVector<double>& values);
     /// As solve_with_factor with an unsymmetric K, or K^T, free unknowns.

@@ -1,0 +1,16 @@
+"""Lists of objects that scenes are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def checked_list(name: str, items, kinds: tuple[type, ...], wanted: str | None = None) -> tuple:
+    """Of one object or several; raises ValueError where one is of none of the kinds."""
+    wanted = wanted or ", ".join(kind.__name__ for kind in kinds) + " objects"
+    listed = [items] if isinstance(items, (*kinds, type)) or not isinstance(items, Iterable) else list(items)
+    for item in listed:
+        if not isinstance(item, kinds):
+            what = f"the class {item.__name__}: call it" if isinstance(item, type) else type(item).__name__
+            raise ValueError(f"{name} must hold {wanted}, got {what}")
+    return tuple(listed)
