@@ -30,20 +30,23 @@ std::atomic<int> thread_count{initial_threads()};
 constexpr int looks = 4000;
 
 template <class Condition>
-bool look_for(const Condition& condition) {
-    for (int k = 0; k < looks; ++k) {
-        if (condition()) return true;
+void look_for(const Condition& condition, int times) {
+    for (int k = 0; k < times && !condition(); ++k) {
 #if defined(__x86_64__) || defined(__i386__)
         __builtin_ia32_pause();
 #endif
     }
-    return false;
+}
+
+// Where threads share processors, one that looks keeps another from its work.
+int looks_of(int threads) {
+    return threads <= static_cast<int>(std::thread::hardware_concurrency()) ? looks : 0;
 }
 
 // One parallel loop at a time runs on the pool; a nested or concurrent one runs on its caller's thread.
 class Pool {
   public:
-    explicit Pool(int wanted) : owner_(getpid()), wanted_(wanted) {
+    explicit Pool(int wanted) : owner_(getpid()), wanted_(wanted), looks_(looks_of(wanted + 1)) {
         try {
             while (static_cast<int>(threads_.size()) < wanted) threads_.emplace_back([this] { work(); });
         } catch (const std::system_error&) {  // the system gives no more: those that run do the work
@@ -75,7 +78,7 @@ class Pool {
         wake_.notify_all();
         drain(body, count);
         const auto done = [this] { return busy_.load() == 0; };
-        look_for(done);
+        look_for(done, looks_);
         std::unique_lock lock(mutex_);
         done_.wait(lock, done);
         body_ = nullptr;
@@ -101,7 +104,7 @@ class Pool {
             const std::function<void(int)>* body;
             int count;
             const auto wanted = [&] { return stop_.load() || round_.load() != seen; };
-            look_for(wanted);
+            look_for(wanted, looks_);
             {
                 std::unique_lock lock(mutex_);
                 wake_.wait(lock, wanted);
@@ -118,7 +121,7 @@ class Pool {
     }
 
     const pid_t owner_;
-    const int wanted_;
+    const int wanted_, looks_;
     std::vector<std::thread> threads_;
     std::mutex mutex_;
     std::condition_variable wake_, done_;
