@@ -196,6 +196,13 @@ void register_model(py::module_& module) {
             [](const Model& m, double progress) { return m.reduction().prescribed_rate(progress); },
             "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")
         .def("energy", &Model::energy, py::call_guard<py::gil_scoped_release>())
+        .def_property_readonly("term_names",
+                               [](const Model& model) {
+                                   py::list names;
+                                   for (const std::string_view name : model.term_names())
+                                       names.append(py::str(name.data(), name.size()));
+                                   return names;
+                               })
         .def("energies", &energies)
         .def(
             "gradient",

@@ -164,7 +164,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     scene, model = asked.inputs.scene, asked.inputs.scene._model
     positions, edge_rotations, velocities = _outputs(asked, found)
     recorded = len(found.kinetic_energy)
-    names = list(model.energies(found.last_state, _core.Controls()))
+    names = model.term_names
     by_term = np.array(found.energies).reshape(recorded, len(names))
     return Trajectory(
         scene=scene,

@@ -284,6 +284,12 @@ double Model::energy(const VectorXd& q, const Controls& controls) const {
     return total;
 }
 
+std::vector<std::string_view> Model::term_names() const {
+    std::vector<std::string_view> names;
+    for (const std::unique_ptr<Term>& term : terms_) names.push_back(term->name());
+    return names;
+}
+
 std::vector<std::pair<std::string_view, double>> Model::energies(const VectorXd& q,
                                                                  const Controls& controls) const {
     std::vector<std::pair<std::string_view, double>> of_terms;

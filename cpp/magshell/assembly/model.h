@@ -61,6 +61,8 @@ class Model {
     Rows3 vertex_rows(const VectorXd& full) const { return positions(full); }
 
     double energy(const VectorXd& q, const Controls& controls) const;
+    /// In the order of energies().
+    std::vector<std::string_view> term_names() const;
     std::vector<std::pair<std::string_view, double>> energies(const VectorXd& q,
                                                               const Controls& controls) const;
 
