@@ -6,17 +6,17 @@
 namespace magshell::bindings {
 namespace {
 
-py::dict pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, const Array& by_positions,
+py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, const Array& by_positions,
                              const Array& by_edge_rotations) {
     const Rows3 positions = to_rows3(by_positions);
     const VectorXd rotations = to_vector(by_edge_rotations);
-    SceneGradient gradient;
+    Gradient gradient;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        gradient = pull_back(model, equilibrium, model.gradient_by_state(positions, rotations));
+        gradient = pull_back(model, equilibrium, model.bodies().gradient_by_state(positions, rotations));
     }
-    return to_dict(model, gradient);
+    return py::make_tuple(values_to_user(model, gradient.values), gradient.controls);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ PathResult follow(Model& model, const VectorXd& start, const Model::Memory& memo
     if (!until.is_none())
         ends = [&](const PathPoint& point) {
             const py::gil_scoped_acquire locked;
-            return call_python(until, point.parameter, model.positions(point.state)).cast<bool>();
+            return call_python(until, point.parameter, model.bodies().positions(point.state)).cast<bool>();
         };
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());

@@ -1,5 +1,5 @@
 // The model of a scene to Python: checked arrays in, numbers out. Scene in the package builds it.
-#include "magshell/assembly/model.h"
+#include "magshell/scene/model.h"
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
@@ -25,13 +25,6 @@ std::vector<HeldNode> held_nodes(const IndexArray& nodes, const Array& frames) {
     return held;
 }
 
-std::vector<Motion> motions_of(const Array& rows) {
-    std::vector<Motion> motions;
-    for (py::ssize_t k = 0; k < rows.shape(0); ++k)
-        motions.push_back({Vec3(rows.data(k, 0)), Vec3(rows.data(k, 1)), Vec3(rows.data(k, 2))});
-    return motions;
-}
-
 std::vector<ContactInput> contacts_of(const py::list& given) {
     std::vector<ContactInput> contacts;
     for (const py::handle each : given) {
@@ -48,59 +41,58 @@ std::vector<ContactInput> contacts_of(const py::list& given) {
     return contacts;
 }
 
-std::vector<ContactLaw> contact_laws_of(const Array& rows) {
-    std::vector<ContactLaw> laws;
-    for (py::ssize_t k = 0; k < rows.shape(0); ++k)
-        laws.push_back({rows.at(k, 0), rows.at(k, 1), rows.at(k, 2), rows.at(k, 3), rows.at(k, 4)});
-    return laws;
+std::vector<ObstacleInput> obstacles_of(const py::list& given) {
+    std::vector<ObstacleInput> obstacles;
+    for (const py::handle each : given)
+        obstacles.push_back(
+            {each["shape"].cast<std::shared_ptr<Obstacle>>(), each["moves"].cast<bool>()});
+    return obstacles;
 }
 
-std::vector<PlacedObstacle> obstacles_of(const py::list& shapes, const Array& placements) {
-    std::vector<PlacedObstacle> placed;
-    for (py::size_t k = 0; k < shapes.size(); ++k)
-        placed.push_back({shapes[k].cast<std::shared_ptr<Obstacle>>(),
-                          {Vec3(placements.data(k, 0)), Vec3(placements.data(k, 1))}});
-    return placed;
+std::vector<SheetInput> sheets_of(const py::list& given) {
+    std::vector<SheetInput> sheets;
+    for (const py::handle each : given) {
+        SheetInput& sheet = sheets.emplace_back();
+        sheet.owner = each["owner"].cast<std::string>();
+        sheet.mesh = each["mesh"].cast<std::shared_ptr<TriangleMesh>>();
+        sheet.vertices = each["vertices"].cast<std::vector<Index>>();
+        sheet.directors = each["directors"].cast<bool>();
+        sheet.magnetic = each["magnetic"].cast<bool>();
+        sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
+    }
+    return sheets;
 }
 
-SceneValues values_of(const py::dict& given) {
-    const auto array = [&](const char* name) { return given[name].cast<Array>(); };
-    SceneValues values;
-    const Array thickness = array("thickness"), young = array("young_modulus"),
-                poisson = array("poisson_ratio");
-    for (py::ssize_t f = 0; f < thickness.size(); ++f)
-        values.materials.push_back({thickness.at(f), young.at(f), poisson.at(f)});
-    values.curvature_scale = to_vector(array("curvature_scale"));
-    values.vertex_mass = to_vector(array("vertex_mass"));
-    values.gravity = to_vector(array("gravity"));
-    values.vertex_loads = to_rows3(array("vertex_loads"));
-    values.couples = to_vector(array("couples"));
-    values.motions = motions_of(array("motions"));
-    for (const py::handle source : given["field_sources"])
-        values.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
-    values.water = given["water"].cast<std::shared_ptr<Water>>();
-    values.contacts = contact_laws_of(array("contacts"));
-    values.obstacles = obstacles_of(given["obstacles"], array("placements"));
-    return values;
-}
-
-std::unique_ptr<Model> make_model(const std::shared_ptr<TriangleMesh>& mesh, const py::dict& values,
-                                  const py::kwargs& given) {
+std::unique_ptr<Model> make_model(const py::kwargs& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     const auto indices = [&](const char* name) { return given[name].cast<IndexArray>(); };
-    SceneInput input(*mesh);
-    input.directors = given["directors"].cast<bool>();
-    input.directed_edges = directed_edges(indices("directed_edges"));
+    SceneInput input;
+    input.n_vertices = given["n_vertices"].cast<Index>();
+    input.sheets = sheets_of(given["sheets"]);
     input.directions = to_rows3(array("directions"));
     input.held = held_nodes(indices("held_nodes"), array("held_frames"));
-    const IndexArray couple_edges = indices("couple_edges");
-    for (py::ssize_t k = 0; k < couple_edges.shape(0); ++k)
-        input.couples.push_back({couple_edges.at(k, 0), couple_edges.at(k, 1)});
-    input.magnetic = given["magnetic"].cast<bool>();
+    input.motions = given["motions"].cast<Index>();
+    const IndexArray couples = indices("couples");
+    for (py::ssize_t k = 0; k < couples.shape(0); ++k)
+        input.couples.push_back({couples.at(k, 0), couples.at(k, 1), couples.at(k, 2)});
+    input.gravity = given["gravity"].cast<bool>();
+    input.loads = given["loads"].cast<bool>();
+    for (const py::handle source : given["field_sources"])
+        input.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
     input.contacts = contacts_of(given["contacts"]);
-    input.values = values_of(values);
+    input.obstacles = obstacles_of(given["obstacles"]);
+    input.water = given["water"].cast<std::shared_ptr<Water>>();
     const py::gil_scoped_release unlocked;
-    return std::make_unique<Model>(std::move(input));
+    return std::make_unique<Model>(input);
+}
+
+// (owner, name, unit, first, rows, width) of each.
+py::list entries_of(const Parameters& parameters) {
+    py::list entries;
+    for (const Parameters::Entry& entry : parameters.entries())
+        entries.append(py::make_tuple(entry.owner, entry.name, entry.unit, entry.slot.first, entry.slot.rows,
+                                      entry.slot.width));
+    return entries;
 }
 
 py::dict energies(const Model& model, const VectorXd& q, const Controls& controls) {
@@ -110,7 +102,10 @@ py::dict energies(const Model& model, const VectorXd& q, const Controls& control
         of_terms = model.energies(q, controls);
     }
     py::dict energies;
-    for (const auto& [name, value] : of_terms) energies[py::str(name.data(), name.size())] = value;
+    for (const auto& [name, value] : of_terms) {  // terms of one name, of several bodies, as one
+        const py::str key(name.data(), name.size());
+        energies[key] = value + (energies.contains(key) ? energies[key].cast<double>() : 0.0);
+    }
     return energies;
 }
 
@@ -138,62 +133,54 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
 }  // namespace
 
 void register_model(py::module_& module) {
-    py::class_<Controls>(module, "Controls")
-        .def(py::init([](const Vec3& flux_density, double field, double load, double gravity, double motion) {
-                 return Controls{flux_density, field, load, gravity, motion, {}};
-             }),
-             py::kw_only(), py::arg("flux_density") = Vec3::Zero().eval(), py::arg("field") = 0.0,
-             py::arg("load") = 0.0, py::arg("gravity") = 0.0, py::arg("motion") = 0.0)
-        .def_readonly("flux_density", &Controls::flux_density)
-        .def_readonly("field", &Controls::field)
-        .def_readonly("load", &Controls::load)
-        .def_readonly("gravity", &Controls::gravity)
-        .def_readonly("motion", &Controls::motion)
-        .def("towards", &interpolate, py::arg("to"), py::arg("parameter"));
-
     py::class_<Model>(module, "Model")
-        .def(py::init(&make_model), py::arg("mesh"), py::arg("values"))
-        .def("set_values",
-             [](Model& model, const py::dict& values) {
-                 const SceneValues given = values_of(values);
-                 const py::gil_scoped_release unlocked;
-                 const std::lock_guard lock(model.in_use());
-                 model.set_values(given);
-             })
-        .def("set_magnetization",
-             [](Model& model, const Array& magnetization) {
-                 const Rows3 rows = to_rows3(magnetization);
-                 const py::gil_scoped_release
-                     unlocked;  // a solve that holds the lock may be waiting for the GIL
-                 const std::lock_guard lock(model.in_use());
-                 model.set_magnetization(rows);
-             })
+        .def(py::init(&make_model))
+        .def_property_readonly(
+            "parameters", [](const Model& m) { return entries_of(m.registry().values); },
+            "(owner, name, unit, first, rows, width) of each, in the flat vector of set_values.")
+        .def_property_readonly(
+            "controls", [](const Model& m) { return entries_of(m.registry().controls); },
+            "Likewise, in the flat vectors of controls.")
+        .def(
+            "set_values",
+            [](Model& model, const Array& values) {
+                const VectorXd given = to_vector(values);
+                if (given.size() != model.registry().values.size())
+                    throw InvalidInput("the scene has " + std::to_string(model.registry().values.size()) +
+                                       " values, got " + std::to_string(given.size()));
+                const py::gil_scoped_release
+                    unlocked;  // a solve that holds the lock may be waiting for the GIL
+                const std::lock_guard lock(model.in_use());
+                model.set_values(given);
+            },
+            "All of them, rows in the caller's order.")
         .def_property_readonly("size", &Model::size)
         .def_property_readonly("analyses", &Model::analyses)
         .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
         .def_property_readonly("bytes", &Model::bytes)
-        .def("rest_state", &Model::rest_state)
+        .def_property_readonly("n_strains", &Model::n_strains)
+        .def("rest_state", [](const Model& m) { return m.bodies().rest_state(); })
         .def("state", [](const Model& m, const Array& x,
-                         const Array& r) { return m.state(to_rows3(x), to_vector(r)); })
+                         const Array& r) { return m.bodies().state(to_rows3(x), to_vector(r)); })
         .def(
             "full_vector",
             [](const Model& m, const Array& rows) {
-                return m.gradient_by_state(to_rows3(rows), VectorXd::Zero(m.sheet().n_edges()));
+                return m.bodies().gradient_by_state(to_rows3(rows), VectorXd::Zero(m.bodies().n_edges()));
             },
             "Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.")
-        .def("positions", &Model::positions)
-        .def("edge_rotations", &Model::edge_rotations)
+        .def("positions", [](const Model& m, const VectorXd& q) { return m.bodies().positions(q); })
+        .def("edge_rotations", [](const Model& m, const VectorXd& q) { return m.bodies().edge_rotations(q); })
         .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })
         .def("reduce", [](const Model& m, const VectorXd& full) { return m.reduction().vector(full); })
         .def(
             "free_weights",
             [](const Model& m, const Array& of_vertices) {
-                return m.reduction().weights(m.vertex_weights(to_vector(of_vertices)));
+                return m.reduction().weights(m.bodies().vertex_weights(to_vector(of_vertices)));
             },
             "Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.")
         .def(
             "prescribed_rate",
-            [](const Model& m, double progress) { return m.reduction().prescribed_rate(progress); },
+            [](const Model& m, const Controls& controls) { return m.reduction().prescribed_rate(controls); },
             "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")
         .def("energy", &Model::energy, py::call_guard<py::gil_scoped_release>())
         .def_property_readonly("term_names",

@@ -33,9 +33,10 @@ class Backward {
           motion_(motion),
           by_q_(by_q),
           by_v_(by_v),
-          stepper_(newton, input.tableau, input.inertia, input.viscosity) {
+          stepper_(newton, input.tableau, input.inertia, input.viscosity),
+          scene_(model_.registry()) {
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
-        g_.controls.resize(input.controls.size());
+        g_.controls.assign(input.controls.size(), model_.no_controls());
     }
 
     MotionGradient run() {
@@ -48,6 +49,7 @@ class Backward {
             end = std::min(end, at->first);
         }
         back_to_start();
+        g_.values = std::move(scene_.values);
         return std::move(g_);
     }
 
@@ -101,7 +103,7 @@ class Backward {
         const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
         const double dt = algebra.dt(), adt = algebra.stage_time();
         const VectorXd &mass = input_.inertia.mass, &damping = input_.inertia.damping;
-        const Index coordinates = 3 * model_.sheet().n_vertices();
+        const Index coordinates = model_.n_coordinates();
         const Rates at(algebra, record, coordinates);
 
         std::vector<VectorXd> by_v(first + n, VectorXd::Zero(model_.size())), by_w = by_v;
@@ -151,7 +153,7 @@ class Backward {
             by_w_ = std::move(by_w.front());
         }
         if (input_.viscosity.any()) {
-            model_.evaluate(record.begin.q, {});
+            model_.evaluate(record.begin.q, model_.no_controls());
             g_.positions += model_.strain_forces(viscous.by_d_begin);
             by_strains_ = std::move(viscous.by_begin);
             by_dt += viscous.by_dt;
@@ -195,9 +197,10 @@ class Backward {
         const VectorXd lambda = solve(stage, controls, anchor, -by_x);
         viscous.after_solve(i, lambda);
 
-        SceneGradient gradient = model_.vjp(stage.q, controls, lambda);
+        scene_.controls.setZero();
+        model_.vjp(stage.q, controls, lambda, scene_);
         KinematicsGradient by_forces;
-        if (model_.has_forces()) by_forces = model_.forces_vjp(controls, lambda, gradient);
+        if (model_.has_forces()) by_forces = model_.forces_vjp(controls, lambda, scene_);
         if (model_.reduction().moves()) {
             // Once more: the factorization has turned the blocks of framed nodes.
             model_.assemble(stage.q, controls, false);
@@ -206,12 +209,11 @@ class Backward {
             model_.matrix().multiply(lambda.data(), reaction.data());
             if (model_.has_forces()) model_.remainder().add_product(lambda, true, reaction);
             reaction += by_x;
-            model_.reduction().vjp(reaction, controls.motion, gradient.motions, gradient.controls.motion);
+            model_.reduction().vjp(reaction, controls, scene_);
         }
         const auto [first, weight] = input_.between(step, share);
-        g_.controls[first] = g_.controls[first] + (1.0 - weight) * gradient.controls;
-        g_.controls[first + 1] = g_.controls[first + 1] + weight * gradient.controls;
-        g_.scene.add_scene(gradient);
+        g_.controls[first] += (1.0 - weight) * scene_.controls;
+        g_.controls[first + 1] += weight * scene_.controls;
         return {lambda, std::move(by_forces)};
     }
 
@@ -229,9 +231,9 @@ class Backward {
         VectorXd reaction(model_.size());
         model_.matrix().multiply(lambda.data(), reaction.data());
         g_.positions += reaction;
-        const SceneGradient gradient = model_.vjp(q, controls, lambda);
-        g_.controls[0] = g_.controls[0] + gradient.controls;
-        g_.scene.add_scene(gradient);
+        scene_.controls.setZero();
+        model_.vjp(q, controls, lambda, scene_);
+        g_.controls[0] += scene_.controls;
     }
 
     // Adds what the loss says of the state at the beginning of a step.
@@ -249,6 +251,7 @@ class Backward {
     const MotionResult& motion_;
     const std::vector<VectorXd>&by_q_, &by_v_;
     Stepper stepper_;
+    Gradient scene_;  // by all values; by the controls of the stage at hand
     // By the rates, and by the Maxwell branch, at the beginning of the last step taken back.
     VectorXd by_w_;
     ViscousGradient by_strains_;

@@ -22,7 +22,7 @@ struct MotionGradient {
     VectorXd mass, damping;          // of all unknowns
     double time_step = 0.0;
     Viscosity viscosity{0.0, 0.0, 0.0};
-    SceneGradient scene;             // its controls are empty
+    VectorXd values;                 // of the scene
     std::vector<Controls> controls;  // as MotionInput::controls
 };
 

@@ -4,7 +4,7 @@
 
 namespace magshell {
 
-SceneGradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state) {
+Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state) {
     if (!equilibrium.factor)
         throw InvalidInput("the equilibrium was found without keeping its factorization");
     const VectorXd& q = equilibrium.state;
@@ -17,13 +17,14 @@ SceneGradient pull_back(Model& model, const StaticsResult& equilibrium, const Ve
 
     model.set_memory(equilibrium.memory);
     model.evaluate(q, controls);
-    SceneGradient gradient = model.vjp(q, controls, lambda);
+    Gradient gradient(model.registry());
+    model.vjp(q, controls, lambda, gradient);
     if (reduction.moves()) {
         model.assemble(q, controls, false);
         VectorXd reaction(q.size());
         model.matrix().multiply(lambda.data(), reaction.data());
         reaction += by_state;
-        reduction.vjp(reaction, controls.motion, gradient.motions, gradient.controls.motion);
+        reduction.vjp(reaction, controls, gradient);
     }
     return gradient;
 }

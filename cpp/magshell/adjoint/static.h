@@ -11,6 +11,6 @@ namespace magshell {
 
 /// dF/dk from dF/dq, a vector of all unknowns, at an equilibrium whose factor was kept. The model must hold
 /// the values that the equilibrium was found with. Throws InvalidInput where no factor was kept.
-SceneGradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state);
+Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state);
 
 }  // namespace magshell

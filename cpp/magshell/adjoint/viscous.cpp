@@ -6,7 +6,7 @@ ViscousAdjoint::ViscousAdjoint(Model& model, const Viscosity& law, const StepAlg
                                const PartRecord& part, const ViscousGradient& by_end)
     : model_(model), law_(law), step_(step) {
     if (!law.any()) return;
-    const SheetStrains d_begin = model.strains(part.begin.q), zero = d_begin.times(0.0);
+    const StrainSet d_begin = model.strains(part.begin.q), zero = d_begin.times(0.0);
     rates_ = first_rates(step.tableau(), part.begin);
     first_ = rates_.size();
     for (std::size_t i = 0; i < part.stages.size(); ++i) {
@@ -28,10 +28,6 @@ ViscousAdjoint::ViscousAdjoint(Model& model, const Viscosity& law, const StepAlg
     by_d_begin = by_begin.e = zero;
 }
 
-double ViscousAdjoint::dot(const SheetStrains& a, const SheetStrains& b) const {
-    return a.dot(b, model_.sheet().n_faces());
-}
-
 void ViscousAdjoint::set_history(int i) const {
     if (law_.any()) model_.set_history(law_.scale(step_.stage_time()), &stages_[i].shift);
 }
@@ -40,19 +36,19 @@ void ViscousAdjoint::before_solve(int i, VectorXd& by_q) {
     if (!law_.any()) return;
     const ViscousStage& stage = stages_[i];
     const StageRates& rates = rates_[first_ + i];
-    const SheetStrains &by_d_rate = by_d_rate_[first_ + i], &by_e_rate = by_e_rate_[first_ + i];
+    const StrainSet &by_d_rate = by_d_rate_[first_ + i], &by_e_rate = by_e_rate_[first_ + i];
     const double T = step_.stage_time();
-    SheetStrains by_d = by_d_rate.times(1.0 / T);  // d' = (d - d^)/T
+    StrainSet by_d = by_d_rate.times(1.0 / T);  // d' = (d - d^)/T
     by_d_hat_[i].add(-1.0 / T, by_d_rate);
-    by_stage_time_[i] -= dot(by_d_rate, rates.d) / T;
+    by_stage_time_[i] -= by_d_rate.dot(rates.d) / T;
     if (law_.maxwell()) {
         const double tau = law_.maxwell_time, r = law_.ratio(T);
         by_d.add(1.0 / tau, by_e_rate);  // e' = (d - e)/tau
         by_e_[i].add(-1.0 / tau, by_e_rate);
-        by_law.maxwell_time -= dot(by_e_rate, rates.e) / tau;
+        by_law.maxwell_time -= by_e_rate.dot(rates.e) / tau;
         by_e_hat_[i].add(1.0 / (1.0 + r), by_e_[i]);  // e = (e^ + r d)/(1 + r)
         by_d.add(r / (1.0 + r), by_e_[i]);
-        by_ratio_[i] += (dot(by_e_[i], stage.d) - dot(by_e_[i], stage.e_hat)) / ((1.0 + r) * (1.0 + r));
+        by_ratio_[i] += (by_e_[i].dot(stage.d) - by_e_[i].dot(stage.e_hat)) / ((1.0 + r) * (1.0 + r));
     }
     by_q += model_.strain_forces(by_d);
 }
@@ -62,14 +58,14 @@ void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {
     const ViscousStage& stage = stages_[i];
     const double T = step_.stage_time(), beta = law_.stiffness_damping;
     // lambda . J^T C (scale d - shift)
-    const SheetStrains along = model_.stresses(model_.strain_rates(lambda));
-    const double by_scale = dot(along, stage.d), by_d_share = -dot(along, stage.d_hat);
+    const StrainSet along = model_.stresses(model_.strain_rates(lambda));
+    const double by_scale = along.dot(stage.d), by_d_share = -along.dot(stage.d_hat);
     by_d_hat_[i].add(-beta / T, along);
     by_law.stiffness_damping += (by_scale + by_d_share) / T;
     by_stage_time_[i] -= beta / (T * T) * (by_scale + by_d_share);
     if (law_.maxwell()) {
         const double r = law_.ratio(T), relaxed = law_.relaxed(T);
-        const double by_relaxed = by_scale - dot(along, stage.e_hat);
+        const double by_relaxed = by_scale - along.dot(stage.e_hat);
         by_e_hat_[i].add(-relaxed, along);
         by_law.maxwell_modulus += by_relaxed / (1.0 + r);
         by_ratio_[i] -= by_relaxed * relaxed / (1.0 + r);
@@ -88,10 +84,10 @@ void ViscousAdjoint::pass_on(int i) {
     for (std::size_t j = 0; j < first_ + i; ++j) {
         const double a = step_.tableau().a[i][j];
         by_d_rate_[j].add(a * step_.dt(), by_d_hat_[i]);
-        by_dt += a * dot(rates_[j].d, by_d_hat_[i]);
+        by_dt += a * rates_[j].d.dot(by_d_hat_[i]);
         if (!law_.maxwell()) continue;
         by_e_rate_[j].add(a * step_.dt(), by_e_hat_[i]);
-        by_dt += a * dot(rates_[j].e, by_e_hat_[i]);
+        by_dt += a * rates_[j].e.dot(by_e_hat_[i]);
     }
     if (i > 0 || first_ == 0) return;
     by_begin.d_rate = by_d_rate_.front();

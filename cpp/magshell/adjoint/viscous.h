@@ -7,7 +7,7 @@ namespace magshell {
 
 /// By the Maxwell strains between two steps, and by the rates of the strains there; empty where nothing asks.
 struct ViscousGradient {
-    SheetStrains e, d_rate, e_rate;
+    StrainSet e, d_rate, e_rate;
 };
 
 class ViscousAdjoint {
@@ -23,13 +23,12 @@ class ViscousAdjoint {
     /// At the evaluated stage: what lambda says of the history and of the law.
     void after_solve(int i, const VectorXd& lambda);
 
-    SheetStrains by_d_begin;
+    StrainSet by_d_begin;
     ViscousGradient by_begin;
     Viscosity by_law{0.0, 0.0, 0.0};
     double by_dt = 0.0;
 
   private:
-    double dot(const SheetStrains& a, const SheetStrains& b) const;
     void pass_on(int i);
 
     Model& model_;
@@ -38,8 +37,8 @@ class ViscousAdjoint {
     std::size_t first_ = 0;  // stage among all rates
     std::vector<ViscousStage> stages_;
     std::vector<StageRates> rates_;
-    std::vector<SheetStrains> by_e_, by_d_hat_, by_e_hat_;  // by stage
-    std::vector<SheetStrains> by_d_rate_, by_e_rate_;       // by rate
+    std::vector<StrainSet> by_e_, by_d_hat_, by_e_hat_;  // by stage
+    std::vector<StrainSet> by_d_rate_, by_e_rate_;       // by rate
     std::vector<double> by_ratio_, by_stage_time_;
 };
 

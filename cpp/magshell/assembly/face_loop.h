@@ -3,12 +3,13 @@
 #pragma once
 
 #include "magshell/assembly/lanes.h"
+#include "magshell/assembly/schedule.h"
 
 namespace magshell {
 
 class FaceLoop {
   public:
-    FaceLoop(const Sheet& sheet, const Schedule& schedule, const SystemMatrix& matrix);
+    FaceLoop(const Surface& surface, const PartLoop& parts, const SystemMatrix& matrix);
 
     Index packs() const { return packs_for(faces_); }
     int lanes_in(Index pack) const { return std::min(Pack::width, faces_ - pack * Pack::width); }
@@ -36,25 +37,25 @@ class FaceLoop {
     /// body(pack) for the packs of a part.
     template <class Body>
     static void over_packs(const Part& part, const Body& body) {
-        for (Index pack = part.first_face / Pack::width; pack < packs_for(part.last_face); ++pack) body(pack);
+        for (Index pack = part.first / Pack::width; pack < packs_for(part.last); ++pack) body(pack);
     }
 
     /// body(pack) for all packs, in the schedule's order, where body scatters.
     template <class Body>
     void scatter_packs(const Body& body) const {
-        schedule_.scatter([&](const Part& part) { over_packs(part, body); });
+        parts_.scatter([&](const Part& part) { over_packs(part, body); });
     }
 
     /// body(pack) for all packs, where body writes only what belongs to them.
     template <class Body>
     void each_pack(const Body& body) const {
-        schedule_.each([&](const Part& part) { over_packs(part, body); });
+        parts_.each([&](const Part& part) { over_packs(part, body); });
     }
 
     /// The sum of energy(pack) over the faces.
     template <class Energy>
     double sum(const Energy& energy) const {
-        return schedule_.sum([&](const Part& part) {
+        return parts_.sum([&](const Part& part) {
             double total = 0.0;
             over_packs(part, [&](Index pack) {
                 const Pack shares = energy(pack);
@@ -69,7 +70,7 @@ class FaceLoop {
   private:
     Index faces_;
     const std::vector<std::array<Index, 3>>* corners_;
-    const Schedule& schedule_;
+    const PartLoop& parts_;
     std::vector<PairSlots<3>> slots_;
 };
 

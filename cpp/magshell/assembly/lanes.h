@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "magshell/assembly/residual.h"
 #include "magshell/assembly/system_matrix.h"
-#include "magshell/assembly/term.h"
 #include "magshell/core/vector3.h"
 #include "magshell/energy/symmetric3.h"
 
@@ -18,11 +18,6 @@ constexpr Index packs_for(Index elements) {
 inline Index element_of(Index pack, int lane, Index elements) {
     const Index element = pack * Pack::width + lane;
     return element < elements ? element : elements - 1;
-}
-
-/// The same vector in every lane.
-inline Pack3 broadcast(const Vec3& v) {
-    return {Pack(v.x()), Pack(v.y()), Pack(v.z())};
 }
 
 inline void set_lane(Pack3& pack, int lane, const double* from) {

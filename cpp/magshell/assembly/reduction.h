@@ -8,8 +8,10 @@
 #include <memory>
 #include <vector>
 
-#include "magshell/assembly/motion.h"
+#include "magshell/assembly/support_motion.h"
 #include "magshell/assembly/system_matrix.h"
+#include "magshell/body/nodes.h"
+#include "magshell/core/parameters.h"
 #include "magshell/linalg/factor.h"
 
 namespace magshell {
@@ -24,27 +26,27 @@ struct HeldNode {
 
 class Reduction {
   public:
-    /// `rest` per node; nodes from `n_vertices` on are directions and turn only.
-    Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const std::vector<Vec3>& rest,
-              Index n_vertices);
+    /// `motions`: how many the held nodes refer to. The nodes have to outlive it.
+    Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const Nodes& nodes, Index motions,
+              Registry& registry);
 
-    /// As many as held nodes refer to.
-    void set_motions(std::vector<Motion> motions) { motions_ = std::move(motions); }
+    void set_values(const Values& values);
     bool moves() const { return !motions_.empty(); }
+
+    /// How far the motions have gone: 0 at rest, 1 at their end.
+    double progress(const Controls& controls) const { return controls[progress_.first]; }
 
     Index size() const { return pattern_->size; }
     const std::shared_ptr<const SparsePattern>& pattern() const { return pattern_; }
 
-    /// Where the supports want their nodes at this progress of their motion, less where they are: zero
-    /// elsewhere.
-    VectorXd prescribed_increment(const VectorXd& q, double progress) const;
+    /// Where the supports want their nodes, less where they are: zero elsewhere.
+    VectorXd prescribed_increment(const VectorXd& q, const Controls& controls) const;
 
     /// d(where the supports want their nodes)/d(progress).
-    VectorXd prescribed_rate(double progress) const;
+    VectorXd prescribed_rate(const Controls& controls) const;
 
-    /// Sets the gradients by each motion and by their progress, given the gradient by what supports hold.
-    void vjp(const VectorXd& by_state, double progress, std::vector<Motion>& by_motion,
-             double& by_progress) const;
+    /// Adds the gradients by the motions and by their progress, given the gradient by what supports hold.
+    void vjp(const VectorXd& by_state, const Controls& controls, Gradient& out) const;
 
     /// The largest angle [rad] by which a support turns in all.
     double largest_turn() const;
@@ -69,9 +71,14 @@ class Reduction {
     void turn_blocks(SystemMatrix& full) const;
 
     std::vector<HeldNode> held_;
-    std::vector<Motion> motions_;
-    std::vector<Vec3> rest_;
-    Index n_vertices_, full_size_;
+    const Nodes& nodes_;
+    struct MotionSlots {
+        Slot center, rotation, displacement;
+    };
+    std::vector<MotionSlots> slots_;
+    std::vector<SupportMotion> motions_;
+    Slot progress_;
+    Index full_size_;
     std::vector<Index> frame_of_;       // per node: index into held_ where turned, else -1; empty if none is
     std::vector<Index> free_unknowns_;  // reduced -> full, ascending
     std::shared_ptr<const SparsePattern> pattern_;

@@ -17,7 +17,12 @@ Index part_length(Index faces) {
 
 }  // namespace
 
-Schedule::Schedule(const Sheet& sheet) {
+Schedule::Schedule(Index nodes, const std::vector<const Sheet*>& bodies) : loops_(bodies.size()) {
+    for (Index body = 0; body < static_cast<Index>(bodies.size()); ++body) cut(*bodies[body], body);
+    colour(nodes, bodies);
+}
+
+void Schedule::cut(const Sheet& sheet, Index body) {
     Index fold = 0;
     const Index folds = static_cast<Index>(sheet.folds.size());
     const Index length = part_length(sheet.n_faces());
@@ -25,59 +30,67 @@ Schedule::Schedule(const Sheet& sheet) {
         const Index last = std::min(sheet.n_faces(), first + length);
         const Index first_fold = fold;
         while (fold < folds && sheet.folds[fold].first_face() < last) ++fold;
-        parts_.push_back({static_cast<Index>(parts_.size()), first, last, first_fold, fold});
+        const Part part{static_cast<Index>(all_.parts_.size()), body, first, last, first_fold, fold};
+        all_.parts_.push_back(part);
+        loops_[body].parts_.push_back(part);
     }
-    colour(sheet);
 }
 
-void Schedule::colour(const Sheet& sheet) {
-    const Index count = static_cast<Index>(parts_.size());
-    std::vector<std::vector<Index>> parts_at(sheet.n_nodes()), nodes_in(count);
-    for (Index p = 0; p < count; ++p)
-        for (Index f = parts_[p].first_face; f < parts_[p].last_face; ++f)
-            for (const Index node : sheet.stencils[f].nodes)
-                if (node >= 0 && (parts_at[node].empty() || parts_at[node].back() != p)) {
-                    parts_at[node].push_back(p);
-                    nodes_in[p].push_back(node);
+void Schedule::colour(Index nodes, const std::vector<const Sheet*>& bodies) {
+    const Index count = static_cast<Index>(all_.parts_.size());
+    std::vector<std::vector<Index>> parts_at(nodes), nodes_in(count);
+    for (const Part& part : all_.parts_)
+        for (Index element = part.first; element < part.last; ++element)
+            for (const Index node : bodies[part.body]->stencils[element].nodes)
+                if (node >= 0 && (parts_at[node].empty() || parts_at[node].back() != part.number)) {
+                    parts_at[node].push_back(part.number);
+                    nodes_in[part.number].push_back(node);
                 }
     std::vector<Index> colour_of(count, -1);
+    std::vector<std::vector<Index>>& colours = all_.colours_;
     for (Index p = 0; p < count; ++p) {
-        std::vector<bool> taken(colours_.size() + 1, false);
+        std::vector<bool> taken(colours.size() + 1, false);
         for (const Index node : nodes_in[p])
             for (const Index other : parts_at[node])
                 if (colour_of[other] >= 0) taken[colour_of[other]] = true;
         colour_of[p] = static_cast<Index>(std::find(taken.begin(), taken.end(), false) - taken.begin());
-        if (colour_of[p] == static_cast<Index>(colours_.size())) colours_.emplace_back();
-        colours_[colour_of[p]].push_back(p);
+        if (colour_of[p] == static_cast<Index>(colours.size())) colours.emplace_back();
+        colours[colour_of[p]].push_back(p);
+    }
+    for (PartLoop& loop : loops_) {
+        loop.colours_.resize(colours.size());
+        for (Index k = 0; k < static_cast<Index>(loop.parts_.size()); ++k)
+            loop.colours_[colour_of[loop.parts_[k].number]].push_back(k);
+        std::erase_if(loop.colours_, [](const std::vector<Index>& parts) { return parts.empty(); });
     }
 }
 
 std::vector<Part> Schedule::in_order() const {
     std::vector<Part> order;
-    for (const std::vector<Index>& parts : colours_)
-        for (const Index p : parts) order.push_back(parts_[p]);
+    for (const std::vector<Index>& parts : all_.colours_)
+        for (const Index p : parts) order.push_back(all_.parts_[p]);
     return order;
 }
 
-void Schedule::scatter(const std::function<void(const Part&)>& body) const {
+std::size_t Schedule::bytes() const {
+    return 2 * all_.parts_.size() * (sizeof(Part) + sizeof(Index));
+}
+
+void PartLoop::scatter(const std::function<void(const Part&)>& body) const {
     for (const std::vector<Index>& parts : colours_)
         parallel_for(static_cast<int>(parts.size()), [&](int k) { body(parts_[parts[k]]); });
 }
 
-void Schedule::each(const std::function<void(const Part&)>& body) const {
+void PartLoop::each(const std::function<void(const Part&)>& body) const {
     parallel_for(static_cast<int>(parts_.size()), [&](int p) { body(parts_[p]); });
 }
 
-double Schedule::sum(const std::function<double(const Part&)>& body) const {
+double PartLoop::sum(const std::function<double(const Part&)>& body) const {
     std::vector<double> shares(parts_.size());
     parallel_for(static_cast<int>(parts_.size()), [&](int p) { shares[p] = body(parts_[p]); });
     double total = 0.0;
     for (const double share : shares) total += share;
     return total;
-}
-
-std::size_t Schedule::bytes() const {
-    return parts_.size() * (sizeof(Part) + sizeof(Index));
 }
 
 }  // namespace magshell

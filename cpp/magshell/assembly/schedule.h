@@ -1,48 +1,65 @@
-// Which parts of a sheet may be scattered at the same time.
+// Which parts of the bodies may be scattered at the same time.
 //
-// Faces are cut into parts of fixed length, each with the folds that it is first to touch, and parts that
-// share a node get different colours. Colours follow each other, parts of one colour run in parallel: no two
-// threads add to one place, and the order of additions at a place is that of the colours, whatever the number
-// of threads. Same bits on one thread and on many. A part also fits in a core's cache with its share of the
-// Hessian.
+// The elements of a body are cut into parts of fixed length, those of a sheet each with the folds that it is
+// first to touch, and parts that share a node get different colours. Colours follow each other, parts of one
+// colour run in parallel: no two threads add to one place, and the order of additions at a place is that of
+// the colours, whatever the number of threads. Same bits on one thread and on many. A part also fits in a
+// core's cache with its share of the Hessian.
 #pragma once
 
 #include <functional>
 #include <vector>
 
-#include "magshell/assembly/sheet.h"
+#include "magshell/body/sheet.h"
 
 namespace magshell {
 
 struct Part {
-    Index number;
-    Index first_face, last_face;  // first_face is a multiple of every pack width
-    Index first_fold, last_fold;
+    Index number;       // among those of all bodies
+    Index body;
+    Index first, last;  // elements; the first is a multiple of every pack width
+    Index first_fold = 0, last_fold = 0;
 };
 
-class Schedule {
+/// The parts of one body.
+class PartLoop {
   public:
-    explicit Schedule(const Sheet& sheet);
-
     /// body(part) for every part, colour after colour, where body scatters into shared arrays.
     void scatter(const std::function<void(const Part&)>& body) const;
 
-    /// The parts in an order in which scatter may come to them.
-    std::vector<Part> in_order() const;
-
-    /// body(part) for every part at once, where body writes only to its own faces and folds.
+    /// body(part) for every part at once, where body writes only to its own elements and folds.
     void each(const std::function<void(const Part&)>& body) const;
 
     /// The sum of body(part) over the parts, added up in their order.
     double sum(const std::function<double(const Part&)>& body) const;
 
+  private:
+    friend class Schedule;
+    std::vector<Part> parts_;
+    std::vector<std::vector<Index>> colours_;  // of parts_
+};
+
+class Schedule {
+  public:
+    Schedule(Index nodes, const std::vector<const Sheet*>& bodies);
+    Schedule(const Schedule&) = delete;
+    Schedule& operator=(const Schedule&) = delete;
+
+    const PartLoop& of(Index body) const { return loops_[body]; }
+
+    /// body(part) for the parts of all bodies, colour after colour.
+    void scatter(const std::function<void(const Part&)>& body) const { all_.scatter(body); }
+    /// The parts in an order in which scatter may come to them.
+    std::vector<Part> in_order() const;
+
     std::size_t bytes() const;
 
   private:
-    void colour(const Sheet& sheet);
+    void cut(const Sheet& sheet, Index body);
+    void colour(Index nodes, const std::vector<const Sheet*>& bodies);
 
-    std::vector<Part> parts_;
-    std::vector<std::vector<Index>> colours_;
+    PartLoop all_;
+    std::vector<PartLoop> loops_;
 };
 
 }  // namespace magshell

@@ -10,17 +10,12 @@
 #include <array>
 #include <vector>
 
+#include "magshell/body/stencil.h"
 #include "magshell/core/large_memory.h"
 #include "magshell/core/types.h"
 #include "magshell/core/vector3.h"
 
 namespace magshell {
-
-/// The unknowns that one element couples. Negative: absent.
-struct Stencil {
-    std::array<Index, 6> nodes{-1, -1, -1, -1, -1, -1};
-    std::array<Index, 3> rotations{-1, -1, -1};
-};
 
 class SystemMatrix {
   public:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "magshell/core/pack.h"
+#include "magshell/core/types.h"
 
 namespace magshell {
 
@@ -26,6 +27,11 @@ struct Pack3 {
     friend Pack3 operator-(const Pack3& a) { return {-a.x, -a.y, -a.z}; }
     friend Pack3 operator*(const Pack& s, const Pack3& a) { return {s * a.x, s * a.y, s * a.z}; }
 };
+
+/// The same vector in every lane.
+inline Pack3 broadcast(const Vec3& v) {
+    return {Pack(v.x()), Pack(v.y()), Pack(v.z())};
+}
 
 inline Pack dot(const Pack3& a, const Pack3& b) {
     return a.x * b.x + a.y * b.y + a.z * b.z;

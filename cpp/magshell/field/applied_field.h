@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -28,6 +29,12 @@ struct FieldProbe {
     std::vector<Vec3> direction;  // v
 };
 
+/// A parameter of a field: so many rows of so many numbers.
+struct FieldParameter {
+    std::string_view name, unit;
+    Index rows, width;
+};
+
 /// An applied flux density B(x).
 class AppliedField {
   public:
@@ -42,10 +49,16 @@ class AppliedField {
     virtual void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order,
                              double scale, FieldSamples& out) const = 0;
 
-    /// The gradient of a probe of scale * B by the field's own parameters; empty where it has none.
-    virtual VectorXd vjp(std::span<const Vec3> /*points*/, const FieldProbe&, double /*scale*/) const {
-        return {};
-    }
+    /// What of it a solve may change; none by default.
+    virtual std::vector<FieldParameter> parameters() const { return {}; }
+    /// One with values of its own, for a scene that changes them; nullptr where there are none.
+    virtual std::shared_ptr<AppliedField> clone() const { return nullptr; }
+    /// All of them, one after another, row by row.
+    virtual void set_values(std::span<const double> /*values*/) {}
+
+    /// Adds the gradient of a probe of scale * B by the parameters, in the layout of set_values.
+    virtual void add_vjp(std::span<const Vec3> /*points*/, const FieldProbe&, double /*scale*/,
+                         std::span<double> /*out*/) const {}
 
     /// Whether add_samples runs Python code. It then takes the GIL by itself.
     virtual bool needs_gil() const { return false; }

@@ -73,10 +73,23 @@ void Dipoles::add_samples(std::span<const Vec3> points, std::span<const Vec3> mo
 // B and dB/dx are linear in p and, as matrices that take p to u . B and m . dB/dx v, symmetric: by p they are
 // the flux of u and the gradient of m along v. By the place of the dipole they change as by the point,
 // reversed.
-VectorXd Dipoles::vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale) const {
+std::vector<FieldParameter> Dipoles::parameters() const {
+    const Index n = static_cast<Index>(positions_.size());
+    return {{"positions", "m", n, 3}, {"moments", "A m^2", n, 3}};
+}
+
+void Dipoles::set_values(std::span<const double> values) {
+    const std::size_t n = positions_.size();
+    for (std::size_t d = 0; d < n; ++d) {
+        positions_[d] = Vec3(values.data() + 3 * d);
+        moments_[d] = Vec3(values.data() + 3 * (n + d));
+    }
+}
+
+void Dipoles::add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
+                      std::span<double> out) const {
     const double k = scale * vacuum_permeability / (4.0 * std::numbers::pi);
     const auto n = static_cast<int>(positions_.size());
-    VectorXd out = VectorXd::Zero(6 * n);
     parallel_for(n, [&](int d) {
         Vec3 by_position = Vec3::Zero(), by_moment = Vec3::Zero();
         for (std::size_t point = 0; point < points.size(); ++point) {
@@ -88,10 +101,9 @@ VectorXd Dipoles::vjp(std::span<const Vec3> points, const FieldProbe& probe, dou
             by_position -=
                 3.0 * k3 / distance * (gradient(moments_[d], e) * u + curvature(moments_[d], m, e) * v);
         }
-        out.segment<3>(3 * d) = by_position;
-        out.segment<3>(3 * (n + d)) = by_moment;
+        Eigen::Map<Vec3>(out.data() + 3 * d) += by_position;
+        Eigen::Map<Vec3>(out.data() + 3 * (n + d)) += by_moment;
     });
-    return out;
 }
 
 }  // namespace magshell

@@ -19,8 +19,11 @@ class Dipoles final : public AppliedField {
     void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
                      FieldSamples& out) const override;
 
-    /// By each position, then by each moment, (2 n, 3) row by row.
-    VectorXd vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale) const override;
+    std::vector<FieldParameter> parameters() const override;
+    std::shared_ptr<AppliedField> clone() const override { return std::make_shared<Dipoles>(*this); }
+    void set_values(std::span<const double> values) override;
+    void add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
+                 std::span<double> out) const override;
 
   private:
     std::vector<Vec3> positions_;

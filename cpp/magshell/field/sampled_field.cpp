@@ -56,15 +56,32 @@ SampledField::SampledField(const Vec3& origin, const Vec3& spacing, const std::a
                            std::to_string(flux_density.size()) + " values");
     }
 
-    Grid grid{samples, {}};
-    grid.values.reserve(expected);
-    for (const Vec3& b : flux_density) grid.values.emplace_back(b.x(), b.y(), b.z(), 0.0);
-    for (int a = 0; a < 3; ++a)
-        if (samples[a] > 1) grid = map_lines(a, grid, spline_coefficients, 2);
-    for (int a = 0; a < 3; ++a) {
+    std::ptrdiff_t stride = 1;  // of coefficients, of which an axis has two more than samples
+    for (int a = 2; a >= 0; --a) {
         const bool constant = samples[a] == 1;
-        axes_[a] = {origin[a], constant ? 0.0 : 1.0 / spacing[a], samples[a], constant ? 0 : grid.stride(a)};
+        axes_[a] = {origin[a], constant ? 0.0 : 1.0 / spacing[a], samples[a], constant ? 0 : stride};
+        stride *= constant ? 1 : samples[a] + 2;
     }
+    set_values({flux_density.data()->data(), 3 * flux_density.size()});
+}
+
+std::size_t SampledField::count() const {
+    std::size_t count = 1;
+    for (const Axis& axis : axes_) count *= static_cast<std::size_t>(axis.samples);
+    return count;
+}
+
+std::vector<FieldParameter> SampledField::parameters() const {
+    return {{"flux_density", "T", static_cast<Index>(count()), 3}};
+}
+
+void SampledField::set_values(std::span<const double> values) {
+    Grid grid{{axes_[0].samples, axes_[1].samples, axes_[2].samples}, {}};
+    grid.values.reserve(count());
+    for (std::size_t k = 0; k < count(); ++k)
+        grid.values.emplace_back(values[3 * k], values[3 * k + 1], values[3 * k + 2], 0.0);
+    for (int a = 0; a < 3; ++a)
+        if (axes_[a].samples > 1) grid = map_lines(a, grid, spline_coefficients, 2);
     coefficients_ = std::move(grid.values);
 }
 
@@ -156,7 +173,8 @@ void SampledField::add_samples(std::span<const Vec3> points, std::span<const Vec
 
 // The samples reach a point through the coefficients around it, linearly. One point after another, as they
 // share them.
-VectorXd SampledField::vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale) const {
+void SampledField::add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
+                           std::span<double> out) const {
     Grid grid;
     for (int a = 0; a < 3; ++a) grid.size[a] = axes_[a].samples + (axes_[a].samples > 1 ? 2 : 0);
     grid.values.assign(coefficients_.size(), Vec4(Vec4::Zero()));
@@ -178,10 +196,8 @@ VectorXd SampledField::vjp(std::span<const Vec3> points, const FieldProbe& probe
     }
     for (int a = 2; a >= 0; --a)
         if (axes_[a].samples > 1) grid = map_lines(a, grid, spline_samples_gradient, -2);
-    VectorXd by_samples(3 * grid.values.size());
     for (std::size_t k = 0; k < grid.values.size(); ++k)
-        by_samples.segment<3>(3 * k) = grid.values[k].head<3>();
-    return by_samples;
+        for (int c = 0; c < 3; ++c) out[3 * k + c] += grid.values[k][c];
 }
 
 }  // namespace magshell

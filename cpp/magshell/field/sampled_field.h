@@ -22,8 +22,12 @@ class SampledField final : public AppliedField {
     void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
                      FieldSamples& out) const override;
 
-    /// By the samples, (nx ny nz, 3) row by row. The points lie in the grid.
-    VectorXd vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale) const override;
+    std::vector<FieldParameter> parameters() const override;
+    std::shared_ptr<AppliedField> clone() const override { return std::make_shared<SampledField>(*this); }
+    void set_values(std::span<const double> values) override;
+    /// The points lie in the grid.
+    void add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
+                 std::span<double> out) const override;
 
     /// Whether the point lies in the grid; rounding may carry it out by a billionth of a cell.
     bool contains(const Vec3& point) const;
@@ -51,6 +55,9 @@ class SampledField final : public AppliedField {
     template <int Order>
     void add_sample(std::size_t k, const Vec3& point, const Vec3& moment, double scale,
                     FieldSamples& out) const;
+
+    /// The number of samples.
+    std::size_t count() const;
 
     std::array<Axis, 3> axes_;
     std::vector<Vec4> coefficients_;

@@ -96,7 +96,7 @@ class Follower {
     bool find_tangent(PathPoint& point, Tangent& tangent) {
         const Controls at = controls(point.parameter);
         model_.evaluate(point.state, at);
-        const VectorXd held = rate_.motion * model_.reduction().prescribed_rate(at.motion);
+        const VectorXd held = model_.reduction().progress(rate_) * model_.reduction().prescribed_rate(at);
         Eigen::MatrixXd pull = held;
         const FactorReport factor = newton_.factorize(point.state, at, false, {}, pull);
         if (!factor.succeeded) return false;
@@ -120,14 +120,14 @@ class Follower {
             model_.evaluate(q, at);
             const double residual = newton_.relative_residual(q, {});
             newton_.watch(residual);
-            const VectorXd gap = model_.reduction().prescribed_increment(q, at.motion);
+            const VectorXd gap = model_.reduction().prescribed_increment(q, at);
             const bool in_place = gap.lpNorm<Eigen::Infinity>() <= 1e-14 * model_.extent();
             if (in_place && residual <= newton_.options().tolerance) {
                 found = {q, parameter, model_.memory(), 0};
                 return true;
             }
             if (!std::isfinite(residual) || iterations == corrector_iterations) return false;
-            const VectorXd held = rate_.motion * model_.reduction().prescribed_rate(at.motion);
+            const VectorXd held = model_.reduction().progress(rate_) * model_.reduction().prescribed_rate(at);
             Eigen::MatrixXd pulls(q.size(), 2);
             pulls << gap, held;
             if (!newton_.factorize(q, at, newton_.options().mixed, {}, pulls).succeeded) return false;

@@ -21,13 +21,9 @@ std::vector<Controls> controls_of(const MotionInput& input, const Tableau& table
     return controls;
 }
 
-std::size_t bytes_of(const SheetStrains& strains) {
-    return (strains.membrane.size() + strains.bending.size()) * sizeof(Pack);
-}
-
 std::size_t bytes_of(const MotionState& state) {
     return sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() + state.rates.w.size()) +
-           bytes_of(state.e) + bytes_of(state.rates.d) + bytes_of(state.rates.e);
+           state.e.bytes() + state.rates.d.bytes() + state.rates.e.bytes();
 }
 
 std::size_t bytes_of(const PartRecord& part) {
@@ -81,7 +77,7 @@ class Run {
     void plan(const KeepOptions& keep) {
         const bool explicit_first = input_.tableau.begins_explicitly;
         const std::size_t vector = sizeof(double) * model_.size();
-        const std::size_t strains = 6 * sizeof(double) * model_.sheet().n_faces();
+        const std::size_t strains = sizeof(double) * model_.n_strains();
         std::size_t state = (explicit_first ? 4 : 2) * vector;
         if (input_.viscosity.maxwell()) state += strains;
         if (explicit_first && input_.viscosity.any()) state += (input_.viscosity.maxwell() ? 2 : 1) * strains;

@@ -64,7 +64,7 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     for (const int c : order) {
         VectorXd shape = model.reduction().expand(y.col(c));
         Index largest;
-        shape.head(3 * model.sheet().n_vertices()).cwiseAbs().maxCoeff(&largest);
+        shape.head(model.n_coordinates()).cwiseAbs().maxCoeff(&largest);
         modes.push_back({eigenvalues[c], shape / shape[largest]});
     }
     return modes;

@@ -90,7 +90,7 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
     const Reduction& reduction = model_.reduction();
     // Held components have no residual of their own; those of framed nodes are told apart in their frames.
     const VectorXd free = reduction.expand(reduction.vector(gradient(q, anchor)));
-    const Index nodes = 3 * model_.sheet().n_nodes(), rotations = model_.sheet().n_rotations();
+    const Index nodes = model_.nodes().first_scalar(), rotations = model_.nodes().scalars;
     VectorXd magnitude = model_.residual().magnitude;
     if (anchor.weights) magnitude += anchor.weights->cwiseProduct(q - *anchor.target).cwiseAbs();
     VectorXd cancelling = model_.cancelling_forces(q);
@@ -226,7 +226,7 @@ GmresReport Newton::solve_unsymmetric(const Factor& factor, const LinearMap& sym
 
 bool Newton::still_holds(const VectorXd& q, const Controls& controls) {
     evaluate(q, controls, {});
-    const bool in_place = model_.reduction().prescribed_increment(q, controls.motion).isZero(0.0);
+    const bool in_place = model_.reduction().prescribed_increment(q, controls).isZero(0.0);
     return in_place && relative_residual(q, {}) <= options_.tolerance;
 }
 
@@ -248,7 +248,7 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
     constexpr int most_rounds = 12, most_steps = 20, last_steps = 8;
     constexpr double closer = 1e-2;  // than a round began, it ends at least
     NewtonReport report;
-    q += model_.reduction().prescribed_increment(q, controls.motion);
+    q += model_.reduction().prescribed_increment(q, controls);
     evaluate(q, controls, anchor);
     for (int round = 0; round < most_rounds; ++round) {
         const double enough = std::max(options_.tolerance, closer * relative_residual(q, anchor));
@@ -309,14 +309,14 @@ bool Newton::factor_serves(double contraction, double residual, double last_step
     constexpr double worth = 4.0;  // steps with an old factorization, for one with its own
     // The errors that a factorization leaves behind are those of its own place, twice what the last step
     // left; in bending, as much as the sheet has moved since, of its thickness.
-    const double each = std::max(2.0 * contraction, last_step / model_.thinnest());
+    const double each = std::max(2.0 * contraction, last_step / model_.length_scale());
     return each < 0.1 && std::log(options_.tolerance / residual) >= worth * std::log(each);
 }
 
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                              bool mixed) {
     NewtonReport report;
-    VectorXd move = model_.reduction().prescribed_increment(q, controls.motion);
+    VectorXd move = model_.reduction().prescribed_increment(q, controls);
     bool extrapolated = false;
     double last_step = 0.0, last_residual = std::numeric_limits<double>::infinity();
     double moved = std::numeric_limits<double>::infinity();  // since the last factorization
@@ -338,7 +338,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (in_place && settled &&
             (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
-            report.in_place = moved <= nothing * model_.thinnest();
+            report.in_place = moved <= nothing * model_.length_scale();
             return report;
         }
         if (report.iterations == max_iterations)
@@ -354,12 +354,12 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             if (report.iterations == 0) first_negative_pivots = negative_pivots;
             report.lost = negative_pivots > first_negative_pivots + most_new_negative_pivots;
             if (mixed && report.lost) return fail("the iteration lost its way");
-            moved = last_step <= little * model_.thinnest() ? 0.0 : std::numeric_limits<double>::infinity();
+            moved = last_step <= little * model_.length_scale() ? 0.0 : std::numeric_limits<double>::infinity();
         }
         const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
                                                        deserved(report.residual, options_.tolerance));
         move.setZero();
-        const double length = step.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
+        const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())
             return fail("the steps of the iteration do not get shorter");

@@ -14,7 +14,7 @@
 #include <optional>
 #include <string>
 
-#include "magshell/assembly/model.h"
+#include "magshell/scene/model.h"
 #include "magshell/linalg/factor.h"
 #include "magshell/linalg/gmres.h"
 

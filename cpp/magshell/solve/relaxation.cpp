@@ -19,7 +19,7 @@ class Relaxation {
   public:
     Relaxation(Newton& newton, VectorXd& q, const Controls& controls)
         : newton_(newton), model_(newton.model()), q_(q), controls_(controls) {
-        q_ += model_.reduction().prescribed_increment(q_, controls.motion);
+        q_ += model_.reduction().prescribed_increment(q_, controls);
         energy_ = model_.energy(q_, controls);
     }
 
@@ -78,7 +78,7 @@ class Relaxation {
     double largest_stiffness() const {
         const SystemMatrix& matrix = model_.matrix();
         double largest = 0.0;
-        for (Index k = 0; k < 3 * model_.sheet().n_vertices(); ++k)
+        for (Index k = 0; k < model_.n_coordinates(); ++k)
             if (model_.metric()[k] > 0.0)
                 largest = std::max(largest,
                                    std::abs(matrix.values()[matrix.column_starts()[k]]) / model_.metric()[k]);
@@ -126,7 +126,7 @@ class Relaxation {
         }
         q_ = trial;
         energy_ = energy;
-        last_move_ = moved.head(3 * model_.sheet().n_vertices()).lpNorm<Eigen::Infinity>();
+        last_move_ = moved.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (report.iterations <= quick_iterations) rate_ /= rate_decay;
         return true;
     }

@@ -12,7 +12,7 @@ VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, cons
 
     model.set_memory(equilibrium.memory);
     model.evaluate(q, to);
-    VectorXd change = reduction.prescribed_increment(q, to.motion);
+    VectorXd change = reduction.prescribed_increment(q, to);
     VectorXd force = model.residual().gradient;
     if (!change.isZero(0.0)) {
         model.assemble(q, to, false);

@@ -5,7 +5,7 @@
 namespace magshell {
 
 RotationsAtRest::RotationsAtRest(Model& model, const VectorXd& q, const Controls& controls)
-    : model_(model), first_(3 * model.sheet().n_nodes()) {
+    : model_(model), first_(model.nodes().first_scalar()) {
     model.evaluate(q, controls);
     model.assemble(q, controls, false);
     const SystemMatrix& matrix = model.matrix();

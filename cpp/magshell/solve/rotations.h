@@ -3,7 +3,7 @@
 
 #include <Eigen/SparseCholesky>
 
-#include "magshell/assembly/model.h"
+#include "magshell/scene/model.h"
 
 namespace magshell {
 

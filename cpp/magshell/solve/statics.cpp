@@ -30,7 +30,9 @@ class Statics {
         if (options_.start_at_rest && from_ == to_ && newton_.still_holds(result_.state, to_))
             accept(result_.state, to_, 1.0, newton_.relative_residual(result_.state, {}));
         double step = options_.first_step, failed_step = 2.0;
-        const double turn = std::abs(to_.motion - from_.motion) * newton_.model().reduction().largest_turn();
+        const Reduction& reduction = newton_.model().reduction();
+        const double turn =
+            std::abs(reduction.progress(to_) - reduction.progress(from_)) * reduction.largest_turn();
         const double longest_step = turn > longest_turn ? longest_turn / turn : 1.0;
         FactorReport factor;  // at the last load step
         while (result_.progress < 1.0) {

@@ -57,15 +57,15 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
     const StepAlgebra& step = algebra(dt, tableau_from(state));
     const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
-    const Index coordinates = 3 * model.sheet().n_vertices();
+    const Index coordinates = model.n_coordinates();
     model.set_memory(state.memory);
     model.begin_step(state.q, controls.front());
     const ElasticAfterwards elastic_afterwards(model);
-    const SheetStrains at_begin = viscosity_.any() ? model.strains(state.q) : SheetStrains();
+    const StrainSet at_begin = viscosity_.any() ? model.strains(state.q) : StrainSet();
     std::vector<StageRates> rates = first_rates(tableau, state);
     std::vector<StageState> stages;
     VectorXd q = state.q, x_hat, v_hat;
-    SheetStrains e;
+    StrainSet e;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
         const VectorXd target = step.target(x_hat, v_hat);

@@ -11,7 +11,7 @@
 //   e^_i
 #pragma once
 
-#include "magshell/assembly/model.h"
+#include "magshell/scene/model.h"
 
 namespace magshell {
 
@@ -31,23 +31,23 @@ struct Viscosity {
 /// How fast things change in a stage: positions, velocities, strains, and strains of the Maxwell branch.
 struct StageRates {
     VectorXd v, w;
-    SheetStrains d, e;
+    StrainSet d, e;
 
     bool empty() const { return v.size() == 0; }
 };
 
 /// The strains of one stage: what it starts from, and what comes out.
 struct ViscousStage {
-    SheetStrains d_hat, e_hat, shift;
-    SheetStrains d, e;
+    StrainSet d_hat, e_hat, shift;
+    StrainSet d, e;
 
     ViscousStage() = default;
     /// From the strains at the beginning of the step and all rates until then.
     ViscousStage(const Viscosity& law, double stage_time, double dt, const double* a,
-                 const std::vector<StageRates>& rates, const SheetStrains& d_begin,
-                 const SheetStrains& e_begin);
+                 const std::vector<StageRates>& rates, const StrainSet& d_begin,
+                 const StrainSet& e_begin);
     /// Once the stage is solved: the rates of its strains too.
-    void finish(const Viscosity& law, double stage_time, SheetStrains strains, StageRates& rates);
+    void finish(const Viscosity& law, double stage_time, StrainSet strains, StageRates& rates);
 };
 
 /// Elastic again when it goes.

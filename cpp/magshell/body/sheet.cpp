@@ -1,0 +1,73 @@
+#include "magshell/body/sheet.h"
+
+#include "magshell/strain/fold_angle.h"
+
+namespace magshell {
+
+Index Sheet::add_fold(const Nodes& at, const std::array<Index, 4>& nodes, bool right_is_point) {
+    const std::vector<Vec3>& rest = at.rest;
+    const Fold fold(broadcast(rest[nodes[0]]), broadcast(rest[nodes[1]]), broadcast(rest[nodes[2]]),
+                    broadcast(rest[nodes[3]]), Pack(right_is_point ? 1.0 : 0.0));
+    folds.push_back({nodes, right_is_point, fold.angle()[0], {}, {}});
+    return static_cast<Index>(folds.size()) - 1;
+}
+
+void Sheet::add_folds(const TriangleMesh& mesh, const std::vector<DirectedEdge>& directed, bool directors,
+                      Nodes& nodes) {
+    first_rotation = nodes.scalars;
+    for (const Index f : faces.user)
+        edges.push_back({mesh.face_edges()(f, 0), mesh.face_edges()(f, 1), mesh.face_edges()(f, 2)});
+    std::vector<Index> direction_of(mesh.n_edges(), -1), fold_of(mesh.n_edges(), -1);
+    for (const DirectedEdge& d : directed) direction_of[d.edge] = d.direction;
+    rotation_of_edge.assign(mesh.n_edges(), -1);
+    sides.resize(n_faces());
+
+    for (Index f = 0; f < n_faces(); ++f)
+        for (int i = 0; i < 3; ++i) {
+            const Index e = edges[f][i], user_face = faces.user[f];
+            FaceSide& side = sides[f][i];
+            const Index from = corners[f][(i + 1) % 3], to = corners[f][(i + 2) % 3], tip = corners[f][i];
+            const bool forward = mesh.edge_faces()(e, 0) == user_face;
+            if (direction_of[e] >= 0) {
+                side.fold = add_fold(nodes, {from, to, tip, nodes.direction_node(direction_of[e])}, false);
+                side.weight = static_cast<float>(folds[side.fold].weight());
+                folds[side.fold].left = {f, i};
+                continue;
+            }
+            if (directors) {
+                if (rotation_of_edge[e] < 0) {
+                    rotation_of_edge[e] = nodes.scalars++;
+                    edge_of_rotation.push_back(e);
+                }
+                side.rotation = rotation_of_edge[e];
+                side.sign = forward ? 1 : -1;
+            }
+            if (mesh.is_boundary(e)) continue;
+            side.on_left = forward;
+            if (fold_of[e] < 0) {
+                const Index other = faces.core[mesh.edge_faces()(e, forward ? 1 : 0)];
+                int across = 0;
+                while (edges[other][across] != e) ++across;
+                const Index beyond = corners[other][across];
+                fold_of[e] = forward ? add_fold(nodes, {from, to, tip, beyond}, true)
+                                     : add_fold(nodes, {to, from, beyond, tip}, true);
+            }
+            side.fold = fold_of[e];
+            side.weight = static_cast<float>(folds[side.fold].weight());
+            (forward ? folds[side.fold].left : folds[side.fold].right) = {f, i};
+        }
+    add_stencils();
+}
+
+void Sheet::add_stencils() {
+    stencils.resize(n_faces());
+    for (Index f = 0; f < n_faces(); ++f)
+        for (int i = 0; i < 3; ++i) {
+            const FaceSide& side = sides[f][i];
+            stencils[f].nodes[i] = corners[f][i];
+            if (side.fold >= 0) stencils[f].nodes[3 + i] = folds[side.fold].nodes[side.on_left ? 3 : 2];
+            stencils[f].rotations[i] = side.rotation;
+        }
+}
+
+}  // namespace magshell

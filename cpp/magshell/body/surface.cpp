@@ -1,0 +1,57 @@
+#include "magshell/body/surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "magshell/mesh/curve_order.h"
+
+namespace magshell {
+
+Surface::Surface(std::string owner_, const TriangleMesh& mesh, const std::vector<Index>& vertices,
+                 NodeNumbering& numbering)
+    : owner(std::move(owner_)) {
+    const auto place = [&](Index face, int k) -> Vec3 {
+        return mesh.rest_positions().row(mesh.faces()(face, k)).transpose();
+    };
+    std::vector<Vec3> barycentres(mesh.n_faces());
+    for (Index f = 0; f < mesh.n_faces(); ++f) {
+        barycentres[f].setZero();
+        for (int k = 0; k < 3; ++k) barycentres[f] += place(f, k) / 3.0;
+    }
+    faces = order_along_curve(barycentres);
+    corners.resize(n_faces());
+    rest_corners_.resize(n_faces());
+    for (Index f = 0; f < n_faces(); ++f)
+        for (int k = 0; k < 3; ++k) {
+            const Index user = faces.user[f];
+            rest_corners_[f][k] = place(user, k);
+            corners[f][k] = numbering.number(vertices[mesh.faces()(user, k)], rest_corners_[f][k]);
+        }
+}
+
+double Surface::largest_coordinate(Index face) const {
+    double largest = 0.0;
+    for (const Vec3& corner : rest_corners_[face])
+        largest = std::max(largest, corner.lpNorm<Eigen::Infinity>());
+    return largest;
+}
+
+double Surface::smallest_height(Index face) const {
+    const auto& [a, b, c] = rest_corners_[face];
+    const double longest =
+        std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
+    return (b - a).cross(c - a).norm() / longest;
+}
+
+double Surface::extent() const {
+    Vec3 lowest = rest_corners_.front().front(), highest = lowest;
+    for (const std::array<Vec3, 3>& face : rest_corners_)
+        for (const Vec3& corner : face) {
+            lowest = lowest.cwiseMin(corner);
+            highest = highest.cwiseMax(corner);
+        }
+    return (highest - lowest).norm();
+}
+
+}  // namespace magshell

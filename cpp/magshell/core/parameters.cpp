@@ -1,0 +1,63 @@
+#include "magshell/core/parameters.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace magshell {
+
+Slot Parameters::add(const std::string& owner, const std::string& name, const std::string& unit, Index rows,
+                     Index width, const Renumbering* order) {
+    for (const Entry& entry : entries_) {
+        if (entry.owner != owner || entry.name != name) continue;
+        if (entry.slot.rows != rows || entry.slot.width != width || entry.order != order)
+            throw std::logic_error("the " + name + " of " + owner + " is registered with two shapes");
+        return entry.slot;
+    }
+    const Slot slot{static_cast<Index>(entries_.size()), size_, rows, width};
+    entries_.push_back({owner, name, unit, slot, order});
+    size_ += slot.size();
+    return slot;
+}
+
+// move(place in the caller's order, place in ours, width) for all rows.
+template <class Move>
+void Parameters::each_row(const Move& move) const {
+    for (const Entry& entry : entries_) {
+        if (!entry.order) {
+            move(entry.slot.first, entry.slot.first, entry.slot.size());
+            continue;
+        }
+        for (Index row = 0; row < entry.slot.rows; ++row)
+            move(entry.slot.at(entry.order->user[row]), entry.slot.at(row), entry.slot.width);
+    }
+}
+
+VectorXd Parameters::to_core(const VectorXd& in_user_order) const {
+    VectorXd ours(size_);
+    each_row([&](Index user, Index core, Index width) {
+        ours.segment(core, width) = in_user_order.segment(user, width);
+    });
+    return ours;
+}
+
+VectorXd Parameters::to_user(const VectorXd& in_core_order) const {
+    VectorXd users(size_);
+    each_row([&](Index user, Index core, Index width) {
+        users.segment(user, width) = in_core_order.segment(core, width);
+    });
+    return users;
+}
+
+void Values::set(const Parameters& parameters, VectorXd numbers) {
+    changed_.assign(parameters.entries().size(), 1);
+    if (numbers_.size() == numbers.size())
+        for (const Parameters::Entry& entry : parameters.entries()) {
+            const double* before = numbers_.data() + entry.slot.first;
+            changed_[entry.slot.entry] =
+                !std::equal(before, before + entry.slot.size(), numbers.data() + entry.slot.first);
+        }
+    numbers_ = std::move(numbers);
+}
+
+}  // namespace magshell

@@ -1,0 +1,26 @@
+// Two numberings of the same things: the caller's, and ours.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "magshell/core/types.h"
+
+namespace magshell {
+
+/// user[k] is the caller's index of our k, core[u] ours of the caller's u.
+struct Renumbering {
+    std::vector<Index> user, core;
+
+    Index size() const { return static_cast<Index>(user.size()); }
+
+    static Renumbering from_user_order(std::vector<Index> user) {
+        Renumbering numbering;
+        numbering.core.resize(user.size());
+        for (Index k = 0; k < static_cast<Index>(user.size()); ++k) numbering.core[user[k]] = k;
+        numbering.user = std::move(user);
+        return numbering;
+    }
+};
+
+}  // namespace magshell

@@ -1,0 +1,31 @@
+#include "magshell/obstacle/placed_obstacle.h"
+
+#include "magshell/core/rotation_vector.h"
+
+namespace magshell {
+
+StandingObstacle::StandingObstacle(const PlacedObstacle& placed, const ObstaclePose& pose)
+    : shape_(placed.shape.get()),
+      placement_(placed.placement),
+      pose_(pose),
+      center_(placement_.center + pose.displacement),
+      moved_(rotation(pose.rotation_vector)),
+      axes_(moved_ * rotation(placement_.rotation_vector)) {}
+
+Distance StandingObstacle::distance(const Vec3& x) const {
+    Distance at = shape_->distance(own(x));
+    at.normal = axes_ * at.normal;
+    at.curvature = axes_ * at.curvature * axes_.transpose();
+    return at;
+}
+
+void StandingObstacle::vjp(const Vec3& x, const Distance& at, double by_distance, const Vec3& by_normal,
+                           const Vec3& by_relative_velocity, Placement& out) const {
+    const Vec3 from_center = x - center_, by_place = by_distance * at.normal + at.curvature * by_normal;
+    out.center += by_relative_velocity.cross(pose_.spin) - by_place;
+    const Vec3 by_turn = at.normal.cross(by_normal) - from_center.cross(by_place);
+    out.rotation_vector +=
+        transposed_jacobian_times(placement_.rotation_vector, moved_.transpose() * by_turn);
+}
+
+}  // namespace magshell

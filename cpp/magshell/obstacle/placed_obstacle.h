@@ -1,0 +1,50 @@
+// An obstacle where it stands in a scene, at rest or on its way.
+//
+//   a point x of the world is R^T (x - c) in the obstacle's own frame,   R = R(pose) R(placement),
+//   c = centre + displacement; the body moves there with  v(x) = velocity + spin x (x - c)
+#pragma once
+
+#include <memory>
+
+#include "magshell/obstacle/pose.h"
+#include "magshell/obstacle/obstacle.h"
+
+namespace magshell {
+
+/// Where it was put; also the gradient by that.
+struct Placement {
+    Vec3 center = Vec3::Zero(), rotation_vector = Vec3::Zero();
+};
+
+struct PlacedObstacle {
+    std::shared_ptr<const Obstacle> shape;
+    Placement placement;
+};
+
+/// A placed obstacle at one time. The shape has to outlive it.
+class StandingObstacle {
+  public:
+    StandingObstacle(const PlacedObstacle& placed, const ObstaclePose& pose);
+
+    /// As Obstacle::distance, at a point of the world and in its axes.
+    Distance distance(const Vec3& x) const;
+    /// A point of the world in the obstacle's own frame.
+    Vec3 own(const Vec3& x) const { return axes_.transpose() * (x - center_); }
+    /// Of the body at x [m/s].
+    Vec3 velocity(const Vec3& x) const { return pose_.velocity + pose_.spin.cross(x - center_); }
+    const Vec3& spin() const { return pose_.spin; }
+
+    /// Adds the gradient by the placement of a function of the distance at x, its normal there and a velocity
+    /// relative to the body, given the gradients by the three.
+    void vjp(const Vec3& x, const Distance& at, double by_distance, const Vec3& by_normal,
+             const Vec3& by_relative_velocity, Placement& out) const;
+
+  private:
+    const Obstacle* shape_;
+    Placement placement_;
+    ObstaclePose pose_;
+    Vec3 center_;
+    Mat3 moved_, axes_;  // R(pose), R
+};
+
+}  // namespace magshell

@@ -1,0 +1,112 @@
+#include "magshell/scene/bodies.h"
+
+#include <algorithm>
+
+namespace magshell {
+
+Bodies::Bodies(const SceneInput& input) {
+    NodeNumbering numbering(input.n_vertices);
+    for (const SheetInput& sheet : input.sheets)
+        owned_.push_back(std::make_unique<Sheet>(sheet.owner, *sheet.mesh, sheet.vertices, numbering));
+    nodes_ = numbering.finish(input.directions);
+    for (std::size_t k = 0; k < owned_.size(); ++k) {
+        const SheetInput& given = input.sheets[k];
+        owned_[k]->add_folds(*given.mesh, given.directed_edges, given.directors, nodes_);
+        n_edges_ += owned_[k]->n_edges();
+        sheets_.push_back(owned_[k].get());
+    }
+}
+
+std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
+    std::vector<Stencil> all;
+    for (const Sheet* sheet : sheets_)
+        all.insert(all.end(), sheet->stencils.begin(), sheet->stencils.end());
+    for (const EdgeCoupleInput& couple : input.couples) {
+        const Sheet& sheet = *sheets_[couple.sheet];
+        const Index user_face = input.sheets[couple.sheet].mesh->edge_faces().row(couple.edge).maxCoeff();
+        Stencil s;
+        for (int k = 0; k < 3; ++k) s.nodes[k] = sheet.corners[sheet.faces.core[user_face]][k];
+        s.nodes[3] = nodes_.direction_node(couple.direction);
+        all.push_back(s);
+    }
+    return all;
+}
+
+VectorXd Bodies::rest_state() const {
+    VectorXd q = VectorXd::Zero(nodes_.n_unknowns());
+    for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
+    return q;
+}
+
+VectorXd Bodies::state(const Rows3& positions, const VectorXd& edge_rotations) const {
+    VectorXd q = gradient_by_state(positions, edge_rotations);
+    for (Index node = nodes_.n_vertices(); node < nodes_.n_nodes(); ++node)
+        q.segment<3>(3 * node) = nodes_.rest[node];
+    return q;
+}
+
+VectorXd Bodies::gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const {
+    VectorXd gradient = VectorXd::Zero(nodes_.n_unknowns());
+    for (Index v = 0; v < nodes_.n_vertices(); ++v)
+        gradient.segment<3>(3 * v) = by_positions.row(nodes_.user_vertex(v)).transpose();
+    Index first_edge = 0;
+    for (const Sheet* sheet : sheets_) {
+        for (Index r = 0; r < sheet->n_rotations(); ++r)
+            gradient[nodes_.first_scalar() + sheet->first_rotation + r] =
+                by_edge_rotations[first_edge + sheet->edge_of_rotation[r]];
+        first_edge += sheet->n_edges();
+    }
+    return gradient;
+}
+
+Rows3 Bodies::positions(const VectorXd& q) const {
+    Rows3 x(nodes_.n_vertices(), 3);
+    for (Index v = 0; v < nodes_.n_vertices(); ++v)
+        x.row(nodes_.user_vertex(v)) = q.segment<3>(3 * v).transpose();
+    return x;
+}
+
+VectorXd Bodies::edge_rotations(const VectorXd& q) const {
+    VectorXd rotations = VectorXd::Zero(n_edges_);
+    Index first_edge = 0;
+    for (const Sheet* sheet : sheets_) {
+        for (Index r = 0; r < sheet->n_rotations(); ++r)
+            rotations[first_edge + sheet->edge_of_rotation[r]] =
+                q[nodes_.first_scalar() + sheet->first_rotation + r];
+        first_edge += sheet->n_edges();
+    }
+    return rotations;
+}
+
+VectorXd Bodies::vertex_weights(const VectorXd& by_vertex) const {
+    VectorXd weights = VectorXd::Zero(nodes_.n_unknowns());
+    for (Index v = 0; v < nodes_.n_vertices(); ++v)
+        weights.segment<3>(3 * v).setConstant(by_vertex[nodes_.user_vertex(v)]);
+    return weights;
+}
+
+double Bodies::extent() const {
+    double largest = 0.0;
+    for (const Sheet* sheet : sheets_) largest = std::max(largest, sheet->extent());
+    return largest;
+}
+
+double Bodies::reach() const {
+    double largest = 0.0;
+    for (Index v = 0; v < nodes_.n_vertices(); ++v)
+        largest = std::max(largest, nodes_.rest[v].lpNorm<Eigen::Infinity>());
+    return largest;
+}
+
+VectorXd Bodies::area_metric() const {
+    VectorXd metric = VectorXd::Zero(nodes_.n_unknowns());
+    for (const Sheet* sheet : sheets_)
+        for (Index f = 0; f < sheet->n_faces(); ++f) {
+            const auto& [a, b, c] = sheet->rest_corners(f);
+            for (const Index node : sheet->corners[f])
+                metric.segment<3>(3 * node).array() += (b - a).cross(c - a).norm() / 6.0;
+        }
+    return metric;
+}
+
+}  // namespace magshell

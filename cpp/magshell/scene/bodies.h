@@ -1,0 +1,46 @@
+// The bodies of a scene in the core's numbering.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "magshell/scene/scene_input.h"
+
+namespace magshell {
+
+class Bodies {
+  public:
+    explicit Bodies(const SceneInput& input);
+
+    const Nodes& nodes() const { return nodes_; }
+    const std::vector<const Sheet*>& sheets() const { return sheets_; }
+    /// Of all sheets, one after another, in the caller's numbers.
+    Index n_edges() const { return n_edges_; }
+    /// What each element couples, and each couple.
+    std::vector<Stencil> stencils(const SceneInput& input) const;
+
+    VectorXd rest_state() const;
+    /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,).
+    VectorXd state(const Rows3& positions, const VectorXd& edge_rotations) const;
+    /// A gradient by the caller's positions and edge rotations as one by all unknowns.
+    VectorXd gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const;
+    Rows3 positions(const VectorXd& q) const;
+    VectorXd edge_rotations(const VectorXd& q) const;
+    /// One number a vertex of the caller as one for each unknown, zero for those that are no vertex.
+    VectorXd vertex_weights(const VectorXd& by_vertex) const;
+
+    /// Of the largest body: the diagonal of its bounding box at rest [m].
+    double extent() const;
+    /// The largest coordinate at rest [m].
+    double reach() const;
+    /// Area at each unknown of a vertex, zero for all others.
+    VectorXd area_metric() const;
+
+  private:
+    std::vector<std::unique_ptr<Sheet>> owned_;
+    std::vector<const Sheet*> sheets_;
+    Nodes nodes_;
+    Index n_edges_ = 0;
+};
+
+}  // namespace magshell

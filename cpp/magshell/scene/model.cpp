@@ -1,0 +1,323 @@
+#include "magshell/scene/model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "magshell/core/errors.h"
+#include "magshell/strain/fold_angle.h"
+#include "magshell/term/bending_term.h"
+#include "magshell/term/couple_term.h"
+#include "magshell/term/friction_term.h"
+#include "magshell/term/load_term.h"
+#include "magshell/term/magnetic_term.h"
+#include "magshell/term/membrane_term.h"
+#include "magshell/term/water_term.h"
+
+namespace magshell {
+namespace {
+
+std::vector<HeldNode> renumbered(std::vector<HeldNode> held, const Nodes& nodes) {
+    for (HeldNode& h : held)
+        if (h.node < nodes.n_vertices()) h.node = nodes.vertices.core[h.node];
+    return held;
+}
+
+CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& mesh, const Sheet& sheet,
+                             const Nodes& at) {
+    const bool forward = mesh.edge_faces()(given.edge, 0) != TriangleMesh::none;
+    const Index f = sheet.faces.core[mesh.edge_faces()(given.edge, forward ? 0 : 1)];
+    int i = 0;
+    while (sheet.edges[f][i] != given.edge) ++i;
+    const std::array<Index, 3>& c = sheet.corners[f];
+    const std::array<Index, 4> nodes = {c[(i + 1) % 3], c[(i + 2) % 3], c[i],
+                                        at.direction_node(given.direction)};
+    const Fold fold(broadcast(at.rest[nodes[0]]), broadcast(at.rest[nodes[1]]), broadcast(at.rest[nodes[2]]),
+                    broadcast(at.rest[nodes[3]]), Pack(0.0));
+    return {nodes, fold.angle()[0], sheet.rotation_of_edge[given.edge], forward ? 1.0 : -1.0, 0.0};
+}
+
+}  // namespace
+
+Model::Model(const SceneInput& input)
+    : bodies_(input),
+      matrix_(nodes().n_nodes(), nodes().scalars, bodies_.stencils(input)),
+      reduction_(matrix_, renumbered(input.held, nodes()), nodes(), input.motions, registry_),
+      schedule_(nodes().n_nodes(), bodies_.sheets()),
+      sources_(input.field_sources, registry_),
+      of_body_(bodies_.sheets().size()),
+      metric_(bodies_.area_metric()),
+      extent_(bodies_.extent()),
+      rest_reach_(bodies_.reach()) {
+    // The standard controls are there in every scene, whether a term reads them or not.
+    registry_.controls.add("scene", "applied_flux_density", "T", 1, 3);
+    for (const char* factor : {"field_factor", "load_factor", "gravity_factor"})
+        registry_.controls.add("scene", factor, "1", 1, 1);
+    for (Index body = 0; body < static_cast<Index>(bodies_.sheets().size()); ++body)
+        loops_.push_back(
+            std::make_unique<FaceLoop>(*bodies_.sheets()[body], schedule_.of(body), matrix_));
+    add_terms(input);
+    for (const std::unique_ptr<Term>& term : terms_)
+        if (term->body() >= 0) of_body_[term->body()].push_back(term.get());
+    share_out_columns();
+}
+
+void Model::add_terms(const SceneInput& input) {
+    const Index count = static_cast<Index>(bodies_.sheets().size());
+    for (Index body = 0; body < count; ++body) {
+        std::unique_ptr<MembraneTerm> term = std::make_unique<MembraneTerm>(
+            *bodies_.sheets()[body], body, *loops_[body], nodes(), registry_);
+        elastic_.push_back(term.get());
+        terms_.push_back(std::move(term));
+    }
+    for (Index body = 0; body < count; ++body) {
+        std::unique_ptr<BendingTerm> term = std::make_unique<BendingTerm>(
+            *bodies_.sheets()[body], body, schedule_.of(body), nodes(), matrix_, registry_);
+        elastic_.push_back(term.get());
+        terms_.push_back(std::move(term));
+    }
+    for (Index body = 0; body < count; ++body)
+        if (input.sheets[body].magnetic)
+            terms_.push_back(std::make_unique<MagneticTerm>(*bodies_.sheets()[body], body, *loops_[body],
+                                                            sources_, registry_));
+    if (input.gravity)
+        terms_.push_back(std::make_unique<LoadTerm>("gravity", "gravity_factor", nodes(), registry_));
+    if (input.loads)
+        terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));
+    if (!input.couples.empty()) add_couples(input);
+    if (!input.contacts.empty()) add_contacts(input);
+    if (input.water)
+        for (Index body = 0; body < count; ++body)
+            forces_.push_back(std::make_unique<WaterTerm>(*bodies_.sheets()[body], *loops_[body],
+                                                          *input.water, registry_));
+}
+
+void Model::add_couples(const SceneInput& input) {
+    std::vector<CoupleTerm::Couple> couples;
+    for (const EdgeCoupleInput& given : input.couples)
+        couples.push_back(
+            couple_of(given, *input.sheets[given.sheet].mesh, *bodies_.sheets()[given.sheet], nodes()));
+    terms_.push_back(std::make_unique<CoupleTerm>(nodes(), matrix_, std::move(couples), registry_));
+}
+
+void Model::add_contacts(const SceneInput& input) {
+    std::unique_ptr<ContactTerm> contact =
+        std::make_unique<ContactTerm>(nodes(), matrix_, input.contacts, input.obstacles, registry_);
+    contact_ = contact.get();
+    terms_.push_back(std::move(contact));
+    std::vector<bool> rubs, lagged;
+    for (const ContactInput& each : input.contacts) {
+        rubs.push_back(each.rubs);
+        lagged.push_back(each.lagged);
+    }
+    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
+        forces_.push_back(std::make_unique<FrictionTerm>(*contact_, std::move(rubs), std::move(lagged)));
+}
+
+void Model::set_values(const VectorXd& in_user_order) {
+    values_.set(registry_.values, registry_.values.to_core(in_user_order));
+    reduction_.set_values(values_);
+    sources_.set_values(values_);
+    bool cancels_otherwise = false;
+    length_scale_ = std::numeric_limits<double>::infinity();
+    for (const std::unique_ptr<Term>& term : terms_) {
+        cancels_otherwise |= term->set_values(values_);
+        length_scale_ = std::min(length_scale_, term->length_scale());
+    }
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->set_values(values_);
+    if (cancels_otherwise) cancelling_forces_.resize(0);
+}
+
+// A sheet that has fallen or flown far knows its shape less exactly. By powers of two, so that most states
+// share what was computed once.
+VectorXd Model::cancelling_forces(const VectorXd& q) {
+    const double reach = q.head(n_coordinates()).lpNorm<Eigen::Infinity>();
+    double beyond = 0.0;
+    if (std::isfinite(reach) && reach > 2.0 * rest_reach_)
+        beyond = std::exp2(std::ceil(std::log2(reach / rest_reach_))) * rest_reach_;
+    if (cancelling_forces_.size() == 0 || beyond != beyond_) {
+        beyond_ = beyond;
+        cancelling_forces_ = VectorXd::Zero(size());
+        for (const std::unique_ptr<Term>& term : terms_)
+            term->add_cancelling_forces(beyond, cancelling_forces_);
+    }
+    return history_scale_ * cancelling_forces_;
+}
+
+void Model::vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda, Gradient& out) {
+    for (const std::unique_ptr<Term>& term : terms_) term->vjp(q.data(), controls, lambda.data(), out);
+}
+
+void Model::set_history(double scale, const StrainSet* shift) {
+    history_scale_ = scale;
+    for (std::size_t k = 0; k < elastic_.size(); ++k)
+        elastic_[k]->set_history({scale, shift ? &shift->of_terms[k] : nullptr});
+}
+
+StrainSet Model::strains(const VectorXd& q) {
+    StrainSet strains;
+    for (ElasticTerm* term : elastic_) strains.of_terms.push_back(term->strains(q.data()));
+    return strains;
+}
+
+StrainSet Model::strain_rates(const VectorXd& p) {
+    StrainSet rates;
+    for (ElasticTerm* term : elastic_) rates.of_terms.push_back(term->strain_rates(p.data()));
+    return rates;
+}
+
+VectorXd Model::strain_forces(const StrainSet& stresses) {
+    Residual forces;
+    forces.reset(size());
+    for (std::size_t k = 0; k < elastic_.size(); ++k)
+        elastic_[k]->add_forces(stresses.of_terms[k], forces);
+    return std::move(forces.gradient);
+}
+
+StrainSet Model::stresses(const StrainSet& strains) const {
+    StrainSet stresses;
+    for (std::size_t k = 0; k < elastic_.size(); ++k)
+        stresses.of_terms.push_back(elastic_[k]->stresses(strains.of_terms[k]));
+    return stresses;
+}
+
+std::shared_ptr<Factor> Model::new_factor() {
+    if (spare_) return std::exchange(spare_, nullptr);
+    if (!analysed_) {
+        analysed_ = analyze(reduction_.pattern());
+        ++analyses_;
+    }
+    return analysed_->sibling();
+}
+
+void Model::keep_spare(std::shared_ptr<Factor> factor) {
+    constexpr std::size_t large = std::size_t{1} << 28;
+    if (!factor || factor.use_count() > 1 || factor->bytes() > large) return;
+    factor->forget();
+    spare_ = std::move(factor);
+}
+
+double Model::energy(const VectorXd& q, const Controls& controls) const {
+    double total = 0.0;
+    for (const std::unique_ptr<Term>& term : terms_) total += term->energy(q.data(), controls);
+    return total;
+}
+
+std::vector<std::string_view> Model::term_names() const {
+    std::vector<std::string_view> names;
+    for (const std::unique_ptr<Term>& term : terms_) names.push_back(term->name());
+    return names;
+}
+
+std::vector<std::pair<std::string_view, double>> Model::energies(const VectorXd& q,
+                                                                 const Controls& controls) const {
+    std::vector<std::pair<std::string_view, double>> of_terms;
+    for (const std::unique_ptr<Term>& term : terms_)
+        of_terms.emplace_back(term->name(), term->energy(q.data(), controls));
+    return of_terms;
+}
+
+void Model::evaluate(const VectorXd& q, const Controls& controls) {
+    residual_.reset(size());
+    for (const std::unique_ptr<Term>& term : terms_) term->evaluate(q.data(), controls, residual_);
+}
+
+std::string Model::not_finite(const VectorXd& q, const Controls& controls) {
+    Residual residual;
+    for (const std::unique_ptr<Term>& term : terms_) {
+        residual.reset(size());
+        term->evaluate(q.data(), controls, residual);
+        for (Index k = 0; k < size(); ++k)
+            if (!std::isfinite(residual.gradient[k])) {
+                const std::string of = "the " + std::string(term->name()) + " force";
+                if (k >= n_coordinates()) return of + " is not finite";
+                return of + " on vertex " + std::to_string(nodes().user_vertex(k / 3)) + " is not finite";
+            }
+    }
+    return {};
+}
+
+void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress) {
+    const auto clear = [&](std::size_t part) {
+        for (const Index node : first_nodes_[part]) matrix_.clear_node(node);
+        for (const Index rotation : first_rotations_[part]) matrix_.clear_rotation(rotation);
+    };
+    clear(first_nodes_.size() - 1);
+    // All terms of a part before the next part: its share of the matrix is cleared and filled in the cache.
+    for (const std::unique_ptr<Term>& term : terms_) term->prepare_assembly(q.data(), controls);
+    schedule_.scatter([&](const Part& part) {
+        clear(part.number);
+        for (const Term* term : of_body_[part.body])
+            term->assemble(part, q.data(), controls, extrapolated_stress, matrix_);
+    });
+    for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
+}
+
+void Model::share_out_columns() {
+    const std::vector<Part> parts = schedule_.in_order();
+    std::vector<bool> node_taken(nodes().n_nodes(), false), rotation_taken(nodes().scalars, false);
+    first_nodes_.resize(parts.size() + 1);
+    first_rotations_.resize(parts.size() + 1);
+    const auto take = [](std::vector<bool>& taken, Index number, std::vector<Index>& list) {
+        if (number < 0 || taken[number]) return;
+        taken[number] = true;
+        list.push_back(number);
+    };
+    for (const Part& part : parts)
+        for (Index element = part.first; element < part.last; ++element) {
+            const Stencil& stencil = bodies_.sheets()[part.body]->stencils[element];
+            for (const Index node : stencil.nodes) take(node_taken, node, first_nodes_[part.number]);
+            for (const Index r : stencil.rotations) take(rotation_taken, r, first_rotations_[part.number]);
+        }
+    for (Index node = 0; node < nodes().n_nodes(); ++node) take(node_taken, node, first_nodes_.back());
+}
+
+void Model::extrapolate(const VectorXd& p) {
+    for (const std::unique_ptr<Term>& term : terms_) term->extrapolate(p.data());
+}
+
+VectorXd Model::gradient_rate(const VectorXd& q, const Controls& rate) {
+    Residual change;
+    change.reset(size());
+    for (const std::unique_ptr<Term>& term : terms_)
+        if (term->driven()) term->evaluate(q.data(), rate, change);
+    return change.gradient;
+}
+
+Model::Memory Model::memory() const {
+    Memory memory;
+    for (const std::unique_ptr<Term>& term : terms_) memory.push_back(term->memory());
+    return memory;
+}
+
+void Model::set_memory(const Memory& memory) {
+    bool fits = memory.empty() || memory.size() == terms_.size();
+    for (std::size_t k = 0; fits && k < memory.size(); ++k)
+        fits = memory[k].size() == terms_[k]->memory().size();
+    if (!fits) throw InvalidInput("the start remembers a motion of another scene: start from its positions");
+    for (std::size_t k = 0; k < terms_.size(); ++k)
+        terms_[k]->set_memory(memory.empty() ? std::vector<double>(terms_[k]->memory().size(), 0.0)
+                                             : memory[k]);
+}
+
+StrainSet Model::no_strains() const {
+    StrainSet strains;
+    for (const ElasticTerm* term : elastic_) strains.of_terms.emplace_back(term->elements());
+    return strains;
+}
+
+Index Model::n_strains() const {
+    Index count = 0;
+    for (const ElasticTerm* term : elastic_) count += 3 * term->elements();
+    return count;
+}
+
+std::size_t Model::bytes() const {
+    std::size_t total = matrix_.bytes() + reduction_.bytes() + schedule_.bytes();
+    for (const std::unique_ptr<FaceLoop>& loop : loops_) total += loop->bytes();
+    for (const std::unique_ptr<Term>& term : terms_) total += term->bytes();
+    return total;
+}
+
+}  // namespace magshell

@@ -1,0 +1,153 @@
+// A scene in the core: bodies, terms, supports. Everything is evaluated here; solvers only call.
+//
+// Not for two threads at once: evaluations keep what the assembly after them needs.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/reduction.h"
+#include "magshell/linalg/factor.h"
+#include "magshell/scene/bodies.h"
+#include "magshell/term/elastic_term.h"
+#include "magshell/term/field_sources.h"
+#include "magshell/term/force_term.h"
+
+namespace magshell {
+
+class Model {
+  public:
+    explicit Model(const SceneInput& input);
+    Model(const Model&) = delete;
+    Model& operator=(const Model&) = delete;
+
+    /// What its terms read: the lists of values and of controls.
+    const Registry& registry() const { return registry_; }
+    /// All values, in the caller's order of rows; solves need them set once.
+    void set_values(const VectorXd& in_user_order);
+    Controls no_controls() const { return Controls::Zero(registry_.controls.size()); }
+
+    const Bodies& bodies() const { return bodies_; }
+    const Nodes& nodes() const { return bodies_.nodes(); }
+    const Reduction& reduction() const { return reduction_; }
+    SystemMatrix& matrix() { return matrix_; }
+    const Residual& residual() const { return residual_; }
+    Index size() const { return nodes().n_unknowns(); }
+    Index n_coordinates() const { return nodes().n_coordinates(); }
+    double extent() const { return extent_; }
+    /// The smallest of its terms': the thickness of the thinnest sheet [m].
+    double length_scale() const { return length_scale_; }
+    const VectorXd& metric() const { return metric_; }
+    /// The floor under every residual of a state, to be multiplied by the unit of round-off.
+    VectorXd cancelling_forces(const VectorXd& q);
+    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or
+    /// without.
+    void add_cancelling_contact_forces(bool in_motion, VectorXd& out) const;
+
+    double energy(const VectorXd& q, const Controls& controls) const;
+    /// In the order of energies(); terms of one name, of several bodies, follow each other.
+    std::vector<std::string_view> term_names() const;
+    std::vector<std::pair<std::string_view, double>> energies(const VectorXd& q,
+                                                              const Controls& controls) const;
+
+    /// The residual at q; keeps what assemble and extrapolate need.
+    void evaluate(const VectorXd& q, const Controls& controls);
+    /// Which term's force is not finite at q, and on which vertex; empty if all are.
+    std::string not_finite(const VectorXd& q, const Controls& controls);
+    /// The Hessian at the last evaluated state, in matrix().
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
+    void extrapolate(const VectorXd& p);
+    /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in
+    /// them.
+    VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
+
+    /// Forces that no energy has act only within the stages of time steps. A step begins at q; at a stage,
+    /// after evaluate and after assemble at the same q, they add to the residual and to matrix(), and leave
+    /// the rest of their Jacobian in remainder().
+    bool has_forces() const { return !forces_.empty(); }
+    void begin_step(const VectorXd& q, const Controls& controls);
+    bool has_contact() const { return contact_ != nullptr; }
+    /// Why a step from q to `end` cannot be: a point would be on the other side of an obstacle. Else empty.
+    std::string blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                        const Controls& controls_at_end) const;
+    void evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage);
+    void assemble_forces(const Controls& controls, bool cautious = false);
+    void hold_forces(bool held);
+    const Remainder& remainder() const { return remainder_; }
+    /// Adds - lambda . df/dk; returns lambda . df by what else they depend on.
+    KinematicsGradient forces_vjp(const Controls& controls, const VectorXd& lambda, Gradient& out) const;
+
+    /// Adds lambda . dg/dk at the last evaluated state, for all k but what supports do; lambda is zero where
+    /// they hold.
+    void vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda, Gradient& out);
+
+    /// The elastic terms' stresses are C (scale d - shift) from now on, and C d without a shift.
+    void set_history(double scale, const StrainSet* shift);
+    StrainSet strains(const VectorXd& q);
+    /// Zeros.
+    StrainSet no_strains() const;
+    /// At the last evaluated state: J p, and J^T s.
+    StrainSet strain_rates(const VectorXd& p);
+    VectorXd strain_forces(const StrainSet& stresses);
+    StrainSet stresses(const StrainSet& strains) const;
+    /// How many numbers a set of strains has.
+    Index n_strains() const;
+
+    /// A factorization for the reduced Hessian, analysed once for all of them.
+    std::shared_ptr<Factor> new_factor();
+    /// One that nobody else holds, for the next who asks: fresh memory costs page faults. What is large goes
+    /// back to the system.
+    void keep_spare(std::shared_ptr<Factor> factor);
+    /// How often the pattern was analysed.
+    int analyses() const { return analyses_; }
+
+    /// What the terms remember of how the state was reached. An empty memory is that of the rest state.
+    using Memory = std::vector<std::vector<double>>;
+    Memory memory() const;
+    void set_memory(const Memory& memory);
+
+    std::size_t bytes() const;
+    std::mutex& in_use() { return in_use_; }
+
+  private:
+    void add_terms(const SceneInput& input);
+    void add_couples(const SceneInput& input);
+    void add_contacts(const SceneInput& input);
+    void share_out_columns();
+
+    Registry registry_;
+    Bodies bodies_;
+    SystemMatrix matrix_;
+    Reduction reduction_;
+    Schedule schedule_;
+    std::vector<std::unique_ptr<FaceLoop>> loops_;  // of each surface
+    FieldSources sources_;
+    std::vector<std::unique_ptr<Term>> terms_;
+    std::vector<std::vector<const Term*>> of_body_;  // those assembled by its parts
+    std::vector<ElasticTerm*> elastic_;
+    std::vector<std::unique_ptr<ForceTerm>> forces_;
+    const ContactTerm* contact_ = nullptr;
+    // By part: the nodes and rotations whose columns it is the first to add to, and so clears. Last:
+    // nobody's.
+    std::vector<std::vector<Index>> first_nodes_, first_rotations_;
+    Values values_;
+    Kinematics kinematics_;  // where the forces were evaluated last
+    Remainder remainder_;
+    std::unique_ptr<Factor> analysed_;
+    std::shared_ptr<Factor> spare_;
+    int analyses_ = 0;
+    double length_scale_ = 0.0;
+    Residual residual_;
+    VectorXd metric_;
+    VectorXd cancelling_forces_;  // of the elastic terms, without history
+    double beyond_ = 0.0;         // [m] by how much coordinates were larger than at rest then
+    double history_scale_ = 1.0;
+    double extent_, rest_reach_;  // [m]
+    std::mutex in_use_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,53 @@
+// Of a model, what acts in time steps only: forces that no energy has, and obstacles in the way.
+#include "magshell/scene/model.h"
+
+namespace magshell {
+
+void Model::begin_step(const VectorXd& q, const Controls& controls) {
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->begin_step(q, controls);
+}
+
+std::string Model::blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                           const Controls& controls_at_end) const {
+    const Index node = contact_ ? contact_->passes_through(q, controls, end, controls_at_end) : -1;
+    if (node < 0) return {};
+    return "vertex " + std::to_string(nodes().user_vertex(node)) +
+           " passes through an obstacle within a step";
+}
+
+void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage) {
+    const Index coordinates = n_coordinates();
+    kinematics_.q = q;
+    kinematics_.rate = 1.0 / stage.time;
+    kinematics_.v.setZero(size());
+    kinematics_.w.setZero(size());
+    kinematics_.v.head(coordinates) = kinematics_.rate * (q - *stage.x_hat).head(coordinates);
+    kinematics_.w.head(coordinates) = kinematics_.rate * (kinematics_.v - *stage.v_hat).head(coordinates);
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
+}
+
+void Model::add_cancelling_contact_forces(bool in_motion, VectorXd& out) const {
+    if (contact_) contact_->add_cancelling_normal_forces(out);
+    if (!in_motion) return;
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_cancelling_forces(kinematics_, out);
+}
+
+void Model::hold_forces(bool held) {
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->hold(held);
+}
+
+void Model::assemble_forces(const Controls& controls, bool cautious) {
+    remainder_.clear();
+    for (const std::unique_ptr<ForceTerm>& force : forces_)
+        force->assemble(kinematics_, controls, cautious, matrix_, remainder_);
+}
+
+KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda,
+                                     Gradient& out) const {
+    KinematicsGradient by{VectorXd::Zero(size()), VectorXd::Zero(size()), VectorXd::Zero(size())};
+    for (const std::unique_ptr<ForceTerm>& force : forces_)
+        force->vjp(kinematics_, controls, lambda, by, out);
+    return by;
+}
+
+}  // namespace magshell

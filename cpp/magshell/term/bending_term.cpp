@@ -1,0 +1,303 @@
+#include "magshell/term/bending_term.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace magshell {
+
+BendingTerm::BendingTerm(const Sheet& sheet, Index body, const PartLoop& parts, const Nodes& nodes,
+                         const SystemMatrix& matrix, Registry& registry)
+    : StrainScaffold(sheet.n_faces()),
+      sheet_(sheet),
+      body_(body),
+      parts_(parts),
+      first_scalar_(nodes.first_scalar()),
+      materials_(sheet, registry),
+      curvature_scale_(registry.values.add(sheet.owner, "curvature_scale", "1", sheet.n_edges(), 1)),
+      stiffness_(face_packs()),
+      folds_(sheet.folds.size()) {
+    for (const Stencil& s : sheet.stencils) {
+        FaceSlots& slots = face_slots_.emplace_back();
+        slots.nodes = pair_slots<6>(matrix, s.nodes);
+        for (int i = 0; i < 3; ++i) {
+            const Index r = s.rotations[i];
+            for (int k = 0; k < 6; ++k)
+                slots.rotation_nodes[6 * i + k] =
+                    r < 0 || s.nodes[k] < 0 ? -1 : matrix.rotation_slot(r, s.nodes[k]);
+            for (int j = 0; j <= i; ++j)
+                slots.rotations[lower_index(i, j)] =
+                    r < 0 || s.rotations[j] < 0 ? -1 : matrix.rotations_slot(r, s.rotations[j]);
+        }
+    }
+    for (const FoldStencil& fold : sheet.folds) {
+        fold_slots_.push_back(pair_slots<4>(matrix, fold.nodes));
+        fold_slots_.back()[lower_index(2, 2)] = -1;  // (3, 2): the two wings do not meet in d2theta
+    }
+}
+
+bool BendingTerm::set_values(const Values& values) {
+    const bool material_changed = materials_.set_values(values);
+    if (!material_changed && !values.changed(curvature_scale_)) return false;
+    curvature_scales_ = Eigen::Map<const VectorXd>(values[curvature_scale_], curvature_scale_.size());
+    for (Index pack = 0; pack < face_packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = element_of(pack, lane, sheet_.n_faces());
+            const Vec3 scale = scales_of(f);
+            const Mat3 stiffness = RestFace(sheet_.rest_corners(f).data()).bending_stiffness(materials_[f]);
+            const Mat3 scaled = scale.asDiagonal() * stiffness * scale.asDiagonal();
+            set_lane(stiffness_[pack], lane, scaled);
+        }
+    return true;
+}
+
+Vec3 BendingTerm::scales_of(Index face) const {
+    const std::array<Index, 3>& e = sheet_.edges[face];
+    return {curvature_scales_[e[0]], curvature_scales_[e[1]], curvature_scales_[e[2]]};
+}
+
+// Lanes past the last fold repeat it.
+Fold BendingTerm::folds_at(Index first, Index last, const double* q) const {
+    Pack3 x[4];
+    Pack right_is_point;
+    for (int lane = 0; lane < Pack::width; ++lane) {
+        const FoldStencil& fold = sheet_.folds[std::min(first + lane, last - 1)];
+        for (int k = 0; k < 4; ++k) set_lane(x[k], lane, q + 3 * fold.nodes[k]);
+        right_is_point.set(lane, fold.right_is_point ? 1.0 : 0.0);
+    }
+    return Fold(x[0], x[1], x[2], x[3], right_is_point);
+}
+
+// theta - theta~ in (-pi, pi]: a sheet rolled into a closed surface may have its rest angle on the other side
+// of pi.
+double BendingTerm::turn_from(double angle, Index fold) const {
+    return std::remainder(angle - sheet_.folds[fold].rest_angle, 2.0 * std::numbers::pi);
+}
+
+void BendingTerm::store_folds(const double* q) {
+    parts_.each([&](const Part& part) {
+        for (Index first = part.first_fold; first < part.last_fold; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, part.last_fold);
+            const Fold fold = folds_at(first, last, q);
+            const Pack angle = fold.angle();
+            Pack3 g[4];
+            fold.gradient(g);
+            for (int lane = 0; lane < last - first; ++lane) {
+                FoldState& state = folds_[first + lane];
+                state.turn = turn_from(angle[lane], first + lane);
+                for (int k = 0; k < 4; ++k) {
+                    state.gradient[3 * k] = g[k].x[lane];
+                    state.gradient[3 * k + 1] = g[k].y[lane];
+                    state.gradient[3 * k + 2] = g[k].z[lane];
+                }
+            }
+        }
+    });
+}
+
+/// delta of a pack of faces from a number a fold and the rotations in q; linear, so it serves rates as well.
+void BendingTerm::measure(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const {
+    const double* rotation = q + first_scalar_;
+    for (int lane = 0; lane < Pack::width; ++lane) {
+        const std::array<FaceSide, 3>& sides = sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
+        for (int i = 0; i < 3; ++i) {
+            const FaceSide& side = sides[i];
+            double value = side.fold < 0 ? 0.0 : side.weight * (folds_[side.fold].*turn);
+            if (side.rotation >= 0) value += side.sign * rotation[side.rotation];
+            delta[i].set(lane, value);
+        }
+    }
+}
+
+double BendingTerm::energy(const double* q, const Controls&) const {
+    std::vector<double> turns(folds_.size());
+    parts_.each([&](const Part& part) {
+        for (Index first = part.first_fold; first < part.last_fold; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, part.last_fold);
+            const Pack angle = folds_at(first, last, q).angle();
+            for (Index h = first; h < last; ++h) turns[h] = turn_from(angle[h - first], h);
+        }
+    });
+    const double* rotation = q + first_scalar_;
+    return parts_.sum([&](const Part& part) {
+        double total = 0.0;
+        for (Index f = part.first; f < part.last; ++f) {
+            double delta[3];
+            for (int i = 0; i < 3; ++i) {
+                const FaceSide& side = sheet_.sides[f][i];
+                delta[i] = side.fold < 0 ? 0.0 : side.weight * turns[side.fold];
+                if (side.rotation >= 0) delta[i] += side.sign * rotation[side.rotation];
+            }
+            const Symmetric3& stiffness = stiffness_[f / Pack::width];
+            const int lane = f % Pack::width;
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) total += 0.5 * delta[i] * stiffness(i, j)[lane] * delta[j];
+        }
+        return total;
+    });
+}
+
+void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
+    store_folds(q);
+    each_pack([&](Index pack) {
+        Pack delta[3];
+        strain(pack, q, delta);
+        keep_stress(pack, delta);
+    });
+    add_forces(stress_, out);
+}
+
+/// dE/dtheta of a fold: what the strains that it enters are worth.
+double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const {
+    double sum = 0.0;
+    for (const FoldStencil::Side& side : {fold.left, fold.right})
+        if (side.face >= 0)
+            sum += stress.number(side.face, side.corner);
+    return fold.weight() * sum;
+}
+
+void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
+    // Faces that share a rotation share an edge and so a node: parts of one colour meet at no rotation
+    // either.
+    parts_.scatter([&](const Part& part) {
+        for (Index h = part.first_fold; h < part.last_fold; ++h) {
+            const double m = moment(sheet_.folds[h], stresses);
+            for (int k = 0; k < 4; ++k)
+                for (int c = 0; c < 3; ++c)
+                    out.add(3 * sheet_.folds[h].nodes[k] + c, m * folds_[h].gradient[3 * k + c]);
+        }
+        for (Index f = part.first; f < part.last; ++f)
+            for (int i = 0; i < 3; ++i) {
+                const FaceSide& side = sheet_.sides[f][i];
+                if (side.rotation >= 0)
+                    out.add(first_scalar_ + side.rotation,
+                            side.sign * stresses.number(f, i));
+            }
+    });
+}
+
+void BendingTerm::assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+                           SystemMatrix& out) const {
+    FaceLoop::over_packs(part, [&](Index pack) { assemble_faces(pack, out); });
+    const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
+    for (Index first = part.first_fold; first < part.last_fold; first += Pack::width)
+        assemble_folds(first, std::min(first + Pack::width, part.last_fold), q, stress, out);
+}
+
+void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
+    BendingFace face;
+    for (int lane = 0; lane < Pack::width; ++lane) {
+        const std::array<FaceSide, 3>& sides = sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
+        for (int i = 0; i < 3; ++i) {
+            const FaceSide& side = sides[i];
+            face.sign[i].set(lane, side.sign);
+            static constexpr double nothing[12] = {};
+            const double* g = side.fold < 0 ? nothing : folds_[side.fold].gradient;
+            // On its right face, a fold's first two nodes are swapped and so are its last two.
+            const int swap = side.on_left ? 0 : 3;
+            const Vec3 from[4] = {side.weight * Vec3(g + swap), side.weight * Vec3(g + 3 - swap),
+                                  side.weight * Vec3(g + 6 + swap), side.weight * Vec3(g + 9 - swap)};
+            set_lane(face.corner[i][(i + 1) % 3], lane, from[0]);
+            set_lane(face.corner[i][(i + 2) % 3], lane, from[1]);
+            set_lane(face.corner[i][i], lane, from[2]);
+            set_lane(face.beyond[i], lane, from[3]);
+        }
+    }
+    Pack33 blocks[21];
+    Pack3 stiff_corner[3][3], rows[3][6];
+    const Symmetric3 stiffness = history_.scaled(stiffness_[pack]);
+    face.node_blocks(stiffness, blocks, stiff_corner);
+    const bool directors = sheet_.n_rotations() > 0;
+    if (directors) face.rotation_rows(stiffness, stiff_corner, rows);
+
+    const int lanes = std::min(Pack::width, sheet_.n_faces() - pack * Pack::width);
+    for (int lane = 0; lane < lanes; ++lane) {
+        const Index f = pack * Pack::width + lane;
+        const Stencil& stencil = sheet_.stencils[f];
+        const FaceSlots& slots = face_slots_[f];
+        scatter_blocks<6>(out, stencil.nodes, slots.nodes, blocks, lane);
+        if (!directors) continue;
+        for (int i = 0; i < 3; ++i) {
+            if (stencil.rotations[i] < 0) continue;
+            for (int k = 0; k < 6; ++k)
+                if (stencil.nodes[k] >= 0)
+                    out.add_rotation_row(slots.rotation_nodes[6 * i + k], out.column_length(stencil.nodes[k]),
+                                         rows[i][k], lane);
+            for (int j = 0; j <= i; ++j)
+                if (stencil.rotations[j] >= 0)
+                    out.add(slots.rotations[lower_index(i, j)],
+                            face.sign[i][lane] * face.sign[j][lane] * stiffness(i, j)[lane]);
+        }
+    }
+}
+
+void BendingTerm::assemble_folds(Index first, Index last, const double* q, const Strains& stress,
+                                 SystemMatrix& out) const {
+    FoldCurvature curvature(folds_at(first, last, q));
+    Pack moments(0.0);
+    for (Index h = first; h < last; ++h) moments.set(h - first, moment(sheet_.folds[h], stress));
+    for (Pack33& block : curvature.block) block = moments * block;
+    for (Index h = first; h < last; ++h)
+        scatter_blocks<4>(out, sheet_.folds[h].nodes, fold_slots_[h], curvature.block, h - first);
+}
+
+void BendingTerm::store_rates(const double* p) {
+    parts_.each([&](const Part& part) {
+        for (Index h = part.first_fold; h < part.last_fold; ++h) {
+            folds_[h].rate = 0.0;
+            for (int k = 0; k < 4; ++k)
+                for (int c = 0; c < 3; ++c)
+                    folds_[h].rate += folds_[h].gradient[3 * k + c] * p[3 * sheet_.folds[h].nodes[k] + c];
+        }
+    });
+}
+
+// With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T C + C e_i e_i^T.
+void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+    store_rates(lambda);
+    std::vector<Vec3> by_scale(sheet_.n_faces());
+    each_pack([&](Index pack) {
+        Pack delta[3], along[3], stress_rate[3];
+        strain(pack, q, delta);
+        history_.apply(pack, delta);
+        rate(pack, lambda, along);
+        stiffness_[pack].times(along, stress_rate);
+        for (Index f = pack * Pack::width; f < std::min((pack + 1) * Pack::width, sheet_.n_faces()); ++f) {
+            const int lane = f % Pack::width;
+            const Vec3 d = lane_of(delta, lane), rates = lane_of(along, lane), scale = scales_of(f);
+            const Vec3 stress = lane_of(stress_.at(pack), lane);
+            const Mat3 by_poisson_ratio =
+                RestFace(sheet_.rest_corners(f).data()).bending_by_poisson_ratio(materials_[f]);
+            materials_.add_vjp(f, 3, rates.dot(stress),
+                               rates.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d)), out);
+            by_scale[f] = (rates.cwiseProduct(stress) + d.cwiseProduct(lane_of(stress_rate, lane)))
+                              .cwiseQuotient(scale);
+        }
+    });
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        for (int i = 0; i < 3; ++i) out.values[curvature_scale_.at(sheet_.edges[f][i])] += by_scale[f][i];
+}
+
+// A fold angle is exact to about one unit of round-off of a radian, and no better than the positions over the
+// heights of its faces. Its moments are forces at the corners, over the same heights.
+void BendingTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const double height = sheet_.smallest_height(f);
+        const double angle = 1.0 + 0.25 * (sheet_.largest_coordinate(f) + beyond) / height;
+        for (int i = 0; i < 3; ++i) {
+            const FaceSide& side = sheet_.sides[f][i];
+            double moment = 0.0;
+            for (int j = 0; j < 3; ++j)
+                moment += std::abs(stiffness_[f / Pack::width](i, j)[f % Pack::width]) * angle;
+            if (side.rotation >= 0) out[first_scalar_ + side.rotation] += moment;
+            for (const Index corner : sheet_.corners[f])
+                out.segment<3>(3 * corner).array() += moment / height;
+        }
+    }
+}
+
+std::size_t BendingTerm::bytes() const {
+    return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + bytes_of(stiffness_) +
+           bytes_of_stresses() + bytes_of(folds_);
+}
+
+}  // namespace magshell

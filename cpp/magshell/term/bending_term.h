@@ -1,0 +1,83 @@
+// The bending energy of a whole sheet, `hinge` and `midedge` alike: energy/bending.h over
+// strain/fold_angle.h.
+//
+// Fold angles and their gradients are found once an edge; faces combine three of them. The Hessian is the
+// faces' J^T C J, plus each fold's curvature times the moment of the faces beside it.
+#pragma once
+
+#include "magshell/assembly/face_loop.h"
+#include "magshell/energy/bending.h"
+#include "magshell/strain/fold_angle.h"
+#include "magshell/term/elastic_term.h"
+#include "magshell/term/sheet_materials.h"
+
+namespace magshell {
+
+class BendingTerm final : public StrainScaffold<BendingTerm> {
+  public:
+    BendingTerm(const Sheet& sheet, Index body, const PartLoop& parts, const Nodes& nodes,
+                const SystemMatrix& matrix, Registry& registry);
+
+    std::string_view name() const override { return "bending"; }
+    Index body() const override { return body_; }
+    bool set_values(const Values& values) override;
+    double length_scale() const override { return materials_.thinnest(); }
+    double energy(const double* q, const Controls&) const override;
+    void evaluate(const double* q, const Controls&, Residual& out) override;
+    void assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+                  SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    void add_cancelling_forces(double beyond, VectorXd& out) const override;
+    void add_forces(const Strains& stresses, Residual& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    friend class StrainScaffold<BendingTerm>;
+    // A fold at the last evaluated state.
+    struct FoldState {
+        double turn;          // theta - theta~
+        double gradient[12];  // by its four nodes
+        double rate;          // of theta, along the last extrapolated step
+        double unused[2];     // two cache lines in all
+    };
+    struct FaceSlots {
+        PairSlots<6> nodes;
+        std::array<Index, 18> rotation_nodes;  // rotation i against node k, at 6 i + k
+        std::array<Index, 6> rotations;        // rotations (i, j) at lower_index(i, j)
+    };
+
+    Index face_packs() const { return packs_for(sheet_.n_faces()); }
+    template <class Body>
+    void each_pack(const Body& body) const {
+        parts_.each([&](const Part& part) { FaceLoop::over_packs(part, body); });
+    }
+    Fold folds_at(Index first, Index last, const double* q) const;
+    double turn_from(double angle, Index fold) const;
+    void measure(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const;
+    void begin_strains(const double* q) { store_folds(q); }
+    void begin_rates(const double* p) { store_rates(p); }
+    void strain(Index pack, const double* q, Pack d[3]) const { measure(pack, q, &FoldState::turn, d); }
+    void rate(Index pack, const double* p, Pack d[3]) const { measure(pack, p, &FoldState::rate, d); }
+    const Symmetric3& stiffness(Index pack) const { return stiffness_[pack]; }
+    double moment(const FoldStencil& fold, const Strains& stress) const;
+    void store_folds(const double* q);
+    void store_rates(const double* p);
+    Vec3 scales_of(Index face) const;
+    void assemble_faces(Index pack, SystemMatrix& out) const;
+    void assemble_folds(Index first, Index last, const double* q, const Strains& stress,
+                        SystemMatrix& out) const;
+
+    const Sheet& sheet_;
+    const Index body_;
+    const PartLoop& parts_;
+    const Index first_scalar_;
+    SheetMaterials materials_;
+    Slot curvature_scale_;
+    std::vector<FaceSlots> face_slots_;
+    std::vector<PairSlots<4>> fold_slots_;
+    VectorXd curvature_scales_;  // one an edge, [Chen22] k_cur
+    std::vector<Symmetric3> stiffness_;
+    std::vector<FoldState> folds_;
+};
+
+}  // namespace magshell

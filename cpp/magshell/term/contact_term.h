@@ -1,0 +1,116 @@
+// Contact with obstacles: penalty energies of points of the sheet, its vertices and, if wanted, points on its
+// faces.
+//
+//   E = k_n S(offset - distance(x)),   x = sum w_i x_i                    [J]    energy/contact.h
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "magshell/assembly/lanes.h"
+#include "magshell/energy/contact.h"
+#include "magshell/obstacle/placed_obstacle.h"
+#include "magshell/term/term.h"
+
+namespace magshell {
+
+/// A point that obstacles keep out: a vertex, or a weighted sum of the corners of a face.
+struct ContactPoint {
+    std::array<Index, 3> nodes{-1, -1, -1};
+    Vec3 weights = Vec3::UnitX();
+};
+
+/// What touches what. Points on faces come after vertices.
+struct ContactInput {
+    std::vector<Index> obstacles;
+    std::vector<ContactPoint> points;  // with the caller's vertices
+    bool rubs = false,
+         lagged = false;  // whether there is friction, and whether with the normal force of before
+};
+
+/// A body in the way, and whether it moves.
+struct ObstacleInput {
+    std::shared_ptr<const Obstacle> shape;
+    bool moves = false;
+};
+
+/// A 3x3 block of a matrix in every lane.
+Pack33 to_pack(const Mat3& block);
+
+class ContactTerm final : public Term {
+  public:
+    /// A point that touches an obstacle.
+    struct Touch {
+        Index contact, obstacle, point;
+        Vec3 place;
+        Distance at;
+        double force, stiffness;  // N [N] and dN/d(depth) [N/m]
+    };
+
+    ContactTerm(const Nodes& nodes, const SystemMatrix& matrix, const std::vector<ContactInput>& contacts,
+                const std::vector<ObstacleInput>& obstacles, Registry& registry);
+
+    bool set_values(const Values& values) override;
+
+    /// The points that touch at q, in the order of contacts, obstacles and points.
+    std::vector<Touch> touches(const double* q, const Controls& controls) const;
+    /// Those at the last evaluated state.
+    const std::vector<Touch>& touching() const { return touching_; }
+
+    /// The first vertex of a point that comes out on another side of an obstacle than it went in, on its
+    /// straight way from q to `end` as the obstacle sees it; -1 where none does.
+    Index passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                         const Controls& controls_at_end) const;
+
+    const ContactPoint& point(const Touch& touch) const {
+        return contacts_[touch.contact].points[touch.point];
+    }
+    const ContactLaw& law(const Touch& touch) const { return laws_[touch.contact]; }
+    StandingObstacle standing(Index obstacle, const Controls& controls) const;
+    /// Adds the gradient by the law and by the place of what a point touches.
+    void add_vjp(const Touch& touch, const ContactLaw& by_law, const Placement& by_place,
+                 Gradient& out) const;
+
+    /// Adds a symmetric block between the nodes of a point, weighted.
+    void add_block(const Touch& touch, const Mat3& block, SystemMatrix& out) const;
+    /// The weighted sum over a point's nodes of a vector of all unknowns.
+    Vec3 at_point(const Touch& touch, const double* all) const;
+    /// Adds a vector to a point's nodes, weighted.
+    void spread(const Touch& touch, const Vec3& vector, VectorXd& out) const;
+    void spread(const Touch& touch, const Vec3& force, Residual& out) const;
+    /// Adds the magnitude of forces that cancel inside one that depends on the point's place by a stiffness
+    /// [N/m].
+    void add_cancelling_force(const Touch& touch, double stiffness, VectorXd& out) const;
+    /// Those inside the normal forces at the last evaluated state.
+    void add_cancelling_normal_forces(VectorXd& out) const;
+
+    std::string_view name() const override { return "contact"; }
+    bool driven() const override { return false; }
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    struct Contact {
+        std::vector<Index> obstacles;
+        std::vector<ContactPoint> points;  // with our nodes
+        std::vector<PairSlots<3>>
+            slots;  // of the points with several nodes, from the first on: they come last
+        Index first_on_face = 0;
+        Slot stiffness, smoothing, offset, friction, sticking_speed;
+    };
+    struct ObstacleSlots {
+        Slot center, rotation;
+        Slot pose;  // a control; none where it stays
+    };
+
+    std::vector<Contact> contacts_;
+    std::vector<ContactLaw> laws_;
+    std::vector<PlacedObstacle> obstacles_;
+    std::vector<ObstacleSlots> obstacle_slots_;
+    std::vector<Touch> touching_;
+};
+
+}  // namespace magshell

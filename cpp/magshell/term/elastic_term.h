@@ -1,0 +1,90 @@
+// Elastic energies 1/2 d^T C d of three strains an element: what they share, written once.
+#pragma once
+
+#include "magshell/term/strains.h"
+#include "magshell/term/term.h"
+
+namespace magshell {
+
+class ElasticTerm : public Term {
+  public:
+    bool driven() const override { return false; }
+
+    /// From now on; an empty history makes the term elastic again.
+    void set_history(const StrainHistory& history) { history_ = history; }
+
+    /// How many there are, each with three strains.
+    virtual Index elements() const = 0;
+    /// d at q.
+    virtual Strains strains(const double* q) = 0;
+    /// J p at the last evaluated state.
+    virtual Strains strain_rates(const double* p) = 0;
+    /// C d, without history.
+    virtual Strains stresses(const Strains& strains) const = 0;
+    /// Adds J^T s at the last evaluated state.
+    virtual void add_forces(const Strains& stresses, Residual& out) = 0;
+
+  protected:
+    StrainHistory history_;
+};
+
+/// The scaffold. A Kernel (the deriving class) has
+///     each_pack(body)                   body(pack) for all packs of its elements
+///     begin_strains(q), begin_rates(p)  what the strains of all elements need beforehand
+///     strain(pack, q, d), rate(pack, p, d)   d at q; J p at the last evaluated state
+///     stiffness(pack)                   C
+template <class Kernel>
+class StrainScaffold : public ElasticTerm {
+  public:
+    explicit StrainScaffold(Index elements) : stress_(elements), extrapolated_(elements) {}
+
+    Index elements() const final { return stress_.elements; }
+
+    void extrapolate(const double* p) final {
+        kernel().begin_rates(p);
+        kernel().each_pack([&](Index pack) {
+            Pack along[3], change[3];
+            kernel().rate(pack, p, along);
+            history_.scaled(kernel().stiffness(pack)).times(along, change);
+            for (int i = 0; i < 3; ++i) extrapolated_.at(pack)[i] = stress_.at(pack)[i] + change[i];
+        });
+    }
+
+    Strains strains(const double* q) final {
+        kernel().begin_strains(q);
+        Strains out(stress_.elements);
+        kernel().each_pack([&](Index pack) { kernel().strain(pack, q, out.at(pack)); });
+        return out;
+    }
+
+    Strains strain_rates(const double* p) final {
+        kernel().begin_rates(p);
+        Strains out(stress_.elements);
+        kernel().each_pack([&](Index pack) { kernel().rate(pack, p, out.at(pack)); });
+        return out;
+    }
+
+    Strains stresses(const Strains& strains) const final {
+        Strains out(stress_.elements);
+        kernel().each_pack(
+            [&](Index pack) { kernel().stiffness(pack).times(strains.at(pack), out.at(pack)); });
+        return out;
+    }
+
+  protected:
+    /// Keeps the stress of a pack, given its strain.
+    void keep_stress(Index pack, Pack strain[3]) {
+        history_.apply(pack, strain);
+        kernel().stiffness(pack).times(strain, stress_.at(pack));
+    }
+
+    std::size_t bytes_of_stresses() const { return bytes_of(stress_.packs) + bytes_of(extrapolated_.packs); }
+
+    Strains stress_, extrapolated_;
+
+  private:
+    Kernel& kernel() { return static_cast<Kernel&>(*this); }
+    const Kernel& kernel() const { return static_cast<const Kernel&>(*this); }
+};
+
+}  // namespace magshell

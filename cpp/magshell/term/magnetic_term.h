@@ -1,0 +1,51 @@
+// The magnetic energy of a whole sheet, in a uniform applied flux density and any number of field sources.
+//
+// Where the field is uniform nothing is sampled; where no face is magnetized along its normal as well, the
+// force does not depend on the deformation and there is no Hessian to add.
+#pragma once
+
+#include "magshell/assembly/face_loop.h"
+#include "magshell/energy/magnetic.h"
+#include "magshell/term/field_sources.h"
+#include "magshell/term/term.h"
+
+namespace magshell {
+
+class MagneticTerm final : public Term {
+  public:
+    /// The sources have to outlive it.
+    MagneticTerm(const Surface& surface, Index body, const FaceLoop& loop, const FieldSources& sources,
+                 Registry& registry);
+
+    std::string_view name() const override { return Magnetic::name; }
+    Index body() const override { return body_; }
+    bool set_values(const Values& values) override;
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void prepare_assembly(const double* q, const Controls& controls) override;
+    void assemble(const Part& part, const double* q, const Controls& controls, bool,
+                  SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    bool sampled(const Controls& controls) const { return !sources_.empty() && controls[field_factor_.first] != 0.0; }
+    Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
+    /// The barycentres and the magnetizations [A/m] there, by face.
+    void place(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
+    /// The applied field at every barycentre, in packs. Order as in AppliedField::add_samples.
+    std::vector<Magnetic::Field> sample(const double* q, const Controls& controls, int order) const;
+
+    const Surface& surface_;
+    const Index body_;
+    const FaceLoop& loop_;
+    const FieldSources& sources_;
+    Slot magnetization_, thickness_;    // values
+    Slot flux_density_, field_factor_;  // controls
+    std::vector<double> thicknesses_;
+    std::vector<Magnetic::Element> elements_;
+    std::vector<Magnetic::Field> fields_;  // sampled for the assembly at hand; empty in a uniform field
+    bool normal_magnetization_ = false;
+};
+
+}  // namespace magshell

@@ -1,0 +1,50 @@
+// The membrane energy of a whole sheet: energy/membrane.h on every face.
+#pragma once
+
+#include "magshell/assembly/face_loop.h"
+#include "magshell/energy/membrane.h"
+#include "magshell/term/elastic_term.h"
+#include "magshell/term/sheet_materials.h"
+
+namespace magshell {
+
+class MembraneTerm final : public StrainScaffold<MembraneTerm> {
+  public:
+    MembraneTerm(const Surface& surface, Index body, const FaceLoop& loop, const Nodes& nodes,
+                 Registry& registry);
+
+    std::string_view name() const override { return Membrane::name; }
+    Index body() const override { return body_; }
+    bool set_values(const Values& values) override;
+    double length_scale() const override { return materials_.thinnest(); }
+    double energy(const double* q, const Controls&) const override;
+    void evaluate(const double* q, const Controls&, Residual& out) override;
+    void assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+                  SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    void add_cancelling_forces(double beyond, VectorXd& out) const override;
+    void add_forces(const Strains& stresses, Residual& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    friend class StrainScaffold<MembraneTerm>;
+    template <class Body>
+    void each_pack(const Body& body) const {
+        loop_.each_pack(body);
+    }
+    void begin_strains(const double*) {}
+    void begin_rates(const double*) {}
+    void strain(Index pack, const double* q, Pack d[3]) const;
+    void rate(Index pack, const double* p, Pack d[3]) const;
+    const Symmetric3& stiffness(Index pack) const { return elements_[pack].stiffness; }
+
+    const Surface& surface_;
+    const Index body_;
+    const FaceLoop& loop_;
+    const Index nodes_;
+    SheetMaterials materials_;
+    std::vector<Membrane::Element> elements_;
+    std::vector<double> state_;  // the nodes at which stress_ holds
+};
+
+}  // namespace magshell

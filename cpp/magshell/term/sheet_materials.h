@@ -1,0 +1,35 @@
+// What a sheet is made of, face by face, and the gradient by it.
+#pragma once
+
+#include <vector>
+
+#include "magshell/body/surface.h"
+#include "magshell/core/parameters.h"
+#include "magshell/energy/material.h"
+
+namespace magshell {
+
+class SheetMaterials {
+  public:
+    SheetMaterials(const Surface& surface, Registry& registry);
+
+    /// Whether any has changed.
+    bool set_values(const Values& values);
+    const SheetMaterial& operator[](Index face) const { return of_faces_[face]; }
+    double thinnest() const;
+    std::size_t bytes() const { return of_faces_.capacity() * sizeof(SheetMaterial); }
+
+    /// Adds what an energy says of a face's material whose stiffness goes with this power of the thickness:
+    /// `work` = lambda . g, and lambda . dg/dnu.
+    void add_vjp(Index face, int power, double work, double by_poisson_ratio, Gradient& out) const {
+        out.values[young_modulus_.at(face)] += work / of_faces_[face].young_modulus;
+        out.values[thickness_.at(face)] += power * work / of_faces_[face].thickness;
+        out.values[poisson_ratio_.at(face)] += by_poisson_ratio;
+    }
+
+  private:
+    Slot thickness_, young_modulus_, poisson_ratio_;
+    std::vector<SheetMaterial> of_faces_;
+};
+
+}  // namespace magshell

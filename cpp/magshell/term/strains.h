@@ -1,0 +1,63 @@
+// The strains of all elastic terms at a state, and what makes an elastic term viscous: a stress that knows
+// where the strain has been.
+//
+//   sigma = C (scale d - shift)
+//
+// covers every linear law that is integrated implicitly in time; solve/viscosity.h has those that are used.
+#pragma once
+
+#include <vector>
+
+#include "magshell/assembly/lanes.h"
+
+namespace magshell {
+
+/// Three numbers an element, in the layout of packs: strain i of pack p at 3 p + i, one lane an element.
+struct Strains {
+    std::vector<Pack> packs;
+    Index elements = 0;
+
+    explicit Strains(Index elements_ = 0)
+        : packs(3 * packs_for(elements_), Pack(0.0)), elements(elements_) {}
+    Pack* at(Index pack) { return packs.data() + 3 * pack; }
+    const Pack* at(Index pack) const { return packs.data() + 3 * pack; }
+    double number(Index element, int i) const {
+        return packs[3 * (element / Pack::width) + i][element % Pack::width];
+    }
+    void set(Index element, int i, double value) {
+        packs[3 * (element / Pack::width) + i].set(element % Pack::width, value);
+    }
+};
+
+/// Of all elastic terms of a scene, one after another; a vector space.
+struct StrainSet {
+    std::vector<Strains> of_terms;
+
+    bool empty() const { return of_terms.empty(); }
+    void add(double factor, const StrainSet& other);
+    StrainSet times(double factor) const;
+    /// The sum over the elements.
+    double dot(const StrainSet& other) const;
+    std::size_t bytes() const;
+};
+
+struct StrainHistory {
+    double scale = 1.0;
+    const Strains* shift = nullptr;
+
+    /// From d to scale d - shift.
+    void apply(Index pack, Pack strain[3]) const {
+        if (!shift) return;
+        for (int i = 0; i < 3; ++i) strain[i] = Pack(scale) * strain[i] - shift->at(pack)[i];
+    }
+
+    /// scale C.
+    Symmetric3 scaled(const Symmetric3& stiffness) const {
+        Symmetric3 result = stiffness;
+        if (shift)
+            for (Pack& entry : result.at) entry *= Pack(scale);
+        return result;
+    }
+};
+
+}  // namespace magshell

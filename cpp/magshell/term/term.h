@@ -1,0 +1,72 @@
+// A term of the energy: all elements of one kind. One virtual call a term, none an element.
+#pragma once
+
+#include <limits>
+#include <string_view>
+#include <vector>
+
+#include "magshell/assembly/residual.h"
+#include "magshell/assembly/schedule.h"
+#include "magshell/assembly/system_matrix.h"
+#include "magshell/core/parameters.h"
+
+namespace magshell {
+
+/// The order of calls in a Newton step: evaluate at a state; the three of the assembly there, with its own
+/// stresses (plain Newton) or with the extrapolated ones (mixed); once the increment is known, extrapolate.
+class Term {
+  public:
+    virtual ~Term() = default;
+
+    virtual std::string_view name() const = 0;
+
+    /// The body whose parts it is assembled by; negative: it has none of them.
+    virtual Index body() const { return -1; }
+
+    /// Takes what it reads of the values; whether anything of that has changed.
+    virtual bool set_values(const Values& values) = 0;
+
+    /// A displacement [m] that matters to its Hessian: a sheet's thickness.
+    virtual double length_scale() const { return std::numeric_limits<double>::infinity(); }
+
+    /// Whether the controls drive it. Every term that they do is linear in them.
+    virtual bool driven() const { return true; }
+
+    /// The energy [J] at q; changes nothing.
+    virtual double energy(const double* q, const Controls& controls) const = 0;
+
+    /// Adds the gradient at q and keeps what assemble and extrapolate need of this state.
+    virtual void evaluate(const double* q, const Controls& controls, Residual& out) = 0;
+
+    /// What the Hessian at the last evaluated state needs beforehand.
+    virtual void prepare_assembly(const double* /*q*/, const Controls&) {}
+
+    /// Adds a part's share of the Hessian; parts that share no node may run at the same time.
+    virtual void assemble(const Part&, const double* /*q*/, const Controls&, bool /*extrapolated_stress*/,
+                          SystemMatrix& /*out*/) const {}
+
+    /// Adds the share of the Hessian that is not on faces.
+    virtual void finish_assembly(const double* /*q*/, const Controls&, SystemMatrix& /*out*/) const {}
+
+    /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J
+    /// p).
+    virtual void extrapolate(const double* /*p*/) {}
+
+    /// Adds the magnitude of forces that cancel inside the strains themselves, as for |a|^2 - |a~|^2 at rest,
+    /// with coordinates larger than at rest by `beyond` [m].
+    virtual void add_cancelling_forces(double /*beyond*/, VectorXd& /*out*/) const {}
+
+    /// Adds lambda . dg/dk at the last evaluated state q for every value and control k that the term's
+    /// gradient g depends on; lambda is a vector of all unknowns. With dE/dC = 1/2 d d^T this is (J lambda)^T
+    /// dC/dk d for a strain.
+    virtual void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) = 0;
+
+    /// What the term must know of how its state was reached, such as full turns; a solve that rejects a state
+    /// puts back what it was.
+    virtual std::vector<double> memory() const { return {}; }
+    virtual void set_memory(const std::vector<double>&) {}
+
+    virtual std::size_t bytes() const = 0;
+};
+
+}  // namespace magshell

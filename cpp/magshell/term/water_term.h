@@ -1,0 +1,32 @@
+// Drag, thrust and added mass of water on all faces.                                      force/drag.h
+#pragma once
+
+#include "magshell/assembly/face_loop.h"
+#include "magshell/force/drag.h"
+#include "magshell/term/force_term.h"
+
+namespace magshell {
+
+class WaterTerm final : public ForceTerm {
+  public:
+    /// Takes the curves from `water`; its numbers come as values, of all surfaces alike.
+    WaterTerm(const Surface& surface, const FaceLoop& faces, const Water& water, Registry& registry);
+
+    std::string_view name() const override { return "water"; }
+    void set_values(const Values& values) override;
+    void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
+    void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
+                  Remainder& rest) const override;
+    void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
+             Gradient& out) const override;
+
+  private:
+    Drag drag(const Kinematics& at, Index face) const;
+
+    const Surface& surface_;
+    const FaceLoop& loop_;
+    Slot fluid_density_, velocity_, drag_coefficient_, thrust_coefficient_, added_mass_;
+    Water water_;
+};
+
+}  // namespace magshell
