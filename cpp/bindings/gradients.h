@@ -17,12 +17,14 @@ inline Array rows_of(const std::vector<Motion>& motions) {
     return rows;
 }
 
-// Stiffness and friction, (k, 2).
+// As rows of the laws: (k, 5), the layout in which they came.
 inline Array rows_of(const std::vector<ContactLaw>& contacts) {
-    Array rows({static_cast<py::ssize_t>(contacts.size()), py::ssize_t{2}});
+    Array rows({static_cast<py::ssize_t>(contacts.size()), py::ssize_t{5}});
     for (std::size_t k = 0; k < contacts.size(); ++k) {
-        rows.mutable_at(k, 0) = contacts[k].stiffness;
-        rows.mutable_at(k, 1) = contacts[k].friction;
+        const ContactLaw& law = contacts[k];
+        const double numbers[5] = {law.stiffness, law.smoothing, law.offset, law.friction,
+                                   law.sticking_speed};
+        for (int n = 0; n < 5; ++n) rows.mutable_at(k, n) = numbers[n];
     }
     return rows;
 }

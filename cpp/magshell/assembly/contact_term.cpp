@@ -86,7 +86,8 @@ std::vector<ContactTerm::Touch> ContactTerm::touches(const double* q, const Cont
                     if (!(depth > 0.0)) continue;
                     const Penalty penalty(depth, law.smoothing);
                     found[block].push_back({static_cast<Index>(c), o, p, x, at, law.stiffness * penalty.force,
-                                            law.stiffness * penalty.stiffness});
+                                            law.stiffness * penalty.stiffness,
+                                            law.stiffness * penalty.force_by_smoothing});
                 }
             });
             for (const std::vector<Touch>& part : found) all.insert(all.end(), part.begin(), part.end());
@@ -123,6 +124,13 @@ void ContactTerm::spread(const Touch& touch, const Vec3& force, Residual& out) c
     for (int k = 0; k < 3; ++k)
         if (p.nodes[k] >= 0)
             for (int axis = 0; axis < 3; ++axis) out.add(3 * p.nodes[k] + axis, p.weights[k] * force[axis]);
+}
+
+void ContactTerm::add_by_law(const Touch& touch, double by_force, SceneGradient& out) const {
+    ContactLaw& by_law = out.contacts[touch.contact];
+    by_law.stiffness += by_force * touch.force / law(touch).stiffness;
+    by_law.smoothing += by_force * touch.by_smoothing;
+    by_law.offset += by_force * touch.stiffness;
 }
 
 void ContactTerm::add_cancelling_force(const Touch& touch, double stiffness, VectorXd& out) const {
@@ -178,7 +186,7 @@ void ContactTerm::vjp(const double*, const Controls& controls, const double* lam
     for (const Touch& touch : touching_) {
         const Vec3 along = at_point(touch, lambda);
         const double by_force = -along.dot(touch.at.normal);
-        out.contacts[touch.contact].stiffness += by_force * touch.force / law(touch).stiffness;
+        add_by_law(touch, by_force, out);
         standing(touch.obstacle, controls)
             .vjp(touch.place, touch.at, -touch.stiffness * by_force, -touch.force * along, Vec3::Zero(),
                  out.obstacles[touch.obstacle]);

@@ -24,6 +24,7 @@ class ContactTerm final : public Term {
         Vec3 place;
         Distance at;
         double force, stiffness;  // N [N] and dN/d(depth) [N/m]
+        double by_smoothing;      // dN/d(smoothing) [N/m]
     };
 
     ContactTerm(const Sheet& sheet, const SystemMatrix& matrix, const std::vector<ContactInput>& contacts);
@@ -56,6 +57,8 @@ class ContactTerm final : public Term {
     /// Adds a vector to a point's nodes, weighted.
     void spread(const Touch& touch, const Vec3& vector, VectorXd& out) const;
     void spread(const Touch& touch, const Vec3& force, Residual& out) const;
+    /// Adds the gradient by a point's law of a function of its normal force, given that by the force.
+    void add_by_law(const Touch& touch, double by_force, SceneGradient& out) const;
     /// Adds the magnitude of forces that cancel inside one that depends on the point's place by a stiffness
     /// [N/m].
     void add_cancelling_force(const Touch& touch, double stiffness, VectorXd& out) const;

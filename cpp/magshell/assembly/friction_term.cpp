@@ -83,8 +83,9 @@ void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambd
         }
         ContactLaw& by_law = out.contacts[touch.contact];
         by_law.friction -= along.dot(friction.force);
+        by_law.sticking_speed -= law.friction * along.dot(friction.by_sticking_speed);
         const double by_force = -law.friction * along.dot(friction.by_normal_force);
-        by_law.stiffness += by_force * touch.force / law.stiffness;
+        contact_.add_by_law(touch, by_force, out);
         each.obstacle.vjp(touch.place, touch.at, -touch.stiffness * by_force,
                           -law.friction * (friction.by_normal.transpose() * along), -by_velocity,
                           out.obstacles[touch.obstacle]);

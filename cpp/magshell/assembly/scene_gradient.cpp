@@ -32,10 +32,7 @@ void SceneGradient::add_scene(const SceneGradient& part) {
         sum.translation += one.translation;
     });
     add_each(field_sources, part.field_sources, [](VectorXd& sum, const VectorXd& one) { add(sum, one); });
-    add_each(contacts, part.contacts, [](ContactLaw& sum, const ContactLaw& one) {
-        sum.stiffness += one.stiffness;
-        sum.friction += one.friction;
-    });
+    add_each(contacts, part.contacts, [](ContactLaw& sum, const ContactLaw& one) { sum.add(one); });
     water.add(part.water, 1.0);
     add_each(obstacles, part.obstacles, [](Placement& sum, const Placement& one) {
         sum.center += one.center;

@@ -21,7 +21,7 @@ struct SceneGradient {
     VectorXd couples;
     std::vector<Motion> motions;
     std::vector<VectorXd> field_sources;  // of each source, by its own parameters
-    std::vector<ContactLaw> contacts;     // stiffness and friction
+    std::vector<ContactLaw> contacts;
     std::vector<Placement> obstacles;
     Drag::Gradient water;
     Controls controls;

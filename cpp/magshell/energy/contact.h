@@ -16,11 +16,21 @@ struct ContactLaw {
     double offset = 0.0;          // [m], the distance that points keep
     double friction = 0.0;        // coefficient of friction
     double sticking_speed = 0.0;  // [m/s], below which friction holds
+
+    /// Of gradients by a law.
+    void add(const ContactLaw& part) {
+        stiffness += part.stiffness;
+        smoothing += part.smoothing;
+        offset += part.offset;
+        friction += part.friction;
+        sticking_speed += part.sticking_speed;
+    }
 };
 
 /// S and its derivatives at a depth [m] > 0, for a stiffness of one.
 struct Penalty {
     double energy, force, stiffness;
+    double force_by_smoothing;  // at the same depth
 
     Penalty(double depth, double smoothing) {
         if (depth < smoothing) {
@@ -33,6 +43,7 @@ struct Penalty {
             force = beyond;
             energy = 0.5 * beyond * beyond + smoothing * smoothing / 24.0;
         }
+        force_by_smoothing = -0.5 * stiffness * stiffness;
     }
 };
 
