@@ -151,6 +151,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     py::dict result = to_dict(model, gradient.scene);
     for (const auto& [name, rows] : rows_of(gradient.controls)) result[name] = rows;
     result["positions"] = model.positions(gradient.positions);
+    result["edge_rotations"] = model.edge_rotations(gradient.positions);
     result["velocities"] = model.positions(gradient.velocities);
     result["mass"] = VectorXd(model.vertex_rows(gradient.mass).rowwise().sum());
     result["damping"] = VectorXd(model.vertex_rows(gradient.damping).rowwise().sum());

@@ -52,6 +52,13 @@ class Once(torch.autograd.Function):
         )
 
 
+def depends_on(tensor: torch.Tensor, other: torch.Tensor) -> bool:
+    """Whether torch knows a way from one to the other."""
+    if not tensor.requires_grad:
+        return False
+    return torch.autograd.grad(tensor.sum(), other, retain_graph=True, allow_unused=True)[0] is not None
+
+
 def solved(adjoint, arrays: tuple[np.ndarray, ...], dtype, leaves: list) -> tuple[torch.Tensor, ...]:
     """The arrays as tensors from which gradients go back to the leaves."""
     return Solved.apply(adjoint, arrays, dtype, *leaves)

@@ -79,7 +79,8 @@ def simulate(
     A step that does not converge is taken in halves, down to 1/64 of it. Raises NotConverged and Interrupted with the
     motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
     velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
-    continuous, time_step, damping, start positions and velocities among them. Second derivatives raise NoGradient, as
+    continuous, time_step, damping, start (positions or an Equilibrium) and velocities among them. Where an input has
+    none (a Trajectory as start; time_step where a function of the time leaves torch), they raise NoGradient. Second derivatives raise NoGradient, as
     in ms.equilibrium.
 
     They are exact where the motion is differentiable: through impact, stick and slip on smooth obstacles too. It is not
