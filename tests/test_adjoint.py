@@ -258,14 +258,6 @@ def test_other_dtypes_come_back_as_they_were():
     assert young.grad.dtype == torch.float32 and field.grad.dtype == torch.float64
 
 
-def test_no_second_derivative():
-    young = tensor(YOUNG)
-    found = ms.equilibrium(everything(), **DEFAULTS, young_modulus=young)
-    (first,) = torch.autograd.grad((found.positions**2).sum(), young, create_graph=True)
-    with pytest.raises(RuntimeError, match="once_differentiable"):
-        first.sum().backward()
-
-
 def test_nothing_is_kept_without_a_gradient_and_nothing_afterwards():
     scene, young = everything(), tensor(YOUNG)
     with torch.no_grad():

@@ -138,6 +138,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     result["values"] = values_to_user(model, gradient.values);
     result["controls"] = rows_of(model, gradient.controls);
     result["positions"] = model.bodies().positions(gradient.positions);
+    result["edge_rotations"] = model.bodies().edge_rotations(gradient.positions);
     result["velocities"] = model.bodies().positions(gradient.velocities);
     result["mass"] = VectorXd(model.bodies().positions(gradient.mass).rowwise().sum());
     result["damping"] = VectorXd(model.bodies().positions(gradient.damping).rowwise().sum());

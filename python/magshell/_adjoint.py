@@ -40,7 +40,9 @@ class Adjoint:
 
 
 def by_leaf(inputs: Inputs, leaf, gradient: dict) -> np.ndarray:
-    """By one leaf, from the core's gradients."""
+    """By one leaf, from the core's gradients. Raises NoGradient where it has none."""
+    if leaf.refusal:
+        raise NoGradient(f"no gradient by {leaf.name}: {leaf.refusal}")
     values = gradient if leaf.owner is None else inputs.values.gradients(leaf.owner, gradient)
     by_rows = np.asarray(values[leaf.name])
     if by_rows.size == np.prod(leaf.shape, dtype=int):

@@ -33,8 +33,11 @@ def between(old: dict, new: dict, share: float) -> dict:
 
 def packed(scene, design: dict, form) -> dict:
     """With numbers in place of the scene's objects, and form(array) in place of each array."""
-    objects, own = _objects(scene), {name: value for name, value in design.items() if name != "values"}
-    values = {objects.index(owner): named for owner, named in design.get("values", {}).items()}
+    objects, own = (
+        [id(each) for each in _objects(scene)],
+        {name: value for name, value in design.items() if name != "values"},
+    )
+    values = {objects.index(id(owner)): named for owner, named in design.get("values", {}).items()}
     return {
         **{name: form(array) for name, array in own.items()},
         "values": {
@@ -53,4 +56,4 @@ def unpacked(scene, design: dict) -> dict:
 
 
 def _objects(scene) -> list:
-    return [scene, scene.shell, *scene.supports, *scene.loads, *scene.fields]
+    return [scene, *scene.parts]

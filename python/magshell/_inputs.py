@@ -16,11 +16,15 @@ from .scene import Scene
 
 
 class Leaf(NamedTuple):
-    """A tensor among the inputs that requires a gradient, and what it is: a value of `owner`, or the solve's own."""
+    """A tensor among the inputs that requires a gradient, and what it is: a value of `owner`, or the solve's own.
+
+    refusal: why it gets none, which NoGradient says when it is asked for.
+    """
 
     tensor: Any
     owner: object | None
     name: str
+    refusal: str = ""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -82,6 +86,12 @@ class Inputs:
     def take(self, name: str, value):
         """The numbers of another input, which joins the leaves if it asks for a gradient."""
         return self._numbers(name, value)
+
+    def refuse(self, name: str, tensor, why: str) -> None:
+        """Where a tensor asks for a gradient that there is not, whoever takes gradients is told."""
+        if wants_gradient(tensor):
+            self.leaves = [leaf for leaf in self.leaves if leaf.tensor is not tensor or leaf.name != name]
+            self.leaves.append(Leaf(tensor, None, name, why))
 
     def _numbers(self, name: str, value, owner=None):
         """A tensor's numbers; anything else as it came."""

@@ -12,7 +12,7 @@ from ._quantity import quantity
 from ._schedule import scheduled
 from ._start import check_faces
 from ._surroundings import check_outside, poses
-from ._tensors import is_tensor
+from ._tensors import detached, is_tensor, wants_gradient
 from .equilibrium import Equilibrium
 from .integrators import Integrator
 from .solvers import Newton
@@ -57,6 +57,7 @@ class MotionInputs:
         if keep not in (None, "stages", "checkpoints", "factors"):
             raise ValueError(f'keep must be "stages", "checkpoints", "factors" or None, got {keep!r}')
         self.keep = getattr(_core.Keep, keep or "nothing")
+        self._given_time_step = time_step
         self.time_step = float(quantity("time_step", "s", inputs.take("time_step", time_step), ()))
         if not self.time_step > 0:
             raise ValueError(f"time_step [s] must be positive, got {self.time_step}")
@@ -99,11 +100,9 @@ class MotionInputs:
         """Of the obstacles at all knots; their time goes on where the start's ended."""
         values, scene = self.inputs.values, self.inputs.scene
         shares = np.array((0.0, *self.integrator._times))
-        if any(leaf.name == "time_step" for leaf in self.inputs.leaves) and any(
-            values.current(each).motion is not None for each in scene.obstacles
-        ):
-            raise ValueError(
-                "time_step cannot have a gradient where obstacles move by a function of the time"
+        if any(values.current(each).motion is not None for each in scene.obstacles):
+            self.inputs.refuse(
+                "time_step", self._given_time_step, "obstacles move by a function of the time"
             )
         times = self.start.time + self.time_step * (np.arange(self.steps)[:, None] + shares).ravel()
         return poses([values.current(each) for each in scene.obstacles], times)
@@ -117,6 +116,9 @@ class MotionInputs:
         elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
         knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, time_step)
+        if callable(value) and wants_gradient(time_step) and not _differentiable_in_time(knots, time_step):
+            why = f"{name} is a function of the time that torch cannot follow; make its values from the time by torch"
+            self.inputs.refuse("time_step", time_step, why)
         return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
 
     def _checked_damping(self, given) -> np.ndarray:
@@ -185,7 +187,12 @@ class MotionInputs:
             if start.scene is not inputs.scene:
                 raise ValueError("start is of another scene; hand over its positions instead")
             if isinstance(start, Trajectory):
+                why = "it goes on from another motion, whose history has no gradient: start=first.end takes its numbers"
+                inputs.refuse("start", start.positions, why)
                 return start.end
+            if wants_gradient(start.positions):
+                inputs.take("positions", start.positions)
+                inputs.take("edge_rotations", start.edge_rotations)
             return MotionState(0.0, start._state, still, start._memory)
         if isinstance(start, MotionState):
             return _checked_state(start, model.size, mesh.n_faces)
@@ -215,6 +222,14 @@ def _checked_state(start: MotionState, size: int, n_faces: int) -> MotionState:
         quantity(f"start.memory[{k}]", "SI", each, ("n",))
     quantity("start.time", "s", start.time, ())
     return start
+
+
+def _differentiable_in_time(knots, time_step) -> bool:
+    """Whether a control that came as a function has its derivative by the time, or is the same at all times."""
+    from .autograd import depends_on
+
+    numbers = np.asarray(detached(knots))
+    return bool((numbers == numbers[0]).all()) or (is_tensor(knots) and depends_on(knots, time_step))
 
 
 def _count(name: str, value) -> int:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from ._quantity import quantity
 from .loads import EdgeCouple
+from .shell import Shell
 
-SHELL_NAMES = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "curvature_scale")
+SHELL_NAMES = Shell._replaceable
 
 
 def requested(scene, vertex_loads, values, moving: bool = False, **shell) -> dict[object, dict[str, object]]:
@@ -45,12 +46,11 @@ def _add(asked: dict, owner, name: str, value) -> None:
 
 
 def _check(scene, owner, named) -> None:
-    parts = (*scene.supports, *scene.loads, *scene.fields, *scene.contacts, *scene.obstacles, scene.water)
-    if not any(owner is item for item in (scene, scene.shell, *parts)):
+    if not any(owner is item for item in (scene, *scene.parts)):
         raise ValueError(f"values has a key that is not the scene, nor an object of it: {owner!r}")
     if not isinstance(named, dict):
         raise ValueError(f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}")
-    names = ("gravity", "vertex_loads") if owner is scene else getattr(owner, "_replaceable", ())
+    names = getattr(owner, "_replaceable", ())
     for name in named:
         if name not in names:
             what = f"it has {', '.join(names)}" if names else "it has none that can be"

@@ -63,9 +63,10 @@ def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
     for contact in scene.contacts:
         vertices, weights = contact.points(scene.mesh)
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])
+        offset = values.current(contact).offset
         for obstacle in contact.obstacles:
-            depth = contact.offset - values.current(obstacle).signed_distance(where, time)
-            inside = np.flatnonzero(depth > 0.5 * np.max(scene.shell.thickness))
+            depth = offset - values.current(obstacle).signed_distance(where, time)
+            inside = np.flatnonzero(depth > 0.5 * np.max(values.shell.thickness))
             if inside.size:
                 worst = inside[np.argmax(depth[inside])]
                 touched = np.unique(vertices[inside][vertices[inside] >= 0])

@@ -70,7 +70,11 @@ class Values:
             by_masses = gradient.get("mass")
             if by_weights is not None:
                 by_masses = by_weights @ self.gravity + (0.0 if by_masses is None else by_masses)
-            return self.shell.gradients(by_masses, gradient)
+            found = self.shell.gradients(by_masses, gradient)
+            for contact, by_law in zip(scene.contacts, gradient["contacts"], strict=True):
+                by_default = self.current(contact).by_thickness(self.shell, by_law)
+                found["thickness"] = found["thickness"] + by_default
+            return found
         if isinstance(owner, EdgeCouple):
             by_edge = np.zeros(mesh.n_edges)
             by_edge[self.couple_edges] = gradient["couples"]
@@ -80,8 +84,7 @@ class Values:
         if owner in scene.supports:
             return self._motion_gradients(self.current(owner), gradient["motions"])
         if owner in scene.contacts:
-            names = ("contact_stiffness", "friction_coefficient")
-            return dict(zip(names, gradient["contacts"][scene.contacts.index(owner)], strict=True))
+            return owner.gradients(gradient["contacts"][scene.contacts.index(owner)])
         if owner is scene.water:
             return gradient["water"]
         if owner in scene.obstacles:

@@ -15,6 +15,8 @@ _FACE_POINTS = {  # barycentric coordinates of the points on a face
     1: np.full((1, 3), 1.0 / 3.0),
     3: np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0,
 }
+_SMOOTHING = 1e-2  # of the mean thickness
+_STICKING = 1e-2  # of the sheet's extent, a second
 
 
 class Contact:
@@ -43,7 +45,7 @@ class Contact:
     True
     """
 
-    _replaceable = ("contact_stiffness", "friction_coefficient")
+    _replaceable = ("contact_stiffness", "smoothing", "offset", "friction_coefficient", "sticking_speed")
 
     def __init__(
         self,
@@ -82,7 +84,7 @@ class Contact:
         self.face_samples = int(face_samples)
 
     def replaced(self, **values) -> Contact:
-        """The same contact with another contact_stiffness or friction_coefficient."""
+        """The same contact with other numbers of its law."""
         if "friction_coefficient" in values and self.friction_coefficient is None:
             raise ValueError(
                 "a Contact without friction cannot get some in a solve: give it some, zero will do"
@@ -118,15 +120,24 @@ class Contact:
         )
 
     def law(self, shell) -> tuple[float, ...]:
-        """Stiffness [N/m], smoothing [m], offset [m], friction coefficient, sticking speed [m/s]."""
+        """The numbers of `_replaceable` for this sheet: N/m, m, m, 1, m/s."""
         extent = np.linalg.norm(np.ptp(shell.mesh.rest_positions, axis=0))
         return (
             self.contact_stiffness,
-            1e-2 * float(np.mean(shell.thickness)) if self.smoothing is None else self.smoothing,
+            _SMOOTHING * float(np.mean(shell.thickness)) if self.smoothing is None else self.smoothing,
             self.offset,
             self.friction_coefficient or 0.0,
-            1e-2 * extent if self.sticking_speed is None else self.sticking_speed,
+            _STICKING * extent if self.sticking_speed is None else self.sticking_speed,
         )
+
+    def gradients(self, by_law: np.ndarray) -> dict[str, np.ndarray]:
+        """By its own numbers, given those by what `law` returned."""
+        return dict(zip(self._replaceable, by_law, strict=True))
+
+    def by_thickness(self, shell, by_law: np.ndarray) -> np.ndarray:
+        """By the sheet's thickness (n_f,), which a default in `law` is made from."""
+        by_smoothing = self.gradients(by_law)["smoothing"] if self.smoothing is None else 0.0
+        return np.full(shell.thickness.shape, _SMOOTHING * by_smoothing / shell.thickness.size)
 
     def __repr__(self) -> str:
         friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"

@@ -79,7 +79,9 @@ def simulate(
     A step that does not converge is taken in halves, down to 1/64 of it. Raises NotConverged and Interrupted with the
     motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
     velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
-    continuous, time_step, damping, start positions and velocities among them.
+    continuous, time_step, damping, start (positions or an Equilibrium) and velocities among them. Where an input has
+    none (a Trajectory as start; time_step where a function of the time leaves torch), they raise NoGradient. Second derivatives raise NoGradient, as
+    in ms.equilibrium.
 
     They are exact where the motion is differentiable: through impact, stick and slip on smooth obstacles too. It is not
     where a point touches a kink of an obstacle (Trajectory.kinks says where), where a little more makes a step fail or
@@ -161,7 +163,7 @@ def simulate(
 
 
 def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
-    scene, model = asked.inputs.scene, asked.inputs.scene._model
+    scene, model, values = asked.inputs.scene, asked.inputs.scene._model, asked.inputs.values
     positions, edge_rotations, velocities = _outputs(asked, found)
     recorded = len(found.kinetic_energy)
     names = model.term_names
@@ -198,7 +200,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         linear_time=found.linear_time,
         _field_factors=asked.recorded("field_factor", recorded),
         _placed=[
-            (contact, [asked.inputs.values.current(each) for each in contact.obstacles])
+            (values.current(contact), [values.current(each) for each in contact.obstacles], values.shell)
             for contact in scene.contacts
         ],
     )

@@ -46,4 +46,5 @@ class MultistartFailed(RuntimeError):
 
 
 class NoGradient(RuntimeError):
-    """A gradient was asked for at a state that has none: not converged, or not stable."""
+    """A gradient was asked for where there is none: at a state that did not converge or is not stable, by an input that
+    has none, or of a gradient (second derivatives: take differences of gradients)."""

@@ -42,6 +42,8 @@ class Scene:
     160
     """
 
+    _replaceable = ("gravity", "vertex_loads")
+
     def __init__(
         self,
         shell: Shell,
@@ -142,6 +144,20 @@ class Scene:
     @property
     def mesh(self):
         return self.shell.mesh
+
+    @property
+    def parts(self) -> tuple:
+        """Every object of it, always in the same order. What a solve's `values` may name beside the scene itself."""
+        water = () if self.water is None else (self.water,)
+        return (
+            self.shell,
+            *self.supports,
+            *self.loads,
+            *self.fields,
+            *self.contacts,
+            *self.obstacles,
+            *water,
+        )
 
     @property
     def has_uniform_field(self) -> bool:

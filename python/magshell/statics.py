@@ -45,7 +45,8 @@ def equilibrium(
     vertex_loads: N, (n_v, 3): stand in for all forces of the scene's loads.
     values: {object of the scene: {name: value}}, stand in for what the objects were made with: the values of loads, the
         displacement, rotation and center of supports that move, positions and moments of Dipoles, the flux_density of a
-        SampledField, and {scene: {"gravity": value}}. The scene is not analysed again.
+        SampledField, the law of a Contact, the center and rotation of an obstacle, the numbers of Water, and
+        {scene: {"gravity": value}}. The scene is not analysed again. `scene.parts` lists the objects.
     start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
         (n_v, 3) m. By default the rest shape, unloaded. Load cases may have Equilibria, one each.
     require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.
@@ -56,7 +57,8 @@ def equilibrium(
     bad input. With torch tensors among the inputs, positions and edge rotations come back as tensors, and gradients go
     back from them to every input above but `start`. Each costs one back-substitution with the factorization at the
     solution, kept as long as the result is. Asked for where the solve did not converge, or at an equilibrium that is
-    not stable, they raise NoGradient.
+    not stable, they raise NoGradient. So do second derivatives: differences of gradients are exact to some 1e-8, and
+    (g(x + h v) - g(x - h v)) / 2h is the Hessian's product with v.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))

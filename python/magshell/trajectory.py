@@ -91,7 +91,9 @@ class Trajectory:
     wall_time: float
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
-    _placed: list = field(repr=False, default_factory=list)  # (contact, its obstacles where they were)
+    _placed: list = field(
+        repr=False, default_factory=list
+    )  # (contact, its obstacles where they were, the shell)
 
     @property
     def displacements(self):
@@ -125,7 +127,7 @@ class Trajectory:
         positions = detached(self.positions)
         found = {}
         for k, time in enumerate(self.times):
-            near = [near_kinks(*each, self.scene.shell, positions[k], time) for each in self._placed]
+            near = [near_kinks(*each, positions[k], time) for each in self._placed]
             if near and (every := np.unique(np.concatenate(near))).size:
                 found[k] = every
         return found

@@ -21,6 +21,7 @@ struct ContactLaw {
 /// S and its derivatives at a depth [m] > 0, for a stiffness of one.
 struct Penalty {
     double energy, force, stiffness;
+    double force_by_smoothing;  // at the same depth
 
     Penalty(double depth, double smoothing) {
         if (depth < smoothing) {
@@ -33,6 +34,7 @@ struct Penalty {
             force = beyond;
             energy = 0.5 * beyond * beyond + smoothing * smoothing / 24.0;
         }
+        force_by_smoothing = -0.5 * stiffness * stiffness;
     }
 };
 

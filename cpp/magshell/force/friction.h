@@ -12,6 +12,8 @@
 // potential.
 #pragma once
 
+#include <algorithm>
+
 #include "magshell/core/types.h"
 
 namespace magshell {
@@ -19,10 +21,11 @@ namespace magshell {
 /// The force for mu = 1, and its derivatives.
 struct Friction {
     Vec3 force;
-    Vec3 by_normal_force;  // df/dN
-    Mat3 by_velocity;      // df/dv, symmetric and never positive
-    Mat3 secant;           // - mu N (s/u) (I - n n^T), with f = secant v
-    Mat3 by_normal;        // df/dn
+    Vec3 by_normal_force;    // df/dN
+    Mat3 by_velocity;        // df/dv, symmetric and never positive
+    Mat3 secant;             // - mu N (s/u) (I - n n^T), with f = secant v
+    Mat3 by_normal;          // df/dn
+    Vec3 by_sticking_speed;  // df/de
 
     Friction(double normal_force, const Vec3& normal, const Vec3& velocity, double sticking_speed) {
         const double along = normal.dot(velocity);
@@ -41,6 +44,9 @@ struct Friction {
         const Mat3 turning = per_speed * Mat3::Identity() + along_sliding;
         secant = -normal_force * per_speed * (Mat3::Identity() - normal * normal.transpose());
         by_velocity = secant - normal_force * along_sliding;
+        // dh/de = - 2 (1 - y)/e^2 where it sticks
+        const double sticking = std::max(1.0 - y, 0.0) / (sticking_speed * sticking_speed);
+        by_sticking_speed = 2.0 * normal_force * sticking * sliding;
         // dv_t/dn = -(n . v) I - n v^T
         by_normal = normal_force * turning * (along * Mat3::Identity() + normal * velocity.transpose());
     }

@@ -98,14 +98,17 @@ StandingObstacle ContactTerm::standing(Index obstacle, const Controls& controls)
     return {obstacles_[obstacle], ObstaclePose{row(0), row(1), row(2), row(3)}};
 }
 
-void ContactTerm::add_vjp(const Touch& touch, const ContactLaw& by_law, const Placement& by_place,
-                          Gradient& out) const {
+void ContactTerm::add_vjp(const Touch& touch, double by_force, const ContactLaw& by_friction,
+                          const Placement& by_placement, Gradient& out) const {
     const Contact& contact = contacts_[touch.contact];
-    out.values[contact.stiffness.first] += by_law.stiffness;
-    out.values[contact.friction.first] += by_law.friction;
+    out.values[contact.stiffness.first] += by_force * touch.force / law(touch).stiffness;
+    out.values[contact.smoothing.first] += by_force * touch.by_smoothing;
+    out.values[contact.offset.first] += by_force * touch.stiffness;
+    out.values[contact.friction.first] += by_friction.friction;
+    out.values[contact.sticking_speed.first] += by_friction.sticking_speed;
     const ObstacleSlots& obstacle = obstacle_slots_[touch.obstacle];
-    out.values.segment<3>(obstacle.center.first) += by_place.center;
-    out.values.segment<3>(obstacle.rotation.first) += by_place.rotation_vector;
+    out.values.segment<3>(obstacle.center.first) += by_placement.center;
+    out.values.segment<3>(obstacle.rotation.first) += by_placement.rotation_vector;
 }
 
 std::vector<ContactTerm::Touch> ContactTerm::touches(const double* q, const Controls& controls) const {
@@ -126,7 +129,8 @@ std::vector<ContactTerm::Touch> ContactTerm::touches(const double* q, const Cont
                     if (!(depth > 0.0)) continue;
                     const Penalty penalty(depth, law.smoothing);
                     found[block].push_back({static_cast<Index>(c), o, p, x, at, law.stiffness * penalty.force,
-                                            law.stiffness * penalty.stiffness});
+                                            law.stiffness * penalty.stiffness,
+                                            law.stiffness * penalty.force_by_smoothing});
                 }
             });
             for (const std::vector<Touch>& part : found) all.insert(all.end(), part.begin(), part.end());
@@ -220,7 +224,7 @@ void ContactTerm::vjp(const double*, const Controls& controls, const double* lam
         standing(touch.obstacle, controls)
             .vjp(touch.place, touch.at, -touch.stiffness * by_force, -touch.force * along, Vec3::Zero(),
                  by_placement);
-        add_vjp(touch, {.stiffness = by_force * touch.force / law(touch).stiffness}, by_placement, out);
+        add_vjp(touch, by_force, {}, by_placement, out);
     }
 }
 

@@ -45,6 +45,7 @@ class ContactTerm final : public Term {
         Vec3 place;
         Distance at;
         double force, stiffness;  // N [N] and dN/d(depth) [N/m]
+        double by_smoothing;      // dN/d(smoothing) [N/m]
     };
 
     ContactTerm(const Nodes& nodes, const SystemMatrix& matrix, const std::vector<ContactInput>& contacts,
@@ -67,9 +68,10 @@ class ContactTerm final : public Term {
     }
     const ContactLaw& law(const Touch& touch) const { return laws_[touch.contact]; }
     StandingObstacle standing(Index obstacle, const Controls& controls) const;
-    /// Adds the gradient by the law and by the place of what a point touches.
-    void add_vjp(const Touch& touch, const ContactLaw& by_law, const Placement& by_place,
-                 Gradient& out) const;
+    /// Adds the gradient of a function of a point's normal force and friction: by what the force is made
+    /// from, by friction's own numbers and by the place of the obstacle.
+    void add_vjp(const Touch& touch, double by_force, const ContactLaw& by_friction,
+                 const Placement& by_placement, Gradient& out) const;
 
     /// Adds a symmetric block between the nodes of a point, weighted.
     void add_block(const Touch& touch, const Mat3& block, SystemMatrix& out) const;

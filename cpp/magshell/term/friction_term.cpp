@@ -85,10 +85,10 @@ void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambd
         Placement by_placement;
         each.obstacle.vjp(touch.place, touch.at, -touch.stiffness * by_force,
                           -law.friction * (friction.by_normal.transpose() * along), -by_velocity, by_placement);
-        contact_.add_vjp(
-            touch,
-            {.stiffness = by_force * touch.force / law.stiffness, .friction = -along.dot(friction.force)},
-            by_placement, out);
+        contact_.add_vjp(touch, by_force,
+                         {.friction = -along.dot(friction.force),
+                          .sticking_speed = -law.friction * along.dot(friction.by_sticking_speed)},
+                         by_placement, out);
     }
 }
 
