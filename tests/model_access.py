@@ -2,27 +2,40 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 import magshell as ms
-from magshell import _core
+from magshell._values import Values
 
 
-@dataclass
+@dataclass(frozen=True)
+class Controls:
+    """What acts on a scene: T, and factors."""
+
+    applied_flux_density: tuple[float, ...] = (0.0, 0.0, 0.0)
+    field_factor: float = 0.0
+    load_factor: float = 0.0
+    gravity_factor: float = 0.0
+    motion_factor: float = 0.0
+
+    def of(self, scene: ms.Scene) -> np.ndarray:
+        """As the core takes them."""
+        numbers = {("scene", name): value for name, value in asdict(self).items()}
+        return scene._control_layout.packed(numbers, scene._control_layout.zeros())
+
+
 class Problem:
     """A scene with the controls and the magnetization under which it is looked at."""
 
-    scene: ms.Scene
-    controls: _core.Controls
-    magnetization: np.ndarray | None = None
-
-    def __post_init__(self):
+    def __init__(self, scene: ms.Scene, controls: Controls, magnetization: np.ndarray | None = None):
+        self.scene, self.magnetization = scene, magnetization
+        self.controls = controls.of(scene)
         self.model = self.scene._model
-        if self.magnetization is not None:
-            n_faces = self.scene.mesh.n_faces
-            self.model.set_magnetization(np.broadcast_to(self.magnetization, (n_faces, 3)).copy())
+        if magnetization is not None:
+            rows = np.broadcast_to(magnetization, (scene.mesh.n_faces, 3))
+            self.model.set_values(Values(scene, magnetization=rows).numbers)
 
     @property
     def n_nodes(self) -> int:

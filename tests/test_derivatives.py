@@ -6,10 +6,9 @@ from rest: stretched, compressed, and folded to within a tenth of a degree of ly
 
 import numpy as np
 import pytest
-from model_access import Problem
+from model_access import Controls, Problem
 
 import magshell as ms
-from magshell._core import Controls
 
 FIELD = (0.03, -0.05, 0.08)  # T
 MAGNETIZATION = {"tangential": (4e4, 3e4, 0.0), "normal": (0.0, 0.0, 6e4), "mixed": (3e4, -2e4, 5e4)}
@@ -87,7 +86,7 @@ def gravity(size):
     scene = ms.Scene(
         soft(flat_mesh(size), mass_density=1e3), gravity=(1.0, -2.0, -9.81), allow_rigid_motions=True
     )
-    return Problem(scene, Controls(gravity=0.7))
+    return Problem(scene, Controls(gravity_factor=0.7))
 
 
 def loads(size):
@@ -97,7 +96,7 @@ def loads(size):
         ms.EdgeLoad(mesh.edges_at(x=size), (0.4, -0.3, 2.0)),
         ms.AreaLoad((0.0, 0.7, -1.0), faces=[1, 3, 4]),
     ]
-    return Problem(ms.Scene(soft(mesh), loads=acting, allow_rigid_motions=True), Controls(load=1.3))
+    return Problem(ms.Scene(soft(mesh), loads=acting, allow_rigid_motions=True), Controls(load_factor=1.3))
 
 
 def couple(bending):
@@ -107,7 +106,7 @@ def couple(bending):
         scene = ms.Scene(
             soft(mesh, bending=bending), loads=[ms.EdgeCouple(ends, 0.8)], allow_rigid_motions=True
         )
-        return Problem(scene, Controls(load=1.0))
+        return Problem(scene, Controls(load_factor=1.0))
 
     return build
 
@@ -117,7 +116,7 @@ def clamped(size):
     inner = mesh.edges_between(mesh.vertices_where(lambda x: np.abs(x[:, 0] - 0.5 * size) < 0.13 * size))
     supports = [ms.Clamp(mesh.edges_at(x=0.0), rotation=(0.0, 1.0, 0.0)), ms.Clamp(inner[:1])]
     scene = ms.Scene(shell(mesh, 10.0), supports=supports)
-    return Problem(scene, Controls(motion=0.5))
+    return Problem(scene, Controls(motion_factor=0.5))
 
 
 def turned(mesh):
@@ -152,9 +151,9 @@ def patchwork(size):
     return Problem(ms.Scene(sheet, allow_rigid_motions=True), Controls())
 
 
-IN_FIELD = Controls(flux_density=np.array(FIELD))
-IN_SOURCES = Controls(flux_density=np.zeros(3), field=1.0)
-IN_BOTH = Controls(flux_density=np.array(FIELD), field=0.8)
+IN_FIELD = Controls(applied_flux_density=np.array(FIELD))
+IN_SOURCES = Controls(applied_flux_density=np.zeros(3), field_factor=1.0)
+IN_BOTH = Controls(applied_flux_density=np.array(FIELD), field_factor=0.8)
 
 # name -> (how to build it at a size, the term that must carry nearly all of the energy, or None)
 TERMS = {

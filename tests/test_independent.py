@@ -6,10 +6,9 @@ space, angles from face normals, and the magnetic energy from a matrix inverse, 
 
 import numpy as np
 import pytest
-from model_access import Problem
+from model_access import Controls, Problem
 
 import magshell as ms
-from magshell._core import Controls
 
 torch = pytest.importorskip("torch")
 
@@ -40,7 +39,7 @@ def make_problem(bending, carrier):
     )
     clamped = np.concatenate([mesh.edges_at(x=0.0), mesh.edges_at(x=1.0)[:1]])
     scene = ms.Scene(sheet, supports=[ms.Clamp(clamped)], field=ms.UniformField())
-    return Problem(scene, Controls(flux_density=np.array(FLUX_DENSITY)), np.array(MAGNETIZATION)), clamped
+    return Problem(scene, Controls(applied_flux_density=np.array(FLUX_DENSITY)), np.array(MAGNETIZATION)), clamped
 
 
 class Formulas:

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from model_access import Problem
+from model_access import Controls, Problem
 
 import magshell as ms
-from magshell._core import Controls
 
 BENDINGS = ["midedge", "hinge"]
 MAGNETIZATION = np.array([3e4, 1e4, -2e4])  # A/m
@@ -210,7 +209,7 @@ def test_any_number_of_threads_gives_the_same_bits(bending, thread_counts, rng):
     field = [ms.UniformField(), ms.Dipoles([[0.05, 0.0, 0.1]], [[0.0, 0.0, 5.0]])]
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, bending=bending)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=field)
-    problem = Problem(scene, Controls(flux_density=FLUX_DENSITY, field=1.0), MAGNETIZATION)
+    problem = Problem(scene, Controls(applied_flux_density=FLUX_DENSITY, field_factor=1.0), MAGNETIZATION)
     q = problem.model.state(*random_state(problem, rng))
     seen = set()
     for count in (*thread_counts, 1):

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from model_access import Problem
+from model_access import Controls, Problem
 
 import magshell as ms
-from magshell._core import Controls
 
 YOUNG, THICKNESS = 2e6, 2e-3  # Pa, m
 OBLIQUE = ms.supports.rotation_matrix(np.array([0.7, -1.1, 0.4]))
@@ -151,7 +150,7 @@ def test_a_tangential_magnetization_pulls_at_the_boundary_only(rotation, rng):
     mesh = sheet().mesh.transformed(rotation)
     shell = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e-12)
     scene = ms.Scene(shell, field=ms.UniformField(), allow_rigid_motions=True)
-    problem = Problem(scene, Controls(flux_density=rotation @ FLUX_DENSITY), rotation @ TANGENTIAL)
+    problem = Problem(scene, Controls(applied_flux_density=rotation @ FLUX_DENSITY), rotation @ TANGENTIAL)
     expected = ms.EdgeLoad(*edge_traction(mesh, rotation)).vertex_forces(mesh)
     scale = np.abs(expected).max()
     inside = np.setdiff1d(np.arange(mesh.n_vertices), mesh.boundary_vertices)
@@ -221,7 +220,7 @@ def test_loads_are_what_they_say_in_total():
     scene = ms.Scene(
         shell, loads=[load for load, _ in totals.values()], gravity=(0, 0, -9.81), allow_rigid_motions=True
     )
-    problem = Problem(scene, Controls(load=1.0, gravity=1.0))
+    problem = Problem(scene, Controls(load_factor=1.0, gravity_factor=1.0))
     way = np.array([0.1, 0.2, -0.3])
     before, after = (
         problem.model.energies(

@@ -6,6 +6,7 @@ import numpy as np
 
 from . import _core
 from ._inputs import Inputs
+from ._values import Gradient
 from .errors import NoGradient
 
 
@@ -20,7 +21,7 @@ class Adjoint:
         self._refuse()
         inputs, model = self._inputs, self._inputs.scene._model
         with inputs.in_core():
-            gradient = _core.pull_back(model, self._found, *by_outputs)
+            gradient = Gradient(inputs.scene, *_core.pull_back(model, self._found, *by_outputs))
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if asked else None for leaf, asked in leaves]
 
@@ -39,12 +40,14 @@ class Adjoint:
             )
 
 
-def by_leaf(inputs: Inputs, leaf, gradient: dict) -> np.ndarray:
+def by_leaf(inputs: Inputs, leaf, gradient: Gradient) -> np.ndarray:
     """By one leaf, from the core's gradients. Raises NoGradient where it has none."""
     if leaf.refusal:
         raise NoGradient(f"no gradient by {leaf.name}: {leaf.refusal}")
-    values = gradient if leaf.owner is None else inputs.values.gradients(leaf.owner, gradient)
-    by_rows = np.asarray(values[leaf.name])
+    if leaf.owner is None:
+        by_rows = np.asarray(gradient.own(leaf.name))
+    else:
+        by_rows = np.asarray(inputs.values.gradients(leaf.owner, gradient)[leaf.name])
     if by_rows.size == np.prod(leaf.shape, dtype=int):
         return by_rows.reshape(leaf.shape)
     return by_rows.sum(axis=0).reshape(leaf.shape)  # one value for every row

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _core
 from ._quantity import quantity, real_numbers
 from ._replacements import checked
 from ._tensors import detached, is_tensor, to_array, wants_gradient
@@ -65,18 +64,13 @@ class Inputs:
             self._numbers("remanent_magnetization", remanent_magnetization)
         )
         flux_density = self._flux_density(self._numbers("applied_flux_density", applied_flux_density))
-        names = {
-            "load_factor": "load",
-            "gravity_factor": "gravity",
-            "field_factor": "field",
-            "motion_factor": "motion",
-        }
         numbers = {
-            names[key]: float(quantity(key, "1", self._numbers(key, value), ()))
+            ("scene", key): float(quantity(key, "1", self._numbers(key, value), ()))
             for key, value in factors.items()
         }
-        self.controls = _core.Controls(flux_density=flux_density, **numbers)
-        self.values = self._values(replaced) if replaced else scene._values
+        numbers["scene", "applied_flux_density"] = flux_density
+        self.controls = scene._control_layout.packed(numbers, scene._control_layout.zeros())
+        self.values = self._values(replaced or {})
 
     @property
     def tensors(self) -> list:
@@ -112,7 +106,9 @@ class Inputs:
             }
             for owner, named in replaced.items()
         }
-        return Values(scene, scene._constraints, arrays)
+        if not arrays and self.magnetization is None:
+            return scene._values
+        return Values(scene, arrays, self.magnetization)
 
     def _magnetization(self, given) -> np.ndarray | None:
         if not self.scene.fields:
@@ -146,8 +142,6 @@ class Inputs:
         """The scene's core with this magnetization in it, for one solve; those of other threads wait."""
         with self.scene._exclusive():
             if self.scene._in_core is not self.values:
-                self.scene._model.set_values(self.values.core)
+                self.scene._model.set_values(self.values.numbers)
                 self.scene._in_core = self.values
-            if self.magnetization is not None:
-                self.scene._model.set_magnetization(self.magnetization)
             yield

@@ -6,6 +6,7 @@ import numpy as np
 
 from . import _core
 from ._adjoint import by_leaf
+from ._values import Gradient
 from .errors import NoGradient
 
 
@@ -23,6 +24,7 @@ class MotionAdjoint:
                 f"no gradient here: the motion stopped after {found.steps_done} of {asked.steps} steps ({found.reason})"
             )
         with inputs.in_core():
-            gradient = _core.pull_back_motion(inputs.scene._model, asked.core, found, *by_outputs)
+            found_by = _core.pull_back_motion(inputs.scene._model, asked.core, found, *by_outputs)
+        gradient = Gradient(inputs.scene, found_by.pop("values"), found_by.pop("controls"), found_by)
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if is_wanted else None for leaf, is_wanted in leaves]

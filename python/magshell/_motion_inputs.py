@@ -18,12 +18,12 @@ from .integrators import Integrator
 from .solvers import Newton
 from .trajectory import MotionState, Trajectory
 
-_CONTROLS = {  # (unit, of one time, name in the core)
-    "applied_flux_density": ("T", (3,), "flux_density"),
-    "field_factor": ("1", (), "field"),
-    "load_factor": ("1", (), "load"),
-    "gravity_factor": ("1", (), "gravity"),
-    "motion_factor": ("1", (), "motion"),
+_CONTROLS = {  # (unit, of one time)
+    "applied_flux_density": ("T", (3,)),
+    "field_factor": ("1", ()),
+    "load_factor": ("1", ()),
+    "gravity_factor": ("1", ()),
+    "motion_factor": ("1", ()),
 }
 
 
@@ -80,10 +80,7 @@ class MotionInputs:
                 "integrator": integrator._name,
                 "time_step": self.time_step,
                 "steps": self.steps,
-                "controls": {
-                    **{_CONTROLS[name][2]: array for name, array in self._knots.items()},
-                    "obstacles": self._poses(),
-                },
+                "controls": self._all_controls(),
                 "newton": solver._newton_options(),
                 "record_every": self.record_every,
             },
@@ -96,19 +93,32 @@ class MotionInputs:
         ends = a_step * self.record_every * np.arange(1, count) - 1
         return knots[np.concatenate([[0], ends])]
 
+    def _all_controls(self) -> np.ndarray:
+        """(knots, m), in the core's layout."""
+        layout, moving = self.inputs.scene._control_layout, self._poses()
+        rows = {("scene", name): array for name, array in self._knots.items()}
+        for k, _ in enumerate(self.inputs.scene.obstacles):
+            if (f"obstacle {k}", "pose") in layout:
+                rows[f"obstacle {k}", "pose"] = moving[:, k]
+        knots = self.steps * (len(self.integrator._times) + 1)
+        return np.array(
+            [
+                layout.packed({key: array[n] for key, array in rows.items()}, layout.zeros())
+                for n in range(knots)
+            ]
+        )
+
     def _poses(self) -> np.ndarray:
         """Of the obstacles at all knots; their time goes on where the start's ended."""
         values, scene = self.inputs.values, self.inputs.scene
         shares = np.array((0.0, *self.integrator._times))
         if any(values.current(each).motion is not None for each in scene.obstacles):
-            self.inputs.refuse(
-                "time_step", self._given_time_step, "obstacles move by a function of the time"
-            )
+            self.inputs.refuse("time_step", self._given_time_step, "obstacles move by a function of the time")
         times = self.start.time + self.time_step * (np.arange(self.steps)[:, None] + shares).ravel()
         return poses([values.current(each) for each in scene.obstacles], times)
 
     def _controls(self, name: str, value, time_step) -> np.ndarray:
-        unit, row, _ = _CONTROLS[name]
+        unit, row = _CONTROLS[name]
         if name == "applied_flux_density" and value is None:
             if self.inputs.scene.has_uniform_field:
                 raise ValueError("the scene has a UniformField, so applied_flux_density [T] is needed")
@@ -195,7 +205,7 @@ class MotionInputs:
                 inputs.take("edge_rotations", start.edge_rotations)
             return MotionState(0.0, start._state, still, start._memory)
         if isinstance(start, MotionState):
-            return _checked_state(start, model.size, mesh.n_faces)
+            return _checked_state(start, model.size, model.n_strains)
         given = inputs.take("positions", start)
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
         check_faces(mesh, positions)
@@ -203,7 +213,7 @@ class MotionInputs:
         return MotionState(0.0, model.state(positions, np.zeros(mesh.n_edges)), still, [])
 
 
-def _checked_state(start: MotionState, size: int, n_faces: int) -> MotionState:
+def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState:
     """A MotionState as it is. Its arrays come from a file, or from a caller who made it."""
     if np.ndim(start.state) == 1 and len(start.state) != size:
         raise ValueError(f"start is a state of {len(start.state)} unknowns, but the scene has {size}")
@@ -213,7 +223,7 @@ def _checked_state(start: MotionState, size: int, n_faces: int) -> MotionState:
         quantity(f"start.{name}", "SI", values, (0,) if optional else (size,))
     for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
         values = getattr(start, name)
-        quantity(f"start.{name}", "SI", values, (2, 0 if np.size(values) == 0 else n_faces, 3))
+        quantity(f"start.{name}", "SI", values, (0 if np.size(values) == 0 else n_strains,))
     if not isinstance(start.memory, list):
         raise ValueError(
             f"start.memory must be a list of lists of numbers, got {type(start.memory).__name__}"

@@ -19,7 +19,7 @@ class RestStiffness:
     def __init__(self, scene: Scene):
         self._model = scene._model
         self.rest = self._model.rest_state()
-        *self._pattern, self._values = self._model.hessian(self.rest, _core.Controls())
+        *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())
         self._factor = _core.analyze(*self._pattern)
         report = self._factor.factorize(self._values)
         if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
@@ -48,8 +48,9 @@ class RestStiffness:
 
     def response(self, inputs: Inputs) -> np.ndarray:
         """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports move."""
-        model, unloaded = self._model, _core.Controls()
-        moved = model.prescribed_rate(0.0) * inputs.controls.motion
+        model, layout = self._model, inputs.scene._control_layout
+        unloaded = layout.zeros()
+        moved = model.prescribed_rate(unloaded) * layout.part(inputs.controls, "scene", "motion_factor")
         forces = model.gradient(self.rest, unloaded) - model.gradient(self.rest, inputs.controls)
         if moved.any():
             forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved

@@ -122,7 +122,6 @@ def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibriu
         _state=found.state,
         _memory=found.memory,
         _controls=found.controls,
-        _magnetization=inputs.magnetization,
         _values=inputs.values,
     )
 
@@ -141,7 +140,8 @@ def _outputs(inputs: Inputs, found):
 def _flux_density(inputs: Inputs, found):
     if found.progress == 1.0 and is_tensor(inputs.given_flux_density):
         return inputs.given_flux_density
-    return like(np.array(found.controls.flux_density), *inputs.given)
+    flux_density = inputs.scene._control_layout.part(found.controls, "scene", "applied_flux_density")
+    return like(flux_density[0].copy(), *inputs.given)
 
 
 def _failure(found, at_rest: bool) -> str:

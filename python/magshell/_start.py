@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import _core
 from ._inputs import Inputs
 from ._quantity import quantity
 from ._surroundings import check_outside
@@ -28,16 +27,13 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     model = scene._model
     if start is None:
         check_outside(scene, inputs.values, scene.mesh.rest_positions, 0.0)
-        return model.rest_state(), [], _core.Controls(), True
+        return model.rest_state(), [], scene._control_layout.zeros(), True
     if isinstance(start, Origin):
         return start.state, start.memory, start.inputs.controls, True
     if isinstance(start, Equilibrium):
         if start.scene is not scene:
             raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
-        same = np.array_equal(start._magnetization, inputs.magnetization) and start._values.same_as(
-            inputs.values
-        )
-        return start._state, start._memory, start._controls, same
+        return start._state, start._memory, start._controls, start._values.same_as(inputs.values)
     positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
     n_v = scene.mesh.n_vertices
     if len(positions) != n_v:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
-from . import _core
 from ._inputs import Inputs
 from ._mode_shapes import mode_shapes
 from ._rest import RestStiffness
@@ -116,11 +115,9 @@ def _stiffness_change(
     """The values of dK, in the pattern of K, for the controls as they are."""
     # Where nothing moves before buckling, K is linear in the controls and any step is exact.
     step = _PRE_LOAD * float(scene.mesh.edge_lengths.mean()) / displacement if displacement > 0.0 else 1.0
-    unloaded = _core.Controls()
 
     def values(t: float) -> np.ndarray:
-        controls = unloaded.towards(inputs.controls, t)
-        return scene._model.hessian(stiffness.rest + t * response, controls)[3]
+        return scene._model.hessian(stiffness.rest + t * response, t * inputs.controls)[3]
 
     change = (values(step) - values(-step)) / (2.0 * step)
     if not change.any():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._checked_list import checked_list
+from ._owner import Owner
 from ._quantity import quantity
 from ._selections import indices, selection
 from .mesh import TriangleMesh
@@ -19,7 +20,7 @@ _SMOOTHING = 1e-2  # of the mean thickness
 _STICKING = 1e-2  # of the sheet's extent, a second
 
 
-class Contact:
+class Contact(Owner):
     """Keeps points of a sheet out of obstacles, with friction if wanted [Chen22, 6.1; Geilinger et al. 2020].
 
     obstacles: one of ms.obstacles, or several.
@@ -130,13 +131,13 @@ class Contact:
             _STICKING * extent if self.sticking_speed is None else self.sticking_speed,
         )
 
-    def gradients(self, by_law: np.ndarray) -> dict[str, np.ndarray]:
-        """By its own numbers, given those by what `law` returned."""
-        return dict(zip(self._replaceable, by_law, strict=True))
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        for name, number in zip(self._replaceable, self.law(values.shell), strict=True):
+            numbers[label, name] = number
 
-    def by_thickness(self, shell, by_law: np.ndarray) -> np.ndarray:
+    def by_thickness(self, label: str, shell, gradient) -> np.ndarray:
         """By the sheet's thickness (n_f,), which a default in `law` is made from."""
-        by_smoothing = self.gradients(by_law)["smoothing"] if self.smoothing is None else 0.0
+        by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
         return np.full(shell.thickness.shape, _SMOOTHING * by_smoothing / shell.thickness.size)
 
     def __repr__(self) -> str:

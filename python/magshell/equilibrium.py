@@ -45,7 +45,6 @@ class Equilibrium:
     _state: np.ndarray = field(repr=False)
     _memory: list = field(repr=False)
     _controls: Any = field(repr=False)
-    _magnetization: Any = field(repr=False)
     _values: Any = field(repr=False)
 
     def __getstate__(self):

@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from . import _core as core
+from ._owner import Owner
 from ._quantity import quantity, real_numbers
 from ._tensors import is_tensor
 
@@ -26,7 +27,7 @@ def residual_to_remanent(residual_flux_density):
     return float(remanent) if remanent.ndim == 0 else remanent
 
 
-class AppliedField:
+class AppliedField(Owner):
     """A flux density B(x) [T] that does not depend on the sheet.
 
     `_core` is the field of the C++ core, or None where a solve supplies the value. `_made_from` are the arguments that
@@ -36,6 +37,10 @@ class AppliedField:
     _core: core.AppliedField | None = None
     _replaceable: tuple[str, ...] = ()
     _made_from: Mapping[str, object] = MappingProxyType({})
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        for name in self._replaceable:
+            numbers[label, name] = self._made_from[name]
 
     def __getstate__(self) -> dict:
         return dict(self._made_from)
@@ -101,10 +106,6 @@ class Dipoles(AppliedField):
         if len(changed.positions) != len(self.positions):
             raise ValueError(f"there must be {len(self.positions)} dipoles, got {len(changed.positions)}")
         return changed
-
-    def gradients(self, by_parameters: np.ndarray) -> dict[str, np.ndarray]:
-        positions, moments = by_parameters.reshape(2, -1, 3)
-        return {"positions": positions, "moments": moments}
 
     def __repr__(self) -> str:
         count = len(self.positions)
@@ -186,9 +187,6 @@ class SampledField(AppliedField):
         return SampledField(
             self.origin, self.spacing, quantity("flux_density", "T", flux_density, (*self.counts, 3))
         )
-
-    def gradients(self, by_parameters: np.ndarray) -> dict[str, np.ndarray]:
-        return {"flux_density": by_parameters.reshape(*self.counts, 3)}
 
     def contains(self, points) -> np.ndarray:
         """Whether points [m], (..., 3), lie in the grid: bool, (...)."""

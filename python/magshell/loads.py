@@ -4,28 +4,48 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._owner import Owner
 from ._quantity import quantity, real_numbers
 from ._selections import indices, selection
 from .mesh import TriangleMesh
 
 
-class PointLoad:
+class DeadLoad(Owner):
+    """Forces that keep size and direction, given by one value: so much of it on each of some parts of the mesh."""
+
+    def __init__(self, label: str, values):
+        """label: the name and unit of the value."""
+        self._label = label
+        setattr(self, self._replaceable[0], _vectors(*label.rstrip("]").split(" [", 1), values))
+
+    def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
+        """(n_v, 3), N."""
+        vertices, weights = self._shares(mesh)
+        rows = _rows(self._label, getattr(self, self._replaceable[0]), len(vertices))
+        return _spread(mesh, vertices, rows * weights)
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        key = ("loads", "forces")
+        numbers[key] = numbers.get(key, 0.0) + self.vertex_forces(values.scene.mesh)
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        vertices, weights = self._shares(values.scene.mesh)
+        by_forces = gradient.value("loads", "forces")
+        return {self._replaceable[0]: by_forces[vertices].sum(axis=1) * weights}
+
+    def _shares(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """The vertices of each part (k, m), and how much of the value each of them feels (k, 1)."""
+        raise TypeError(f"{type(self).__name__} is no load of its own")
+
+
+class PointLoad(DeadLoad):
     """A force [N] on each of some vertices: `force` (3,) on every one of them, or (k, 3), one each."""
 
     _replaceable = ("force",)
 
     def __init__(self, vertices, force):
         self.vertices = selection("PointLoad vertices", vertices)
-        self.force = _vectors("force", "N", force)
-
-    def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
-        """(n_v, 3), N."""
-        vertices, weights = self._shares(mesh)
-        return _spread(mesh, vertices, _rows("force [N]", self.force, len(vertices)) * weights)
-
-    def gradients(self, mesh: TriangleMesh, by_vertex_forces: np.ndarray) -> dict[str, np.ndarray]:
-        """By the force, one a vertex."""
-        return {"force": _gathered(*self._shares(mesh), by_vertex_forces)}
+        super().__init__("force [N]", force)
 
     def replaced(self, *, force) -> PointLoad:
         return PointLoad(self.vertices, force)
@@ -35,25 +55,14 @@ class PointLoad:
         return vertices[:, None], np.ones((len(vertices), 1))
 
 
-class EdgeLoad:
+class EdgeLoad(DeadLoad):
     """A force per rest length [N/m] along some edges, half to each end: (3,) or (k, 3), one an edge."""
 
     _replaceable = ("force_per_length",)
 
     def __init__(self, edges, force_per_length):
         self.edges = selection("EdgeLoad edges", edges)
-        self.force_per_length = _vectors("force_per_length", "N/m", force_per_length)
-
-    def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
-        """(n_v, 3), N."""
-        ends, weights = self._shares(mesh)
-        return _spread(
-            mesh, ends, _rows("force_per_length [N/m]", self.force_per_length, len(ends)) * weights
-        )
-
-    def gradients(self, mesh: TriangleMesh, by_vertex_forces: np.ndarray) -> dict[str, np.ndarray]:
-        """By the force per length, one an edge."""
-        return {"force_per_length": _gathered(*self._shares(mesh), by_vertex_forces)}
+        super().__init__("force_per_length [N/m]", force_per_length)
 
     def replaced(self, *, force_per_length) -> EdgeLoad:
         return EdgeLoad(self.edges, force_per_length)
@@ -63,25 +72,14 @@ class EdgeLoad:
         return mesh.edges[edges], (mesh.edge_lengths[edges] / 2.0)[:, None]
 
 
-class AreaLoad:
+class AreaLoad(DeadLoad):
     """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face."""
 
     _replaceable = ("force_per_area",)
 
     def __init__(self, force_per_area, faces=None):
         self.faces = None if faces is None else selection("AreaLoad faces", faces)
-        self.force_per_area = _vectors("force_per_area", "N/m2", force_per_area)
-
-    def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
-        """(n_v, 3), N."""
-        corners, weights = self._shares(mesh)
-        return _spread(
-            mesh, corners, _rows("force_per_area [N/m2]", self.force_per_area, len(corners)) * weights
-        )
-
-    def gradients(self, mesh: TriangleMesh, by_vertex_forces: np.ndarray) -> dict[str, np.ndarray]:
-        """By the force per area, one a face."""
-        return {"force_per_area": _gathered(*self._shares(mesh), by_vertex_forces)}
+        super().__init__("force_per_area [N/m2]", force_per_area)
 
     def replaced(self, *, force_per_area) -> AreaLoad:
         return AreaLoad(force_per_area, self.faces)
@@ -95,7 +93,7 @@ class AreaLoad:
         return mesh.faces[faces], (mesh.face_areas[faces] / 3.0)[:, None]
 
 
-class EdgeCouple:
+class EdgeCouple(Owner):
     """A couple per rest length [N] turning the director of free boundary edges about the edge itself.
 
     couple_per_length: a number, about the edge's direction with the sheet on its left (seen from the side its normals
@@ -117,10 +115,16 @@ class EdgeCouple:
         edges, along = self._along(mesh)
         return edges, along @ np.atleast_1d(self.couple_per_length)
 
-    def gradients(self, mesh: TriangleMesh, by_edge_couples: np.ndarray) -> dict[str, np.ndarray]:
-        """By the couple per length, given those by the couple on every edge of the mesh (n_e,)."""
-        edges, along = self._along(mesh)
-        return {"couple_per_length": by_edge_couples[edges] @ along}
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        key, turned = ("couples", "couples"), values.scene._couple_edges
+        edges, couples = self.edge_couples(values.scene.mesh)
+        by_edge = np.bincount(edges, weights=couples, minlength=values.scene.mesh.n_edges)
+        numbers[key] = numbers.get(key, 0.0) + by_edge[turned]
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        edges, along = self._along(values.scene.mesh)
+        of_edges = np.searchsorted(values.scene._couple_edges, edges)
+        return {"couple_per_length": gradient.value("couples", "couples")[of_edges] @ along}
 
     def replaced(self, *, couple_per_length) -> EdgeCouple:
         changed = EdgeCouple(self.edges, couple_per_length)
@@ -163,8 +167,3 @@ def _spread(mesh: TriangleMesh, vertices: np.ndarray, forces: np.ndarray) -> np.
     at_vertices = np.zeros((mesh.n_vertices, 3))
     np.add.at(at_vertices, vertices, forces[:, None, :])
     return at_vertices
-
-
-def _gathered(vertices: np.ndarray, weights: np.ndarray, by_vertex_forces: np.ndarray) -> np.ndarray:
-    """The transpose of spreading: one gradient a row of vertices."""
-    return by_vertex_forces[vertices].sum(axis=1) * weights

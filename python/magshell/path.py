@@ -64,7 +64,7 @@ class Path:
     def equilibrium(self, index: int) -> Equilibrium:
         """One of the points, stable or not, as an Equilibrium: to look at, or to start another solve from."""
         index = range(len(self))[index]
-        controls = self._from.towards(self._to, self.parameters[index])
+        controls = self._controls[index]
         options = MixedNewton()._options()
         options.require_stable = False
         point = self._points[index]
@@ -73,9 +73,16 @@ class Path:
     @property
     def applied_flux_densities(self) -> np.ndarray:
         """The uniform field at each point, (n, 3), T."""
-        return np.array([self._from.towards(self._to, t).flux_density for t in self.parameters]).reshape(
-            -1, 3
-        )
+        return self._control("applied_flux_density")[:, 0]
+
+    @property
+    def _controls(self) -> np.ndarray:
+        """All of them at each point, (n, m): on a straight line."""
+        along = self.parameters[:, None]
+        return (1.0 - along) * self._from + along * self._to
+
+    def _control(self, name: str) -> np.ndarray:
+        return self.scene._control_layout.part(self._controls, "scene", name)
 
     @property
     def stable(self) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _constraints, _core, _surroundings
 from ._checked_list import checked_list
+from ._layout import Layout
 from ._quantity import quantity
 from ._values import Values
 from .contact import Contact
@@ -110,24 +111,57 @@ class Scene:
                 "field or gravity does"
             )
         n_directions, n_couples = len(constraints.directions), len(edges)
-        self._constraints = constraints
+        self._constraints, self._couple_edges = constraints, edges
         self._turn, self._solving = threading.RLock(), False
-        # What the core holds now: a solve with other values puts its own there.
-        self._values = self._in_core = Values(self, constraints)
         self._model = _core.Model(
-            mesh._core,
-            self._values.core,
-            directors=shell.bending == "midedge",
-            directed_edges=constraints.directed_edges,
+            n_vertices=mesh.n_vertices,
+            sheets=[
+                {
+                    "owner": "body 0",
+                    "mesh": mesh._core,
+                    "vertices": np.arange(mesh.n_vertices),
+                    "directors": shell.bending == "midedge",
+                    "magnetic": bool(self.fields),
+                    "directed_edges": constraints.directed_edges,
+                }
+            ],
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
             held_frames=constraints.held_frames,
-            couple_edges=np.stack([edges, n_directions - n_couples + np.arange(n_couples)], axis=1).astype(
-                np.int32
-            ),
-            magnetic=bool(self.fields),
+            motions=len(constraints.motions),
+            couples=np.stack(
+                [np.zeros(n_couples), edges, n_directions - n_couples + np.arange(n_couples)], axis=1
+            ).astype(np.int32),
+            gravity=bool(self.gravity.any()),
+            loads=any(not isinstance(load, EdgeCouple) for load in self.loads),
+            field_sources=[source._core for source in self._sources],
             contacts=_surroundings.contact_inputs(self.contacts, mesh),
+            obstacles=[{"shape": each._core, "moves": each.motion is not None} for each in self.obstacles],
+            water=None if self.water is None else self.water._core,
         )
+        self._value_layout = Layout(self._model.parameters)
+        self._control_layout = Layout(self._model.controls)
+        # What the core holds now: a solve with other values puts its own there.
+        self._values = self._in_core = Values(self)
+        self._model.set_values(self._values.numbers)
+
+    @property
+    def _sources(self) -> list[AppliedField]:
+        return [field for field in self.fields if not isinstance(field, UniformField)]
+
+    @property
+    def _labels(self) -> list[tuple[object, str]]:
+        """Every object of it with the name that the core has for its values."""
+        kinds = (
+            ("body", (self.shell,)),
+            ("support", self.supports),
+            ("load", self.loads),
+            ("field", self._sources),
+            ("contact", self.contacts),
+            ("obstacle", self.obstacles),
+        )
+        labels = [(each, f"{kind} {k}") for kind, objects in kinds for k, each in enumerate(objects)]
+        return labels if self.water is None else [*labels, (self.water, "water")]
 
     @contextmanager
     def _exclusive(self):

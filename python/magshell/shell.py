@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._owner import Owner
 from ._quantity import quantity, real_numbers
 from .mesh import TriangleMesh, checked_mesh
 
 BENDING = ("midedge", "hinge")
 
 
-class Shell:
+class Shell(Owner):
     """A thin sheet of St. Venant-Kirchhoff material under the Kirchhoff-Love assumption.
 
     Every property is a number, or an array with one entry a face; `curvature_scale` one an edge.
@@ -66,12 +67,20 @@ class Shell:
         properties = {name: getattr(self, name) for name in self._replaceable}
         return Shell(self.mesh, bending=self.bending, **{**properties, **values})
 
-    def gradients(self, by_masses: np.ndarray | None, gradient: dict) -> dict[str, np.ndarray]:
-        """The core's gradients by its properties, with what they do to the masses of the vertices added.
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        for name in ("thickness", "young_modulus", "poisson_ratio", "curvature_scale"):
+            numbers[label, name] = getattr(self, name)
+        numbers[label, "remanent_magnetization"] = np.zeros((self.mesh.n_faces, 3))  # a solve brings it
 
-        by_masses: (n_v,), or None where they have no part.
-        """
-        found = {name: gradient[name] for name in self._replaceable if name in gradient}
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        """With what its values do to the masses of the vertices, and to what contacts make of the thickness."""
+        found = {
+            name: gradient.value(label, name)
+            for name in ("thickness", "young_modulus", "poisson_ratio", "curvature_scale")
+        }
+        for contact, of_contact in values.contacts:
+            found["thickness"] = found["thickness"] + contact.by_thickness(of_contact, self, gradient)
+        by_masses = values.by_masses(gradient)
         if by_masses is not None:
             by_face = by_masses[self.mesh.faces].sum(axis=1) / 3.0
             found["thickness"] = found["thickness"] + by_face * self.mesh.face_areas * self.mass_density

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._owner import Owner
 from ._quantity import quantity
 from ._selections import indices, selection
 from .mesh import TriangleMesh
@@ -48,7 +49,29 @@ class DirectedEdges(NamedTuple):
     motion: RigidMotion | None
 
 
-class Pin:
+class Support(Owner):
+    """What moves of a support are the rigid motions of the nodes that it holds, all alike."""
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        for owner, motion in self._motions(values):
+            numbers[owner, "center"] = motion.center
+            numbers[owner, "rotation"] = motion.rotation
+            numbers[owner, "displacement"] = motion.translation
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        owners = [owner for owner, _ in self._motions(values)]
+        return {
+            name: np.sum([gradient.value(owner, name)[0] for owner in owners], axis=0)
+            for name in ("center", "rotation", "displacement")
+        }
+
+    def _motions(self, values) -> list[tuple[str, RigidMotion]]:
+        """With the labels that the core has for them."""
+        motions = enumerate(values.constraints.motions)
+        return [(f"motion {k}", motion) for k, motion in motions if motion.support is self]
+
+
+class Pin(Support):
     """Holds positions of vertices: `components` any of "x", "y", "z", together by default.
 
     displacement: (3,) m, where the pinned vertices are moved to while the solve goes on.
@@ -89,7 +112,7 @@ class Pin:
         return f"Pin({len(self.vertices)} vertices, components {self.components}{self._motion.summary()})"
 
 
-class Clamp:
+class Clamp(Support):
     """Holds edges: the positions of their vertices and the direction of the sheet across them.
 
     displacement, rotation, center: as for Pin; the direction turns along.
@@ -129,7 +152,7 @@ class Clamp:
         return f"Clamp({len(self.edges)} edges{self._motion.summary()})"
 
 
-class SymmetryPlane:
+class SymmetryPlane(Support):
     """The sheet goes on as its own mirror image behind a plane: vertices stay in it, and the angle across it stays.
 
     normal: (3,), of the plane; any length but zero.

@@ -14,10 +14,6 @@ from .integrators import Integrator
 from .scene import Scene
 
 
-def _no_strains() -> np.ndarray:
-    return np.zeros((2, 0, 3))
-
-
 @dataclass(frozen=True)
 class MotionState:
     """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits.
@@ -31,9 +27,9 @@ class MotionState:
     velocity: np.ndarray = field(repr=False)
     memory: list = field(repr=False, default_factory=list)
     acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
-    strain_rates: np.ndarray = field(repr=False, default_factory=_no_strains)
-    maxwell_strains: np.ndarray = field(repr=False, default_factory=_no_strains)
-    maxwell_strain_rates: np.ndarray = field(repr=False, default_factory=_no_strains)
+    strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    maxwell_strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
 
     def save(self, path: str | Path) -> None:
         """Writes an .npz file."""

@@ -97,7 +97,7 @@ def vibration_modes(
         )
     with inputs.in_core():
         if equilibrium is None:
-            stiffness = model.hessian(model.rest_state(), _core.Controls())
+            stiffness = model.hessian(model.rest_state(), scene._control_layout.zeros())
         else:
             stiffness = model.hessian(equilibrium._state, equilibrium._controls)
     pencil = _Pencil(stiffness, masses, _slow_square(inputs.values.shell, scene.mesh.size))
@@ -202,7 +202,7 @@ def _inputs(scene: Scene, equilibrium: Equilibrium | None) -> Inputs:
         raise ValueError(f"equilibrium must be an Equilibrium, got {type(equilibrium).__name__}")
     if equilibrium.scene is not scene:
         raise ValueError("the equilibrium is of another scene")
-    inputs = Inputs(scene, equilibrium._magnetization, uniform)
+    inputs = Inputs(scene, np.zeros(3) if scene.fields else None, uniform)
     inputs.values = equilibrium._values
     return inputs
 

@@ -6,13 +6,14 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from . import _core
+from ._owner import Owner
 from ._quantity import quantity
 
 _HEAD_ON = 0.5 * np.pi
 _NONE = 1e-9  # what of a table counts as zero, over its largest value; and how far its angles may miss the ends [rad]
 
 
-class Water:
+class Water(Owner):
     """Water, or another fluid, that flows past a sheet and through which the sheet moves: [Chen22] (42)-(44).
 
     On a face of area A whose corners move at v on average, and are accelerated by w,

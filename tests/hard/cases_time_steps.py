@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from answers import below, both, holds, near
-from model_access import Problem
+from model_access import Controls, Problem
 from registry import case
 from scipy.linalg import eigh
 from sheets import LENGTH, MAGNETIZATION, cantilever, shell, strip
 
 import magshell as ms
-from magshell._core import Controls
 
 GRAVITY = 9.81
 INTEGRATORS = (ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3(), ms.ImplicitEuler())
@@ -50,7 +49,7 @@ def same_motion_in_any_steps(time_step):
 
 def exact_fall(scene: ms.Scene, time: float) -> np.ndarray:
     """Displacements of a strip that begins to feel its weight, by all modes of the linear problem."""
-    problem = Problem(scene, Controls(gravity=1.0))
+    problem = Problem(scene, Controls(gravity_factor=1.0))
     model = problem.model
     q = model.rest_state()
     stiffness, force = problem.hessian(q, reduced=True), -model.reduce(problem.gradient(q))
@@ -110,7 +109,8 @@ def weak_jumps():
     inertia = np.diag(np.asarray(model.free_weights(scene.shell.vertex_masses))) / dt**2
     x = v = np.zeros(len(stiffness))
     for field in fields:
-        force = -model.reduce(np.asarray(model.gradient(q, Controls(flux_density=field))))
+        controls = Controls(applied_flux_density=field).of(scene)
+        force = -model.reduce(np.asarray(model.gradient(q, controls)))
         now = np.linalg.solve(inertia + stiffness, inertia @ (x + dt * v) + force)
         x, v = now, (now - x) / dt
     expected = np.asarray(model.positions(model.expand(x)))

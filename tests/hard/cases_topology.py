@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from answers import Answer, at_rest, both, near, refused
 from cases_slivers import cut_inside
-from model_access import Problem
+from model_access import Controls, Problem
 from registry import case
 from sheets import LENGTH, cantilever, end_position, force_for, shell, strip
 from theory import stretch
 
 import magshell as ms
-from magshell._core import Controls
 
 
 def moebius_strip(cells: int = 24) -> tuple[np.ndarray, np.ndarray]:

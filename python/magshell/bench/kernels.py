@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 import magshell as ms
-from magshell import _core
+from magshell._values import Values
 
 from .report import add_rounds, chosen, print_table
 from .timing import Timing, clocked, measure, peak_memory
@@ -126,10 +126,14 @@ def _near_rest(sheet: Sheet, faces: int):
     build = time.perf_counter() - began
     model = scene._model
     if sheet.magnetization is not None:
-        model.set_magnetization(np.tile(sheet.magnetization, (mesh.n_faces, 1)))
+        magnetization = np.tile(sheet.magnetization, (mesh.n_faces, 1))
+        model.set_values(Values(scene, magnetization=magnetization).numbers)
     state = model.rest_state()
     state += 1e-3 / cells * np.random.default_rng(0).standard_normal(state.size)
-    controls = _core.Controls(flux_density=np.array([0.0, 0.01, 0.02]), gravity=1.0)
+    controls = scene._control_layout.packed(
+        {("scene", "applied_flux_density"): (0.0, 0.01, 0.02), ("scene", "gravity_factor"): 1.0},
+        scene._control_layout.zeros(),
+    )
     return model, state, controls, mesh.n_faces, build
 
 

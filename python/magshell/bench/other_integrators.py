@@ -18,7 +18,7 @@ class Sheet:
     """Energies and implicit solves."""
 
     def __init__(self, scene: ms.Scene):
-        self._model, self._free = scene._model, _core.Controls()
+        self._model, self._free = scene._model, scene._control_layout.zeros()
         self._rest = self._model.rest_state()
         self.masses = self._model.free_weights(scene.shell.vertex_masses)
         *pattern, _ = self._model.hessian(self._rest, self._free)

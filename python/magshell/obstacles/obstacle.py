@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from .. import _core as core
+from .._owner import Owner
 from .._quantity import quantity
 from . import _motion
 
 Surface = tuple[np.ndarray, np.ndarray]
 
 
-class Obstacle(ABC):
+class Obstacle(Owner, ABC):
     """A rigid body that sheets touch; make one of its subclasses.
 
     A point x of the world is R^T (x - center) in the body's own frame, R = exp(rotation). At a time t the motion moves

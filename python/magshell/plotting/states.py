@@ -138,10 +138,9 @@ def timed(states: list[State], times) -> list[State]:
 def _held_by(result) -> dict[str, Any]:
     """What a result says of its states; `strengths` are the factors on the fields that vary in space."""
     held = {name: getattr(result, name, None) for name in ("positions", "remanent_magnetization", "field")}
-    if isinstance(result, Path):  # its controls go in a straight line
-        start, end, along = result._from, result._to, result.parameters[:, None]
-        flux_densities = (1 - along) * np.array(start.flux_density) + along * np.array(end.flux_density)
-        strengths = ((1 - along) * start.field + along * end.field)[:, 0].tolist()
+    if isinstance(result, Path):
+        flux_densities = result.applied_flux_densities
+        strengths = result._control("field_factor")[:, 0].tolist()
         titles = [f"parameter {parameter:.4g}" for parameter in result.parameters]
     elif isinstance(result, Trajectory):
         flux_densities = result.applied_flux_density
@@ -149,11 +148,18 @@ def _held_by(result) -> dict[str, Any]:
         titles = [""]
     else:
         flux_densities = getattr(result, "applied_flux_density", None)
-        strengths = [getattr(getattr(result, "_controls", None), "field", 1.0)]
+        strengths = [_field_factor(result)]
         titles = [""]
     if not result.scene.has_uniform_field:
         flux_densities = None
     return held | {"applied_flux_density": flux_densities, "strengths": strengths, "titles": titles}
+
+
+def _field_factor(result) -> float:
+    controls = getattr(result, "_controls", None)
+    if controls is None:
+        return 1.0
+    return float(result.scene._control_layout.part(controls, "scene", "field_factor")[0])
 
 
 def _states(

@@ -1,0 +1,21 @@
+"""What an object of a scene is to the core's vector of values."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+class Owner:
+    """An object whose replaceable values are the core's under the same names. Others override the two methods, together:
+    each is the transpose of the other."""
+
+    _replaceable: tuple[str, ...] = ()
+
+    def add_numbers(self, label: str, values, numbers: dict[tuple[str, str], np.ndarray]) -> None:
+        """Puts its numbers in place, by owner and name. values: those of the solve; label: its own name there."""
+        for name in self._replaceable:
+            numbers[label, name] = getattr(self, name)
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        """By its values, from the core's gradient; a row for each of its parts."""
+        return {name: gradient.value(label, name) for name in self._replaceable}
