@@ -17,14 +17,17 @@ FLOORS = {
     "magshell/mesh": 1,
     "magshell/linalg": 1,
     "magshell/strain": 2,
+    "magshell/energy": 2,
+    "magshell/force": 2,
     "magshell/field": 2,
     "magshell/obstacle": 2,
-    "magshell/energy": 3,
-    "magshell/force": 3,
+    "magshell/body": 3,
     "magshell/assembly": 4,
-    "magshell/solve": 5,
-    "magshell/adjoint": 6,
-    "bindings": 7,
+    "magshell/term": 5,
+    "magshell/scene": 6,
+    "magshell/solve": 7,
+    "magshell/adjoint": 8,
+    "bindings": 9,
 }
 # Libraries that one folder hides from the others: a pattern of the include, and the folder.
 HIDDEN_HEADERS = {r"pybind11/|Python\.h": "bindings", r"(?i)cholmod": "magshell/linalg"}

@@ -39,7 +39,9 @@ def make_problem(bending, carrier):
     )
     clamped = np.concatenate([mesh.edges_at(x=0.0), mesh.edges_at(x=1.0)[:1]])
     scene = ms.Scene(sheet, supports=[ms.Clamp(clamped)], field=ms.UniformField())
-    return Problem(scene, Controls(applied_flux_density=np.array(FLUX_DENSITY)), np.array(MAGNETIZATION)), clamped
+    return Problem(
+        scene, Controls(applied_flux_density=np.array(FLUX_DENSITY)), np.array(MAGNETIZATION)
+    ), clamped
 
 
 class Formulas:

@@ -7,7 +7,7 @@ namespace magshell::bindings {
 namespace {
 
 py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, const Array& by_positions,
-                             const Array& by_edge_rotations) {
+                              const Array& by_edge_rotations) {
     const Rows3 positions = to_rows3(by_positions);
     const VectorXd rotations = to_vector(by_edge_rotations);
     Gradient gradient;

@@ -92,7 +92,8 @@ Array positions_of(const Model& model, const MotionResult& motion, const Field& 
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size()), n_v = model.nodes().n_vertices();
     Array rows({n, n_v, py::ssize_t{3}});
     for (py::ssize_t k = 0; k < n; ++k)
-        Eigen::Map<Rows3>(rows.mutable_data(k, 0, 0), n_v, 3) = model.bodies().positions(field(motion.recorded[k]));
+        Eigen::Map<Rows3>(rows.mutable_data(k, 0, 0), n_v, 3) =
+            model.bodies().positions(field(motion.recorded[k]));
     return rows;
 }
 
@@ -100,7 +101,8 @@ Array rotations_of(const Model& model, const MotionResult& motion) {
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size()), n_e = model.bodies().n_edges();
     Array rows({n, n_e});
     for (py::ssize_t k = 0; k < n; ++k)
-        Eigen::Map<VectorXd>(rows.mutable_data(k, 0), n_e) = model.bodies().edge_rotations(motion.recorded[k].q);
+        Eigen::Map<VectorXd>(rows.mutable_data(k, 0), n_e) =
+            model.bodies().edge_rotations(motion.recorded[k].q);
     return rows;
 }
 

@@ -44,8 +44,7 @@ std::vector<ContactInput> contacts_of(const py::list& given) {
 std::vector<ObstacleInput> obstacles_of(const py::list& given) {
     std::vector<ObstacleInput> obstacles;
     for (const py::handle each : given)
-        obstacles.push_back(
-            {each["shape"].cast<std::shared_ptr<Obstacle>>(), each["moves"].cast<bool>()});
+        obstacles.push_back({each["shape"].cast<std::shared_ptr<Obstacle>>(), each["moves"].cast<bool>()});
     return obstacles;
 }
 

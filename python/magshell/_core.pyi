@@ -13,7 +13,6 @@ import numpy.typing
 __all__: list[str] = [
     "AppliedField",
     "AttackCurve",
-    "Controls",
     "CriticalKind",
     "CriticalPoint",
     "Dipoles",
@@ -242,32 +241,12 @@ class Water:
         thrust_curve: AttackCurve,
     ) -> None: ...
 
-class Controls:
-    def __init__(
-        self,
-        *,
-        flux_density: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ...,
-        field: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        load: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        gravity: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        motion: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    ) -> None: ...
-    def towards(self, to: Controls, parameter: typing.SupportsFloat | typing.SupportsIndex) -> Controls: ...
-    @property
-    def field(self) -> float: ...
-    @property
-    def flux_density(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
-    @property
-    def gravity(self) -> float: ...
-    @property
-    def load(self) -> float: ...
-    @property
-    def motion(self) -> float: ...
-
 class Model:
-    def __init__(self, mesh: TriangleMesh, values: dict, **kwargs) -> None: ...
+    def __init__(self, **kwargs) -> None: ...
     def assemble(
-        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
+        self,
+        arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> None:
         """
         Gradient and Hessian, left in the core: what `python -m magshell.bench kernels` times.
@@ -276,10 +255,14 @@ class Model:
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def energies(
-        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
+        self,
+        arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> dict: ...
     def energy(
-        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
+        self,
+        arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> float: ...
     def expand(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
@@ -297,19 +280,21 @@ class Model:
         Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.
         """
     def gradient(
-        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], arg1: Controls
+        self,
+        arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def hessian(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: Controls,
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
     ) -> tuple: ...
     def positions(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     def prescribed_rate(
-        self, arg0: typing.SupportsFloat | typing.SupportsIndex
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.
@@ -318,8 +303,10 @@ class Model:
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def rest_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    def set_magnetization(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
-    def set_values(self, arg0: dict) -> None: ...
+    def set_values(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        All of them, rows in the caller's order.
+        """
     def state(
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -330,7 +317,19 @@ class Model:
     @property
     def bytes(self) -> int: ...
     @property
+    def controls(self) -> list:
+        """
+        Likewise, in the flat vectors of controls.
+        """
+    @property
     def free_size(self) -> int: ...
+    @property
+    def n_strains(self) -> int: ...
+    @property
+    def parameters(self) -> list:
+        """
+        (owner, name, unit, first, rows, width) of each, in the flat vector of set_values.
+        """
     @property
     def size(self) -> int: ...
     @property
@@ -404,7 +403,7 @@ class StaticsResult:
     @property
     def bytes(self) -> int: ...
     @property
-    def controls(self) -> Controls: ...
+    def controls(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def factorization(self) -> str: ...
     @property
@@ -576,9 +575,15 @@ class Keep:
 
 class MotionResult:
     def edge_rotations(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
-    def last_maxwell_strain_rates(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
-    def last_maxwell_strains(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
-    def last_strain_rates(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    def last_maxwell_strain_rates(
+        self, arg0: Model
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def last_maxwell_strains(
+        self, arg0: Model
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def last_strain_rates(
+        self, arg0: Model
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def positions(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
     def velocities(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
     @property
@@ -655,13 +660,15 @@ def find_equilibrium(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     memory: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-    from_: Controls,
-    to: Controls,
+    from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: StaticsOptions,
     progress: typing.Any = None,
 ) -> StaticsResult: ...
 def first_order_change(
-    model: Model, equilibrium: StaticsResult, to: Controls
+    model: Model,
+    equilibrium: StaticsResult,
+    to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """
     The change of the state to first order, from an equilibrium whose factor was kept to these controls and the values that the model holds now.
@@ -671,8 +678,8 @@ def follow_path(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     memory: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-    from_: Controls,
-    to: Controls,
+    from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: PathOptions,
     until: typing.Any = None,
     progress: typing.Any = None,
@@ -683,7 +690,7 @@ def pull_back(
     equilibrium: StaticsResult,
     by_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> dict:
+) -> tuple:
     """
     The gradients by everything a solve takes, of a function of positions (n_v, 3) and edge rotations (n_e,) with these gradients. The model must hold the values of that solve.
     """

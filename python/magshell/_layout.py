@@ -52,6 +52,13 @@ class Layout:
                 )
         return vector
 
+    def rows(self, numbers: Mapping[tuple[str, str], np.ndarray], count: int) -> np.ndarray:
+        """(count, size) vectors with these numbers, (count, ...) each, and zeros for the others."""
+        vectors = np.zeros((count, self.size))
+        for key, each in numbers.items():
+            vectors[:, self._places[key].slice] = np.reshape(each, (count, -1))
+        return vectors
+
     def part(self, vector: np.ndarray, owner: str, name: str) -> np.ndarray:
         """(..., rows, width) of vectors (..., size), or (..., rows) of single numbers."""
         place = self._places[owner, name]

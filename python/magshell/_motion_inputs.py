@@ -100,13 +100,7 @@ class MotionInputs:
         for k, _ in enumerate(self.inputs.scene.obstacles):
             if (f"obstacle {k}", "pose") in layout:
                 rows[f"obstacle {k}", "pose"] = moving[:, k]
-        knots = self.steps * (len(self.integrator._times) + 1)
-        return np.array(
-            [
-                layout.packed({key: array[n] for key, array in rows.items()}, layout.zeros())
-                for n in range(knots)
-            ]
-        )
+        return layout.rows(rows, self.steps * (len(self.integrator._times) + 1))
 
     def _poses(self) -> np.ndarray:
         """Of the obstacles at all knots; their time goes on where the start's ended."""

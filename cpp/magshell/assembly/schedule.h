@@ -15,7 +15,7 @@
 namespace magshell {
 
 struct Part {
-    Index number;       // among those of all bodies
+    Index number;  // among those of all bodies
     Index body;
     Index first, last;  // elements; the first is a multiple of every pack width
     Index first_fold = 0, last_fold = 0;

@@ -20,13 +20,15 @@ Vec3 SupportMotion::direction_rate(const Vec3& rest, double progress) const {
     return rotation_vector.cross(direction(rest, progress));
 }
 
-void SupportMotion::point_vjp(const Vec3& rest, double progress, const Vec3& by_place, SupportMotion& out) const {
+void SupportMotion::point_vjp(const Vec3& rest, double progress, const Vec3& by_place,
+                              SupportMotion& out) const {
     out.translation += progress * by_place;
     out.center += by_place - rotation(progress * rotation_vector).transpose() * by_place;
     direction_vjp(rest - center, progress, by_place, out);
 }
 
-void SupportMotion::direction_vjp(const Vec3& rest, double progress, const Vec3& by_place, SupportMotion& out) const {
+void SupportMotion::direction_vjp(const Vec3& rest, double progress, const Vec3& by_place,
+                                  SupportMotion& out) const {
     const Vec3 torque = direction(rest, progress).cross(by_place);
     out.rotation_vector += progress * transposed_jacobian_times(progress * rotation_vector, torque);
 }

@@ -1,6 +1,7 @@
 // A rigid motion of what a support holds.
 //
-//   x -> center + R(t w)(x - center) + t u,   direction -> R(t w) direction           t = the progress, a control
+//   x -> center + R(t w)(x - center) + t u,   direction -> R(t w) direction           t = the progress, a
+//   control
 #pragma once
 
 #include "magshell/core/types.h"

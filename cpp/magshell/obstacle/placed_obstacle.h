@@ -6,8 +6,8 @@
 
 #include <memory>
 
-#include "magshell/obstacle/pose.h"
 #include "magshell/obstacle/obstacle.h"
+#include "magshell/obstacle/pose.h"
 
 namespace magshell {
 

@@ -19,8 +19,7 @@ Bodies::Bodies(const SceneInput& input) {
 
 std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
     std::vector<Stencil> all;
-    for (const Sheet* sheet : sheets_)
-        all.insert(all.end(), sheet->stencils.begin(), sheet->stencils.end());
+    for (const Sheet* sheet : sheets_) all.insert(all.end(), sheet->stencils.begin(), sheet->stencils.end());
     for (const EdgeCoupleInput& couple : input.couples) {
         const Sheet& sheet = *sheets_[couple.sheet];
         const Index user_face = input.sheets[couple.sheet].mesh->edge_faces().row(couple.edge).maxCoeff();

@@ -55,8 +55,7 @@ Model::Model(const SceneInput& input)
     for (const char* factor : {"field_factor", "load_factor", "gravity_factor"})
         registry_.controls.add("scene", factor, "1", 1, 1);
     for (Index body = 0; body < static_cast<Index>(bodies_.sheets().size()); ++body)
-        loops_.push_back(
-            std::make_unique<FaceLoop>(*bodies_.sheets()[body], schedule_.of(body), matrix_));
+        loops_.push_back(std::make_unique<FaceLoop>(*bodies_.sheets()[body], schedule_.of(body), matrix_));
     add_terms(input);
     for (const std::unique_ptr<Term>& term : terms_)
         if (term->body() >= 0) of_body_[term->body()].push_back(term.get());
@@ -66,8 +65,8 @@ Model::Model(const SceneInput& input)
 void Model::add_terms(const SceneInput& input) {
     const Index count = static_cast<Index>(bodies_.sheets().size());
     for (Index body = 0; body < count; ++body) {
-        std::unique_ptr<MembraneTerm> term = std::make_unique<MembraneTerm>(
-            *bodies_.sheets()[body], body, *loops_[body], nodes(), registry_);
+        std::unique_ptr<MembraneTerm> term =
+            std::make_unique<MembraneTerm>(*bodies_.sheets()[body], body, *loops_[body], nodes(), registry_);
         elastic_.push_back(term.get());
         terms_.push_back(std::move(term));
     }
@@ -83,14 +82,13 @@ void Model::add_terms(const SceneInput& input) {
                                                             sources_, registry_));
     if (input.gravity)
         terms_.push_back(std::make_unique<LoadTerm>("gravity", "gravity_factor", nodes(), registry_));
-    if (input.loads)
-        terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));
+    if (input.loads) terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));
     if (!input.couples.empty()) add_couples(input);
     if (!input.contacts.empty()) add_contacts(input);
     if (input.water)
         for (Index body = 0; body < count; ++body)
-            forces_.push_back(std::make_unique<WaterTerm>(*bodies_.sheets()[body], *loops_[body],
-                                                          *input.water, registry_));
+            forces_.push_back(
+                std::make_unique<WaterTerm>(*bodies_.sheets()[body], *loops_[body], *input.water, registry_));
 }
 
 void Model::add_couples(const SceneInput& input) {
@@ -170,8 +168,7 @@ StrainSet Model::strain_rates(const VectorXd& p) {
 VectorXd Model::strain_forces(const StrainSet& stresses) {
     Residual forces;
     forces.reset(size());
-    for (std::size_t k = 0; k < elastic_.size(); ++k)
-        elastic_[k]->add_forces(stresses.of_terms[k], forces);
+    for (std::size_t k = 0; k < elastic_.size(); ++k) elastic_[k]->add_forces(stresses.of_terms[k], forces);
     return std::move(forces.gradient);
 }
 

@@ -42,8 +42,7 @@ void Model::assemble_forces(const Controls& controls, bool cautious) {
         force->assemble(kinematics_, controls, cautious, matrix_, remainder_);
 }
 
-KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda,
-                                     Gradient& out) const {
+KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda, Gradient& out) const {
     KinematicsGradient by{VectorXd::Zero(size()), VectorXd::Zero(size()), VectorXd::Zero(size())};
     for (const std::unique_ptr<ForceTerm>& force : forces_)
         force->vjp(kinematics_, controls, lambda, by, out);

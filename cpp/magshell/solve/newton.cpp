@@ -354,7 +354,8 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             if (report.iterations == 0) first_negative_pivots = negative_pivots;
             report.lost = negative_pivots > first_negative_pivots + most_new_negative_pivots;
             if (mixed && report.lost) return fail("the iteration lost its way");
-            moved = last_step <= little * model_.length_scale() ? 0.0 : std::numeric_limits<double>::infinity();
+            moved =
+                last_step <= little * model_.length_scale() ? 0.0 : std::numeric_limits<double>::infinity();
         }
         const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
                                                        deserved(report.residual, options_.tolerance));

@@ -14,9 +14,9 @@
 #include <optional>
 #include <string>
 
-#include "magshell/scene/model.h"
 #include "magshell/linalg/factor.h"
 #include "magshell/linalg/gmres.h"
+#include "magshell/scene/model.h"
 
 namespace magshell {
 

@@ -18,7 +18,7 @@ namespace magshell {
 struct MotionState {
     VectorXd q, v;
     Model::Memory memory;
-    StrainSet e;    // of the Maxwell branch; empty without one
+    StrainSet e;       // of the Maxwell branch; empty without one
     StageRates rates;  // at the end of the step that led here, for a method that begins with them; else empty
 };
 

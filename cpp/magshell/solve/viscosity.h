@@ -44,8 +44,7 @@ struct ViscousStage {
     ViscousStage() = default;
     /// From the strains at the beginning of the step and all rates until then.
     ViscousStage(const Viscosity& law, double stage_time, double dt, const double* a,
-                 const std::vector<StageRates>& rates, const StrainSet& d_begin,
-                 const StrainSet& e_begin);
+                 const std::vector<StageRates>& rates, const StrainSet& d_begin, const StrainSet& e_begin);
     /// Once the stage is solved: the rates of its strains too.
     void finish(const Viscosity& law, double stage_time, StrainSet strains, StageRates& rates);
 };

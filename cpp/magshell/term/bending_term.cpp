@@ -150,8 +150,7 @@ void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
 double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const {
     double sum = 0.0;
     for (const FoldStencil::Side& side : {fold.left, fold.right})
-        if (side.face >= 0)
-            sum += stress.number(side.face, side.corner);
+        if (side.face >= 0) sum += stress.number(side.face, side.corner);
     return fold.weight() * sum;
 }
 
@@ -169,8 +168,7 @@ void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
             for (int i = 0; i < 3; ++i) {
                 const FaceSide& side = sheet_.sides[f][i];
                 if (side.rotation >= 0)
-                    out.add(first_scalar_ + side.rotation,
-                            side.sign * stresses.number(f, i));
+                    out.add(first_scalar_ + side.rotation, side.sign * stresses.number(f, i));
             }
     });
 }

@@ -55,8 +55,7 @@ void CoupleTerm::evaluate(const double* q, const Controls& controls, Residual& o
         Pack3 g[4];
         fold_at(couple, q).gradient(g);
         for (int node = 0; node < 4; ++node) scatter_node(out, couple.nodes[node], Pack(pull) * g[node], 0);
-        if (couple.rotation >= 0)
-            out.add(first_scalar_ + couple.rotation, -pull * couple.rotation_sign);
+        if (couple.rotation >= 0) out.add(first_scalar_ + couple.rotation, -pull * couple.rotation_sign);
     }
 }
 
@@ -74,8 +73,7 @@ void CoupleTerm::vjp(const double* q, const Controls& controls, const double* la
         double turn_rate = 0.0;
         for (int node = 0; node < 4; ++node)
             turn_rate += lane_of(g[node], 0).dot(Eigen::Map<const Vec3>(lambda + 3 * couple.nodes[node]));
-        if (couple.rotation >= 0)
-            turn_rate -= couple.rotation_sign * lambda[first_scalar_ + couple.rotation];
+        if (couple.rotation >= 0) turn_rate -= couple.rotation_sign * lambda[first_scalar_ + couple.rotation];
         out.values[slot_.at(static_cast<Index>(k))] -= controls[factor_.first] * turn_rate;
         out.controls[factor_.first] -= couple.couple * turn_rate;
     }
@@ -84,7 +82,8 @@ void CoupleTerm::vjp(const double* q, const Controls& controls, const double* la
 void CoupleTerm::finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const {
     for (std::size_t k = 0; k < couples_.size(); ++k) {
         FoldCurvature curvature(fold_at(couples_[k], q));
-        for (Pack33& block : curvature.block) block = Pack(-controls[factor_.first] * couples_[k].couple) * block;
+        for (Pack33& block : curvature.block)
+            block = Pack(-controls[factor_.first] * couples_[k].couple) * block;
         scatter_blocks<4>(out, couples_[k].nodes, slots_[k], curvature.block, 0);
     }
 }

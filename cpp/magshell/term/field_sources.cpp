@@ -23,8 +23,7 @@ void FieldSources::set_values(const Values& values) {
         const bool changed = std::any_of(source.slots.begin(), source.slots.end(),
                                          [&](const Slot& slot) { return values.changed(slot); });
         if (changed)
-            source.own->set_values(
-                {values[source.slots.front()], static_cast<std::size_t>(source.count())});
+            source.own->set_values({values[source.slots.front()], static_cast<std::size_t>(source.count())});
     }
 }
 
@@ -37,9 +36,9 @@ void FieldSources::add_vjp(std::span<const Vec3> points, const FieldProbe& probe
                            Gradient& out) const {
     for (const Source& source : sources_)
         if (source.own)
-            source.own->add_vjp(points, probe, scale,
-                                {out.values.data() + source.slots.front().first,
-                                 static_cast<std::size_t>(source.count())});
+            source.own->add_vjp(
+                points, probe, scale,
+                {out.values.data() + source.slots.front().first, static_cast<std::size_t>(source.count())});
 }
 
 }  // namespace magshell

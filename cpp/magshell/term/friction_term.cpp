@@ -84,7 +84,8 @@ void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambd
         const double by_force = -law.friction * along.dot(friction.by_normal_force);
         Placement by_placement;
         each.obstacle.vjp(touch.place, touch.at, -touch.stiffness * by_force,
-                          -law.friction * (friction.by_normal.transpose() * along), -by_velocity, by_placement);
+                          -law.friction * (friction.by_normal.transpose() * along), -by_velocity,
+                          by_placement);
         contact_.add_vjp(touch, by_force,
                          {.friction = -along.dot(friction.force),
                           .sticking_speed = -law.friction * along.dot(friction.by_sticking_speed)},

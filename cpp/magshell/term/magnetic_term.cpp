@@ -24,8 +24,7 @@ MagneticTerm::MagneticTerm(const Surface& surface, Index body, const FaceLoop& l
       sources_(sources),
       magnetization_(registry.values.add(surface.owner, "remanent_magnetization", "A/m", surface.n_faces(), 3,
                                          &surface.faces)),
-      thickness_(
-          registry.values.add(surface.owner, "thickness", "m", surface.n_faces(), 1, &surface.faces)),
+      thickness_(registry.values.add(surface.owner, "thickness", "m", surface.n_faces(), 1, &surface.faces)),
       flux_density_(registry.controls.add("scene", "applied_flux_density", "T", 1, 3)),
       field_factor_(registry.controls.add("scene", "field_factor", "1", 1, 1)),
       elements_(loop.packs()) {}
@@ -191,7 +190,7 @@ void MagneticTerm::vjp(const double* q, const Controls& controls, const double* 
     for (Index f = 0; f < n; ++f) {
         out.controls.segment<3>(flux_density_.first) += probe.flux[f];
         out.controls[field_factor_.first] += probe.flux[f].dot(samples.flux[f]) +
-                              probe.moment[f].dot(samples.gradient[f] * probe.direction[f]);
+                                             probe.moment[f].dot(samples.gradient[f] * probe.direction[f]);
     }
     sources_.add_vjp(points, probe, factor, out);
 }

@@ -29,7 +29,9 @@ class MagneticTerm final : public Term {
     std::size_t bytes() const override;
 
   private:
-    bool sampled(const Controls& controls) const { return !sources_.empty() && controls[field_factor_.first] != 0.0; }
+    bool sampled(const Controls& controls) const {
+        return !sources_.empty() && controls[field_factor_.first] != 0.0;
+    }
     Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
     /// The barycentres and the magnetizations [A/m] there, by face.
     void place(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;

@@ -17,8 +17,7 @@ struct Strains {
     std::vector<Pack> packs;
     Index elements = 0;
 
-    explicit Strains(Index elements_ = 0)
-        : packs(3 * packs_for(elements_), Pack(0.0)), elements(elements_) {}
+    explicit Strains(Index elements_ = 0) : packs(3 * packs_for(elements_), Pack(0.0)), elements(elements_) {}
     Pack* at(Index pack) { return packs.data() + 3 * pack; }
     const Pack* at(Index pack) const { return packs.data() + 3 * pack; }
     double number(Index element, int i) const {
