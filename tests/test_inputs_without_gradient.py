@@ -34,7 +34,9 @@ def slope(function, at, step):
 
 
 def growing(t):
-    return 3e-3 * torch.sin(300 * torch.as_tensor(t, dtype=torch.float64)) * torch.eye(3, dtype=torch.float64)[2]
+    return (
+        3e-3 * torch.sin(300 * torch.as_tensor(t, dtype=torch.float64)) * torch.eye(3, dtype=torch.float64)[2]
+    )
 
 
 CONTROLS_OUTSIDE_TORCH = {

@@ -101,9 +101,7 @@ class MotionInputs:
         values, scene = self.inputs.values, self.inputs.scene
         shares = np.array((0.0, *self.integrator._times))
         if any(values.current(each).motion is not None for each in scene.obstacles):
-            self.inputs.refuse(
-                "time_step", self._given_time_step, "obstacles move by a function of the time"
-            )
+            self.inputs.refuse("time_step", self._given_time_step, "obstacles move by a function of the time")
         times = self.start.time + self.time_step * (np.arange(self.steps)[:, None] + shares).ravel()
         return poses([values.current(each) for each in scene.obstacles], times)
 
