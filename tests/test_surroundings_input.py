@@ -118,7 +118,8 @@ test_solves_refuse = refused(
             lambda: with_values(contact_stiffness=-5.0),
             r"contact_stiffness \[N/m\] must be positive",
         ),
-        ("what cannot change", lambda: with_values(smoothing=1e-5), "smoothing"),
+        ("what cannot change", lambda: with_values(face_samples=1), "face_samples"),
+        ("no smoothing", lambda: with_values(smoothing=0.0), r"smoothing \[m\] must be positive"),
         ("unknown value", lambda: with_values(stickiness=1.0), "stickiness"),
         (
             "negative density",
@@ -182,6 +183,12 @@ def test_a_start_inside_where_a_value_moves_the_obstacle():
     scene = block_on(GROUND)
     with pytest.raises(ValueError, match=r"the deepest 0[.]01 m deep"):
         simulated(scene, 1, 1e-3, values={scene.obstacles[0]: {"center": (0, 0, 0.01)}})
+
+
+def test_a_start_inside_where_a_value_moves_the_surface():
+    scene = block_on(GROUND)
+    with pytest.raises(ValueError, match=r"the deepest 0[.]01 m deep"):
+        simulated(scene, 1, 1e-3, values={scene.contacts[0]: {"offset": 0.01}})
 
 
 def test_touching_is_not_inside():

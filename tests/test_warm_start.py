@@ -202,3 +202,36 @@ def test_a_design_crosses_a_snap_and_resumes_with_the_same_bits(buckled, critica
     run(crossed[0], checkpoint=tmp_path / "run.pt")
     found = run(7, checkpoint=tmp_path / "run.pt", resume=True)
     assert [record.objective for record in found.history] == [record.objective for record in whole.history]
+
+
+def test_values_of_everything_in_a_scene_go_through_a_state(tmp_path):
+    """Contacts and obstacles too: whatever `values` may name."""
+    torch = pytest.importorskip("torch")
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    load = ms.PointLoad(mesh.vertices_at(x=0.04), (0, 0, -1e-4))
+    clamp = ms.Clamp(mesh.edges_at(x=0.0), displacement=(0, 0, 0))
+    dipole = ms.Dipoles([[0.02, 0, 0.1]], [[0, 0, 0.1]])
+    floor = ms.obstacles.Plane(center=(0, 0, -1e-3))
+    contact = ms.Contact(floor, contact_stiffness=20.0)
+    scene = ms.Scene(
+        sheet, supports=[clamp], loads=[load], field=dipole, contacts=[contact], gravity=(0, 0, -9.81)
+    )
+    values = {
+        scene: {"gravity": (0, 0, -9.0)},
+        sheet: {"thickness": 1.1e-3},
+        clamp: {"displacement": (0, 0, 1e-4)},
+        load: {"force": (0, 0, -2e-4)},
+        dipole: {"moments": [[0, 0, 0.2]]},
+        contact: {"contact_stiffness": 30.0, "offset": 1e-4},
+        floor: {"center": (0, 0, -1.1e-3)},
+    }
+    assert {id(each) for each in values} == {id(each) for each in (scene, *scene.parts)}
+    one, other = ms.WarmStart(scene), ms.WarmStart(scene)
+    one(remanent_magnetization=(1e4, 0, 0), values=values)
+    torch.save(one.state_dict(), tmp_path / "state.pt")
+    other.load_state_dict(torch.load(tmp_path / "state.pt", weights_only=True))
+    assert np.array_equal(one.equilibria.positions, other.equilibria.positions)
+    nearby = {**values, contact: {"contact_stiffness": 31.0, "offset": 1e-4}}
+    found = [each(remanent_magnetization=(1e4, 0, 0), values=nearby) for each in (one, other)]
+    assert np.array_equal(found[0].positions, found[1].positions)

@@ -12,7 +12,9 @@ _silent = ContextVar("silent", default=False)
 
 
 def progress_bar(title: str, total: float, *, shown: bool = True, **options) -> tqdm:
-    """A bar with tqdm's options; one that is not shown takes the same calls."""
+    """A bar with tqdm's options; one that is not shown takes the same calls. Raises ValueError on another `shown`."""
+    if not isinstance(shown, bool):
+        raise ValueError(f"progress must be True or False, got {shown!r:.60}")
     return tqdm(total=total, desc=title, disable=not shown or _silent.get(), **options)
 
 

@@ -80,8 +80,8 @@ def simulate(
     motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
     velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
     continuous, time_step, damping, start (positions or an Equilibrium) and velocities among them. Where an input has
-    none (a Trajectory as start; time_step where a function of the time leaves torch), they raise NoGradient. Second derivatives raise NoGradient, as
-    in ms.equilibrium.
+    none (a Trajectory as start; time_step where a function of the time leaves torch), they raise NoGradient; so do
+    second derivatives, as in ms.equilibrium.
 
     They are exact where the motion is differentiable: through impact, stick and slip on smooth obstacles too. It is not
     where a point touches a kink of an obstacle (Trajectory.kinks says where), where a little more makes a step fail or

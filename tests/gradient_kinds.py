@@ -1,0 +1,239 @@
+"""The kinds of scene in which test_every_gradient.py differentiates, a dozen faces each."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from gradient_scenes import Kind
+from test_adjoint import BENDINGS, DEFAULTS, MAGNETIZATION, MESH, N_V, everything
+
+import magshell as ms
+from magshell import obstacles as ob
+
+torch = pytest.importorskip("torch")
+
+RNG = np.random.default_rng(17)
+EXACT = {"solver": ms.MixedNewton(tolerance=1e-13)}
+STEPS = 4
+FACTORS = {"load_factor": 0.9, "gravity_factor": 0.8, "field_factor": 1.1, "motion_factor": 0.7}
+# Of values that may be zero: m, rad, m/s.
+REACH = {
+    "center": 1e-3,
+    "rotation": 0.3,
+    "displacement": 1e-3,
+    "velocity": 0.1,
+    "velocities": 0.1,
+    "start": 1e-3,
+}
+VISCOUS = {
+    "damping": RNG.uniform(1e-3, 2e-3, N_V),
+    "stiffness_damping": 2e-3,
+    "maxwell_modulus": 0.5,
+    "maxwell_time": 4e-3,
+}
+IN_TIME = {
+    "applied_flux_density": np.array((1e-3, -2e-3, 3e-3)) * RNG.uniform(0.5, 1.5, (STEPS + 1, 3)),
+    "load_factor": RNG.uniform(0, 1, STEPS),
+    "field_factor": RNG.uniform(0.5, 1, STEPS + 1),
+    "motion_factor": np.linspace(0, 0.7, STEPS + 1),
+    "gravity_factor": 0.8,
+    "remanent_magnetization": MAGNETIZATION,
+}
+BEGIN = {
+    "start": MESH.rest_positions + 1e-4 * RNG.standard_normal((N_V, 3)),
+    "velocities": 0.1 * RNG.standard_normal((N_V, 3)),
+    "time_step": 3e-3,
+}
+MIDDLE = np.array([0.07, 0.03, 0.0])
+CURVE = np.linspace(-0.06, 0.06, 5)[:, None] * (0, 1, 0) + 4e-3 * np.linspace(-1, 1, 5)[:, None] ** 2 * (
+    1,
+    0,
+    0,
+)
+GRID = np.linspace(-0.1, 0.1, 9)
+UNDER = {  # every obstacle, its highest point at the middle of its own frame
+    ob.Plane: lambda **place: ob.Plane((-0.02, 0.01, 1.0), **place),
+    ob.Sphere: lambda **place: ob.Sphere(0.06, **_lowered(place, 0.06)),
+    ob.Box: lambda **place: ob.Box((0.06, 0.09, 0.04), rounding=0.015, **_lowered(place, 0.02)),
+    ob.Capsule: lambda **place: ob.Capsule(
+        [[0.0, -0.03, 0.0], [0.01, 0.03, 0.0]], 0.04, **_lowered(place, 0.04)
+    ),
+    ob.Tube: lambda **place: ob.Tube(CURVE, 0.03, inside=False, **_lowered(place, 0.03)),
+    ob.HeightField: lambda **place: ob.HeightField(
+        GRID, GRID, 1e-3 * np.sin(40 * GRID)[:, None] * np.cos(30 * GRID), **place
+    ),
+    ob.MeshObstacle: lambda **place: ob.MeshObstacle(_ball(), resolution=16, **_lowered(place, 0.06)),
+}
+
+
+def _lowered(place: dict, by: float) -> dict:
+    return {**place, "center": np.array(place["center"]) - np.array([0, 0, by])}
+
+
+@cache
+def _ball():
+    return ms.meshes.spherical_cap(0.06, 0.0, np.pi, cells=(24, 12))
+
+
+def under(shape, height: float, **place):
+    """An obstacle of this class, its highest point so far above the sheet's rest plane."""
+    center = MIDDLE + np.array([0, 0, height])
+    return UNDER[shape](**{"center": center, "rotation": (0.01, -0.02, 0.1), **place})
+
+
+def resting_on(shape, bending="midedge", step=1e-5, **contact) -> Kind:
+    """A clamped sheet whose weight lies on an obstacle in part, with what a Contact does by default."""
+    sheet = ms.Shell(
+        MESH, thickness=1e-3, young_modulus=1e7, poisson_ratio=0.4, mass_density=300.0, bending=bending
+    )
+    touching = ms.Contact(under(shape, -2e-3), **{"contact_stiffness": 20.0, "offset": 1e-4, **contact})
+    clamp = ms.Clamp(MESH.edges_at(x=0.0))
+    scene = ms.Scene(sheet, supports=[clamp], contacts=[touching], gravity=(0.2, 0.1, -9.81))
+    return Kind(scene, {"gravity_factor": 1.0}, fixed=EXACT, step=step, reach=REACH)
+
+
+def pinned() -> Kind:
+    """Pins that move and turn, and a couple given as a vector."""
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3)
+    left = ms.Pin(MESH.vertices_at(x=0.0), displacement=(1e-3, 0, 2e-4), rotation=(0.0, 0.2, 0.1))
+    right = ms.Pin(MESH.vertices_at(x=0.1), "yz", rotation=(0.0, -0.1, 0.0), center=(0.1, 0.03, 0.001))
+    couple = ms.EdgeCouple(MESH.edges_at(x=0.1), (1e-4, 2e-3, 0))
+    scene = ms.Scene(sheet, supports=[left, right], loads=[couple], allow_rigid_motions=True)
+    return Kind(scene, {"load_factor": 0.9, "motion_factor": 0.8}, fixed=EXACT, reach=REACH)
+
+
+def load_cases() -> Kind:
+    fields = np.array([DEFAULTS["applied_flux_density"], (0, 0, -2e-3)])
+    controls = {**DEFAULTS, **FACTORS, "applied_flux_density": fields, "load_factor": np.array([0.9, 0.2])}
+    return Kind(everything(), controls, fixed=EXACT, reach=REACH)
+
+
+def warm(scene, values, start=None, solver=None, **design):
+    """The second equilibrium of a WarmStart, near the first."""
+    last = ms.WarmStart(scene, start=start, solver=solver)
+    numbers = {name: value.detach() if torch.is_tensor(value) else value for name, value in design.items()}
+    last(**{**numbers, "applied_flux_density": 0.98 * np.asarray(numbers["applied_flux_density"])})
+    with last.accept_jumps():
+        return last(values=values, **design)
+
+
+def moving(integrator, bending="midedge", **options) -> Kind:
+    fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
+    controls = {**IN_TIME, **BEGIN, **VISCOUS}
+    reach = {
+        **REACH,
+        **{name: 1e2 * np.max(value) for name, value in VISCOUS.items()},
+    }  # which do little here
+    return Kind(everything(bending), controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+
+
+def thrown(shape, integrator=None, swims=False, motion=None, extra=None, options=None, step=1e-5, **contact):
+    """A sheet that is thrown onto an obstacle, or through water, or both. extra: controls, options: other keywords."""
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    contacts = []
+    if shape is not None:
+        law = {"contact_stiffness": 50.0, "offset": 1e-4, **contact}
+        contacts = [ms.Contact(under(shape, -2e-3, motion=motion), **law)]
+    water = None
+    if swims:
+        water = ms.Water(
+            800.0, (0.05, -0.02, 0.01), drag_coefficient=0.9, thrust_coefficient=0.7, added_mass=0.6
+        )
+    scene = ms.Scene(
+        sheet,
+        contacts=contacts,
+        water=water,
+        gravity=(0, 0.3, -9.81),
+        field=ms.UniformField(),
+        allow_rigid_motions=True,
+    )
+    controls = {
+        "remanent_magnetization": (2e4, 0, 3e3),
+        "applied_flux_density": (1e-3, 0.0, 4e-3),
+        "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * RNG.standard_normal((N_V, 3)),
+        "damping": 1e-4,
+        "time_step": 2e-3,
+        **(extra or {}),
+    }
+    fixed = {**EXACT, "steps": 6, "integrator": integrator or ms.ImplicitEuler(), "progress": False}
+    if motion is not None:  # a function of the time: there is no gradient by time_step
+        fixed["time_step"] = controls.pop("time_step")
+    return Kind(scene, controls, ms.simulate, fixed={**fixed, **(options or {})}, step=step, reach=REACH)
+
+
+def in_a_corner() -> Kind:
+    """Nodes with frames of their own: an oblique symmetry plane, on an oblique slope and in water."""
+    turn = ms.supports.rotation_matrix(np.array([0.5, -0.4, 0.8]))
+    mesh = ms.TriangleMesh(MESH.rest_positions @ turn.T, MESH.faces)
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    slope = ob.Plane(turn @ [0.02, 0, 1], center=turn @ [0.05, 0.03, -1.5e-3])
+    scene = ms.Scene(
+        sheet,
+        supports=[ms.SymmetryPlane(turn[:, 1])],
+        contacts=[ms.Contact(slope, friction_coefficient=0.3, contact_stiffness=50.0, offset=1e-4)],
+        water=ms.Water(velocity=turn @ [0.1, 0.02, -0.05], added_mass=0.5),
+        gravity=turn @ [2, 0, -9.81],
+        allow_rigid_motions=True,
+    )
+    controls = {"velocities": turn @ [0.0, 0.0, -0.3], "time_step": 2e-3}
+    fixed = {**EXACT, "steps": 6, "integrator": ms.SDIRK3(), "progress": False}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)
+
+
+def swaying(t):
+    return np.array([0.02 * t, 0.04 * t, 2e-4 * np.sin(40 * t)]), np.array([0.3 * t, 0.2 * t, 0.5 * t])
+
+
+def from_an_equilibrium(scene, values, **controls):
+    """A motion that starts where the sheet is at rest under other controls."""
+    of_sheet = {name: controls[name] for name in ("remanent_magnetization",)}
+    shared = {owner: named for owner, named in values.items()}
+    rest = ms.equilibrium(scene, **of_sheet, applied_flux_density=(0, 0, 2e-3), values=shared, **EXACT)
+    return ms.simulate(scene, start=rest, values=values, **controls)
+
+
+def let_go() -> Kind:
+    controls = {name: IN_TIME[name] for name in ("remanent_magnetization", "applied_flux_density")}
+    fixed = {**EXACT, "steps": STEPS, "time_step": 2e-3, "progress": False}
+    return Kind(everything(), controls, ms.simulate, from_an_equilibrium, fixed, 1e-5, REACH)
+
+
+RUBS = {"friction_coefficient": 0.4}
+MAKERS = {
+    **{
+        f"at rest, {bending}": lambda bending=bending: Kind(
+            everything(bending), {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=REACH
+        )
+        for bending in BENDINGS
+    },
+    "at rest, pinned": pinned,
+    "at rest, load cases": load_cases,
+    "at rest, warm start": lambda: Kind(
+        everything(), {**DEFAULTS, **FACTORS}, solve=warm, fixed=EXACT, reach=REACH
+    ),
+    **{f"at rest on a {shape.__name__}": lambda shape=shape: resting_on(shape) for shape in UNDER},
+    "at rest on a Plane, hinge": lambda: resting_on(ob.Plane, "hinge", face_samples=1),
+    "at rest on a Plane, its law given": lambda: resting_on(
+        ob.Plane, step=1e-4, smoothing=4e-4, offset=5e-4, face_samples=3
+    ),
+    "in motion, euler": lambda: moving(ms.ImplicitEuler(), "hinge"),
+    "in motion, tr_bdf2": lambda: moving(ms.TRBDF2()),
+    "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),
+    "in motion, sdirk3": lambda: moving(ms.SDIRK3(), "hinge", keep="checkpoints", memory_budget=2e4),
+    "from an equilibrium": let_go,
+    "onto a Plane": lambda: thrown(ob.Plane),
+    "onto a Plane, rubbing": lambda: thrown(ob.Plane, **RUBS),
+    "onto a Plane, rubbing late": lambda: thrown(ob.Plane, lagged_friction=True, face_samples=1, **RUBS),
+    "onto a Sphere, its law given": lambda: thrown(
+        ob.Sphere, ms.SDIRK2(), smoothing=2e-4, sticking_speed=0.3, face_samples=3, **RUBS
+    ),
+    "onto a Box that sways": lambda: thrown(ob.Box, motion=swaying, options={"keep": "factors"}, **RUBS),
+    "through water": lambda: thrown(None, ms.TRBDF2(), swims=True),
+    "through water onto a Plane": lambda: thrown(ob.Plane, ms.TRBDF2(), True, extra=VISCOUS, **RUBS),
+    "in a corner": in_a_corner,
+}
+
+
+@cache
+def kind(name: str) -> Kind:
+    return MAKERS[name]()

@@ -1,0 +1,154 @@
+"""What a kind of scene can be differentiated by: found, not listed.
+
+A new value of an object (`_replaceable`), or a new keyword of a solve, is an input by being there.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+
+import numpy as np
+
+import magshell as ms
+
+# Keywords of a solve that are no numbers to differentiate by.
+SETTINGS = {"scene", "values", "solver", "progress"}
+SETTINGS_OF = {
+    ms.equilibrium: SETTINGS | {"require_stable", "start"},  # wherever the search began: a tensor is refused
+    ms.simulate: SETTINGS | {"steps", "integrator", "record_every", "memory_budget", "keep"},
+}
+
+
+@cache
+def continuous(solve) -> set[str]:
+    """The keywords of ms.equilibrium or ms.simulate that are inputs."""
+    return set(inspect.signature(solve).parameters) - SETTINGS_OF[solve]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of scene, and how it is solved.
+
+    solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it.
+    controls: by keyword, the inputs that belong to no object. fixed: other keywords.
+    step: of differences, over the size of a value; reach: that size, where it is not the value's own.
+    """
+
+    scene: ms.Scene
+    controls: dict[str, object]
+    function: Callable = ms.equilibrium
+    solve: Callable | None = None
+    fixed: dict[str, object] = field(default_factory=dict)
+    step: float = 1e-4
+    reach: dict[str, float] = field(default_factory=dict)
+
+    def found(self, given: dict[tuple, object], start=None):
+        """The solution with these inputs, {(object or None, name): value}, in place of those that it has."""
+        keywords, values = {**self.fixed, **self.controls}, {}
+        for (owner, name), value in given.items():
+            if owner is None:
+                keywords[name] = value
+            else:
+                values.setdefault(owner, {})[name] = value
+        if start is not None:
+            keywords["start"] = start
+        return (self.solve or self.function)(self.scene, values=values, **keywords)
+
+    @cached_property
+    def of_objects(self) -> dict[tuple, np.ndarray]:
+        """{(object, name): its value} of everything in the scene."""
+        owners = (self.scene, *self.scene.parts)
+        moving = self.function is ms.simulate
+        return {
+            (owner, name): np.array(value, dtype=np.float64)
+            for owner in owners
+            for name, value in _values_of(self.scene, owner, moving).items()
+        }
+
+    @cached_property
+    def of_solve(self) -> dict[tuple, np.ndarray]:
+        """{(None, keyword): its value}: controls, and what a keyword too can say of the objects, as one number."""
+        own = {(None, name): np.array(value, dtype=np.float64) for name, value in self.controls.items()}
+        for (owner, name), value in self.of_objects.items():
+            if name in continuous(self.function) and owner in (self.scene, self.scene.shell):
+                own[None, name] = value.mean() if owner is self.scene.shell else value
+        return own
+
+    @cached_property
+    def together(self) -> dict[tuple, np.ndarray]:
+        """All inputs, each once and a little off what it was made with, so that nothing is left to a default."""
+        once = {key: value for key, value in self.entries.items() if self._once(key)}
+        rng = np.random.default_rng(23)
+        return {key: value * (1.0 + 0.02 * rng.uniform(-1, 1, value.shape)) for key, value in once.items()}
+
+    def _once(self, key: tuple) -> bool:
+        owner, name = key
+        return name in self.controls if owner is None else name != "vertex_loads"
+
+    @cached_property
+    def entries(self) -> dict[tuple, np.ndarray]:
+        return {**self.of_solve, **self.of_objects}
+
+
+def free(key: tuple) -> np.ndarray | float:
+    """1 for the components of a value that may change at all, and 0 for the others."""
+    owner, name = key
+    if isinstance(owner, ms.Pin) and name == "displacement":
+        return np.array([float(axis in owner.components) for axis in "xyz"])
+    return 1.0
+
+
+def label(kind: Kind, key: tuple) -> str:
+    """For people: what an input is called."""
+    owner, name = key
+    if owner is None:
+        return name
+    owners = [kind.scene, *kind.scene.parts]
+    number = next(k for k, each in enumerate(owners) if each is owner)
+    return f"{type(owner).__name__}[{number}].{name}"
+
+
+def subject(kind: Kind, key: tuple) -> tuple:
+    """(class or function, name) of an input: what coverage counts."""
+    owner, name = key
+    return (kind.function if owner is None else type(owner), name)
+
+
+def subjects() -> set[tuple]:
+    """All that there are: keywords of solves, and values of every class that a scene may hold."""
+    classes = [
+        each for module in (ms, ms.obstacles) for each in vars(module).values() if isinstance(each, type)
+    ]
+    of_classes = {
+        (each, name)
+        for each in classes
+        if not inspect.isabstract(each)
+        for name in getattr(each, "_replaceable", ())
+    }
+    return of_classes | {(solve, name) for solve in SETTINGS_OF for name in continuous(solve)}
+
+
+def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
+    """The values of an object that a solve of this scene may replace, as they are. One that is new must be here."""
+    names = getattr(owner, "_replaceable", ())
+    if owner is scene:
+        loads = scene._values.core["vertex_loads"]
+        values = {"gravity": scene.gravity, "vertex_loads": loads}
+        absent = {name for name, value in values.items() if not np.any(value)}
+    elif isinstance(owner, ms.Contact):
+        values = dict(zip(names, owner.law(scene.shell), strict=True))
+        absent = set() if scene.has_forces_of_motion else {"friction_coefficient"}
+    elif isinstance(owner, ms.Pin | ms.Clamp):
+        motion = owner.held(scene.mesh)[0].motion
+        values = {} if motion is None else {**motion._asdict(), "displacement": motion.translation}
+        absent = set(names) if motion is None else set()
+    elif isinstance(owner, ms.SampledField):
+        values, absent = owner._made_from, set()
+    else:
+        values = {name: getattr(owner, name) for name in names}
+        weightless = owner is scene.shell and not (moving or scene.gravity.any())
+        absent = {"mass_density"} if weightless else set()
+    return {name: values[name] for name in names if name not in absent}
