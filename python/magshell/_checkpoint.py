@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +18,16 @@ def save(path: str | Path, contents: dict) -> None:
     replace_file(path, lambda file: torch.save(contents, file))
 
 
-def load(path: str | Path) -> dict:
-    """What `save` wrote; a file of anything but tensors and plain values is refused."""
+def load(path: str | Path, parts: Iterable[str]) -> dict:
+    """What `save` wrote; a file of anything but tensors and plain values, or without these parts, is refused."""
     torch = require_torch("a checkpoint")
     try:
-        return torch.load(path, weights_only=True)
+        contents = torch.load(path, weights_only=True)
     except Exception as error:
         raise ValueError(f"{path} is not a checkpoint of a minimization: {error}") from error
+    if not isinstance(contents, dict) or not set(parts) <= contents.keys():
+        raise ValueError(f"{path} is not a checkpoint of a minimization, or one of an earlier magshell")
+    return contents
 
 
 def encoded(value, label: str):
