@@ -1,11 +1,9 @@
 """A minimization goes on only with the problem that its checkpoint is of, and says what is another one."""
 
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
 import torch
-from design_problems import rosenbrock
+from design_problems import AcceptsJumps, rosenbrock
 
 import magshell as ms
 
@@ -113,24 +111,17 @@ def test_other_constraints_are_refused(tmp_path):
         run(1.9, resume=True)
 
 
-class Drifting:
+class Drifting(AcceptsJumps):
     """A state that every evaluation moves on, as a warm start's equilibrium or a generator of random numbers."""
 
     def __init__(self):
         self.state = np.array([0.0])
-        self.accepting = False
 
     def __call__(self, x):
         self.state += 1.0  # in place
         if self.state[0] > 9 and not self.accepting:
             raise ms.EquilibriumJumped("past nine")
         return rosenbrock(x) - 100.0 * float(self.state[0])
-
-    @contextmanager
-    def accept_jumps(self):
-        self.accepting = True
-        yield
-        self.accepting = False
 
     def state_dict(self):
         return {"state": self.state}

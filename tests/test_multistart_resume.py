@@ -228,9 +228,9 @@ def test_what_a_run_looks_up_counts(here, tmp_path, monkeypatch):
 
 def test_what_cannot_be_told_apart_is_refused_before_any_work(here, tmp_path):
     lock = threading.Lock()
-    with pytest.raises(ValueError, match="cannot for lock of run: a lock has no digest"):
+    with pytest.raises(ValueError, match="cannot for lock around it: a lock has no digest"):
         quiet(lambda start: start if lock else 0, [1.0], here, checkpoint=tmp_path)
-    with pytest.raises(ValueError, match="start 1 could not be told from another one"):
+    with pytest.raises(ValueError, match="cannot for start 1: a lock has no digest"):
         quiet(runs.square, [1.0, lock], here, checkpoint=tmp_path)
     assert list(tmp_path.iterdir()) == []
 

@@ -19,23 +19,25 @@ def described(run) -> dict[str, str]:
     and what it looks up. Raises ValueError where something bound to it neither is plain nor can be pickled."""
     told: dict[str, str] = {}
     while isinstance(run, functools.partial):
-        told |= {f"argument {k}": _told(f"argument {k}", each) for k, each in enumerate(run.args)}
-        told |= {name: _told(name, each) for name, each in run.keywords.items()}
+        told |= {f"argument {k}": told_apart(f"argument {k}", each) for k, each in enumerate(run.args)}
+        told |= {name: told_apart(name, each) for name, each in run.keywords.items()}
         run = run.func
     if isinstance(run, types.MethodType):
-        told["its object"] = _told("its object", run.__self__)
+        told["its object"] = told_apart("its object", run.__self__)
         run = run.__func__
     if not is_own_function(run):
         if not isinstance(run, type | types.BuiltinFunctionType | types.FunctionType):
-            told["its object"] = _told("its object", run)
+            told["its object"] = told_apart("its object", run)
             run = type(run)
         return told | {"run": f"{run.__module__}.{run.__qualname__}"}
     told["run"] = f"{run.__module__}.{run.__qualname__}"
-    told["its code"] = _told("its code", run.__code__)
+    told["its code"] = told_apart("its code", run.__code__)
     for name, parameter in inspect.signature(run).parameters.items():
         if parameter.default is not parameter.empty:
-            told[f"the default of {name}"] = _told(name, parameter.default)
-    told |= {f"{name} around it": _told(name, each) for name, each in closure(run).items()}
+            told[f"the default of {name}"] = told_apart(f"the default of {name}", parameter.default)
+    told |= {
+        f"{name} around it": told_apart(f"{name} around it", each) for name, each in closure(run).items()
+    }
     for name, each in used_globals(run):
         try:
             told[f"the module's {name}"] = _in_words(each)
@@ -54,12 +56,13 @@ def differences(known: dict[str, str], now: dict[str, str]) -> list[str]:
     ]
 
 
-def _told(name: str, value) -> str:
+def told_apart(name: str, value) -> str:
+    """The value in words or its digest. Raises ValueError, naming it, where it has none."""
     try:
         return _in_words(value)
     except TypeError as error:
         raise ValueError(
-            f"a checkpoint must tell whether a later call runs the same, and cannot for {name} of run: {error}"
+            f"a checkpoint must tell whether a later call does the same, and cannot for {name}: {error}"
         ) from error
 
 

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from ._attempt import Outcome
-from ._digest import digest
 from ._files import replace_file
 from ._plain import from_plain, to_plain
-from ._run_description import described, differences
+from ._run_description import described, differences, told_apart
 
 _NUMBERS = ("objective", "violation", "seconds")
 
@@ -30,7 +29,7 @@ class StartFiles:
         if self.folder.exists() and not self.folder.is_dir():
             raise ValueError(f"checkpoint must be a folder, and {folder} is a file")
         self._run = described(run)
-        self._starts = [_digest_of(number, start) for number, start in enumerate(starts)]
+        self._starts = [told_apart(f"start {number}", start) for number, start in enumerate(starts)]
         self.folder.mkdir(parents=True, exist_ok=True)
         if not resume and (found := self._numbers()):
             raise ValueError(
@@ -82,12 +81,3 @@ class StartFiles:
 
     def _path(self, number: int) -> Path:
         return self.folder / f"start-{number:04d}.npz"
-
-
-def _digest_of(number: int, start) -> str:
-    try:
-        return digest(start)
-    except TypeError as error:
-        raise ValueError(
-            f"start {number} could not be told from another one by a later call, as a checkpoint needs: {error}"
-        ) from error
