@@ -108,6 +108,6 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "banner.png", dpi=250)
+    ms.Picture(plot(outcome)).save(out / "banner.png", dpi=250)
     picture(outcome).save(out / "banner_in_space.png")
     print(f"\nPictures in {out}/; {time.perf_counter() - began:.0f} s in all.")

@@ -185,7 +185,7 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "bending_twisting.png", dpi=200)
+    ms.Picture(plot(outcome)).save(out / "bending_twisting.png", dpi=200)
     bent_picture(outcome).save(out / "bending.png")
     twisted_picture(outcome).save(out / "twisting.png")
     movie(outcome, out / "twisting.gif")

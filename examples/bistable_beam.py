@@ -133,6 +133,6 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "bistable_beam.png", dpi=200)
+    ms.Picture(plot(outcome)).save(out / "bistable_beam.png", dpi=200)
     picture(outcome).save(out / "bistable_beam_states.png")
     print(f"\nPictures in {out}/; {time.perf_counter() - began:.0f} s in all.")

@@ -207,7 +207,7 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "bistable_in_time.png", dpi=200)
+    ms.Picture(plot(outcome)).save(out / "bistable_in_time.png", dpi=200)
     picture(outcome).save(out / "bistable_in_time_states.png")
     movie(outcome, out / "bistable_in_time.gif")
     print(f"\nPictures and the movie in {out}/; {time.perf_counter() - began:.0f} s in all.")

@@ -198,7 +198,7 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "hexagram.png", dpi=200)
+    ms.Picture(plot(outcome)).save(out / "hexagram.png", dpi=200)
     for name, picture in pictures(outcome).items():
         picture.save(out / f"hexagram_{name}.png")
     print(f"\nPictures in {out}/; {time.perf_counter() - began:.0f} s in all.")

@@ -39,6 +39,8 @@ from _identify.limits import deviations, of_finer_magnetizations, scaled_togethe
 from _identify.model import NOISE, measured, sheet, true_magnetization
 from _identify.report import draw_history, draw_magnetization, draw_modulus, summary
 
+import magshell as ms
+
 PRICES = (1.0, 0.3, 0.1, 0.03, 0.01)
 
 
@@ -116,5 +118,5 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "identify.png", dpi=200)
+    ms.Picture(plot(outcome)).save(out / "identify.png", dpi=200)
     print(f"\nPicture in {out}/; {time.perf_counter() - began:.0f} s in all.")

@@ -125,6 +125,6 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "kirigami_reaching.png", dpi=160)
+    ms.Picture(plot(outcome)).save(out / "kirigami_reaching.png", dpi=160)
     movie(outcome, out / "kirigami_reaching.gif")
     print(f"\nPicture and movie in {out}/; {time.perf_counter() - began:.0f} s in all.")

@@ -34,6 +34,8 @@ from _kirigami.design import SEARCHES, Search
 from _kirigami.model import kirigami
 from _kirigami.report import draw_convergence, draw_design, draw_switching, draw_tower, summary
 
+import magshell as ms
+
 
 def main(searches: Sequence[Search] = SEARCHES, iterations: int = 95, trials: int = 30) -> dict:
     """The figure's numbers, in SI units; the first search's tower is the one that is checked."""
@@ -75,5 +77,5 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "kirigami_tower.png", dpi=200)
+    ms.Picture(plot(outcome)).save(out / "kirigami_tower.png", dpi=200)
     print(f"\nPicture in {out}/; {time.perf_counter() - began:.0f} s in all.")

@@ -55,6 +55,8 @@ from _octopus.channels import CHANNELS
 from _octopus.report import draw_convergence, draw_field, draw_path, draw_snapshot, movie, summary
 from _octopus.task import Swim, Variables
 
+import magshell as ms
+
 STEPS, ITERATIONS = 1500, 3
 SNAPSHOTS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the time set
 
@@ -157,7 +159,7 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "octopus.png", dpi=130)
+    ms.Picture(plot(outcome)).save(out / "octopus.png", dpi=130)
     for channel, result in outcome.items():
         movie(result, out / f"octopus_{channel.replace(' ', '_')}.gif")
     print(f"\nPictures and movies in {out}/.")

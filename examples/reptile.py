@@ -103,7 +103,7 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "reptile.png", dpi=160)
+    ms.Picture(plot(outcome)).save(out / "reptile.png", dpi=160)
     for ground, crawled in outcome["walks"].items():
         picture(*crawled).save(out / f"reptile_{ground}.png")
         animation(outcome, ground, out / f"reptile_{ground}.gif")

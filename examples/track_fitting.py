@@ -97,7 +97,7 @@ if __name__ == "__main__":
     print(summary(outcome))
     out = Path("out")
     out.mkdir(exist_ok=True)
-    plot(outcome).savefig(out / "track_fitting.png", dpi=200)
+    ms.Picture(plot(outcome)).save(out / "track_fitting.png", dpi=200)
     for curve in outcome["fits"]:
         picture(outcome, curve).save(out / f"track_fitting_{curve}.png")
         animation(outcome, curve, out / f"track_fitting_{curve}.gif")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 
@@ -240,3 +241,15 @@ def nlopt_mma(given: Problem) -> tuple[np.ndarray, float]:
     optimizer.set_maxeval(1000)
     u = optimizer.optimize((given.start - given.lower) / width)
     return given.lower + width * u, optimizer.last_optimum_value() * sizes[0]
+
+
+class AcceptsJumps:
+    """What offers to cross a jump of the equilibrium, as ms.WarmStart does."""
+
+    accepting = False
+
+    @contextmanager
+    def accept_jumps(self) -> Iterator[None]:
+        self.accepting = True
+        yield
+        self.accepting = False

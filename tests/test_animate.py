@@ -159,7 +159,14 @@ def test_without_ffmpeg_the_error_says_what_to_install(tmp_path, monkeypatch) ->
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"fps": 0}, r"fps \[1/s\] must be positive, got 0"),
+        ({"fps": 0}, r"fps \[1/s\] must be positive, from 0.01 to 1000, got 0"),
+        ({"fps": 1e-4}, "fps .* from 0.01 to 1000"),
+        ({"width": 20_000}, "at least 400 pixels and at most 8000, got 20000"),
+        (
+            {"times": [0.0, 1.0, 1e6], "speed": 1.0},
+            r"would have 2.5e\+07 frames, and at most 20000 .* `speed`",
+        ),
+        ({"times": [0.0, 1.0, 2.0], "speed": 1e-300}, "would have .* frames"),
         ({"fps": 60}, "at most 50 frames a second"),
         ({"fps": np.nan}, r"fps \[1/s\] must be finite"),
         ({"speed": -1.0}, "speed must be positive, got -1"),

@@ -10,7 +10,7 @@ import multistart_runs as runs
 import numpy as np
 import pytest
 import torch
-from multistart_runs import STARTS, bits, quiet
+from multistart_runs import STARTS, quiet
 
 import magshell as ms
 
@@ -100,72 +100,6 @@ def test_threads_are_given_back(here):
         assert ms.num_threads() == 3
     finally:
         ms.set_num_threads(before)
-
-
-# Resuming
-
-
-def test_a_second_call_does_only_the_rest(here, tmp_path):
-    calls = []
-
-    def run(start):
-        calls.append(start["seed"])
-        if start["seed"] == 2 and len(calls) < 4:
-            raise RuntimeError("not yet")
-        return start["x"].sum()
-
-    starts = [{"seed": seed, "x": np.full(2, float(seed))} for seed in (3, 2, 1)]
-    first = quiet(run, starts, here, checkpoint=tmp_path / "a" / "b")
-    assert len(first) == 2 and len(first.failed) == 1
-    starts.append({"seed": 0, "x": np.zeros(2)})
-    second = quiet(run, starts, here, checkpoint=tmp_path / "a" / "b", resume=True)
-    assert calls == [3, 2, 1, 2, 0] and second.objectives.tolist() == [0.0, 2.0, 4.0, 6.0]
-    assert quiet(run, starts, here, checkpoint=tmp_path / "a" / "b", resume=True).objectives.tolist() == [
-        0,
-        2,
-        4,
-        6,
-    ]
-    assert len(calls) == 5
-    names = sorted(path.name for path in (tmp_path / "a" / "b").iterdir())
-    assert names == [f"start-000{number}.pickle" for number in range(4)]
-
-
-def test_resumed_gives_the_same_bits(here, tmp_path):
-    whole = quiet(runs.valley, STARTS, here)
-    quiet(runs.valley, STARTS[:2], here, checkpoint=tmp_path)
-    assert bits(quiet(runs.valley, STARTS, here, checkpoint=tmp_path, resume=True)) == bits(whole)
-
-
-@pytest.mark.parametrize(
-    ("before", "after"),
-    [
-        (np.array([1.0, 2.0]), np.array([1.0, 2.5])),
-        (np.array([1.0, 2.0]), np.array([1.0, 2.0], dtype=np.float32)),
-        (torch.tensor([1.0]), torch.tensor([-1.0])),
-        ({"x": [1.0, np.zeros(2)]}, {"x": [1.0, np.ones(2)]}),
-        ((1, 2), [1, 2]),
-        (1, 2),
-    ],
-)
-def test_another_start_under_the_same_number_is_refused(before, after, here, tmp_path):
-    quiet(lambda start: 1.0, [0, before], here, checkpoint=tmp_path)
-    with pytest.raises(ValueError, match=r"start-0001\.pickle was begun at another start than number 1"):
-        quiet(lambda start: 1.0, [0, after], here, checkpoint=tmp_path, resume=True)
-    assert len(quiet(lambda start: 1.0, [0, before], here, checkpoint=tmp_path, resume=True)) == 2
-
-
-def test_a_folder_is_not_taken_for_another(here, tmp_path):
-    quiet(runs.square, [1.0], here, checkpoint=tmp_path)
-    with pytest.raises(ValueError, match="holds 1 finished starts already: say resume=True"):
-        quiet(runs.square, [1.0], here, checkpoint=tmp_path)
-    with pytest.raises(ValueError, match="written by the run square, and this one is fails_at_two"):
-        quiet(runs.fails_at_two, [1.0], here, checkpoint=tmp_path, resume=True)
-    (tmp_path / "start-0000.pickle").write_bytes(b"half a pick")
-    with pytest.raises(ValueError, match=r"start-0000\.pickle is not a finished start"):
-        quiet(runs.square, [1.0], here, checkpoint=tmp_path, resume=True)
-    with pytest.raises(ValueError, match="must be a folder"):
-        quiet(runs.square, [1.0], here, checkpoint=tmp_path / "start-0000.pickle", resume=True)
 
 
 # Bad input

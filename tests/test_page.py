@@ -175,6 +175,22 @@ def test_a_page_needs_no_network(mesh, path_, tmp_path) -> None:
     assert "{{" not in text
 
 
+@pytest.mark.parametrize(
+    "words",
+    ["</script><script>alert(1)</script>", "<!--<script>", '"><img src=x onerror=alert(1)>', "{{data}}"],
+)
+def test_names_are_text_and_nothing_else(mesh, path_, tmp_path, words) -> None:
+    plain = Page(ms.write_page(mesh, tmp_path / "a.html", **path_, color=np.arange(mesh.n_faces)).read_text())
+    named = {"title": words, "titles": [words, "b", "c"], "color_label": words}
+    path = ms.write_page(mesh, tmp_path / "b.html", **path_, color=np.arange(mesh.n_faces), **named)
+    page = Page(path.read_text())
+    assert page.heading == words and page.data["states"][0]["title"] == words
+    assert page.data["scalars"][0]["label"] == words
+    assert page.open == plain.open == [] and page.links == plain.links and page.ids == plain.ids
+    assert path.read_text().count("<script") == 2
+    assert page.data["states"][0]["positions"] == plain.data["states"][0]["positions"]
+
+
 def test_a_page_is_as_large_as_its_mesh(tmp_path) -> None:
     sizes = []
     for cells in ((40, 40), (80, 80)):

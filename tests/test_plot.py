@@ -307,7 +307,7 @@ def test_of_many_states_some_are_drawn(mesh) -> None:
         ({"titles": ["a", "b"]}, "titles must be 1 strings"),
         ({"states": [0, 1]}, "states must be numbers of the 1 states"),
         ({"arrows": -1}, "arrows must be"),
-        ({"width": 10}, "width must be at least 400"),
+        ({"width": 10}, "width must be at least 400 pixels and at most 8000, got 10"),
         ({"backend": "opengl"}, "backend must be 'pyvista' or 'matplotlib', got 'opengl'"),
     ],
 )

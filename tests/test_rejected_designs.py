@@ -1,11 +1,9 @@
 """Designs that cannot be evaluated: every optimizer goes less far; jumps are crossed where that is allowed."""
 
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
 import torch
-from design_problems import two_balls
+from design_problems import AcceptsJumps, two_balls
 
 import magshell as ms
 
@@ -127,11 +125,11 @@ def test_a_first_design_that_is_rejected_raises_as_it_is():
         quiet(objective, [design(0.0)], ms.optim.LBFGS)
 
 
-class Snapping:
+class Snapping(AcceptsJumps):
     """A state that follows x until it snaps at x = 0, and back at x = -1, like an equilibrium with hysteresis."""
 
     def __init__(self):
-        self.branch, self.accepting = 0, False
+        self.branch = 0
 
     def __call__(self, x):
         branch = 1 if x.item() > 0 else 0 if x.item() < -1 else self.branch
@@ -139,12 +137,6 @@ class Snapping:
             raise ms.EquilibriumJumped(f"snaps at {x.item():.3g}")
         self.branch = branch
         return ((x - 2) ** 2).sum() + 3.0 * branch
-
-    @contextmanager
-    def accept_jumps(self):
-        self.accepting = True
-        yield
-        self.accepting = False
 
     def state_dict(self):
         return {"branch": self.branch}

@@ -10,7 +10,7 @@ from motions import lifted_strip
 import magshell as ms
 from magshell import series
 
-pytest.importorskip("meshio")
+meshio = pytest.importorskip("meshio")
 
 MESH = ms.meshes.rectangle(0.05, 0.01, cells=(8, 2))
 
@@ -80,15 +80,16 @@ def test_a_shorter_series_replaces_a_longer_one(move, tmp_path) -> None:
 
 @pytest.mark.parametrize("reason", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
 def test_what_was_written_before_an_error_is_listed(move, tmp_path, monkeypatch, reason) -> None:
-    write = series.write_mesh
+    write, written = meshio.vtu.write, []
 
-    def until_the_fourth(path, *arguments) -> None:
-        write(path, *arguments)
-        if path.name.endswith("_3.vtu"):
+    def until_the_fourth(path, content) -> None:
+        write(path, content)
+        written.append(path)
+        if len(written) == 4:
             path.write_bytes(path.read_bytes()[:100])
             raise reason
 
-    monkeypatch.setattr(series, "write_mesh", until_the_fourth)
+    monkeypatch.setattr(meshio.vtu, "write", until_the_fourth)
     with pytest.raises(type(reason)) as caught:
         ms.write_series(tmp_path / "strip.pvd", move)
     found = listed(tmp_path / "strip.pvd")
@@ -126,19 +127,24 @@ def test_a_disk_that_takes_nothing(move, tmp_path, monkeypatch) -> None:
         ),
         ({"vertex_fields": {"heat": np.zeros(27)}}, r"vertex field 'heat' must have shape \(3, 27\)"),
         ({"face_fields": {"strain": np.zeros((3, 27))}}, r"face field 'strain' must have shape \(3, 32\)"),
+        ({"vertex_fields": {'a"b': np.zeros((3, 27))}}, r"vertex field names must be printable words"),
+        ({"face_fields": {"a<b": np.zeros((3, 32))}}, r"face field names must be .* got 'a<b'"),
         ({"positions": np.zeros((0, 27, 3))}, r"positions \[m\] must have shape"),
     ],
 )
 def test_bad_input_is_refused(tmp_path, arguments, message) -> None:
     positions = MESH.rest_positions + np.zeros((3, 1, 1))
+    ms.write_series(tmp_path / "a.pvd", MESH)
     with pytest.raises(ValueError, match=message):
         ms.write_series(tmp_path / "a.pvd", MESH, **{"positions": positions, **arguments})
-    assert files(tmp_path) == set()
+    assert files(tmp_path) == {"a.pvd", "a/a_0.vtu"}  # those of before
 
 
 def test_bad_places_are_refused(move, tmp_path) -> None:
     with pytest.raises(ValueError, match=r"saved as \.pvd, got 'a\.vtu'; write_mesh writes one state"):
         ms.write_series(tmp_path / "a.vtu", move)
+    with pytest.raises(ValueError, match="the name of a series must be printable"):
+        ms.write_series(tmp_path / "a\n.pvd", move)
     with pytest.raises(FileNotFoundError, match="there is no folder"):
         ms.write_series(tmp_path / "none" / "a.pvd", move)
     with pytest.raises(ValueError, match="the list is empty"):

@@ -9,7 +9,7 @@ import numpy as np
 from ._solve import FACTORS, Search, find
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
-from .errors import Interrupted, NotConverged
+from .errors import DesignRejected, Interrupted, NotConverged
 from .scene import Scene
 
 _DIMENSIONS = {"applied_flux_density": 1, **dict.fromkeys(FACTORS, 0)}  # of one case
@@ -48,6 +48,14 @@ def starts_of(start, count: int) -> Sequence:
     return start
 
 
+def of_case(error: BaseException, number: int, count: int, last_good) -> BaseException:
+    """The error that says which load case failed."""
+    told = f"load case {number} of {count}: {error}"
+    if isinstance(error, DesignRejected):
+        return type(error)(told, last_good, load_case=number)
+    return type(error)(told, last_good)
+
+
 def find_all(scene: Scene, cases: list[dict], starts: Sequence, search: Search) -> Equilibria:
     """The equilibrium of each case. An error tells which one failed, and holds those before it and its last state."""
     found: list[Equilibrium] = []
@@ -55,8 +63,7 @@ def find_all(scene: Scene, cases: list[dict], starts: Sequence, search: Search) 
         try:
             found.append(find(scene, arguments, start, _part_of(search, k, len(cases))).equilibrium)
         except (NotConverged, Interrupted) as error:
-            so_far = Equilibria([*found, error.last_good])
-            raise type(error)(f"load case {k} of {len(cases)}: {error}", so_far) from error
+            raise of_case(error, k, len(cases), Equilibria([*found, error.last_good])) from error
     return Equilibria(found)
 
 

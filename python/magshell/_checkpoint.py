@@ -1,15 +1,13 @@
-"""Files that are either the old one or the new one, never a part of either, and that hold nothing but data."""
+"""Checkpoints: files that hold nothing but data."""
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Callable
+from collections.abc import Iterable
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
+from ._files import replace_file
 from ._tensors import is_tensor, require_torch
 
 _ARRAY = "numpy array"  # the only key of a dict that stands for one
@@ -20,28 +18,16 @@ def save(path: str | Path, contents: dict) -> None:
     replace_file(path, lambda file: torch.save(contents, file))
 
 
-def replace_file(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
-    """Replaces the file at once: it is written beside its place and then renamed."""
-    path = Path(path)
-    handle, written = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(written, path)
-    except BaseException:
-        Path(written).unlink(missing_ok=True)
-        raise
-
-
-def load(path: str | Path) -> dict:
-    """What `save` wrote; a file of anything but tensors and plain values is refused."""
+def load(path: str | Path, parts: Iterable[str]) -> dict:
+    """What `save` wrote; a file of anything but tensors and plain values, or without these parts, is refused."""
     torch = require_torch("a checkpoint")
     try:
-        return torch.load(path, weights_only=True)
+        contents = torch.load(path, weights_only=True)
     except Exception as error:
         raise ValueError(f"{path} is not a checkpoint of a minimization: {error}") from error
+    if not isinstance(contents, dict) or not set(parts) <= contents.keys():
+        raise ValueError(f"{path} is not a checkpoint of a minimization, or one of an earlier magshell")
+    return contents
 
 
 def encoded(value, label: str):

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ._files import replace_file
+
 _TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
@@ -81,21 +83,20 @@ def write_ply(
         *_property_lines(face),
         "end_header",
     ]
-    face = {"count": np.full(len(faces), 3, dtype="u1"), "vertex_indices": faces.astype("<i4"), **face}
-    with path.open("wb") as file:
-        file.write(("\n".join(header) + "\n").encode())
-        file.write(_packed(vertex).tobytes())
-        file.write(_packed(face).tobytes())
+    lengths = np.full(len(faces), 3, dtype="u1")  # under a name that no field can have
+    face = {"vertex_indices count": lengths, "vertex_indices": faces.astype("<i4"), **face}
+    parts = [("\n".join(header) + "\n").encode(), _packed(vertex).tobytes(), _packed(face).tobytes()]
+    replace_file(path, lambda file: file.writelines(parts))
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], dict, int]:
     """Byte order ("" for ASCII), elements, field components that belong together, where the body starts."""
-    end = data.find(b"end_header")
-    if not data.startswith(b"ply") or end < 0:
+    end = data.find(b"\nend_header") + 1
+    if not data.startswith(b"ply") or not end:
         raise ValueError("it has no PLY header")
     body = data.index(b"\n", end) + 1
     order, elements, groups = None, [], {}
-    for line in data[:end].decode("latin-1").splitlines()[1:]:
+    for line in _text(data[:end]).splitlines()[1:]:
         words = line.split()
         if not words:
             continue
@@ -113,6 +114,14 @@ def _header(data: bytes) -> tuple[str, list[_Element], dict, int]:
     if order is None:
         raise ValueError("its header does not say which format it is in")
     return order, elements, groups, body
+
+
+def _text(header: bytes) -> str:
+    """PLY says nothing of letters beyond ASCII; magshell writes them as UTF-8."""
+    try:
+        return header.decode("utf-8")
+    except UnicodeDecodeError:
+        return header.decode("latin-1")
 
 
 def _binary_table(element: _Element, data: bytes, offset: int, order: str) -> tuple[dict, int]:

@@ -4,19 +4,44 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import asdict
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
 
 from ._answer import Answer
 from ._checkpoint import decoded, encoded
+from ._configuration import kept
+from ._rejections import conflict, in_words, reason_of, total
+from ._resume import check_objective, check_same
 from ._tensors import is_tensor, require_torch
 from .errors import DesignRejected, EquilibriumJumped
 from .minimum import STANDSTILL, Minimum, Record
 
+PARTS = (
+    "method",
+    "parameters",
+    "optimizer",
+    "history",
+    "best",
+    "terms",
+    "stateful",
+    "configuration",
+)  # of a snapshot
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A design that was evaluated, its terms, and the states from which: None where no checkpoint needs them."""
+
+    design: list
+    terms: dict[str, float]
+    states: list | None = None
+
 
 class Run:
-    """One minimization, an iteration at a time. Arguments as in `ms.minimize`; cross: whether jumps are crossed."""
+    """One minimization, an iteration at a time. Arguments as in `ms.minimize`; cross: whether jumps are crossed;
+    checkpointed: whether snapshots will be asked for."""
 
     def __init__(
         self,
@@ -26,6 +51,7 @@ class Run:
         feasibility: float,
         stateful: Sequence,
         cross: bool,
+        checkpointed: bool,
     ):
         if not callable(objective):
             raise ValueError(f"objective must be a function of the parameters, got {objective!r:.60}")
@@ -38,12 +64,25 @@ class Run:
         self.history: list[Record] = []
         self.best: dict | None = None
         offering = {id(each): each for each in (objective, *self.stateful) if hasattr(each, "accept_jumps")}
-        self._crossing = list(offering.values()) if cross else []
+        self._offering, self._cross, self._checkpointed = list(offering.values()), cross, checkpointed
+        self.configuration = kept({"feasibility": feasibility, **self.optimizer.configuration()})
         self._evaluations = 0
-        self.rejected = 0  # trial designs of the iteration under way
-        self._answers: list[tuple[list, dict]] = []  # the designs of one step, and the terms there
-        self._terms: dict[str, float] = {}
+        self.rejections: Counter[str] = Counter()  # of the iteration under way
+        self.watch: Callable[[], None] = lambda: None  # called after every evaluation
+        self._answers: list[_Seen] = []  # of one step
+        self._at = _Seen([], {})  # the design of the last record
+        self._recorded = False  # whether the iteration under way is in the history
+        self._stuck = False  # at a jump that no step avoids
         self._started = time.perf_counter()
+
+    @property
+    def method(self) -> str:
+        return _name(getattr(self.optimizer, "optimizer", self.optimizer))  # what AnyTorch drives
+
+    @property
+    def rejected(self) -> int:
+        """Trial designs of the iteration under way."""
+        return sum(self.rejections.values())
 
     @property
     def iteration(self) -> int:
@@ -51,12 +90,15 @@ class Run:
 
     def closure(self):
         self._evaluations += 1
+        before = self.states() if self._checkpointed else None
         try:
             answer = Answer.of(self.objective(*self.parameters))
-        except DesignRejected:
-            self.rejected += 1
+        except DesignRejected as error:
+            self.rejections[reason_of(error)] += 1
             raise
-        self._answers.append((self._values(), answer.terms))
+        finally:
+            self.watch()
+        self._answers.append(_Seen(self.values(), answer.terms, before))
         return answer.objective, answer.constraints
 
     def begin(self) -> None:
@@ -64,20 +106,19 @@ class Run:
 
     def advance(self) -> bool:
         """One step; whether it moved anything. Raises the last rejection if no step was short enough."""
-        before = self._values()
-        self._answers, self.rejected = [], 0
+        before = self.values()
+        self._answers, self.rejections, self._recorded = [], Counter(), False
         try:
             self.optimizer.step(self.closure)
             jumped = False
         except EquilibriumJumped:
-            if not self._crossing:
+            if not (self._cross and self._offering):
+                self._stuck = True
                 raise
-            with ExitStack() as accepted:
-                for each in self._crossing:
-                    accepted.enter_context(each.accept_jumps())
+            with self.accepting_jumps():
                 self.optimizer.leap(self.closure)
             jumped = True
-        moved = any(not a.equal(b) for a, b in zip(before, self._values(), strict=True))
+        moved = any(not a.equal(b) for a, b in zip(before, self.values(), strict=True))
         self._record(self.iteration + 1, self.optimizer.evaluate(self.closure), jumped)
         return moved
 
@@ -90,60 +131,70 @@ class Run:
         """The best design, which the parameters are set to. None before there is any."""
         if self.best is None:
             return None
-        self._set(self.best["parameters"])
+        self.set(self.best["parameters"])
         best = [value.clone() for value in self.best["parameters"]]
-        return Minimum(best, self.best["objective"], self.best["violation"], self.history, reason)
+        told = self._all_rejections, conflict(self.history, self._lost, self._stuck)
+        return Minimum(best, self.best["objective"], self.best["violation"], self.history, reason, *told)
 
     def snapshot(self) -> dict:
         return {
-            "method": _method(self.optimizer),
-            "parameters": self._values(),
+            "method": self.method,
+            "parameters": self.values(),
             "optimizer": self.optimizer.state_dict(),
             "history": [asdict(record) for record in self.history],
             "best": self.best,
-            "terms": self._terms,
-            "stateful": [encoded(each.state_dict(), f"state of {_name(each)}") for each in self.stateful],
+            "terms": self._at.terms,
+            "stateful": self.states(),
+            "configuration": self.configuration,
         }
 
     def restore(self, snapshot: dict) -> None:
-        shapes = [tuple(value.shape) for value in snapshot["parameters"]]
-        if shapes != [tuple(p.shape) for p in self.parameters]:
-            raise ValueError(f"the checkpoint holds parameters of shapes {shapes}, not those of this problem")
-        if snapshot["method"] != _method(self.optimizer):
-            raise ValueError(
-                f"the checkpoint is of {snapshot['method']}, and cannot be resumed with {_method(self.optimizer)}"
-            )
-        if len(snapshot["stateful"]) != len(self.stateful):
-            raise ValueError(
-                f"the checkpoint holds the state of {len(snapshot['stateful'])} objects, "
-                f"but `stateful` has {len(self.stateful)}"
-            )
-        self._set(snapshot["parameters"])
+        """Goes on from a snapshot. Raises ValueError where it is of something else, and changes nothing then."""
+        check_same(self, snapshot)
+        check_objective(self, snapshot)
+        self.set(snapshot["parameters"])
         self.optimizer.load_state_dict(snapshot["optimizer"])
-        for each, state in zip(self.stateful, snapshot["stateful"], strict=True):
-            each.load_state_dict(decoded(state))
+        self.load_states(snapshot["stateful"])
         self.history = [Record(**record) for record in snapshot["history"]]
-        self.best, self._terms = snapshot["best"], snapshot["terms"]
+        self.best, self._at = snapshot["best"], _Seen(self.values(), snapshot["terms"])
         self._evaluations = self.history[-1].evaluations
         self._started -= self.history[-1].seconds
 
+    def summary(self) -> str:
+        """The objective, and how many designs were evaluated and rejected so far."""
+        parts = [f"objective {self.history[-1].objective:.6g}"] if self.history else []
+        return ", ".join(
+            filter(None, (*parts, f"{self._evaluations} evaluations", in_words(self._all_rejections)))
+        )
+
+    @property
+    def _lost(self) -> dict[str, int]:
+        """Rejections of an iteration that is under way, or did not come to its end."""
+        return {} if self._recorded else dict(self.rejections)
+
+    @property
+    def _all_rejections(self) -> dict[str, int]:
+        return dict(total([*(record.rejections for record in self.history), self._lost]))
+
     def _record(self, iteration: int, sample, jumped: bool) -> None:
-        values = self._values()
-        for design, terms in self._answers:
-            if all(a.equal(b) for a, b in zip(design, values, strict=True)):
-                self._terms = terms
+        values = self.values()
+        for seen in self._answers:
+            if all(a.equal(b) for a, b in zip(seen.design, values, strict=True)):
+                self._at = seen
         record = Record(
             iteration,
             sample.objective,
-            self._terms,
+            self._at.terms,
             sample.violation,
             math.sqrt(float(sample.gradient @ sample.gradient)),
             time.perf_counter() - self._started,
             self._evaluations,
             self.rejected,
             jumped,
+            dict(self.rejections),
         )
         self.history.append(record)
+        self._recorded = True
         if self.best is None or self._order(record.objective, record.violation) < self._order(
             self.best["objective"], self.best["violation"]
         ):
@@ -151,16 +202,34 @@ class Run:
                 "parameters": values,
                 "objective": record.objective,
                 "violation": record.violation,
+                "stateful": self._at.states,
+                "jumped": jumped,
             }
 
     def _order(self, objective: float, violation: float) -> tuple[float, float]:
         """Feasible designs by their objective, before all others by how far they are from it."""
         return (0.0, objective) if violation <= self.feasibility else (violation, objective)
 
-    def _values(self) -> list:
+    def values(self) -> list:
         return [parameter.detach().clone() for parameter in self.parameters]
 
-    def _set(self, values: list) -> None:
+    def states(self) -> list:
+        """Of the stateful objects, as a checkpoint holds them."""
+        return [encoded(each.state_dict(), f"state of {_name(each)}") for each in self.stateful]
+
+    def load_states(self, states: list) -> None:
+        for each, state in zip(self.stateful, states, strict=True):
+            each.load_state_dict(decoded(state))
+
+    @contextmanager
+    def accepting_jumps(self, accepted: bool = True) -> Iterator[None]:
+        """Inside, the equilibrium may jump, where something offers that."""
+        with ExitStack() as stack:
+            for each in self._offering if accepted else ():
+                stack.enter_context(each.accept_jumps())
+            yield
+
+    def set(self, values: list) -> None:
         with require_torch("minimize").no_grad():
             for parameter, value in zip(self.parameters, values, strict=True):
                 parameter.copy_(value)
@@ -202,10 +271,6 @@ def _checked_stateful(stateful) -> list:
             if not callable(getattr(each, method, None)):
                 raise ValueError(f"every object in `stateful` needs {method}(), and {_name(each)} has none")
     return list(stateful)
-
-
-def _method(optimizer) -> str:
-    return _name(getattr(optimizer, "optimizer", optimizer))  # what AnyTorch drives
 
 
 def _name(each) -> str:

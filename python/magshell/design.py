@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from ._checkpoint import load, save
 from ._progress import progress_bar
-from ._run import Run
+from ._run import PARTS, Run
 from ._tensors import require_torch
 from .errors import DesignRejected, EquilibriumJumped, Interrupted, ObjectiveFailed
 from .minimum import Minimum, Record
+
+_READING = 0.2  # s
 
 
 def minimize(
@@ -44,7 +49,10 @@ def minimize(
     stateful: objects with state_dict() and load_state_dict(), such as `ms.WarmStart`, that checkpoints take along.
     callback: called with each Record; returning True stops.
     progress: show a bar. checkpoint: a file that is replaced, whole or not at all, every `checkpoint_every`
-    iterations and at the end. resume: continue from it if it exists, with the same bits as without the stop.
+    iterations and at the end. resume: continue from it if it exists, with the same bits as without the stop. A checkpoint
+    of another optimizer, of other bounds or options, or of another objective is refused (ValueError says what differs):
+    its best design is evaluated once and compared. max_iterations, tolerance, patience and on_jump may be others.
+    The bar, each Record and the printed result say how many designs were evaluated and rejected, and why.
 
     An objective may raise `ms.DesignRejected` where a design cannot be evaluated; the step then goes less far. Where
     every shorter one is rejected too, because the equilibrium jumps, the whole step is taken with jumps accepted if
@@ -68,10 +76,13 @@ def minimize(
     if on_jump not in ("cross", "stop"):
         raise ValueError(f'on_jump must be "cross" or "stop", got {on_jump!r}')
     ends = _Ends(max_iterations, tolerance, patience, callback)
-    run = Run(objective, parameters, optimizer, feasibility, stateful, cross=on_jump == "cross")
+    run = Run(
+        objective, parameters, optimizer, feasibility, stateful, on_jump == "cross", checkpoint is not None
+    )
     if resume and Path(checkpoint).exists():
-        run.restore(load(checkpoint))
+        run.restore(load(checkpoint, PARTS))
     bar = progress_bar("minimize", max_iterations, shown=progress, initial=run.iteration)
+    run.watch = _Watch(bar, run)
     try:
         with bar:
             return run.minimum(_loop(run, ends, bar, _Checkpoints(checkpoint, checkpoint_every)))
@@ -101,11 +112,11 @@ def _loop(run: Run, ends: _Ends, bar, checkpoints: _Checkpoints) -> str:
         try:
             moved = run.advance()
         except EquilibriumJumped as error:
-            reason = f"the equilibrium jumps, however short the step: {error}"
+            reason = f"the equilibrium jumps, however short the step: {error} ({run.rejected} designs were rejected)"
         else:
             checkpoints.save(run)
             bar.update()
-            bar.set_postfix_str(f"objective {run.history[-1].objective:.6g}")
+            bar.set_postfix_str(run.summary())
             reason = ends.reason(run.history, None if moved else run.standstill)
     checkpoints.save(run, last=True)
     return reason
@@ -145,6 +156,20 @@ class _Ends:
         values = [record.objective for record in history[-self.patience - 1 :]]
         changes = [abs(b - a) <= self.tolerance * abs(b) for a, b in pairwise(values)]
         return self.tolerance > 0 and len(changes) == self.patience and all(changes)
+
+
+@dataclass
+class _Watch:
+    """Shows after an evaluation what a run is at, since an iteration may need many; not more often than one can read."""
+
+    bar: Any
+    run: Run
+    shown: float = -math.inf
+
+    def __call__(self) -> None:
+        if time.monotonic() - self.shown > _READING:
+            self.bar.set_postfix_str(self.run.summary())
+            self.shown = time.monotonic()
 
 
 @dataclass

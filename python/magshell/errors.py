@@ -5,11 +5,13 @@ from __future__ import annotations
 
 class DesignRejected(RuntimeError):
     """Raised inside an objective: this design cannot be evaluated, its equilibrium was not found or jumped. Go
-    less far. `last_good` holds the last state of the same kind that could be, if there is one."""
+    less far. `last_good` holds the last state of the same kind that could be, if there is one. `load_case`: the number
+    of the load case that it is about, or None."""
 
-    def __init__(self, message: str, last_good=None):
+    def __init__(self, message: str, last_good=None, load_case: int | None = None):
         super().__init__(message)
         self.last_good = last_good
+        self.load_case = load_case
 
 
 class NotConverged(DesignRejected):

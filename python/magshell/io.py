@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ._arrays import named_values
+from ._files import replacing
 from ._mesh_selection import RELATIVE_TOLERANCE
 from ._obj import read_obj
 from ._ply import read_ply, write_ply
@@ -66,7 +67,8 @@ def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, fac
         face_fields: name -> (n_f,) or (n_f, k).
 
     Raises:
-        ValueError: unknown ending, wrong shapes, or names with spaces.
+        ValueError: unknown ending, wrong shapes, or names with spaces or one of " < > &.
+        OSError: it cannot be written; an older file is as it was.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -83,7 +85,8 @@ def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, fac
     meshio = _meshio("vtu")
     cell_data = {name: [values] for name, values in on_faces.items()}
     content = _meshio().Mesh(points, [("triangle", mesh.faces)], point_data=on_vertices, cell_data=cell_data)
-    meshio.write(path, content)
+    with replacing(path) as part:
+        meshio.write(part, content)
 
 
 def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields]:
@@ -168,6 +171,14 @@ def _merge_coincident(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray
     return points[first], vertex.ravel()[faces]
 
 
+def check_field_name(kind: str, name) -> None:
+    """Refuses what one of the formats could not hold: PLY ends a name at a space, and XML has signs of its own."""
+    if not (isinstance(name, str) and name and name.isprintable()) or set(name) & set(' "<>&'):
+        raise ValueError(
+            f'{kind} field names must be printable words without spaces and without any of " < > &, got {name!r}'
+        )
+
+
 def _detached(values):
     """A torch tensor without its history: a file holds no gradient."""
     return values.detach().cpu() if hasattr(values, "detach") else values
@@ -176,8 +187,7 @@ def _detached(values):
 def _checked_fields(kind: str, fields, rows: int) -> dict[str, np.ndarray]:
     checked = {}
     for name, values in named_values(f"{kind}_fields", fields).items():
-        if not isinstance(name, str) or not name or any(character.isspace() for character in name):
-            raise ValueError(f"{kind} field names must be words without spaces, got {name!r}")
+        check_field_name(kind, name)
         array = np.asarray(_detached(values))
         if array.ndim not in (1, 2) or len(array) != rows or 0 in array.shape:
             raise ValueError(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ._rejections import in_words
+
 STANDSTILL = (
     "the optimizer finds no lower design, to rounding"  # the reason of an end where a step moves nothing
 )
@@ -15,7 +17,8 @@ class Record:
 
     objective, its named terms, violation: the largest positive constraint. gradient_norm: |gradient| of the objective.
     seconds: since the start. evaluations: how often the objective was asked for, since the start. rejected: trial
-    designs of this iteration that could not be evaluated. jumped: whether the equilibrium jumped in its step.
+    designs of this iteration that could not be evaluated; rejections: why, {reason: how many}. jumped: whether the
+    equilibrium jumped in its step.
     """
 
     iteration: int
@@ -27,18 +30,23 @@ class Record:
     evaluations: int
     rejected: int = 0
     jumped: bool = False
+    rejections: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass
 class Minimum:
     """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an
-    iteration, from the start; reason: why it ended."""
+    iteration, from the start; reason: why it ended. rejections: why trial designs could not be evaluated, {reason: how
+    many}, in all. conflict: what seems to keep the objective from falling, where it is one and the same jump of the
+    equilibrium in every one of the last iterations; else empty."""
 
     parameters: list
     objective: float
     violation: float
     history: list[Record] = field(default_factory=list)
     reason: str = ""
+    rejections: dict[str, int] = field(default_factory=dict)
+    conflict: str = ""
 
     @property
     def iterations(self) -> int:
@@ -47,4 +55,7 @@ class Minimum:
     def __repr__(self) -> str:
         broken = f", constraints broken by {self.violation:.2g}" if self.violation > 0 else ""
         reached = f"Minimum: objective {self.objective:.6g}{broken}"
-        return f"{reached} after {self.iterations} iterations ({self.reason})"
+        evaluations = f", {self.history[-1].evaluations} evaluations" if self.history else ""
+        rejected = in_words(self.rejections)
+        first = f"{reached} after {self.iterations} iterations{evaluations} ({self.reason})"
+        return "\n  ".join(filter(None, (first, rejected, self.conflict)))

@@ -45,8 +45,12 @@ def multistart(
     attempts: how often a start is begun whose process, made here, dies; then it counts as failed. Other executors
         have rules of their own.
     feasibility: how far a Minimum may break its constraints and still come before all that break theirs by more.
-    checkpoint: a folder that gets a file for every start that has finished.
-    resume: take from it what is there, if the starts are the same, and run the rest and what failed.
+    checkpoint: a folder that gets a file for every start that has finished. The files hold data only: run must return
+        numbers, arrays, tensors, ms.Minimum, or containers of these, and reading them runs nothing.
+    resume: take from it what is there, and run the rest and what failed. What is taken is told by the bar, by the result
+        and by its `resumed`. Another start under the same number is refused, and so is a run that is another one: by its
+        name, its code, the arguments bound to it, what it holds, and what it looks up in its module and in others that
+        are not installed. (Results of another release of magshell or of a package are taken: name another folder.)
     progress: show a bar. The bars of the runs themselves are not shown.
 
     Every start has one thread, magshell's, torch's and in processes made here the BLAS's too, so that results are the
@@ -67,11 +71,13 @@ def multistart(
     starts = _listed(starts)
     _check(run, executor, workers, attempts, feasibility, checkpoint, resume)
     task = _tasks(run, starts, executor)
-    files = None if checkpoint is None else StartFiles(checkpoint, run, resume)
+    files = None if checkpoint is None else StartFiles(checkpoint, run, starts, resume)
     state = _State(starts, feasibility, files)
     bar = progress_bar("multistart", len(starts), shown=progress, initial=len(state.outcomes))
     try:
         with bar:
+            if state.resumed:
+                bar.set_postfix_str(state.summary())
             if executor is not None:
                 _drive(state, executor, task, bar)
             elif state.unfinished:
@@ -112,7 +118,8 @@ class _State:
 
     def __init__(self, starts: list, feasibility: float, files: StartFiles | None):
         self.starts, self._feasibility, self._files = starts, feasibility, files
-        self.outcomes: dict[int, Outcome] = files.finished(starts) if files else {}
+        self.outcomes: dict[int, Outcome] = files.finished() if files else {}
+        self.resumed = tuple(sorted(self.outcomes))
         self._began = time.perf_counter()
 
     @property
@@ -122,7 +129,7 @@ class _State:
     def take(self, number: int, outcome: Outcome) -> None:
         self.outcomes[number] = outcome
         if self._files and not outcome.failed:
-            self._files.write(number, self.starts[number], outcome)
+            self._files.write(number, outcome)
 
     def result(self) -> Multistart:
         finished, failed = [], []
@@ -136,7 +143,7 @@ class _State:
                 finished.append(FinishedStart(number, start, *values, seconds))
         finished.sort(key=self._rank)
         seconds = time.perf_counter() - self._began
-        return Multistart(tuple(finished), tuple(failed), tuple(self.unfinished), seconds)
+        return Multistart(tuple(finished), tuple(failed), tuple(self.unfinished), seconds, self.resumed)
 
     def _rank(self, found: FinishedStart) -> tuple[float, float]:
         """Feasible designs by their objective, before all others by how far they are from it."""
@@ -151,7 +158,8 @@ class _State:
         found = self.result()
         best = f"best {found.best.objective:.6g}" if found else ""
         failed = f"{len(found.failed)} failed" if found.failed else ""
-        return ", ".join(filter(None, (best, failed)))
+        resumed = f"{len(self.resumed)} from {self._files.folder}" if self.resumed else ""
+        return ", ".join(filter(None, (best, failed, resumed)))
 
 
 def _tasks(run, starts: list, executor) -> Callable[[int], tuple]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,9 +13,10 @@ import numpy as np
 from tqdm import tqdm
 
 from ._arrays import named_values
+from ._files import replacing
 from ._quantity import quantity
 from ._tensors import detached
-from .io import write_mesh
+from .io import check_field_name, write_mesh
 from .plotting.playing import with_times
 from .plotting.states import State, states_of
 
@@ -61,6 +63,8 @@ def write_series(
     path = Path(path)
     if path.suffix.lower() != ".pvd":
         raise ValueError(f"a series is saved as .pvd, got {path.name!r}; write_mesh writes one state as .vtu")
+    if not path.name.isprintable():
+        raise ValueError(f"the name of a series must be printable, got {path.name!r}")
     if not path.parent.is_dir():
         raise FileNotFoundError(f"cannot write {path.name!r}: there is no folder {str(path.parent)!r}")
     states = states_of(
@@ -92,7 +96,7 @@ def write_series(
             on_faces = {name: values[k] for name, values in more["face"].items()}
             if magnetized:
                 on_faces["magnetization"] = state.magnetization
-            _write(path.parent / names[k], state, on_vertices, on_faces)
+            write_mesh(path.parent / names[k], state.mesh, state.positions, on_vertices, on_faces)
             done.append(k)
     return path
 
@@ -103,6 +107,7 @@ def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, 
     mesh = states[0].mesh
     rows = mesh.n_vertices if kind == "vertex" else mesh.n_faces
     for name, values in given.items():
+        check_field_name(kind, name)
         if values.ndim not in (2, 3) or values.shape[:2] != (len(states), rows):
             raise ValueError(
                 f"{kind} field {name!r} must have shape ({len(states)}, {rows}) or ({len(states)}, {rows}, k), "
@@ -111,48 +116,41 @@ def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, 
     return given
 
 
-def _write(path: Path, state: State, on_vertices: dict, on_faces: dict) -> None:
-    """One state. The file appears when it is complete."""
-    part = path.with_name(f".{path.name}")
-    try:
-        write_mesh(part, state.mesh, state.positions, on_vertices, on_faces)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
 @contextmanager
 def _listed(path: Path, names: list[str], states: list[State]) -> Iterator[list[int]]:
     """Writes the PVD of the states whose numbers are appended to the list it gives, also after an error."""
     done: list[int] = []
-    reserve = path.with_name(f".{path.name}")
+    stopped = None
     try:
-        _clear(path)
-        (path.parent / path.stem).mkdir(exist_ok=True)
-        # in full at first, so that it has its place on a disk that the states fill
-        reserve.write_bytes(_contents(names, states, range(len(states))))
-        yield done
+        with replacing(path) as part:
+            (path.parent / path.stem).mkdir(exist_ok=True)
+            _clear(path)
+            # in full at first, so that it has its place on a disk that the states fill
+            part.write_bytes(_contents(names, states, range(len(states))))
+            try:
+                yield done
+            except BaseException as error:
+                if not done:
+                    raise
+                stopped = error
+            with part.open("r+b") as file:
+                file.write(_contents(names, states, done))
+                file.truncate()
+        if stopped is not None:
+            raise stopped
     except OSError as error:
         kept = "no state is" if not done else f"{len(done)} of {len(states)} states are"
         where = f", listed in {path.name!r}" if done else ""
-        reason = error.strerror or str(error)
+        reason = os.strerror(error.errno) if error.errno else str(error)
         raise OSError(
             error.errno, f"cannot write the series {str(path)!r}: {reason}; {kept} on disk{where}"
         ) from error
-    finally:
-        if done:
-            contents = _contents(names, states, done)
-            with open(reserve, "r+b") as file:
-                file.write(contents)
-                file.truncate()
-            reserve.replace(path)
-        reserve.unlink(missing_ok=True)
 
 
 def _clear(path: Path) -> None:
     """Removes an earlier series of this name: its list, and the files that bear the names of its states."""
     path.unlink(missing_ok=True)
-    state = re.compile(rf"\.?{re.escape(path.stem)}_\d+\.vtu")
+    state = re.compile(rf"\.?{re.escape(path.stem)}_\d+(\.[0-9a-f]+)?\.vtu")
     for file in (path.parent / path.stem).glob("*.vtu"):
         if state.fullmatch(file.name):
             file.unlink()

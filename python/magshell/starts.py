@@ -40,12 +40,13 @@ class FailedStart:
 @dataclass(frozen=True, eq=False, repr=False)
 class Multistart(Sequence):
     """The finished starts as a sequence, best first. failed: FailedStarts, by number. unfinished: numbers of the starts
-    that an interruption left. seconds: in all."""
+    that an interruption left. seconds: in all. resumed: numbers of the starts whose results came from the checkpoint."""
 
     finished: tuple[FinishedStart, ...]
     failed: tuple[FailedStart, ...]
     unfinished: tuple[int, ...]
     seconds: float
+    resumed: tuple[int, ...] = ()
 
     def __getitem__(self, index):
         return self.finished[index]
@@ -69,6 +70,7 @@ class Multistart(Sequence):
     def __repr__(self) -> str:
         total = len(self.finished) + len(self.failed) + len(self.unfinished)
         head = f"Multistart: {len(self.finished)} of {total} starts finished in {self.seconds:.3g} s"
+        head += f", {len(self.resumed)} of them earlier (from the checkpoint)" if self.resumed else ""
         head += f", {len(self.failed)} failed" if self.failed else ""
         lines = [f"  start {found.number}: {_in_words(found)}" for found in self.finished[:_SHOWN]]
         if len(self.finished) > _SHOWN:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ._files import replace_file
 from ._surroundings import near_kinks
 from ._tensors import detached
 from .integrators import Integrator
@@ -36,8 +37,8 @@ class MotionState:
         lengths = np.array([len(each) for each in self.memory], dtype=np.int64)
         remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.memory)])
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        with Path(path).open("wb") as file:  # a number would be an open file of somebody else's
-            np.savez(file, time=self.time, memory=remembered, memory_lengths=lengths, **arrays)
+        arrays |= {"time": self.time, "memory": remembered, "memory_lengths": lengths}
+        replace_file(path, lambda file: np.savez(file, **arrays))
 
     @classmethod
     def load(cls, path: str | Path) -> MotionState:

@@ -8,14 +8,14 @@ from contextlib import contextmanager
 import numpy as np
 
 from . import _core
-from ._cases import join, split, starts_of
+from ._cases import join, of_case, split, starts_of
 from ._designs import between, numbers_only, packed, unpacked
 from ._solve import Search, Solution, find, inputs_of
 from ._start import Origin
 from ._tensors import require_torch
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
-from .errors import EquilibriumJumped, NotConverged
+from .errors import EquilibriumJumped, Interrupted, NotConverged
 from .scene import Scene
 from .solvers import MixedNewton, Newton
 
@@ -76,10 +76,13 @@ class WarmStart:
             try:
                 solution = self._next(k, arguments) if self._last else self._first(starts[k], arguments)
                 solutions.append(solution)
-            except EquilibriumJumped as error:
+            except (EquilibriumJumped, NotConverged, Interrupted) as error:
                 if cases is None:
                     raise
-                raise EquilibriumJumped(f"load case {k} of {len(cases)}: {error}", error.last_good) from error
+                last_good = error.last_good
+                if not isinstance(error, EquilibriumJumped):
+                    last_good = Equilibria([*(each.equilibrium for each in solutions), last_good])
+                raise of_case(error, k, len(cases), last_good) from error
         self._last, self._of_cases = solutions, cases is not None
         self._design = [numbers_only(arguments) for arguments in cases or [design]]
         return self.equilibria

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+from .._files import replacing
 from .report import (
     add_common_arguments,
     as_json,
@@ -92,7 +93,8 @@ def _draw(name: str, results: dict, made_on: dict, path: Path) -> int:
         figures = importlib.import_module(f"magshell.bench.figures.{PARTS[name].figure}")
     except ImportError as error:
         return _missing(error, f"{path} was not drawn; the numbers are above")
-    figures.draw(results, made_on).savefig(path, dpi=160)
+    with replacing(path) as part:
+        figures.draw(results, made_on).savefig(part, dpi=160)
     print(f"\nThe figure is {path}.")
     return 0
 

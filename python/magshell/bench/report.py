@@ -15,6 +15,7 @@ import scipy
 
 import magshell as ms
 from magshell import _core
+from magshell._files import check_replaceable, replace_file
 from magshell._progress import progress_bar
 
 
@@ -69,19 +70,17 @@ def writable_path(text: str) -> Path:
     path = Path(text)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("a"):
-            pass
+        check_replaceable(path)
     except OSError as error:
-        raise argparse.ArgumentTypeError(f"cannot write {path}: {error.strerror}") from error
+        reason = error.strerror if error.filename is None else f"cannot write {path}: {error.strerror}"
+        raise argparse.ArgumentTypeError(reason) from error
     return path
 
 
 def writable_folder(text: str) -> Path:
     """A folder in which files can be written, made if need be."""
     folder = Path(text)
-    trial = folder / ".written"
-    if not trial.exists():
-        writable_path(str(trial)).unlink()
+    writable_path(str(folder / "part.json"))
     return folder
 
 
@@ -138,7 +137,8 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
 
 def write_json(path: Path, part: str, results: dict) -> None:
     content = {"part": part, "setting": setting(), "results": results}
-    path.write_text(json.dumps(content, indent=2, allow_nan=True) + "\n")
+    text = json.dumps(content, indent=2, allow_nan=True) + "\n"
+    replace_file(path, lambda file: file.write(text.encode()))
 
 
 def setting() -> dict[str, str | int]:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import torch
 
 from ..errors import DesignRejected
-from .base import check_parameter
+from .base import check_parameter, group_options
 from .iterate import Iterate, Restoring
 from .sample import Sample
 
@@ -54,6 +54,10 @@ class AnyTorch(Iterate):
     def load_state_dict(self, state_dict: dict) -> None:
         self.optimizer.load_state_dict(state_dict["optimizer"])
         self._load_sample(state_dict["sample"])
+
+    def configuration(self) -> dict:
+        """{name: value} of the groups' options."""
+        return {"max_shortenings": self.max_shortenings, **group_options(self.param_groups, set())}
 
     def _step(self, closure: Callable, share: float) -> float:
         begin = self.evaluate(closure)

@@ -97,6 +97,15 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         sample = self._sample_state()
         self._run = {name: as_array(value) for name, value in state_dict["run"].items() if name not in sample}
 
+    def configuration(self) -> dict:
+        """{name: number or array} of all that decides where a run goes: the box, the groups' options and the method's."""
+        box = self._box()
+        told = {
+            name: getattr(box, name) + 0.0 for name in ("lower", "upper", "scale")
+        }  # -0.0 is no other bound
+        told |= {name: getattr(self, name) for name in self._copied if not name.startswith("_")}
+        return told | group_options(self.param_groups, set(told))
+
     def __getstate__(self) -> dict:
         kept = {name: getattr(self, name) for name in self._copied}
         return {**super().__getstate__(), **kept, "_closure": None}
@@ -125,6 +134,17 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         """A group's number, (n,): one entry for each entry of its parameters."""
         sizes = [sum(parameter.numel() for parameter in group["params"]) for group in self.param_groups]
         return np.repeat([float(group[name]) for group in self.param_groups], sizes)
+
+
+def group_options(groups: list[dict], without: set[str]) -> dict:
+    """The options of parameter groups, by names of their own."""
+    kept = {"params", "param_names", *without}
+    return {
+        f"{name} of group {number}": value
+        for number, group in enumerate(groups)
+        for name, value in group.items()
+        if name not in kept
+    }
 
 
 def require_range(group: dict, name: str, low: float, high: float) -> None:

@@ -12,13 +12,14 @@ from . import backend as backends
 from . import films
 from .colors import Scalar, scalar_of
 from .frames import Reel, Scenery
+from .limits import arrow_count, checked_width
 from .panels import Drawing, Options, size_of
 from .playing import Moment, between, moments, same_faces, speed_of, spoken, spread, state_at, with_times
-from .plot import arrow_count
 from .states import State, states_of
 from .units import length_unit
 from .view import view_of
 
+SLOWEST, FASTEST = 0.01, 1000.0  # frames a second that the formats can hold
 PALETTE_FRAMES = 12  # that a GIF's colours are chosen from
 
 
@@ -55,7 +56,8 @@ def animate(
     speed: seconds of the motion that one second of the movie shows, 0.1 for ten times slower. By default 1 for a motion
         of 3 to 20 s, else a round number that makes the movie about 8 s long. The movie says which.
     obstacles: as in `plot`; a moving one moves.
-    fps: frames a second; a .gif keeps a whole number of hundredths of a second a frame, and at most 50 a second.
+    fps: frames a second; a .gif keeps a whole number of hundredths of a second a frame, and at most 50 a second. A movie
+        has at most 20,000 frames.
     title: stands before the time. progress: show a bar once it has taken two seconds. The rest is as in `plot`.
 
     Colours, arrows and the window are scaled once, for the whole motion. An .mp4 needs ffmpeg (the extra `movie`).
@@ -65,10 +67,10 @@ def animate(
     ImportError without matplotlib or, for an .mp4, ffmpeg.
     """
     fps = float(quantity("fps", "1/s", fps, ()))
-    if fps <= 0:
-        raise ValueError(f"fps [1/s] must be positive, got {fps:g}")
-    if width < 400:
-        raise ValueError(f"width must be at least 400 pixels, got {width}")
+    if not SLOWEST <= fps <= FASTEST:
+        raise ValueError(f"fps [1/s] must be positive, from {SLOWEST:g} to {FASTEST:g}, got {fps:g}")
+    width = checked_width(width)
+    count = arrow_count(arrows)
     path = films.checked_path(path, fps)
     if path.suffix.lower() == ".gif":
         fps = 100 / round(100 / fps)  # what the format can hold
@@ -88,7 +90,7 @@ def animate(
     speed = speed_of(states, speed)
     unit = length_unit(size_of(states))
     scalar = scalar_of(states, color, color_label, color_range, unit)
-    options = Options(arrow_count(arrows), show_field, rest, mesh_lines)
+    options = Options(count, show_field, rest, mesh_lines)
     scenery = Scenery(states, scalar, view_of(states, view), unit, options)
     shown = moments(states, fps, speed)
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import errno
 import importlib
-import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+
+from .._files import replacing
 
 _NO_PILLOW = 'a GIF needs pillow: pip install "magshell[plot]"'
 _NO_FFMPEG = (
@@ -39,33 +39,11 @@ def checked_path(path, fps: float) -> Path:
 
 def write(path: Path, images: Iterable[np.ndarray], samples: list[np.ndarray], fps: float) -> None:
     """Writes images (height, width, 3) uint8. `samples`: some of them, which between them have all colours."""
-    with _whole(path) as part:
+    with replacing(path) as part:
         if path.suffix.lower() == ".gif":
             _write_gif(part, images, samples, fps)
         else:
             _write_mp4(part, images, fps)
-
-
-@contextmanager
-def _whole(path: Path) -> Iterator[Path]:
-    """A file beside the path that takes its place when all went well, and is gone when not."""
-    handle, name = tempfile.mkstemp(suffix=path.suffix, prefix=f".{path.stem}-", dir=path.parent)
-    os.close(handle)
-    part = Path(name)
-    try:
-        yield part
-        part.chmod(0o666 & ~_umask())
-        part.replace(path)
-    except OSError as error:
-        raise OSError(error.errno, f"cannot write {str(path)!r}: {error.strerror or error}") from error
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _write_gif(path: Path, images: Iterable[np.ndarray], samples: list[np.ndarray], fps: float) -> None:

@@ -5,18 +5,21 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .._files import replace_file
 from .._quantity import quantity
 from . import colors, glyphs
 from .colors import Scalar, scalar_of
+from .limits import arrow_count
 from .panels import outline, size_of
 from .playing import SAMPLES, same_faces, speed_of, spread, with_times
-from .plot import arrow_count, checked_titles
+from .plot import checked_titles
 from .states import State, states_of
 from .units import LengthUnit, length_unit, prefixed, with_unit
 from .view import view_of
@@ -60,6 +63,9 @@ def write_page(
     path = Path(path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"a page is saved as .html, got {path.name!r}")
+    count = arrow_count(arrows)
+    if not isinstance(title, str):
+        raise ValueError(f"title must be a string, got {title!r:.60}")
     if not path.parent.is_dir():
         raise FileNotFoundError(f"cannot write {path.name!r}: there is no folder {str(path.parent)!r}")
     states = states_of(
@@ -80,7 +86,6 @@ def write_page(
     scalars = _scalars(states, color, color_label, color_range, unit)
     titles = checked_titles(titles, states)
     fields = _sources(states, size)
-    count = arrow_count(arrows)
     numbers = 3 * mesh.n_vertices + 6 * count + sum(len(s.values[0]) for s in scalars if not _is_constant(s))
     numbers += max((6 * len(field.starts) for field in fields[0] if field is not None), default=0)
     dtype, kept = _that_fit(len(states), numbers, size_limit)
@@ -99,9 +104,12 @@ def write_page(
         "speed": None if states[0].time is None else speed,
     }
     template = files(__package__).joinpath("page.html").read_text(encoding="utf-8")
-    text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-    page = template.replace("{{title}}", html.escape(title)).replace("{{data}}", text)
-    path.write_text(page, encoding="utf-8")
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {"title": html.escape(title), "data": text}
+    page = re.sub(
+        r"\{\{(title|data)\}\}", lambda place: parts[place[1]], template
+    )  # what is put in is not searched
+    replace_file(path, lambda file: file.write(page.encode()))
     return path
 
 

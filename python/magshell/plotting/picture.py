@@ -9,8 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from .._arrays import positive
+from .._files import replace_file
 from . import colors, polygons, vtk
 from .colors import Scalar, scale_colors
+from .limits import check_pixels
 from .panels import Drawing, Label, Panel
 from .units import round_below
 
@@ -27,21 +30,22 @@ class Picture:
     figure: the matplotlib Figure, to add to. backend: what painted it.
     """
 
-    def __init__(self, figure, backend: str):
+    def __init__(self, figure, backend: str = "matplotlib"):
         self.figure = figure
         self.backend = backend
 
-    def save(self, path) -> Path:
-        """Writes a PNG.
+    def save(self, path, dpi: float | None = None) -> Path:
+        """Writes a PNG. dpi: dots an inch, by default the figure's own. An older file is replaced when it is complete.
 
-        Raises ValueError on another ending, FileNotFoundError or another OSError on a bad folder.
+        Raises ValueError on another ending or too many pixels, FileNotFoundError or another OSError on a bad folder.
         """
         path = Path(path)
         if path.suffix.lower() != ".png":
             raise ValueError(f"a picture is saved as .png, got {path.name!r}")
         if not path.parent.is_dir():
             raise FileNotFoundError(f"cannot save {path.name!r}: there is no folder {str(path.parent)!r}")
-        path.write_bytes(self._repr_png_())
+        content = self._repr_png_(dpi)
+        replace_file(path, lambda file: file.write(content))
         return path
 
     def show(self) -> None:
@@ -61,9 +65,11 @@ class Picture:
         window.figimage(image, resize=True)
         pyplot.show()
 
-    def _repr_png_(self) -> bytes:
+    def _repr_png_(self, dpi: float | None = None) -> bytes:
+        dpi = self.figure.dpi if dpi is None else positive("dpi", dpi)
+        check_pixels(*(dpi * self.figure.get_size_inches()), "ask for fewer dots an inch (`dpi`)")
         buffer = io.BytesIO()
-        self.figure.savefig(buffer, format="png", dpi=self.figure.dpi)
+        self.figure.savefig(buffer, format="png", dpi=dpi)
         return buffer.getvalue()
 
     def __repr__(self) -> str:
@@ -85,6 +91,11 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: 
     panel_height = panel_width * (window[3] - window[2]) / (window[1] - window[0])
     title = TITLE if any(panel.title for panel in drawing.panels) else 0.0
     height = rows * (panel_height + title) + LEGEND + 2 * MARGIN
+    check_pixels(
+        width,
+        height * dpi,
+        "ask for a smaller `width`, or for fewer `states` or more `columns` if there are many",
+    )
     figure = Figure(figsize=(inches, height), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._quantity import quantity
+from .limits import check_frames
 from .states import State, timed
 from .units import clock
 
@@ -72,7 +73,9 @@ def spoken(speed: float) -> str:
 
 def moments(states: list[State], fps: float, speed: float) -> list[Moment]:
     """Those that the frames show, the last state among them; without times, each state once."""
-    if duration_of(states) <= 0:
+    duration = duration_of(states)
+    check_frames(len(states) if duration <= 0 else duration * (fps / speed))
+    if duration <= 0:
         return [Moment(k, 0.0, state.time) for k, state in enumerate(states)]
     times = np.array([state.time for state in states])
     count = max(int(np.ceil((times[-1] - times[0]) * fps / speed - 1e-9)), 1)

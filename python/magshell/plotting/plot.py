@@ -7,7 +7,7 @@ import numpy as np
 from .._arrays import index_array
 from . import backend as backends
 from .colors import scalar_of
-from .glyphs import ARROWS
+from .limits import arrow_count, check_columns, checked_width
 from .panels import Options, draw, size_of
 from .picture import Picture, paint
 from .playing import spread
@@ -60,7 +60,7 @@ def plot(
     titles: one a state. overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light
         shows a motion. columns: of panels, by default what fits best.
     view: (elevation, azimuth) in degrees of the eye, as in matplotlib; by default what suits the sheet.
-    width: pixels.
+    width: pixels, 400 to 8000; a picture has at most 16 million of them.
     backend: "pyvista" or "matplotlib"; by default the environment variable MAGSHELL_PLOT, else pyvista where
         it can render off the screen, else matplotlib.
 
@@ -70,6 +70,9 @@ def plot(
     >>> ms.plot(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), backend="matplotlib", width=800)
     Picture(800 x 343 pixels, painted by matplotlib)
     """
+    width = checked_width(width)
+    check_columns(columns, width)
+    count = arrow_count(arrows)
     painter = backends.choose(backend)
     drawn = states_of(
         what,
@@ -83,22 +86,10 @@ def plot(
     titles = checked_titles(titles, drawn)
     unit = length_unit(size_of(drawn))
     scalar = scalar_of(drawn, color, color_label, color_range, unit)
-    if width < 400 or (columns is not None and columns < 1):
-        raise ValueError(
-            f"width must be at least 400 pixels and columns at least 1, got {width} and {columns}"
-        )
     groups = [drawn] if overlay or fade else [[state] for state in drawn]
-    options = Options(arrow_count(arrows), show_field, rest, mesh_lines, fade)
+    options = Options(count, show_field, rest, mesh_lines, fade)
     drawing = draw(groups, titles, scalar, view_of(drawn, view), unit, options)
     return paint(drawing, width, columns, painter)
-
-
-def arrow_count(arrows: bool | int) -> int:
-    """About how many arrows are on a sheet."""
-    count = ARROWS if arrows is True else int(arrows)
-    if count < 0:
-        raise ValueError(f"arrows must be True, False or a count, got {arrows}")
-    return count
 
 
 def checked_titles(titles, states: list[State]) -> list[str]:

@@ -38,12 +38,17 @@ def paint(axes, panel: Panel, view: View, window: np.ndarray, screen: Screen) ->
     window: (left, right, bottom, top), m.
     """
     fine = render(panel.solids, view, window, screen)
-    image = sum(
-        fine[i::OVERSAMPLING, j::OVERSAMPLING] / 255.0
-        for i in range(OVERSAMPLING)
-        for j in range(OVERSAMPLING)
+    image = np.zeros((fine.shape[0] // OVERSAMPLING, fine.shape[1] // OVERSAMPLING, 3), dtype=np.uint16)
+    for i in range(OVERSAMPLING):
+        for j in range(OVERSAMPLING):
+            image += fine[i::OVERSAMPLING, j::OVERSAMPLING]
+    axes.imshow(
+        image / np.float32(255 * OVERSAMPLING**2),
+        extent=window,
+        interpolation="none",
+        aspect="auto",
+        zorder=0,
     )
-    axes.imshow(image / OVERSAMPLING**2, extent=window, interpolation="none", aspect="auto", zorder=0)
 
 
 def _quiet_without_a_screen() -> None:
