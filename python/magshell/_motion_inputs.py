@@ -7,12 +7,13 @@ from numbers import Integral
 import numpy as np
 
 from . import _core
+from ._clock import Clock, clock_of
 from ._inputs import Inputs
 from ._quantity import quantity
 from ._schedule import scheduled
 from ._start import check_faces
 from ._surroundings import check_outside, poses
-from ._tensors import is_tensor
+from ._tensors import is_tensor, wants_gradient
 from .equilibrium import Equilibrium
 from .integrators import Integrator
 from .solvers import Newton
@@ -25,6 +26,12 @@ _CONTROLS = {  # (unit, of one time, name in the core)
     "gravity_factor": ("1", (), "gravity"),
     "motion_factor": ("1", (), "motion"),
 }
+_NO_WAY_BACK = (  # of an Equilibrium, of a Trajectory
+    "start is an Equilibrium that requires a gradient, and none goes back through it: start=rest.positions passes one "
+    "on, and start=rest.positions.detach() none",
+    "start is a Trajectory that requires a gradient, and none goes back through it: start=first.end goes on without; "
+    "start=first.positions[-1], velocities=first.velocities[-1] pass one on, with the edge rotations at rest and time 0",
+)
 
 
 class MotionInputs:
@@ -64,6 +71,7 @@ class MotionInputs:
         self._damping = self._checked_damping(inputs.take("damping", damping))
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
         self.start = self._begin(start, velocities)
+        self.clock = clock_of(self.start).going_on(self.time_step)
         self._knots = {name: self._controls(name, value, time_step) for name, value in controls.items()}
         self.core = _core.MotionInput(
             inputs.scene._model,
@@ -96,7 +104,7 @@ class MotionInputs:
         return knots[np.concatenate([[0], ends])]
 
     def _poses(self) -> np.ndarray:
-        """Of the obstacles at all knots; their time goes on where the start's ended."""
+        """Of the obstacles at all knots."""
         values, scene = self.inputs.values, self.inputs.scene
         shares = np.array((0.0, *self.integrator._times))
         if any(leaf.name == "time_step" for leaf in self.inputs.leaves) and any(
@@ -105,7 +113,7 @@ class MotionInputs:
             raise ValueError(
                 "time_step cannot have a gradient where obstacles move by a function of the time"
             )
-        times = self.start.time + self.time_step * (np.arange(self.steps)[:, None] + shares).ravel()
+        times = self.clock.at(np.arange(self.steps)[:, None], shares).ravel()
         return poses([values.current(each) for each in scene.obstacles], times)
 
     def _controls(self, name: str, value, time_step) -> np.ndarray:
@@ -116,7 +124,7 @@ class MotionInputs:
             value = np.zeros(3)
         elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
-        knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, time_step)
+        knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)
         return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
 
     def _checked_damping(self, given) -> np.ndarray:
@@ -172,7 +180,12 @@ class MotionInputs:
         rows = np.broadcast_to(quantity("velocities", "m/s", given, np.shape(given)), (n_v, 3))
         velocity = model.full_vector(np.ascontiguousarray(rows))
         return MotionState(
-            origin.time, origin.state, velocity, origin.memory, maxwell_strains=origin.maxwell_strains
+            origin.time,
+            origin.state,
+            velocity,
+            origin.memory,
+            maxwell_strains=origin.maxwell_strains,
+            clock=origin.clock,
         )
 
     def _origin(self, start) -> MotionState:
@@ -184,6 +197,8 @@ class MotionInputs:
         if isinstance(start, Equilibrium | Trajectory):
             if start.scene is not inputs.scene:
                 raise ValueError("start is of another scene; hand over its positions instead")
+            if wants_gradient(start.positions):
+                raise ValueError(_NO_WAY_BACK[isinstance(start, Trajectory)])
             if isinstance(start, Trajectory):
                 return start.end
             return MotionState(0.0, start._state, still, start._memory)
@@ -214,6 +229,8 @@ def _checked_state(start: MotionState, size: int, n_faces: int) -> MotionState:
     for k, each in enumerate(start.memory):
         quantity(f"start.memory[{k}]", "SI", each, ("n",))
     quantity("start.time", "s", start.time, ())
+    if not isinstance(start.clock, Clock | None):
+        raise ValueError(f"start.clock must be that of a motion, or None, got {type(start.clock).__name__}")
     return start
 
 

@@ -55,7 +55,8 @@ def simulate(
 
     steps, time_step: how many, and s.
     applied_flux_density: T: constant (3,), one a step (steps, 3), at the ends of all steps (steps + 1, 3) with straight
-        lines between them, or a function of the time [s] that returns (3,).
+        lines between them, or a function of the time [s] that returns (3,). The time is the motion's own, as in `times`: 0
+        at its beginning, and where `start` is a motion it goes on. Arrays begin with the first step taken here.
     load_factor, gravity_factor, field_factor, motion_factor: as in ms.equilibrium; numbers, or in time as above.
     damping: N s/m, viscous, on every vertex or (n_v,).
     stiffness_damping: s. The rate of the strains adds as much stress as this time of it would: for small motions the
@@ -63,7 +64,8 @@ def simulate(
     maxwell_modulus, maxwell_time: a Maxwell branch beside the elastic stiffness: its modulus over the elastic one, and
         its relaxation time, s. It begins relaxed.
     start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
-        bits. By default the rest shape.
+        bits. By default the rest shape. Gradients go back to positions; an Equilibrium or Trajectory that requires one
+        is refused.
     velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
     remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density.
     integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(). A method of higher
@@ -164,12 +166,12 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     scene, model = asked.inputs.scene, asked.inputs.scene._model
     positions, edge_rotations, velocities = _outputs(asked, found)
     recorded = len(found.kinetic_energy)
-    names = model.term_names
+    names, ended = model.term_names, asked.clock.after(found.steps_done)
     by_term = np.array(found.energies).reshape(recorded, len(names))
     return Trajectory(
         scene=scene,
         integrator=asked.integrator,
-        times=asked.start.time + asked.time_step * asked.record_every * np.arange(recorded),
+        times=asked.clock.at(asked.record_every * np.arange(recorded)),
         positions=positions,
         velocities=velocities,
         edge_rotations=edge_rotations,
@@ -181,7 +183,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         steps_done=found.steps_done,
         halved={step: len(parts) for step, parts in found.halved.items()},
         end=MotionState(
-            asked.start.time + asked.time_step * found.steps_done,
+            ended.time,
             found.last_state,
             found.last_velocity,
             found.last_memory,
@@ -189,6 +191,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
             found.last_strain_rates(model),
             found.last_maxwell_strains(model),
             found.last_maxwell_strain_rates(model),
+            ended,
         ),
         iterations=found.iterations,
         factorizations=found.factorizations,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ._clock import Clock, clock_of
 from ._surroundings import near_kinks
 from ._tensors import detached
 from .integrators import Integrator
@@ -20,10 +21,12 @@ def _no_strains() -> np.ndarray:
 
 @dataclass(frozen=True)
 class MotionState:
-    """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits.
+    """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits,
+    in steps of the same length.
 
-    time: s, since the start of the motion that led here. Everything else is in the core's order of unknowns and faces;
-    what the motion had no need of is empty: accelerations and strain rates (TRBDF2), strains of a Maxwell branch.
+    time: s, since the start of the motion that led here; clock: how it was counted, in steps. Everything else is in the
+    core's order of unknowns and faces; what the motion had no need of is empty: accelerations and strain rates (TRBDF2),
+    strains of a Maxwell branch.
     """
 
     time: float
@@ -34,6 +37,7 @@ class MotionState:
     strain_rates: np.ndarray = field(repr=False, default_factory=_no_strains)
     maxwell_strains: np.ndarray = field(repr=False, default_factory=_no_strains)
     maxwell_strain_rates: np.ndarray = field(repr=False, default_factory=_no_strains)
+    clock: Clock | None = field(repr=False, default=None)
 
     def save(self, path: str | Path) -> None:
         """Writes an .npz file."""
@@ -41,7 +45,14 @@ class MotionState:
         remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.memory)])
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         with Path(path).open("wb") as file:  # a number would be an open file of somebody else's
-            np.savez(file, time=self.time, memory=remembered, memory_lengths=lengths, **arrays)
+            np.savez(
+                file,
+                time=self.time,
+                clock=astuple(clock_of(self)),
+                memory=remembered,
+                memory_lengths=lengths,
+                **arrays,
+            )
 
     @classmethod
     def load(cls, path: str | Path) -> MotionState:
@@ -49,11 +60,13 @@ class MotionState:
         try:
             with np.load(Path(path), allow_pickle=False) as file:
                 time, remembered, lengths = (file[name] for name in ("time", "memory", "memory_lengths"))
+                origin, time_step, steps = file["clock"].tolist()
                 arrays = {name: file[name] for name in _ARRAYS}
-        except (KeyError, ValueError, EOFError) as error:
+            clock = Clock(origin, time_step, int(steps))
+        except (KeyError, ValueError, TypeError, EOFError) as error:
             raise ValueError(f"{path} is not a saved MotionState: {error}") from error
         parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
-        return cls(float(time), memory=[part.tolist() for part in parts], **arrays)
+        return cls(float(time), memory=[part.tolist() for part in parts], clock=clock, **arrays)
 
 
 _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")

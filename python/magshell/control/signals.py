@@ -11,16 +11,26 @@ import math
 
 import numpy as np
 
+from .._clock import Clock, clock_of
 from .._quantity import quantity
 from .._tensors import detached, positive_number, require_torch
+from ..trajectory import MotionState, Trajectory
 from ._arguments import count, tensor
 
 
-def step_times(steps: int, time_step):
-    """The times of the ends of all steps, the start first: (steps + 1,) s. time_step: s."""
+def step_times(steps: int, time_step, start: Trajectory | MotionState | None = None):
+    """The times of the ends of all steps, the start first: (steps + 1,) s.
+
+    time_step: s. start: the motion that goes on with these steps, and whose times do; by default they begin at 0.
+    """
     torch = require_torch("ms.control.step_times")
-    time_step = positive_number("time_step", "s", time_step)
-    return torch.arange(count("steps", steps) + 1, dtype=torch.float64) * time_step
+    time_step, steps = positive_number("time_step", "s", time_step), count("steps", steps)
+    if not isinstance(start, Trajectory | MotionState | None):
+        raise ValueError(f"start must be a Trajectory, a MotionState or None, got {type(start).__name__}")
+    state = start.end if isinstance(start, Trajectory) else start
+    began = Clock(0.0) if state is None else clock_of(state)
+    clock = began.going_on(float(detached(time_step)))
+    return clock.moment(torch.arange(steps + 1, dtype=torch.float64), 0.0, time_step)
 
 
 def held(values, steps: int):
