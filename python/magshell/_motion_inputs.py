@@ -80,7 +80,7 @@ class MotionInputs:
                 "velocity": self.start.velocity,
                 "memory": self.start.memory,
                 **self._history(law),
-                "rotations_given": start is None or isinstance(start, Equilibrium | Trajectory | MotionState),
+                "rotations_given": self.start.rotations_known,
                 **law,
                 "mass": self._mass,
                 "damping": self._damping,
@@ -186,6 +186,7 @@ class MotionInputs:
             origin.memory,
             maxwell_strains=origin.maxwell_strains,
             clock=origin.clock,
+            rotations_known=origin.rotations_known,
         )
 
     def _origin(self, start) -> MotionState:
@@ -208,7 +209,8 @@ class MotionInputs:
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
         check_faces(mesh, positions)
         check_outside(inputs.scene, inputs.values, positions, 0.0)
-        return MotionState(0.0, model.state(positions, np.zeros(mesh.n_edges)), still, [])
+        state = model.state(positions, np.zeros(mesh.n_edges))
+        return MotionState(0.0, state, still, rotations_known=False)
 
 
 def _checked_state(start: MotionState, size: int, n_faces: int) -> MotionState:

@@ -10,6 +10,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from . import _core
 from ._inputs import Inputs
+from ._interrupts import nothing_yet
 from ._mode_shapes import mode_shapes
 from ._rest import RestStiffness
 from .errors import NotConverged
@@ -40,6 +41,7 @@ class Buckling:
         return f"Buckling: at {factors} times the controls; {self.wall_time:.3g} s"
 
 
+@nothing_yet("linear_buckling")
 def linear_buckling(
     scene: Scene,
     *,
@@ -66,7 +68,7 @@ def linear_buckling(
         the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
     Raises ValueError on bad input, where the supports leave the sheet a motion without stiffness, where the
-    controls do nothing, and where the sheet does not buckle under them (a column that is pulled).
+    controls do nothing, and where the sheet does not buckle under them (a column that is pulled); Interrupted.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))

@@ -8,6 +8,7 @@ import numpy as np
 
 from . import _core
 from ._inputs import Inputs
+from ._interrupts import nothing_yet
 from ._motion_adjoint import MotionAdjoint
 from ._motion_inputs import MotionInputs
 from ._progress import progress_bar
@@ -20,6 +21,7 @@ from .solvers import MixedNewton, Newton
 from .trajectory import MotionState, Trajectory
 
 
+@nothing_yet("simulate")
 def simulate(
     scene: Scene,
     *,
@@ -192,6 +194,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
             found.last_maxwell_strains(model),
             found.last_maxwell_strain_rates(model),
             ended,
+            found.begun or asked.start.rotations_known,
         ),
         iterations=found.iterations,
         factorizations=found.factorizations,

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import _core
 from ._inputs import Inputs
+from ._interrupts import nothing_yet
 from ._progress import progress_bar
 from ._solve import solve
 from ._start import starting_point
@@ -86,10 +87,10 @@ class Path:
         return len(self.parameters)
 
     def __repr__(self) -> str:
-        lines = [
-            f"Path: {len(self)} equilibria, {int(self.stable.sum())} of them stable, parameter "
-            f"{self.parameters.min():.4g} to {self.parameters.max():.4g}"
-        ]
+        lines = [f"Path: {len(self)} equilibria"]
+        if len(self):
+            lowest, highest = self.parameters.min(), self.parameters.max()
+            lines[0] += f", {int(self.stable.sum())} of them stable, parameter {lowest:.4g} to {highest:.4g}"
         lines += [
             f"  {point.kind} at {point.parameter:.6g}, after point {point.after_point}"
             for point in self.critical
@@ -100,6 +101,7 @@ class Path:
         return "\n".join(lines)
 
 
+@nothing_yet("follow")
 def follow(
     scene: Scene,
     *,

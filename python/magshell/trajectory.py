@@ -26,7 +26,7 @@ class MotionState:
 
     time: s, since the start of the motion that led here; clock: how it was counted, in steps. Everything else is in the
     core's order of unknowns and faces; what the motion had no need of is empty: accelerations and strain rates (TRBDF2),
-    strains of a Maxwell branch.
+    strains of a Maxwell branch. rotations_known: False where the edge rotations are still to be put to rest.
     """
 
     time: float
@@ -38,6 +38,7 @@ class MotionState:
     maxwell_strains: np.ndarray = field(repr=False, default_factory=_no_strains)
     maxwell_strain_rates: np.ndarray = field(repr=False, default_factory=_no_strains)
     clock: Clock | None = field(repr=False, default=None)
+    rotations_known: bool = field(repr=False, default=True)
 
     def save(self, path: str | Path) -> None:
         """Writes an .npz file."""
@@ -49,6 +50,7 @@ class MotionState:
                 file,
                 time=self.time,
                 clock=astuple(clock_of(self)),
+                rotations_known=self.rotations_known,
                 memory=remembered,
                 memory_lengths=lengths,
                 **arrays,
@@ -61,12 +63,19 @@ class MotionState:
             with np.load(Path(path), allow_pickle=False) as file:
                 time, remembered, lengths = (file[name] for name in ("time", "memory", "memory_lengths"))
                 origin, time_step, steps = file["clock"].tolist()
+                known = bool(file["rotations_known"])
                 arrays = {name: file[name] for name in _ARRAYS}
             clock = Clock(origin, time_step, int(steps))
         except (KeyError, ValueError, TypeError, EOFError) as error:
             raise ValueError(f"{path} is not a saved MotionState: {error}") from error
         parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
-        return cls(float(time), memory=[part.tolist() for part in parts], clock=clock, **arrays)
+        return cls(
+            float(time),
+            memory=[part.tolist() for part in parts],
+            clock=clock,
+            rotations_known=known,
+            **arrays,
+        )
 
 
 _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
@@ -77,7 +86,7 @@ class Trajectory:
     """A motion.
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
-    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J.
+    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C came meanwhile.
     remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
     steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
     taken}. end: the last state, from which another simulation goes on. bytes: kept for gradients.

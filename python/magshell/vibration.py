@@ -10,6 +10,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from . import _core
 from ._inputs import Inputs
+from ._interrupts import nothing_yet
 from ._mode_shapes import mode_shapes
 from .equilibrium import Equilibrium
 from .errors import NotConverged
@@ -61,6 +62,7 @@ class VibrationModes:
         return text
 
 
+@nothing_yet("vibration_modes")
 def vibration_modes(
     scene: Scene, equilibrium: Equilibrium | None = None, *, count: int = 6
 ) -> VibrationModes:
@@ -75,7 +77,7 @@ def vibration_modes(
         grow. By default the rest shape without loads and fields.
     count: how many modes.
 
-    Raises ValueError on bad input, and NotConverged where the search for the modes does not come to its end.
+    Raises ValueError on bad input, NotConverged where the search for the modes does not come to its end, Interrupted.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
