@@ -198,22 +198,3 @@ def test_gradients_of_a_part(name):
     loss({name: tensor}).backward()
     above, below = (float(loss({name: (1 + change) * value})) for change in (1e-5, -1e-5))
     assert tensor.grad.item() == pytest.approx((above - below) / (2e-5 * value), rel=1e-6)
-
-
-def test_no_gradient_is_lost_on_the_way_into_a_motion():
-    """It was: going on from what requires a gradient gave that of the last part only."""
-    torch = pytest.importorskip("torch")
-    magnetization = torch.tensor((3e4, 0.0, 0.0), dtype=torch.float64, requires_grad=True)
-    scene, options = strip(), {"remanent_magnetization": magnetization}
-    off = {"gravity_factor": 0.0, "field_factor": 0.0}
-    rest = ms.equilibrium(scene, applied_flux_density=(0, 0, 1e-3), **off, **options)
-    with pytest.raises(
-        ValueError, match=r"start is an Equilibrium that requires a gradient.*start=rest\.positions"
-    ):
-        simulate(scene, 1, start=rest, **options)
-    first = simulate(scene, 2, start=rest.positions, **options)
-    with pytest.raises(ValueError, match=r"start is a Trajectory that requires a gradient.*start=first\.end"):
-        simulate(scene, 1, start=first, **options)
-    assert simulate(scene, 1, start=first.end, **options).times[0] == first.times[-1]
-    with torch.no_grad():
-        assert not simulate(scene, 1, start=first, **options).positions.requires_grad

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from numbers import Integral
-
 import numpy as np
 
 from . import _core
+from ._arrays import count
 from ._clock import Clock, clock_of
 from ._inputs import Inputs
-from ._quantity import quantity
+from ._memory import check_memory
+from ._quantity import quantity, shape_of
 from ._schedule import scheduled
 from ._start import check_faces
 from ._surroundings import check_outside, poses
-from ._tensors import is_tensor, wants_gradient
 from .equilibrium import Equilibrium
 from .integrators import Integrator
 from .solvers import Newton
@@ -26,12 +25,6 @@ _CONTROLS = {  # (unit, of one time, name in the core)
     "gravity_factor": ("1", (), "gravity"),
     "motion_factor": ("1", (), "motion"),
 }
-_NO_WAY_BACK = (  # of an Equilibrium, of a Trajectory
-    "start is an Equilibrium that requires a gradient, and none goes back through it: start=rest.positions passes one "
-    "on, and start=rest.positions.detach() none",
-    "start is a Trajectory that requires a gradient, and none goes back through it: start=first.end goes on without; "
-    "start=first.positions[-1], velocities=first.velocities[-1] pass one on, with the edge rotations at rest and time 0",
-)
 
 
 class MotionInputs:
@@ -57,8 +50,8 @@ class MotionInputs:
         **controls,
     ):
         self.inputs, self.integrator = inputs, integrator
-        self.steps = _count("steps", steps)
-        self.record_every = _count("record_every", record_every)
+        self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
+        check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
         if not quantity("memory_budget", "bytes", memory_budget, ()) >= 0:
             raise ValueError(f"memory_budget must not be negative, got {memory_budget}")
         if keep not in (None, "stages", "checkpoints", "factors"):
@@ -129,7 +122,7 @@ class MotionInputs:
 
     def _checked_damping(self, given) -> np.ndarray:
         n_v = self.inputs.scene.mesh.n_vertices
-        shape = np.shape(given)
+        shape = shape_of("damping [N s/m]", given)
         if shape not in ((), (n_v,)):
             raise ValueError(f"damping [N s/m] must be a number or have shape (n_v,) = ({n_v},), got {shape}")
         damping = quantity("damping", "N s/m", given, shape)
@@ -173,11 +166,10 @@ class MotionInputs:
             return origin
         n_v = inputs.scene.mesh.n_vertices
         given = inputs.take("velocities", velocities)
-        if np.shape(given) not in ((3,), (n_v, 3)):
-            raise ValueError(
-                f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {np.shape(given)}"
-            )
-        rows = np.broadcast_to(quantity("velocities", "m/s", given, np.shape(given)), (n_v, 3))
+        shape = shape_of("velocities [m/s]", given)
+        if shape not in ((3,), (n_v, 3)):
+            raise ValueError(f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {shape}")
+        rows = np.broadcast_to(quantity("velocities", "m/s", given, shape), (n_v, 3))
         velocity = model.full_vector(np.ascontiguousarray(rows))
         return MotionState(
             origin.time,
@@ -198,8 +190,6 @@ class MotionInputs:
         if isinstance(start, Equilibrium | Trajectory):
             if start.scene is not inputs.scene:
                 raise ValueError("start is of another scene; hand over its positions instead")
-            if wants_gradient(start.positions):
-                raise ValueError(_NO_WAY_BACK[isinstance(start, Trajectory)])
             if isinstance(start, Trajectory):
                 return start.end
             return MotionState(0.0, start._state, still, start._memory)
@@ -234,14 +224,3 @@ def _checked_state(start: MotionState, size: int, n_faces: int) -> MotionState:
     if not isinstance(start.clock, Clock | None):
         raise ValueError(f"start.clock must be that of a motion, or None, got {type(start.clock).__name__}")
     return start
-
-
-def _count(name: str, value) -> int:
-    if (
-        isinstance(value, bool)
-        or is_tensor(value)
-        or not isinstance(value, Integral)
-        or not 1 <= value < 2**31
-    ):
-        raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
-    return int(value)

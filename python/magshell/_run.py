@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from dataclasses import asdict
 
 from ._answer import Answer
+from ._arrays import number
 from ._checkpoint import decoded, encoded
 from ._tensors import is_tensor, require_torch
 from .errors import DesignRejected, EquilibriumJumped
@@ -34,7 +35,9 @@ class Run:
         if {id(p) for p in self.parameters} != {id(p) for p in self.optimizer.parameters}:
             raise ValueError("the optimizer must have been made with the same tensors as `parameters`")
         self.stateful = _checked_stateful(stateful)
-        self.objective, self.feasibility = objective, feasibility
+        self.objective, self.feasibility = objective, number("feasibility", feasibility)
+        if not self.feasibility >= 0:
+            raise ValueError(f"feasibility must not be negative, got {feasibility}")
         self.history: list[Record] = []
         self.best: dict | None = None
         offering = {id(each): each for each in (objective, *self.stateful) if hasattr(each, "accept_jumps")}

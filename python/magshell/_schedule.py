@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._clock import Clock
-from ._quantity import quantity
+from ._quantity import quantity, shape_of
 from ._tensors import detached, is_tensor
 
 
@@ -28,7 +28,7 @@ def scheduled(
     shares = np.array((0.0, *times))
     if callable(value):
         return _called(name, unit, value, row, steps, shares, clock, time_step)
-    shape = np.shape(value)
+    shape = shape_of(f"{name} [{unit}]", value)
     allowed = (row, (steps, *row), (steps + 1, *row))
     if shape not in allowed:
         raise ValueError(

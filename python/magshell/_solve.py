@@ -14,7 +14,7 @@ from ._adjoint import Adjoint
 from ._inputs import Inputs
 from ._replacements import SHELL_NAMES, requested
 from ._start import starting_point
-from ._tensors import is_tensor, like
+from ._tensors import dtype_like, is_tensor, like
 from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
 from .scene import Scene
@@ -143,7 +143,7 @@ def _outputs(inputs: Inputs, found):
         return tuple(like(array, *inputs.given) for array in arrays)
     from .autograd import solved
 
-    return solved(Adjoint(inputs, found), arrays, inputs.given[0].dtype, inputs.tensors)
+    return solved(Adjoint(inputs, found), arrays, dtype_like(*inputs.given), inputs.tensors)
 
 
 def _flux_density(inputs: Inputs, found):

@@ -6,6 +6,9 @@ import numpy as np
 import torch
 from torch.autograd.function import once_differentiable
 
+from ._tensor_kinds import why_not
+from .errors import NoGradient
+
 
 class Solved(torch.autograd.Function):
     """Arrays that were computed from the leaves (tensors); the adjoint knows the way back."""
@@ -19,13 +22,19 @@ class Solved(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx, *by_outputs):
-        arrays = [each.detach().cpu().double().numpy() for each in by_outputs]
+        arrays = [_numbers(each) for each in by_outputs]
         gradients = ctx.adjoint.gradients(arrays, ctx.needs_input_grad[3:])
         by_leaves = (
             None if values is None else torch.from_numpy(np.array(values)).to(dtype=dtype, device=device)
             for values, (dtype, device) in zip(gradients, ctx.leaves, strict=True)
         )
         return None, None, None, *by_leaves
+
+
+def _numbers(by_output) -> np.ndarray:
+    if why := why_not(by_output):
+        raise NoGradient(f"no gradient here: the one by a result {why}")
+    return by_output.detach().cpu().double().numpy()
 
 
 def solved(adjoint, arrays: tuple[np.ndarray, ...], dtype, leaves: list) -> tuple[torch.Tensor, ...]:

@@ -9,8 +9,9 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from . import _core
+from ._arrays import count
+from ._entry import solve_entry
 from ._inputs import Inputs
-from ._interrupts import nothing_yet
 from ._mode_shapes import mode_shapes
 from ._rest import RestStiffness
 from .errors import NotConverged
@@ -41,7 +42,7 @@ class Buckling:
         return f"Buckling: at {factors} times the controls; {self.wall_time:.3g} s"
 
 
-@nothing_yet("linear_buckling")
+@solve_entry
 def linear_buckling(
     scene: Scene,
     *,
@@ -78,8 +79,7 @@ def linear_buckling(
     >>> round(float(ms.linear_buckling(scene).factors[0]), 3)  # pi^2 E h^3 / (48 L^2) = 0.0206 N/m
     0.021
     """
-    if isinstance(modes, bool) or not isinstance(modes, (int, np.integer)) or modes < 1:
-        raise ValueError(f"modes must be an integer of at least 1, got {modes!r}")
+    modes = count("modes", modes)
     inputs = Inputs(
         scene,
         remanent_magnetization,

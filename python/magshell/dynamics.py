@@ -7,13 +7,13 @@ import time
 import numpy as np
 
 from . import _core
+from ._entry import solve_entry
 from ._inputs import Inputs
-from ._interrupts import nothing_yet
 from ._motion_adjoint import MotionAdjoint
 from ._motion_inputs import MotionInputs
 from ._progress import progress_bar
 from ._replacements import requested
-from ._tensors import like
+from ._tensors import dtype_like, like
 from .errors import Interrupted, NotConverged
 from .integrators import TRBDF2, ImplicitEuler, Integrator
 from .scene import Scene
@@ -21,7 +21,7 @@ from .solvers import MixedNewton, Newton
 from .trajectory import MotionState, Trajectory
 
 
-@nothing_yet("simulate")
+@solve_entry
 def simulate(
     scene: Scene,
     *,
@@ -66,8 +66,7 @@ def simulate(
     maxwell_modulus, maxwell_time: a Maxwell branch beside the elastic stiffness: its modulus over the elastic one, and
         its relaxation time, s. It begins relaxed.
     start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
-        bits. By default the rest shape. Gradients go back to positions; an Equilibrium or Trajectory that requires one
-        is refused.
+        bits. By default the rest shape.
     velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
     remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density.
     integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(). A method of higher
@@ -217,7 +216,7 @@ def _outputs(asked: MotionInputs, found):
         return tuple(like(array, *inputs.given) for array in arrays)
     from .autograd import solved
 
-    return solved(MotionAdjoint(asked, found), arrays, inputs.given[0].dtype, inputs.tensors)
+    return solved(MotionAdjoint(asked, found), arrays, dtype_like(*inputs.given), inputs.tensors)
 
 
 _BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"

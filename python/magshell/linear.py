@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ._entry import solve_entry
 from ._inputs import Inputs
-from ._interrupts import nothing_yet
 from ._rest import RestStiffness
 from ._tensors import like
 from .scene import Scene
@@ -42,7 +42,7 @@ class LinearResponse:
         return f"LinearResponse: largest displacement {moved:.4g} m, {self.wall_time:.3g} s"
 
 
-@nothing_yet("linear_response")
+@solve_entry
 def linear_response(
     scene: Scene,
     *,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ._cases import find_all, split, starts_of
-from ._interrupts import nothing_yet
+from ._entry import solve_entry
 from ._solve import Search, find
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
@@ -15,7 +15,7 @@ from .scene import Scene
 from .solvers import MixedNewton, Newton
 
 
-@nothing_yet("equilibrium")
+@solve_entry
 def equilibrium(
     scene: Scene,
     *,

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ._arrays import index_array
 from ._clock import Clock, clock_of
+from ._quantity import quantity
 from ._surroundings import near_kinks
 from ._tensors import detached
 from .integrators import Integrator
@@ -61,16 +63,18 @@ class MotionState:
         """Reads what `save` wrote. Raises ValueError if it is something else."""
         try:
             with np.load(Path(path), allow_pickle=False) as file:
-                time, remembered, lengths = (file[name] for name in ("time", "memory", "memory_lengths"))
-                origin, time_step, steps = file["clock"].tolist()
+                time = float(quantity("time", "s", file["time"], ()))
+                origin, time_step, steps = quantity("clock", "SI", file["clock"], (3,)).tolist()
+                remembered = quantity("memory", "SI", file["memory"], ("n",))
+                lengths = index_array("memory_lengths", file["memory_lengths"])
                 known = bool(file["rotations_known"])
                 arrays = {name: file[name] for name in _ARRAYS}
             clock = Clock(origin, time_step, int(steps))
+            parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
         except (KeyError, ValueError, TypeError, EOFError) as error:
             raise ValueError(f"{path} is not a saved MotionState: {error}") from error
-        parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
         return cls(
-            float(time),
+            time,
             memory=[part.tolist() for part in parts],
             clock=clock,
             rotations_known=known,

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from . import _core
+from ._entry import solve_entry
 from ._inputs import Inputs
-from ._interrupts import nothing_yet
 from ._mode_shapes import mode_shapes
 from .equilibrium import Equilibrium
 from .errors import NotConverged
@@ -62,7 +62,7 @@ class VibrationModes:
         return text
 
 
-@nothing_yet("vibration_modes")
+@solve_entry
 def vibration_modes(
     scene: Scene, equilibrium: Equilibrium | None = None, *, count: int = 6
 ) -> VibrationModes:

@@ -11,11 +11,12 @@ import math
 
 import numpy as np
 
+from .._arrays import count
 from .._clock import Clock, clock_of
-from .._quantity import quantity
+from .._quantity import quantity, shape_of
 from .._tensors import detached, positive_number, require_torch
 from ..trajectory import MotionState, Trajectory
-from ._arguments import count, tensor
+from ._arguments import tensor
 
 
 def step_times(steps: int, time_step, start: Trajectory | MotionState | None = None):
@@ -54,7 +55,8 @@ def harmonics(number: int, duration):
 def oscillation(times, angular_frequencies, cosine_amplitudes, sine_amplitudes):
     """sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), with alpha and beta both (J,) or both (J, 3) [T]; as `fourier`."""
     frequencies = tensor("angular_frequencies", "rad/s", angular_frequencies, ("J",))
-    shape = (len(frequencies),) if np.ndim(detached(cosine_amplitudes)) == 1 else (len(frequencies), 3)
+    one = len(shape_of("cosine_amplitudes [T]", cosine_amplitudes)) == 1
+    shape = (len(frequencies),) if one else (len(frequencies), 3)
     cosines = tensor("cosine_amplitudes", "T", cosine_amplitudes, shape)
     sines = tensor("sine_amplitudes", "T", sine_amplitudes, shape)
     phases = at_times(times)[..., None] * frequencies
@@ -104,7 +106,7 @@ def rotating(times, magnitude, axis, angular_frequency, start):
     """
     torch = require_torch("ms.control.rotating")
     times = at_times(times)
-    shape = tuple(times.shape) if np.ndim(detached(magnitude)) else ()
+    shape = tuple(times.shape) if shape_of("magnitude [T]", magnitude) else ()
     magnitude = tensor("magnitude", "T", magnitude, shape)
     axis, start = tensor("axis", "1", axis, (3,)), tensor("start", "1", start, (3,))
     angular_frequency = tensor("angular_frequency", "rad/s", angular_frequency, ())
@@ -121,4 +123,4 @@ def rotating(times, magnitude, axis, angular_frequency, start):
 
 def at_times(times):
     """One time or a row of them, s."""
-    return tensor("times", "s", times, () if np.ndim(detached(times)) == 0 else ("n",))
+    return tensor("times", "s", times, ("n",) if shape_of("times [s]", times) else ())
