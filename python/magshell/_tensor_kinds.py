@@ -33,7 +33,9 @@ def why_not(values) -> str:
 
 
 def _why_not(torch, tensor) -> str:
-    if _transformed(torch, tensor):
+    from .autograd import is_transformed
+
+    if is_transformed(tensor):
         return _NO_TRANSFORM
     if tensor.is_nested:
         return "is a nested tensor: hand over its parts one by one"
@@ -66,13 +68,3 @@ def _why_not_all(values, depth: int) -> str:
         if why:
             return why
     return ""
-
-
-def _transformed(torch, tensor) -> bool:
-    """Wrapped by torch.func, or with a tangent of forward-mode differentiation."""
-    try:
-        functorch = torch._C._functorch
-        wrapped = functorch.is_functorch_wrapped_tensor(tensor) or functorch.is_legacy_batchedtensor(tensor)
-    except AttributeError:  # another torch: its own error says it
-        wrapped = False
-    return wrapped or torch.autograd.forward_ad.unpack_dual(tensor).tangent is not None

@@ -40,3 +40,13 @@ def _numbers(by_output) -> np.ndarray:
 def solved(adjoint, arrays: tuple[np.ndarray, ...], dtype, leaves: list) -> tuple[torch.Tensor, ...]:
     """The arrays as tensors from which gradients go back to the leaves."""
     return Solved.apply(adjoint, arrays, dtype, *leaves)
+
+
+def is_transformed(tensor: torch.Tensor) -> bool:
+    """Whether torch.func has wrapped it, or it carries a tangent of forward-mode differentiation."""
+    try:
+        functorch = torch._C._functorch
+        wrapped = functorch.is_functorch_wrapped_tensor(tensor) or functorch.is_legacy_batchedtensor(tensor)
+    except AttributeError:  # another torch: its own error says it
+        wrapped = False
+    return wrapped or torch.autograd.forward_ad.unpack_dual(tensor).tangent is not None
