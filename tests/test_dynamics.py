@@ -218,9 +218,15 @@ def test_the_same_bits_on_any_number_of_threads(strip):
     np.testing.assert_array_equal(*found)
 
 
+class Unknown(ms.TRBDF2):
+    _name = "bdf3"
+
+
 BAD = [
     ({"steps": 0}, "steps must be an integer of at least 1, got 0"),
     ({"steps": 2.5}, "steps must be an integer"),
+    ({"steps": 10**12}, r"steps must be below 2\^31, about 2.1e\+09, got 1000000000000"),
+    ({"integrator": Unknown()}, 'no integrator is called "bdf3"'),
     ({"time_step": 0.0}, r"time_step \[s\] must be positive"),
     ({"time_step": np.nan}, r"time_step \[s\] must be finite"),
     ({"applied_flux_density": np.zeros((7, 3))}, r"\(steps, ...\) = \(10, 3\)"),
@@ -261,3 +267,14 @@ def test_more_bad_input(strip):
         simulate(other, start=simulate(strip))
     with pytest.raises(ValueError, match="unknowns"):
         simulate(ms.Scene(shell(bending="hinge"), supports=strip.supports), start=simulate(strip).end)
+
+
+def test_what_does_not_fit_into_memory_is_refused_at_once(strip, monkeypatch):
+    with pytest.raises(MemoryError, match=r"2,000,000,000 steps need .* GB .*record_every.*start="):
+        simulate(strip, steps=2 * 10**9)
+    monkeypatch.setattr("magshell._memory.physical_memory", lambda: 10**5)
+    with pytest.raises(MemoryError, match="record fewer"):
+        simulate(strip, steps=100)
+    assert len(simulate(strip, steps=100, record_every=100)) == 2
+    monkeypatch.setattr("magshell._memory.physical_memory", lambda: None)  # the system does not tell
+    assert len(simulate(strip, steps=100)) == 101

@@ -86,6 +86,20 @@ BAD_INPUT = {
         lambda: ms.CustomField(zeros, gradient=zeros, length_scale=1).gradient(np.zeros((5, 3))),
         r"gradient must return \[T/m\] of shape \(5, 3, 3\)",
     ),
+    "complex values": (
+        lambda: ms.CustomField(lambda x: x + 1e-3j, length_scale=1).flux_density(np.zeros((5, 3))),
+        r"what function returns \[T\] must be an array of real numbers, got dtype complex128",
+    ),
+    "a complex gradient": (
+        lambda: ms.CustomField(
+            zeros, gradient=lambda x: np.zeros((len(x), 3, 3), complex), length_scale=1
+        ).gradient(np.zeros((5, 3))),
+        r"what gradient returns \[T/m\] must be an array of real numbers, got dtype complex128",
+    ),
+    "values as text": (
+        lambda: ms.CustomField(lambda x: x.astype(str), length_scale=1).flux_density(np.zeros((5, 3))),
+        r"what function returns \[T\] must be an array of real numbers",
+    ),
     "array for a function": (lambda: ms.CustomField(GRID, length_scale=1), "must be a function .* ndarray"),
     "no length": (
         lambda: ms.CustomField(zeros, length_scale=0.0),
@@ -180,3 +194,14 @@ def test_residual_flux_density_converts_to_remanent_magnetization():
     residual = torch.tensor([0.1, 0.2], dtype=torch.float64, requires_grad=True)
     ms.residual_to_remanent(residual).sum().backward()
     np.testing.assert_allclose(residual.grad.numpy(), 1 / mu_0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("value", [np.nan, [0.1, np.inf], 0.1j, "0.1", True])
+def test_what_is_no_residual_flux_density_is_refused(value):
+    torch = pytest.importorskip("torch")
+    with pytest.raises(ValueError, match="residual_flux_density"):
+        ms.residual_to_remanent(value)
+    if not isinstance(value, str):
+        with pytest.raises(ValueError, match="residual_flux_density"):
+            ms.residual_to_remanent(torch.tensor(value))
+    assert ms.residual_to_remanent(torch.tensor(1)).dtype == torch.float64  # not float32

@@ -285,6 +285,30 @@ PLY_POINTS = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
         ),
         (PLY_HEADER.format("binary_little_endian 1.0"), "ends in the middle: 0 of 4 rows of vertex"),
         (PLY_HEADER.format("utf8 1.0"), "does not say which format"),
+        (
+            PLY_HEADER.format("ascii 1.0") + PLY_POINTS + "3 0 1 2\n3 0 1.5 3\n",
+            "vertex_indices must be integers of 32 bits, got 1.5",
+        ),
+        (
+            PLY_HEADER.format("ascii 1.0") + PLY_POINTS + "3 0 1 2\n3 0 nan 3\n",
+            "vertex_indices must be integers of 32 bits, got nan",
+        ),
+        (
+            PLY_HEADER.format("ascii 1.0") + PLY_POINTS + "3 0 1 2\n3 0 4294967298 3\n",
+            "vertex_indices must be integers of 32 bits, got 4294967298",
+        ),
+        (
+            PLY_HEADER.replace("int vertex", "float vertex").format("ascii 1.0")
+            + PLY_POINTS
+            + "3 0 1 2\n3 0 1.5 3\n",
+            "vertex_indices must be integers of 64 bits, got 1.5",
+        ),
+        (
+            PLY_HEADER.format("ascii 1.0") + PLY_POINTS + "3 0 1 2\n3 0 2 3 7\n",
+            "'3 0 2 3 7' of face has 5 entries, its header 4",
+        ),
+        (PLY_HEADER.replace("uchar", "float").format("ascii 1.0"), "lengths of lists must be integers"),
+        (PLY_HEADER.replace("face 2", "face -1").format("ascii 1.0"), "its header has 'element face -1'"),
         ("ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n", "it has no face element"),
         ("ply\nformat ascii 1.0\n", "it has no PLY header"),
     ],

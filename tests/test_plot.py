@@ -2,6 +2,7 @@
 
 import importlib.util
 import io
+import sys
 
 import numpy as np
 import pytest
@@ -367,10 +368,9 @@ def test_a_driver_that_fails_leaves_matplotlib(monkeypatch, program, reason) -> 
         backends.why_not_pyvista.cache_clear()
 
 
-def test_without_a_library_the_extra_is_named(mesh, monkeypatch) -> None:
-    found = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name: None if name == "matplotlib" else found(name)
-    )
+@pytest.mark.parametrize("backend", [None, "matplotlib", "pyvista"])
+def test_without_a_library_the_extra_is_named(mesh, monkeypatch, backend) -> None:
+    """However it is missing: not installed, or installed without what it needs itself."""
+    monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
     with pytest.raises(ImportError, match=r'pip install "magshell\[plot\]"'):
-        ms.plot(mesh)
+        ms.plot(mesh, backend=backend)

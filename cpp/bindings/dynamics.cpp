@@ -11,9 +11,11 @@ namespace magshell::bindings {
 namespace {
 
 Tableau tableau_of(const std::string& name) {
+    if (name == "euler") return implicit_euler();
     if (name == "tr_bdf2") return tr_bdf2();
+    if (name == "sdirk2") return sdirk2();
     if (name == "sdirk3") return sdirk3();
-    return name == "sdirk2" ? sdirk2() : implicit_euler();
+    throw InvalidInput("no integrator is called \"" + name + "\"");
 }
 
 // A row a knot.
@@ -167,6 +169,7 @@ void register_dynamics(py::module_& module) {
         .def_readonly("outcome", &MotionResult::outcome)
         .def_readonly("reason", &MotionResult::reason)
         .def_readonly("steps_done", &MotionResult::steps_done)
+        .def_readonly("begun", &MotionResult::begun)
         .def_property_readonly("last_state", [](const MotionResult& r) { return r.last.q; })
         .def_property_readonly("last_velocity", [](const MotionResult& r) { return r.last.v; })
         .def_property_readonly("last_acceleration", [](const MotionResult& r) { return r.last.rates.w; })

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ._tensors import is_tensor
+from ._quantity import real_numbers
+from ._tensors import detached, is_tensor
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Answer:
 
 def _number(name: str, value) -> float:
     try:
-        return float(value.detach() if is_tensor(value) else value)
-    except (TypeError, ValueError, RuntimeError):
+        return float(real_numbers(name, detached(value)))
+    except (TypeError, ValueError):
         came = f"shape {tuple(value.shape)}" if is_tensor(value) else type(value).__name__
         raise ValueError(f"the term {name!r} must be a number or a scalar tensor, got {came}") from None

@@ -15,6 +15,8 @@ from typing import Any
 
 from ._one_thread import one_thread
 from ._progress import no_bars
+from ._quantity import real_numbers
+from ._tensors import detached
 
 
 @dataclass
@@ -109,7 +111,7 @@ def _objective(result) -> tuple[float, float]:
     value = result[0] if isinstance(result, tuple) and result else result
     value = getattr(value, "objective", value)
     try:
-        objective = float(value)
+        objective = float(real_numbers("the objective", detached(value)))
     except (TypeError, ValueError):
         raise TypeError(
             "run must return something with an `objective` (an ms.Minimum), a number, or a tuple that begins "

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from ._quantity import shape_of
 from ._solve import FACTORS, Search, find
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
@@ -20,7 +19,7 @@ def split(arguments: dict) -> list[dict] | None:
     of_cases = {
         name: arguments[name]
         for name, dimensions in _DIMENSIONS.items()
-        if arguments.get(name) is not None and np.ndim(arguments[name]) == dimensions + 1
+        if arguments.get(name) is not None and len(shape_of(name, arguments[name])) == dimensions + 1
     }
     if not of_cases:
         return None

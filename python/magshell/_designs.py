@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from ._quantity import real_numbers
 from ._tensors import detached
 
 
@@ -13,7 +12,7 @@ def numbers_only(design: dict) -> dict:
     return {
         name: {owner: numbers_only(named) for owner, named in value.items()}
         if isinstance(value, dict)
-        else np.array(detached(value), dtype=np.float64)
+        else real_numbers(name, detached(value))
         for name, value in kept.items()
     }
 

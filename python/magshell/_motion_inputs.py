@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from numbers import Integral
-
 import numpy as np
 
 from . import _core
+from ._arrays import count
+from ._clock import Clock, clock_of
 from ._inputs import Inputs
-from ._quantity import quantity
+from ._memory import check_memory
+from ._quantity import quantity, shape_of
 from ._schedule import scheduled
 from ._start import check_faces
 from ._surroundings import check_outside, poses
@@ -50,8 +51,8 @@ class MotionInputs:
         **controls,
     ):
         self.inputs, self.integrator = inputs, integrator
-        self.steps = _count("steps", steps)
-        self.record_every = _count("record_every", record_every)
+        self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
+        check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
         if not quantity("memory_budget", "bytes", memory_budget, ()) >= 0:
             raise ValueError(f"memory_budget must not be negative, got {memory_budget}")
         if keep not in (None, "stages", "checkpoints", "factors"):
@@ -65,6 +66,7 @@ class MotionInputs:
         self._damping = self._checked_damping(inputs.take("damping", damping))
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
         self.start = self._begin(start, velocities)
+        self.clock = clock_of(self.start).going_on(self.time_step)
         self._knots = {name: self._controls(name, value, time_step) for name, value in controls.items()}
         self.core = _core.MotionInput(
             inputs.scene._model,
@@ -73,7 +75,7 @@ class MotionInputs:
                 "velocity": self.start.velocity,
                 "memory": self.start.memory,
                 **self._history(law),
-                "rotations_given": start is None or isinstance(start, Equilibrium | Trajectory | MotionState),
+                "rotations_given": self.start.rotations_known,
                 **law,
                 "mass": self._mass,
                 "damping": self._damping,
@@ -103,12 +105,12 @@ class MotionInputs:
         return layout.rows(rows, self.steps * (len(self.integrator._times) + 1))
 
     def _poses(self) -> np.ndarray:
-        """Of the obstacles at all knots; their time goes on where the start's ended."""
+        """Of the obstacles at all knots."""
         values, scene = self.inputs.values, self.inputs.scene
         shares = np.array((0.0, *self.integrator._times))
         if any(values.current(each).motion is not None for each in scene.obstacles):
             self.inputs.refuse("time_step", self._given_time_step, "obstacles move by a function of the time")
-        times = self.start.time + self.time_step * (np.arange(self.steps)[:, None] + shares).ravel()
+        times = self.clock.at(np.arange(self.steps)[:, None], shares).ravel()
         return poses([values.current(each) for each in scene.obstacles], times)
 
     def _controls(self, name: str, value, time_step) -> np.ndarray:
@@ -119,7 +121,7 @@ class MotionInputs:
             value = np.zeros(3)
         elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
-        knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, time_step)
+        knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)
         if callable(value) and wants_gradient(time_step) and not _differentiable_in_time(knots, time_step):
             why = f"{name} is a function of the time that torch cannot follow; make its values from the time by torch"
             self.inputs.refuse("time_step", time_step, why)
@@ -127,7 +129,7 @@ class MotionInputs:
 
     def _checked_damping(self, given) -> np.ndarray:
         n_v = self.inputs.scene.mesh.n_vertices
-        shape = np.shape(given)
+        shape = shape_of("damping [N s/m]", given)
         if shape not in ((), (n_v,)):
             raise ValueError(f"damping [N s/m] must be a number or have shape (n_v,) = ({n_v},), got {shape}")
         damping = quantity("damping", "N s/m", given, shape)
@@ -171,14 +173,19 @@ class MotionInputs:
             return origin
         n_v = inputs.scene.mesh.n_vertices
         given = inputs.take("velocities", velocities)
-        if np.shape(given) not in ((3,), (n_v, 3)):
-            raise ValueError(
-                f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {np.shape(given)}"
-            )
-        rows = np.broadcast_to(quantity("velocities", "m/s", given, np.shape(given)), (n_v, 3))
+        shape = shape_of("velocities [m/s]", given)
+        if shape not in ((3,), (n_v, 3)):
+            raise ValueError(f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {shape}")
+        rows = np.broadcast_to(quantity("velocities", "m/s", given, shape), (n_v, 3))
         velocity = model.full_vector(np.ascontiguousarray(rows))
         return MotionState(
-            origin.time, origin.state, velocity, origin.memory, maxwell_strains=origin.maxwell_strains
+            origin.time,
+            origin.state,
+            velocity,
+            origin.memory,
+            maxwell_strains=origin.maxwell_strains,
+            clock=origin.clock,
+            rotations_known=origin.rotations_known,
         )
 
     def _origin(self, start) -> MotionState:
@@ -204,7 +211,8 @@ class MotionInputs:
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
         check_faces(mesh, positions)
         check_outside(inputs.scene, inputs.values, positions, 0.0)
-        return MotionState(0.0, model.state(positions, np.zeros(mesh.n_edges)), still, [])
+        state = model.state(positions, np.zeros(mesh.n_edges))
+        return MotionState(0.0, state, still, rotations_known=False)
 
 
 def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState:
@@ -225,6 +233,8 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
     for k, each in enumerate(start.memory):
         quantity(f"start.memory[{k}]", "SI", each, ("n",))
     quantity("start.time", "s", start.time, ())
+    if not isinstance(start.clock, Clock | None):
+        raise ValueError(f"start.clock must be that of a motion, or None, got {type(start.clock).__name__}")
     return start
 
 
@@ -234,14 +244,3 @@ def _differentiable_in_time(knots, time_step) -> bool:
 
     numbers = np.asarray(detached(knots))
     return bool((numbers == numbers[0]).all()) or (is_tensor(knots) and depends_on(knots, time_step))
-
-
-def _count(name: str, value) -> int:
-    if (
-        isinstance(value, bool)
-        or is_tensor(value)
-        or not isinstance(value, Integral)
-        or not 1 <= value < 2**31
-    ):
-        raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
-    return int(value)

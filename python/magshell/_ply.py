@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ._arrays import whole_numbers
 from ._files import replace_file
 
 _TYPES = {
@@ -61,7 +62,7 @@ def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
     if not lists or not {"x", "y", "z"} <= vertex.keys():
         raise ValueError("it lacks x, y, z of its vertices or vertex_indices of its faces")
     points = np.stack([vertex.pop(axis) for axis in "xyz"], axis=1).astype(np.float64)
-    faces = face.pop(lists[0]).astype(np.int64)
+    faces = whole_numbers(lists[0], face.pop(lists[0]))
     if faces.size and faces.shape[1] != 3:
         raise ValueError(f"face 0 has {faces.shape[1]} vertices; only triangles are supported")
     return points, faces, _grouped(vertex, groups.get("vertex", {})), _grouped(face, groups.get("face", {}))
@@ -104,7 +105,11 @@ def _header(data: bytes) -> tuple[str, list[_Element], dict, int]:
             order = _ORDERS.get(words[1])
         elif words[0] == "element":
             elements.append(_Element(words[1], int(words[2])))
+            if elements[-1].count < 0:
+                raise ValueError(f"its header has {line!r}")
         elif words[0] == "property" and words[1] == "list":
+            if _TYPES[words[2]].startswith("f"):
+                raise ValueError(f"its header has {line!r}: lengths of lists must be integers")
             elements[-1].properties.append(_Property(words[4], _TYPES[words[3]], _TYPES[words[2]]))
         elif words[0] == "property":
             elements[-1].properties.append(_Property(words[2], _TYPES[words[1]]))
@@ -157,17 +162,28 @@ def _ascii_table(element: _Element, lines) -> dict:
     table, column = {}, 0
     for prop in element.properties:
         if prop.count_type is None:
-            table[prop.name] = np.array([row[column] for row in rows], dtype=np.float64).astype(prop.type)
+            table[prop.name] = _of_type(prop, [row[column] for row in rows])
             column += 1
         else:
             counts = np.array([int(row[column]) for row in rows], dtype=np.int64)
             _same_lengths(element, {prop.name: counts})
             end = column + 1 + (int(counts[0]) if len(counts) else 0)
-            table[prop.name] = np.array([row[column + 1 : end] for row in rows], dtype=np.float64).astype(
-                prop.type
-            )
+            table[prop.name] = _of_type(prop, [row[column + 1 : end] for row in rows])
             column = end
+    for row in rows:
+        if len(row) != column:
+            raise ValueError(
+                f"{' '.join(row)!r} of {element.name} has {len(row)} entries, its header {column}"
+            )
     return table
+
+
+def _of_type(prop: _Property, words: list) -> np.ndarray:
+    """Words as the numbers that the header says they are."""
+    numbers = np.array(words, dtype=np.float64)
+    if prop.type.startswith("f"):
+        return numbers.astype(prop.type)
+    return whole_numbers(prop.name, numbers, prop.type)
 
 
 def _same_lengths(element: _Element, counts: dict[str, np.ndarray]) -> None:

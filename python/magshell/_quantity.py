@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._tensor_kinds import is_tensor, numbers_of, why_not
+
 
 def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.ndarray:
     """A read-only float64 copy of finite numbers.
@@ -30,18 +32,36 @@ def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.n
 
 def real_numbers(label: str, values) -> np.ndarray:
     """A float64 copy of any shape. Truth values, masked entries and strings are no numbers."""
+    array = array_of(label, values, "be an array of real numbers")
+    if array.dtype == bool or not np.can_cast(array.dtype, np.float64, casting="same_kind"):
+        what = f"{values!r:.60}" if array.ndim == 0 else f"dtype {array.dtype}"
+        raise ValueError(f"{label} must be an array of real numbers, got {what}")
+    return array.astype(np.float64)
+
+
+def shape_of(label: str, values) -> tuple[int, ...]:
+    """The shape of what a caller handed in, which may be a list. Raises ValueError where it has none."""
+    if why := why_not(values):
+        raise ValueError(f"{label} {why}")
+    try:
+        return np.shape(values)
+    except ValueError as error:  # a ragged list
+        raise ValueError(f"{label} must be an array of real numbers: {error}") from None
+
+
+def array_of(label: str, values, wanted: str) -> np.ndarray:
+    """Whatever a caller handed in as an array, perhaps the caller's own. Raises ValueError where it is none, which is
+    then told that it must be what is `wanted`."""
+    if why := why_not(values):
+        raise ValueError(f"{label} {why}")
     if getattr(values, "requires_grad", False):
         raise ValueError(f"{label} requires a gradient, and nothing passes one back to it: detach it first")
     if np.ma.is_masked(values):
         raise ValueError(f"{label} has masked entries: fill them first")
     try:
-        array = np.asarray(values)
-    except (TypeError, ValueError, RuntimeError) as error:  # ragged lists, tensors that numpy cannot take
-        raise ValueError(f"{label} must be an array of real numbers: {error}") from None
-    if array.dtype == bool or not np.can_cast(array.dtype, np.float64, casting="same_kind"):
-        what = f"{values!r:.60}" if array.ndim == 0 else f"dtype {array.dtype}"
-        raise ValueError(f"{label} must be an array of real numbers, got {what}")
-    return array.astype(np.float64)
+        return numbers_of(values) if is_tensor(values) else np.asarray(values)
+    except (TypeError, ValueError, RuntimeError) as error:  # ragged lists, tensors of kinds that nobody knows
+        raise ValueError(f"{label} must {wanted}: {error}") from None
 
 
 def fits(actual: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:

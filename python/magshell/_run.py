@@ -10,6 +10,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 
 from ._answer import Answer
+from ._arrays import number
 from ._checkpoint import decoded, encoded
 from ._configuration import kept
 from ._rejections import conflict, in_words, reason_of, total
@@ -60,7 +61,9 @@ class Run:
         if {id(p) for p in self.parameters} != {id(p) for p in self.optimizer.parameters}:
             raise ValueError("the optimizer must have been made with the same tensors as `parameters`")
         self.stateful = _checked_stateful(stateful)
-        self.objective, self.feasibility = objective, feasibility
+        self.objective, self.feasibility = objective, number("feasibility", feasibility)
+        if not self.feasibility >= 0:
+            raise ValueError(f"feasibility must not be negative, got {feasibility}")
         self.history: list[Record] = []
         self.best: dict | None = None
         offering = {id(each): each for each in (objective, *self.stateful) if hasattr(each, "accept_jumps")}

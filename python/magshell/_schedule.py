@@ -4,22 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._quantity import quantity
+from ._clock import Clock
+from ._quantity import quantity, shape_of
 from ._tensors import detached, is_tensor
 
 
 def scheduled(
-    name: str, unit: str, value, row: tuple[int, ...], steps: int, times: tuple[float, ...], time_step
+    name: str,
+    unit: str,
+    value,
+    row: tuple[int, ...],
+    steps: int,
+    times: tuple[float, ...],
+    clock: Clock,
+    time_step,
 ):
     """The values at all (steps, stages + 1) knots, in one row after another: (steps (stages + 1), *row).
 
     value: constant, row; one a step, (steps, *row); at the ends of the steps, (steps + 1, *row), with straight lines
-    between them; or a function of the time [s]. A tensor stays one, in its graph. Raises ValueError otherwise.
+    between them; or a function of the motion's time [s], which `clock` tells. A tensor stays one, in its graph. Raises
+    ValueError otherwise.
     """
     shares = np.array((0.0, *times))
     if callable(value):
-        return _called(name, unit, value, row, steps, shares, time_step)
-    shape = np.shape(value)
+        return _called(name, unit, value, row, steps, shares, clock, time_step)
+    shape = shape_of(f"{name} [{unit}]", value)
     allowed = (row, (steps, *row), (steps + 1, *row))
     if shape not in allowed:
         raise ValueError(
@@ -40,14 +49,14 @@ def scheduled(
     return between.reshape(-1, *row)
 
 
-def _called(name: str, unit: str, function, row, steps: int, shares: np.ndarray, time_step):
+def _called(name: str, unit: str, function, row, steps: int, shares: np.ndarray, clock: Clock, time_step):
     """A function's values; asked once for every time, and a time that two steps share is asked for once."""
     known = {}
 
     def at(step: int, share: float):
         key = (step + 1, 0.0) if share == 1.0 else (step, share)
         if key not in known:
-            moment = (key[0] + key[1]) * time_step
+            moment = clock.moment(*key, time_step)
             known[key] = function(moment)
             quantity(f"{name} at {float(detached(moment)):g} s", unit, detached(known[key]), row)
         return known[key]

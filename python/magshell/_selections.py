@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._quantity import array_of
+
 
 def selection(name: str, values) -> np.ndarray:
     """Indices, or a mask, as they were given: (k,), k > 0. `indices` checks them once their mesh is known."""
-    try:
-        array = np.atleast_1d(np.asarray(values))
-    except ValueError as error:
-        raise ValueError(f"{name} must be integer indices of shape (k,): {error}") from None
+    array = np.atleast_1d(array_of(name, values, "be integer indices of shape (k,)"))
     if array.size == 0:
         raise ValueError(f"{name} are empty: there is nothing to apply this to")
     if array.ndim != 1 or not (array.dtype == bool or np.issubdtype(array.dtype, np.integer)):

@@ -14,7 +14,7 @@ from ._adjoint import Adjoint
 from ._inputs import Inputs
 from ._replacements import SHELL_NAMES, requested
 from ._start import starting_point
-from ._tensors import is_tensor, like
+from ._tensors import dtype_like, is_tensor, like
 from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
 from .scene import Scene
@@ -87,16 +87,24 @@ def solve(inputs: Inputs, state: np.ndarray, memory: list, from_, to, options, p
     began = time.perf_counter()
     with inputs.in_core():
         found = _core.find_equilibrium(scene._model, state, memory, from_, to, options, progress)
-        result = _result(scene, inputs, found, time.perf_counter() - began)
-    if found.outcome == _core.Outcome.interrupted:
+        energies = _energies(scene, found)
+        result = _result(scene, inputs, found, energies, time.perf_counter() - began)
+    if found.outcome == _core.Outcome.interrupted or energies is None:
         raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(_failure(found, options.start_at_rest), result)
     return Solution(result, found, inputs)
 
 
-def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibrium:
-    model = scene._model
+def _energies(scene: Scene, found) -> dict[str, float] | None:
+    """By term; None where Ctrl-C came meanwhile, in a field of the caller's."""
+    try:
+        return scene._model.energies(found.state, found.controls)
+    except KeyboardInterrupt:
+        return None
+
+
+def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_time: float) -> Equilibrium:
     positions, edge_rotations = _outputs(inputs, found)
     return Equilibrium(
         scene=scene,
@@ -104,7 +112,7 @@ def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibriu
         edge_rotations=edge_rotations,
         remanent_magnetization=inputs.given_magnetization,
         applied_flux_density=_flux_density(inputs, found),
-        energies=model.energies(found.state, found.controls),
+        energies=dict.fromkeys(scene._model.term_names, np.nan) if energies is None else energies,
         stable=found.stable,
         unstable_directions=found.unstable_directions,
         iterations=found.iterations,
@@ -134,7 +142,7 @@ def _outputs(inputs: Inputs, found):
         return tuple(like(array, *inputs.given) for array in arrays)
     from .autograd import solved
 
-    return solved(Adjoint(inputs, found), arrays, inputs.given[0].dtype, inputs.tensors)
+    return solved(Adjoint(inputs, found), arrays, dtype_like(*inputs.given), inputs.tensors)
 
 
 def _flux_density(inputs: Inputs, found):

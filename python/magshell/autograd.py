@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
+from ._tensor_kinds import why_not
 from .errors import NoGradient
 
 
@@ -20,7 +21,7 @@ class Solved(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx, *by_outputs):
-        arrays = [each.detach().cpu().double().numpy() for each in by_outputs]
+        arrays = [_numbers(each) for each in by_outputs]
         gradients = ctx.adjoint.gradients(arrays, ctx.needs_input_grad[3:])
         by_leaves = [
             None if values is None else torch.from_numpy(np.array(values)).to(leaf)
@@ -59,6 +60,22 @@ def depends_on(tensor: torch.Tensor, other: torch.Tensor) -> bool:
     return torch.autograd.grad(tensor.sum(), other, retain_graph=True, allow_unused=True)[0] is not None
 
 
+def _numbers(by_output) -> np.ndarray:
+    if why := why_not(by_output):
+        raise NoGradient(f"no gradient here: the one by a result {why}")
+    return by_output.detach().cpu().double().numpy()
+
+
 def solved(adjoint, arrays: tuple[np.ndarray, ...], dtype, leaves: list) -> tuple[torch.Tensor, ...]:
     """The arrays as tensors from which gradients go back to the leaves."""
     return Solved.apply(adjoint, arrays, dtype, *leaves)
+
+
+def is_transformed(tensor: torch.Tensor) -> bool:
+    """Whether torch.func has wrapped it, or it carries a tangent of forward-mode differentiation."""
+    try:
+        functorch = torch._C._functorch
+        wrapped = functorch.is_functorch_wrapped_tensor(tensor) or functorch.is_legacy_batchedtensor(tensor)
+    except AttributeError:  # another torch: its own error says it
+        wrapped = False
+    return wrapped or torch.autograd.forward_ad.unpack_dual(tensor).tangent is not None

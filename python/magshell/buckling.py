@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
+from ._arrays import count
+from ._entry import solve_entry
 from ._inputs import Inputs
 from ._mode_shapes import mode_shapes
 from ._rest import RestStiffness
@@ -39,6 +41,7 @@ class Buckling:
         return f"Buckling: at {factors} times the controls; {self.wall_time:.3g} s"
 
 
+@solve_entry
 def linear_buckling(
     scene: Scene,
     *,
@@ -65,7 +68,7 @@ def linear_buckling(
         the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
     Raises ValueError on bad input, where the supports leave the sheet a motion without stiffness, where the
-    controls do nothing, and where the sheet does not buckle under them (a column that is pulled).
+    controls do nothing, and where the sheet does not buckle under them (a column that is pulled); Interrupted.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
@@ -75,8 +78,7 @@ def linear_buckling(
     >>> round(float(ms.linear_buckling(scene).factors[0]), 3)  # pi^2 E h^3 / (48 L^2) = 0.0206 N/m
     0.021
     """
-    if isinstance(modes, bool) or not isinstance(modes, (int, np.integer)) or modes < 1:
-        raise ValueError(f"modes must be an integer of at least 1, got {modes!r}")
+    modes = count("modes", modes)
     inputs = Inputs(
         scene,
         remanent_magnetization,

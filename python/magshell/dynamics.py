@@ -7,12 +7,13 @@ import time
 import numpy as np
 
 from . import _core
+from ._entry import solve_entry
 from ._inputs import Inputs
 from ._motion_adjoint import MotionAdjoint
 from ._motion_inputs import MotionInputs
 from ._progress import progress_bar
 from ._replacements import requested
-from ._tensors import like
+from ._tensors import dtype_like, like
 from .errors import Interrupted, NotConverged
 from .integrators import TRBDF2, ImplicitEuler, Integrator
 from .scene import Scene
@@ -20,6 +21,7 @@ from .solvers import MixedNewton, Newton
 from .trajectory import MotionState, Trajectory
 
 
+@solve_entry
 def simulate(
     scene: Scene,
     *,
@@ -55,7 +57,8 @@ def simulate(
 
     steps, time_step: how many, and s.
     applied_flux_density: T: constant (3,), one a step (steps, 3), at the ends of all steps (steps + 1, 3) with straight
-        lines between them, or a function of the time [s] that returns (3,).
+        lines between them, or a function of the time [s] that returns (3,). The time is the motion's own, as in `times`: 0
+        at its beginning, and where `start` is a motion it goes on. Arrays begin with the first step taken here.
     load_factor, gravity_factor, field_factor, motion_factor: as in ms.equilibrium; numbers, or in time as above.
     damping: N s/m, viscous, on every vertex or (n_v,).
     stiffness_damping: s. The rate of the strains adds as much stress as this time of it would: for small motions the
@@ -166,12 +169,12 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     scene, model, values = asked.inputs.scene, asked.inputs.scene._model, asked.inputs.values
     positions, edge_rotations, velocities = _outputs(asked, found)
     recorded = len(found.kinetic_energy)
-    names = model.term_names
+    names, ended = model.term_names, asked.clock.after(found.steps_done)
     by_term = np.array(found.energies).reshape(recorded, len(names))
     return Trajectory(
         scene=scene,
         integrator=asked.integrator,
-        times=asked.start.time + asked.time_step * asked.record_every * np.arange(recorded),
+        times=asked.clock.at(asked.record_every * np.arange(recorded)),
         positions=positions,
         velocities=velocities,
         edge_rotations=edge_rotations,
@@ -183,7 +186,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         steps_done=found.steps_done,
         halved={step: len(parts) for step, parts in found.halved.items()},
         end=MotionState(
-            asked.start.time + asked.time_step * found.steps_done,
+            ended.time,
             found.last_state,
             found.last_velocity,
             found.last_memory,
@@ -191,6 +194,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
             found.last_strain_rates(model),
             found.last_maxwell_strains(model),
             found.last_maxwell_strain_rates(model),
+            ended,
+            found.begun or asked.start.rotations_known,
         ),
         iterations=found.iterations,
         factorizations=found.factorizations,
@@ -213,7 +218,7 @@ def _outputs(asked: MotionInputs, found):
         return tuple(like(array, *inputs.given) for array in arrays)
     from .autograd import solved
 
-    return solved(MotionAdjoint(asked, found), arrays, inputs.given[0].dtype, inputs.tensors)
+    return solved(MotionAdjoint(asked, found), arrays, dtype_like(*inputs.given), inputs.tensors)
 
 
 _BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"

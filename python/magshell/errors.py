@@ -23,7 +23,8 @@ class EquilibriumJumped(DesignRejected):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C stopped a solve. `last_good` holds the last converged state, as a result of the same kind."""
+    """Ctrl-C stopped a solve. `last_good` holds the last converged state, as a result of the same kind; None where
+    there is nothing before all of it is done, as of linear solves, or where the start was not yet known."""
 
     def __init__(self, message: str, last_good=None):
         super().__init__(message)

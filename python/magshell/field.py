@@ -9,21 +9,25 @@ import numpy as np
 
 from . import _core as core
 from ._owner import Owner
-from ._quantity import quantity, real_numbers
-from ._tensors import is_tensor
+from ._quantity import array_of, quantity
+from ._tensors import detached, is_tensor, real_tensor
 
 
 def residual_to_remanent(residual_flux_density):
     """The remanent magnetization M_r = B_r / mu_0 [A/m] of the residual flux density B_r [T] of a data sheet.
 
-    Numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph.
+    Numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph. Raises ValueError on
+    what is not real and finite.
 
     >>> round(residual_to_remanent(0.1))
     79577
     """
+    residual = quantity("residual_flux_density", "T", detached(residual_flux_density), ("...",))
     if is_tensor(residual_flux_density):
-        return residual_flux_density / core.vacuum_permeability
-    remanent = real_numbers("residual_flux_density [T]", residual_flux_density) / core.vacuum_permeability
+        return (
+            real_tensor("residual_flux_density", residual_flux_density, ("...",)) / core.vacuum_permeability
+        )
+    remanent = residual / core.vacuum_permeability
     return float(remanent) if remanent.ndim == 0 else remanent
 
 
@@ -162,7 +166,7 @@ class SampledField(AppliedField):
         """
         lower = quantity("lower", "m", lower, (3,))
         upper = quantity("upper", "m", upper, (3,))
-        counts = np.asarray(counts)
+        counts = array_of("counts", counts, "be three integers")
         if counts.shape != (3,) or counts.dtype.kind not in "iu" or counts.min() < 1:
             raise ValueError(f"counts must be three integers of at least 1, got {counts.tolist()}")
         if (backwards := np.flatnonzero((counts > 1) & (lower >= upper))).size:

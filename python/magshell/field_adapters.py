@@ -8,7 +8,7 @@ import numpy as np
 
 from . import _core as core
 from ._differences import STEP, FluxSampler, Function, GradientSampler
-from ._quantity import quantity
+from ._quantity import quantity, real_numbers
 from .field import AppliedField
 
 
@@ -101,7 +101,7 @@ def _checked_function(name: str, unit: str, function: Function, tail: tuple[int,
         raise ValueError(f"{name} must be a function of points (n, 3) [m], got {type(function).__name__}")
 
     def checked(points: np.ndarray) -> np.ndarray:
-        values = np.asarray(function(points), dtype=np.float64)
+        values = real_numbers(f"what {name} returns [{unit}]", function(points))
         if values.shape != (len(points), *tail):
             raise ValueError(
                 f"{name} must return [{unit}] of shape {(len(points), *tail)} for {len(points)} points,"

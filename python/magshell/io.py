@@ -11,12 +11,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ._arrays import named_values
+from ._arrays import index_array, named_values
 from ._files import replacing
 from ._mesh_selection import RELATIVE_TOLERANCE
 from ._obj import read_obj
 from ._ply import read_ply, write_ply
-from ._quantity import quantity
+from ._quantity import quantity, shape_of
+from ._tensors import detached
 from .mesh import TriangleMesh, checked_mesh
 
 _MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
@@ -76,7 +77,7 @@ def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, fac
         raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}")
     points = checked_mesh(mesh).rest_positions
     if positions is not None:
-        points = quantity("positions", "m", _detached(positions), (mesh.n_vertices, 3))
+        points = quantity("positions", "m", detached(positions), (mesh.n_vertices, 3))
     on_vertices = _checked_fields("vertex", vertex_fields, mesh.n_vertices)
     on_faces = _checked_fields("face", face_fields, mesh.n_faces)
     if ending == ".ply":
@@ -106,6 +107,7 @@ def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields]:
         raise ValueError(f"cannot read {str(path)!r} as {ending[1:].upper()}: {reason}") from error
     if len(faces) == 0:
         raise ValueError(f"{str(path)!r} holds no triangles")
+    faces = index_array(f"the faces of {str(path)!r}", faces)
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
     if ending == ".stl":
@@ -179,20 +181,14 @@ def check_field_name(kind: str, name) -> None:
         )
 
 
-def _detached(values):
-    """A torch tensor without its history: a file holds no gradient."""
-    return values.detach().cpu() if hasattr(values, "detach") else values
-
-
 def _checked_fields(kind: str, fields, rows: int) -> dict[str, np.ndarray]:
     checked = {}
     for name, values in named_values(f"{kind}_fields", fields).items():
         check_field_name(kind, name)
-        array = np.asarray(_detached(values))
-        if array.ndim not in (1, 2) or len(array) != rows or 0 in array.shape:
-            raise ValueError(
-                f"{kind} field {name!r} must have shape ({rows},) or ({rows}, k), got {array.shape}"
-            )
+        shape = shape_of(f"{kind} field {name!r}", values)
+        if len(shape) not in (1, 2) or shape[0] != rows or 0 in shape:
+            raise ValueError(f"{kind} field {name!r} must have shape ({rows},) or ({rows}, k), got {shape}")
+        array = np.asarray(detached(values))
         if array.dtype.kind not in "biuf":
             raise ValueError(f"{kind} field {name!r} must hold real numbers, got dtype {array.dtype}")
         fits = array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.abs(array).max() < 2**31)

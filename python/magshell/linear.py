@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ._entry import solve_entry
 from ._inputs import Inputs
 from ._rest import RestStiffness
 from ._tensors import like
@@ -41,6 +42,7 @@ class LinearResponse:
         return f"LinearResponse: largest displacement {moved:.4g} m, {self.wall_time:.3g} s"
 
 
+@solve_entry
 def linear_response(
     scene: Scene,
     *,
@@ -57,7 +59,7 @@ def linear_response(
     the stiffness they add; supports that move do so at the rate they start with. Controls as in
     ms.equilibrium.
 
-    Raises ValueError on bad input, and where the supports leave the sheet a motion without stiffness.
+    Raises ValueError on bad input, and where the supports leave the sheet a motion without stiffness; Interrupted.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
 from pathlib import Path
 
+from ._arrays import number as checked_number
 from ._attempt import Outcome, attempt_packed, attempt_sent, failure, this_process
 from ._picklable import packed, refuse_while_importing
 from ._progress import progress_bar
@@ -232,7 +233,7 @@ def _check(run, executor, workers, attempts, feasibility, checkpoint, resume) ->
     for name, value in (("workers", 1 if workers is None else workers), ("attempts", attempts)):
         if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
             raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
-    if not feasibility >= 0:
+    if not checked_number("feasibility", feasibility) >= 0:
         raise ValueError(f"feasibility must not be negative, got {feasibility}")
     if resume and checkpoint is None:
         raise ValueError("resume needs the checkpoint to continue from")

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from . import _core
+from ._arrays import count, number, positive
+from ._entry import solve_entry
 from ._inputs import Inputs
 from ._progress import progress_bar
 from ._solve import solve
@@ -93,10 +95,10 @@ class Path:
         return len(self.parameters)
 
     def __repr__(self) -> str:
-        lines = [
-            f"Path: {len(self)} equilibria, {int(self.stable.sum())} of them stable, parameter "
-            f"{self.parameters.min():.4g} to {self.parameters.max():.4g}"
-        ]
+        lines = [f"Path: {len(self)} equilibria"]
+        if len(self):
+            lowest, highest = self.parameters.min(), self.parameters.max()
+            lines[0] += f", {int(self.stable.sum())} of them stable, parameter {lowest:.4g} to {highest:.4g}"
         lines += [
             f"  {point.kind} at {point.parameter:.6g}, after point {point.after_point}"
             for point in self.critical
@@ -107,6 +109,7 @@ class Path:
         return "\n".join(lines)
 
 
+@solve_entry
 def follow(
     scene: Scene,
     *,
@@ -150,11 +153,9 @@ def follow(
     solver = MixedNewton() if solver is None else solver
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
-    for name, value in (("first_step", first_step), ("largest_step", largest_step)):
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be positive, got {value}")
-    if max_points < 2:
-        raise ValueError(f"max_points must be at least 2, got {max_points}")
+    first_step, largest_step = positive("first_step", first_step), positive("largest_step", largest_step)
+    max_points = count("max_points", max_points, least=2)
+    lowest_parameter = number("lowest_parameter", lowest_parameter)
     if not lowest_parameter < 0:
         raise ValueError(f"lowest_parameter must be below 0, where the path starts, got {lowest_parameter}")
     if until is not None and not callable(until):

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from ._arrays import named_values
 from ._files import replacing
-from ._quantity import quantity
+from ._quantity import quantity, shape_of
 from ._tensors import detached
 from .io import check_field_name, write_mesh
 from .plotting.playing import with_times
@@ -103,17 +103,17 @@ def write_series(
 
 def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
     fields = named_values(f"{kind}_fields", fields)
-    given = {name: np.asarray(detached(values)) for name, values in fields.items()}
     mesh = states[0].mesh
     rows = mesh.n_vertices if kind == "vertex" else mesh.n_faces
-    for name, values in given.items():
+    for name, values in fields.items():
         check_field_name(kind, name)
-        if values.ndim not in (2, 3) or values.shape[:2] != (len(states), rows):
+        shape = shape_of(f"{kind} field {name!r}", values)
+        if len(shape) not in (2, 3) or shape[:2] != (len(states), rows):
             raise ValueError(
                 f"{kind} field {name!r} must have shape ({len(states)}, {rows}) or ({len(states)}, {rows}, k), "
-                f"got {values.shape}"
+                f"got {shape}"
             )
-    return given
+    return {name: np.asarray(detached(values)) for name, values in fields.items()}
 
 
 @contextmanager

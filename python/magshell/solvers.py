@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral
 
 from . import _core
+from ._arrays import count
 from ._quantity import quantity
 
 
@@ -35,9 +35,7 @@ class Newton:
             if not 0.0 < quantity(name, "1", getattr(self, name), ()) <= 1.0:
                 raise ValueError(f"{name} must be in (0, 1], got {getattr(self, name)}")
         for name in ("max_iterations", "max_relaxation_steps"):
-            count = getattr(self, name)
-            if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= count < 2**31:
-                raise ValueError(f"{name} must be an integer of at least 1, got {count!r}")
+            count(name, getattr(self, name))
 
     def _newton_options(self) -> _core.NewtonOptions:
         return _core.NewtonOptions(

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ._cases import find_all, split, starts_of
+from ._entry import solve_entry
 from ._solve import Search, find
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
@@ -14,6 +15,7 @@ from .scene import Scene
 from .solvers import MixedNewton, Newton
 
 
+@solve_entry
 def equilibrium(
     scene: Scene,
     *,

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ._arrays import index_array
+from ._clock import Clock, clock_of
 from ._files import replace_file
+from ._quantity import quantity
 from ._surroundings import near_kinks
 from ._tensors import detached
 from .integrators import Integrator
@@ -17,10 +20,12 @@ from .scene import Scene
 
 @dataclass(frozen=True)
 class MotionState:
-    """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits.
+    """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits,
+    in steps of the same length.
 
-    time: s, since the start of the motion that led here. Everything else is in the core's order of unknowns and faces;
-    what the motion had no need of is empty: accelerations and strain rates (TRBDF2), strains of a Maxwell branch.
+    time: s, since the start of the motion that led here; clock: how it was counted, in steps. Everything else is in the
+    core's order of unknowns and faces; what the motion had no need of is empty: accelerations and strain rates (TRBDF2),
+    strains of a Maxwell branch. rotations_known: False where the edge rotations are still to be put to rest.
     """
 
     time: float
@@ -31,13 +36,21 @@ class MotionState:
     strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     maxwell_strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    clock: Clock | None = field(repr=False, default=None)
+    rotations_known: bool = field(repr=False, default=True)
 
     def save(self, path: str | Path) -> None:
         """Writes an .npz file."""
         lengths = np.array([len(each) for each in self.memory], dtype=np.int64)
         remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.memory)])
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        arrays |= {"time": self.time, "memory": remembered, "memory_lengths": lengths}
+        arrays |= {
+            "time": self.time,
+            "clock": astuple(clock_of(self)),
+            "rotations_known": self.rotations_known,
+            "memory": remembered,
+            "memory_lengths": lengths,
+        }
         replace_file(path, lambda file: np.savez(file, **arrays))
 
     @classmethod
@@ -45,12 +58,23 @@ class MotionState:
         """Reads what `save` wrote. Raises ValueError if it is something else."""
         try:
             with np.load(Path(path), allow_pickle=False) as file:
-                time, remembered, lengths = (file[name] for name in ("time", "memory", "memory_lengths"))
+                time = float(quantity("time", "s", file["time"], ()))
+                origin, time_step, steps = quantity("clock", "SI", file["clock"], (3,)).tolist()
+                remembered = quantity("memory", "SI", file["memory"], ("n",))
+                lengths = index_array("memory_lengths", file["memory_lengths"])
+                known = bool(file["rotations_known"])
                 arrays = {name: file[name] for name in _ARRAYS}
-        except (KeyError, ValueError, EOFError) as error:
+            clock = Clock(origin, time_step, int(steps))
+            parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
+        except (KeyError, ValueError, TypeError, EOFError) as error:
             raise ValueError(f"{path} is not a saved MotionState: {error}") from error
-        parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
-        return cls(float(time), memory=[part.tolist() for part in parts], **arrays)
+        return cls(
+            time,
+            memory=[part.tolist() for part in parts],
+            clock=clock,
+            rotations_known=known,
+            **arrays,
+        )
 
 
 _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
@@ -61,7 +85,7 @@ class Trajectory:
     """A motion.
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
-    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J.
+    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C came meanwhile.
     remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
     steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
     taken}. end: the last state, from which another simulation goes on. bytes: kept for gradients.

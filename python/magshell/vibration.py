@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from . import _core
+from ._entry import solve_entry
 from ._inputs import Inputs
 from ._mode_shapes import mode_shapes
 from .equilibrium import Equilibrium
@@ -61,6 +62,7 @@ class VibrationModes:
         return text
 
 
+@solve_entry
 def vibration_modes(
     scene: Scene, equilibrium: Equilibrium | None = None, *, count: int = 6
 ) -> VibrationModes:
@@ -75,7 +77,7 @@ def vibration_modes(
         grow. By default the rest shape without loads and fields.
     count: how many modes.
 
-    Raises ValueError on bad input, and NotConverged where the search for the modes does not come to its end.
+    Raises ValueError on bad input, NotConverged where the search for the modes does not come to its end, Interrupted.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ._mesh_selection import RELATIVE_TOLERANCE
+from ._quantity import quantity
 from .mesh import TriangleMesh
 
 
@@ -65,12 +66,13 @@ def _checked_tolerance(meshes, tolerance: float | None) -> float:
     if tolerance is None:
         tolerance = RELATIVE_TOLERANCE * max(mesh.size for mesh in meshes)
     shortest = min(float(mesh.edge_lengths.min()) for mesh in meshes)
+    tolerance = float(quantity("tolerance", "m", tolerance, ()))
     if not 0 <= tolerance < 0.5 * shortest:
         raise ValueError(
             f"tolerance [m] must be at least 0 and below half of the shortest edge ({shortest:.4g} m), "
             f"got {tolerance}"
         )
-    return float(tolerance)
+    return tolerance
 
 
 def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:

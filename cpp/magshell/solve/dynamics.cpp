@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/rotations.h"
@@ -44,6 +45,14 @@ MotionState beginning(Model& model, const MotionInput& input) {
     return start;
 }
 
+// The last state; its energies are not known yet.
+void record_state(const Model& model, const MotionInput& input, MotionResult& result) {
+    const MotionState& state = result.last;
+    result.recorded.push_back({state.q, state.v, state.memory, {}, {}});
+    result.kinetic_energy.push_back(0.5 * state.v.dot(input.inertia.mass.cwiseProduct(state.v)));
+    result.energies.emplace_back(model.term_names().size(), std::numeric_limits<double>::quiet_NaN());
+}
+
 class Run {
   public:
     Run(Newton& newton, const MotionInput& input, const KeepOptions& keep, MotionResult& result)
@@ -53,19 +62,20 @@ class Run {
           result_(result),
           stepper_(newton, input.tableau, input.inertia, input.viscosity) {
         result_.start = result_.last = beginning(newton.model(), input);
+        result_.begun = true;
         if (keep.gradients) plan(keep);
     }
 
     bool run() {
         record();
         if (result_.keep == Keep::checkpoints) result_.checkpoints[0] = result_.start;
-        for (; result_.steps_done < input_.steps; ++result_.steps_done) {
+        while (result_.steps_done < input_.steps) {
             const Index step = result_.steps_done;
             if (step == next_checkpoint_) keep_checkpoint(step);
             MotionState state = result_.last;
             if (!take(step, state)) return false;
             result_.last = std::move(state);
-            if ((step + 1) % input_.record_every == 0) record();
+            if (++result_.steps_done % input_.record_every == 0) record();
         }
         return true;
     }
@@ -137,15 +147,14 @@ class Run {
     }
 
     void record() {
+        record_state(model_, input_, result_);
+        const Index done = result_.steps_done;
+        const Controls now = done == 0 ? input_.controls_at(0, 0.0) : input_.controls_at(done - 1, 1.0);
         const MotionState& state = result_.last;
-        result_.recorded.push_back({state.q, state.v, state.memory, {}, {}});
-        result_.kinetic_energy.push_back(0.5 * state.v.dot(input_.inertia.mass.cwiseProduct(state.v)));
-        const Index step = result_.recorded.size() == 1 ? 0 : result_.steps_done;
-        const Controls now = input_.controls_at(step, result_.recorded.size() == 1 ? 0.0 : 1.0);
         model_.set_memory(state.memory);
-        std::vector<double> of_terms;
-        for (const auto& [name, energy] : model_.energies(state.q, now)) of_terms.push_back(energy);
-        result_.energies.push_back(std::move(of_terms));
+        std::vector<double>& of_terms = result_.energies.back();
+        std::size_t term = 0;
+        for (const auto& [name, energy] : model_.energies(state.q, now)) of_terms[term++] = energy;
     }
 
     Newton& newton_;
@@ -207,6 +216,7 @@ Index next_checkpoint(Index steps, Index leaf, Index slots) {
 MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions& keep,
                       const MotionWatch& watch) {
     MotionResult result;
+    result.last = input.start;
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(static_cast<double>(result.steps_done) / static_cast<double>(input.steps), residual);
     });
@@ -216,6 +226,7 @@ MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions&
     } catch (const Interrupted&) {
         result.outcome = Outcome::interrupted;
         result.reason = "interrupted";
+        if (!result.begun) record_state(model, input, result);
     }
     result.iterations = newton.iterations();
     result.factorizations = newton.factorizations();

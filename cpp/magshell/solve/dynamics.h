@@ -44,10 +44,11 @@ struct MotionResult {
     Outcome outcome = Outcome::failed;
     std::string reason;
     Index steps_done = 0;
+    bool begun = false;                         // whether the start's edge rotations are those it moves with
     MotionState start, last;                    // start: as the first step took it
     std::vector<MotionState> recorded;          // every record_every steps, the start first
     std::vector<double> kinetic_energy;         // [J], of those
-    std::vector<std::vector<double>> energies;  // [J], of those, term by term
+    std::vector<std::vector<double>> energies;  // [J], of those, term by term; NaN if interrupted meanwhile
     std::map<Index, Parts> halved;              // the steps that were taken in parts
     Keep keep = Keep::nothing;
     std::vector<std::vector<PartRecord>> steps;  // where stages are kept

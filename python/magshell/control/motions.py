@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._quantity import quantity
+from .._quantity import quantity, shape_of
 from .._tensors import detached, positive_number
 from ._arguments import indices, tensor
 from .curves import Curve
@@ -20,7 +20,7 @@ def frames_at(times, wanted):
     times: (n,) s, of the frames, ascending. Raises ValueError if the nearest frame is further off than half a step.
     """
     times = quantity("times", "s", detached(times), ("n",))
-    asked = quantity("wanted", "s", detached(wanted), np.shape(wanted))
+    asked = quantity("wanted", "s", detached(wanted), shape_of("wanted [s]", wanted))
     if len(times) < 2 or not (np.diff(times) > 0).all():
         raise ValueError("times [s] must be at least two, ascending")
     frames = np.abs(times - asked[..., None]).argmin(-1)

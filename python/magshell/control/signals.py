@@ -11,16 +11,27 @@ import math
 
 import numpy as np
 
-from .._quantity import quantity
+from .._arrays import count
+from .._clock import Clock, clock_of
+from .._quantity import quantity, shape_of
 from .._tensors import detached, positive_number, require_torch
-from ._arguments import count, tensor
+from ..trajectory import MotionState, Trajectory
+from ._arguments import tensor
 
 
-def step_times(steps: int, time_step):
-    """The times of the ends of all steps, the start first: (steps + 1,) s. time_step: s."""
+def step_times(steps: int, time_step, start: Trajectory | MotionState | None = None):
+    """The times of the ends of all steps, the start first: (steps + 1,) s.
+
+    time_step: s. start: the motion that goes on with these steps, and whose times do; by default they begin at 0.
+    """
     torch = require_torch("ms.control.step_times")
-    time_step = positive_number("time_step", "s", time_step)
-    return torch.arange(count("steps", steps) + 1, dtype=torch.float64) * time_step
+    time_step, steps = positive_number("time_step", "s", time_step), count("steps", steps)
+    if not isinstance(start, Trajectory | MotionState | None):
+        raise ValueError(f"start must be a Trajectory, a MotionState or None, got {type(start).__name__}")
+    state = start.end if isinstance(start, Trajectory) else start
+    began = Clock(0.0) if state is None else clock_of(state)
+    clock = began.going_on(float(detached(time_step)))
+    return clock.moment(torch.arange(steps + 1, dtype=torch.float64), 0.0, time_step)
 
 
 def held(values, steps: int):
@@ -44,7 +55,8 @@ def harmonics(number: int, duration):
 def oscillation(times, angular_frequencies, cosine_amplitudes, sine_amplitudes):
     """sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), with alpha and beta both (J,) or both (J, 3) [T]; as `fourier`."""
     frequencies = tensor("angular_frequencies", "rad/s", angular_frequencies, ("J",))
-    shape = (len(frequencies),) if np.ndim(detached(cosine_amplitudes)) == 1 else (len(frequencies), 3)
+    one = len(shape_of("cosine_amplitudes [T]", cosine_amplitudes)) == 1
+    shape = (len(frequencies),) if one else (len(frequencies), 3)
     cosines = tensor("cosine_amplitudes", "T", cosine_amplitudes, shape)
     sines = tensor("sine_amplitudes", "T", sine_amplitudes, shape)
     phases = at_times(times)[..., None] * frequencies
@@ -94,7 +106,7 @@ def rotating(times, magnitude, axis, angular_frequency, start):
     """
     torch = require_torch("ms.control.rotating")
     times = at_times(times)
-    shape = tuple(times.shape) if np.ndim(detached(magnitude)) else ()
+    shape = tuple(times.shape) if shape_of("magnitude [T]", magnitude) else ()
     magnitude = tensor("magnitude", "T", magnitude, shape)
     axis, start = tensor("axis", "1", axis, (3,)), tensor("start", "1", start, (3,))
     angular_frequency = tensor("angular_frequency", "rad/s", angular_frequency, ())
@@ -111,4 +123,4 @@ def rotating(times, magnitude, axis, angular_frequency, start):
 
 def at_times(times):
     """One time or a row of them, s."""
-    return tensor("times", "s", times, () if np.ndim(detached(times)) == 0 else ("n",))
+    return tensor("times", "s", times, ("n",) if shape_of("times [s]", times) else ())

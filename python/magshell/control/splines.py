@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from .._arrays import count
 from .._quantity import quantity
 from .._tensors import detached, positive_number, require_torch
-from ._arguments import count, tensor
+from ._arguments import tensor
 from .signals import at_times
 
 

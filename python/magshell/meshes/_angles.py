@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._quantity import real_numbers
+
 TURN = 2 * np.pi
 _ROUND_OFF = 1e-12
 
 
 def angle_span(name: str, angle, symmetric: bool = False) -> tuple[float, float]:
     """(from, to) in rad of a span given as such, or by its width: from 0, or to both sides of 0."""
-    span = np.asarray(angle, dtype=np.float64)
+    span = real_numbers(f"{name} [rad]", angle)
     if span.shape == ():
         span = np.array([-0.5, 0.5]) * span if symmetric else np.array([0.0, span])
     if span.shape != (2,) or not np.isfinite(span).all():

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._arrays import number
+from .._quantity import array_of
+
 DIAGONALS = ("alternating", "aligned", "crossed")
 
 
@@ -78,7 +81,7 @@ MOST_FACES = (2**31 - 1) // 3
 
 
 def checked_cells(cells) -> tuple[int, int]:
-    counts = np.asarray(cells)
+    counts = array_of("cells", cells, "be two integers")
     if counts.shape != (2,) or not np.issubdtype(counts.dtype, np.integer) or (counts < 1).any():
         raise ValueError(f"cells must be two integers of at least 1, got {cells!r}")
     check_size(2 * int(counts[0]) * int(counts[1]))
@@ -134,7 +137,7 @@ def _shaken(
     parameters: np.ndarray, movable: np.ndarray, irregular: float, spacing: np.ndarray, seed: int
 ) -> np.ndarray:
     # moved by a fraction a, the doubled area of half a cell is at least 1 - 4 a of what it was
-    if not 0 <= irregular <= 0.25:
+    if not 0 <= number("irregular", irregular) <= 0.25:
         raise ValueError(f"irregular is a fraction of the spacing in [0, 0.25], got {irregular}")
     # numpy's generator takes more, and crashes on a list that holds itself
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import positive
+from .._quantity import quantity
 from ..mesh import TriangleMesh
 from ._angles import angle_span, is_full_turn
 from ._grid import grid
@@ -51,7 +52,7 @@ def sector(
     14
     """
     outer = positive("outer_radius [m]", outer_radius)
-    inner = float(inner_radius)
+    inner = float(quantity("inner_radius", "m", inner_radius, ()))
     if not 0 <= inner < outer:
         raise ValueError(f"inner_radius [m] must be in [0, outer_radius = {outer}), got {inner_radius}")
     start, stop = angle_span("angle", angle)

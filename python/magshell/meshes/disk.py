@@ -18,7 +18,7 @@ def disk(radius: float, cells: int) -> TriangleMesh:
     384
     """
     radius = positive("radius [m]", radius)
-    if not isinstance(cells, (int, np.integer)) or cells < 1:
+    if isinstance(cells, bool) or not isinstance(cells, (int, np.integer)) or cells < 1:
         raise ValueError(f"cells is the number of rings, an integer of at least 1, got {cells!r}")
     check_size(6 * int(cells) ** 2)
     rings = [np.zeros((1, 3))]

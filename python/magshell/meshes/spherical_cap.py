@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import positive
+from .._quantity import quantity
 from ..mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
@@ -38,6 +39,8 @@ def spherical_cap(
     (17, 17)
     """
     radius = positive("radius [m]", radius)
+    angle_from = float(quantity("angle_from", "rad", angle_from, ()))
+    angle_to = float(quantity("angle_to", "rad", angle_to, ()))
     if not 0 <= angle_from < angle_to <= np.pi:
         raise ValueError(
             f"polar angles [rad] must be 0 <= angle_from < angle_to <= pi, got {angle_from} and {angle_to}"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import _core as core
-from .._quantity import quantity
+from .._quantity import quantity, shape_of
 from ._checks import flag, positive
 from ._surfaces import box_surface, sphere_surface, swept_surface
 from .obstacle import Obstacle, Surface
@@ -119,7 +119,7 @@ class Capsule(Obstacle):
         motion: Callable | None = None,
     ) -> None:
         super().__init__(center, rotation, motion)
-        if np.ndim(ends) == 0:
+        if shape_of("ends [m]", ends) == ():
             half = positive("ends", "m", ends) / 2
             ends = [[-half, 0, 0], [half, 0, 0]]
         self.ends = quantity("ends", "m", ends, (2, 3))

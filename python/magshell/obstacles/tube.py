@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import _core as core
-from .._quantity import quantity
+from .._quantity import quantity, shape_of
 from ._checks import flag
 from ._surfaces import swept_surface
 from .obstacle import Obstacle, Surface
@@ -55,7 +55,7 @@ class Tube(Obstacle):
             raise ValueError(
                 f"points [m] must differ from their neighbours, but points {k} and {k + 1} are the same"
             )
-        constant = np.ndim(radius) == 0
+        constant = shape_of("radius [m]", radius) == ()
         given = np.full(len(self.points), radius) if constant else radius
         self.radius = quantity("radius", "m", given, (len(self.points),))
         if self.radius.min() <= 0:

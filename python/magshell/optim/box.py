@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from .._quantity import real_numbers
+from .._tensors import detached
+
 
 @dataclass(frozen=True)
 class Box:
@@ -59,7 +62,7 @@ def option_tensors(label: str, value, parameters: list[torch.Tensor]) -> list[to
     tensors = []
     for position, (given, parameter) in enumerate(zip(values, parameters, strict=True)):
         try:
-            tensor = torch.as_tensor(given, dtype=torch.float64).detach()
+            tensor = torch.from_numpy(real_numbers(label, detached(given)))
             torch.broadcast_to(tensor, parameter.shape)
         except (TypeError, ValueError, RuntimeError, OverflowError):
             shape = getattr(given, "shape", None)

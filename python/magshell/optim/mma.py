@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from .._arrays import positive
 from ..errors import DesignRejected
 from .approximation import Asymptotes, Surroundings
 from .base import BoxOptimizer, require_range
@@ -55,9 +56,7 @@ class MMA(BoxOptimizer):
         penalty: float = 1000.0,
         max_shortenings: int = 6,
     ):
-        if not (math.isfinite(penalty) and penalty > 0):
-            raise ValueError(f"penalty must be positive and finite, got {penalty}")
-        self.penalty = float(penalty)
+        self.penalty = positive("penalty", penalty)
         super().__init__(
             params,
             {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import importlib.util
 import os
 import subprocess
@@ -32,9 +33,13 @@ def choose(backend: str | None = None) -> str:
     if asked is not None and asked not in BACKENDS:
         source = "backend" if backend else f"the environment variable {VARIABLE}"
         raise ValueError(f"{source} must be 'pyvista' or 'matplotlib', got {asked!r}")
-    if importlib.util.find_spec("matplotlib") is None:
-        raise ImportError(f"pictures need matplotlib, and better ones pyvista as well: {_INSTALL}")
-    if asked == "pyvista" and importlib.util.find_spec("pyvista") is None:
+    try:
+        importlib.import_module("matplotlib.backends.backend_agg")  # what paints, with all that it needs
+    except ImportError as error:
+        raise ImportError(
+            f"pictures need matplotlib, and better ones pyvista as well: {_INSTALL} ({error})"
+        ) from error
+    if asked == "pyvista" and not _installed("pyvista"):
         raise ImportError(f"pyvista was asked for, and it is not installed: {_INSTALL}")
     if asked == "matplotlib" or (reason := why_not_pyvista()) is None:
         return asked or "pyvista"
@@ -43,13 +48,20 @@ def choose(backend: str | None = None) -> str:
     return "matplotlib"
 
 
+def _installed(name: str) -> bool:
+    try:
+        return importlib.util.find_spec(name) is not None
+    except (ImportError, ValueError):  # hidden from this process
+        return False
+
+
 @functools.cache
 def why_not_pyvista() -> str | None:
     """None where pyvista renders off the screen.
 
     A GL driver may end or hang the process that asks it, so another process does.
     """
-    if importlib.util.find_spec("pyvista") is None:
+    if not _installed("pyvista"):
         return "it is not installed"
     try:
         run = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, text=True, timeout=60)

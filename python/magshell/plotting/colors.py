@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._quantity import quantity
+from .._quantity import quantity, shape_of
+from .._tensors import detached
 from .states import State
 from .units import LengthUnit, prefixed
 
@@ -143,12 +144,11 @@ NAMED = {"magnetization": _magnetization, "displacement": _displacement, "magnet
 def _given(states: list[State], color) -> list[np.ndarray]:
     if not hasattr(color, "__len__"):
         raise ValueError(f"color must be None, a name or an array, got {color!r}")
-    several = len(states) > 1 and len(color) == len(states) and np.ndim(color[0]) == 1
+    several = len(states) > 1 and len(color) == len(states) and len(shape_of("color", color[0])) == 1
     arrays = list(color) if several else [color] * len(states)
     values = []
     for state, given in zip(states, arrays, strict=True):
-        given = given.detach().cpu() if hasattr(given, "detach") else given
-        array = quantity("color", "the caller's unit", given, ("n",))
+        array = quantity("color", "the caller's unit", detached(given), ("n",))
         if len(array) not in (state.mesh.n_faces, state.mesh.n_vertices):
             raise ValueError(
                 f"color must hold a number a face, ({state.mesh.n_faces},), or a vertex, "

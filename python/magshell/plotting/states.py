@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._quantity import quantity
+from .._tensors import detached
 from ..equilibria import Equilibria
 from ..field import UniformField
 from ..mesh import TriangleMesh
@@ -122,7 +123,7 @@ def states_of(
 def timed(states: list[State], times) -> list[State]:
     """The states at these times, (n,), s, which are their titles too. Raises ValueError unless there is one a state
     and none falls."""
-    array = quantity("times", "s", _detached(times), ("n",))
+    array = quantity("times", "s", detached(times), ("n",))
     if len(array) != len(states):
         raise ValueError(f"times [s] must be {len(states)} numbers, one a state, got {len(array)}")
     if (np.diff(array) < 0).any():
@@ -191,7 +192,7 @@ def _states(
 def _positions(mesh: TriangleMesh, values) -> np.ndarray:
     if values is None:
         return mesh.rest_positions[None]
-    array = quantity("positions", "m", _detached(values), ("...", "n_v", 3))
+    array = quantity("positions", "m", detached(values), ("...", "n_v", 3))
     if array.shape[-2] != mesh.n_vertices or array.ndim not in (2, 3) or not array.size:
         wanted = f"(n_v, 3) = ({mesh.n_vertices}, 3), or (k, n_v, 3) for k states"
         raise ValueError(f"positions [m] must have shape {wanted}, got {array.shape}")
@@ -201,7 +202,7 @@ def _positions(mesh: TriangleMesh, values) -> np.ndarray:
 def _magnetization(mesh: TriangleMesh, values) -> np.ndarray | None:
     if values is None:
         return None
-    array = quantity("remanent_magnetization", "A/m", _detached(values), ("...", 3))
+    array = quantity("remanent_magnetization", "A/m", detached(values), ("...", 3))
     if array.shape not in ((3,), (mesh.n_faces, 3)):
         wanted = f"(n_f, 3) = ({mesh.n_faces}, 3) or (3,)"
         raise ValueError(f"remanent_magnetization [A/m] must have shape {wanted}, got {array.shape}")
@@ -211,7 +212,7 @@ def _magnetization(mesh: TriangleMesh, values) -> np.ndarray | None:
 def _flux_densities(values, count: int) -> list[np.ndarray | None]:
     if values is None:
         return [None] * count
-    array = quantity("applied_flux_density", "T", _detached(values), ("...", 3))
+    array = quantity("applied_flux_density", "T", detached(values), ("...", 3))
     if array.shape not in ((3,), (count, 3)):
         raise ValueError(f"applied_flux_density [T] must have shape (3,) or ({count}, 3), got {array.shape}")
     return list(np.broadcast_to(array, (count, 3)))
@@ -250,8 +251,3 @@ def _frames(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
     return np.stack([x1 - x0, x2 - x0, normal], axis=2)
-
-
-def _detached(values):
-    """A torch tensor without its history: a picture passes no gradient back."""
-    return values.detach().cpu() if hasattr(values, "detach") else values
