@@ -135,7 +135,8 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
     """The values of an object that a solve of this scene may replace, as they are. One that is new must be here."""
     names = getattr(owner, "_replaceable", ())
     if owner is scene:
-        loads = scene._values.core["vertex_loads"]
+        layout, key = scene._value_layout, ("loads", "forces")
+        loads = layout.part(scene._values.numbers, *key) if key in layout else np.zeros(0)
         values = {"gravity": scene.gravity, "vertex_loads": loads}
         absent = {name for name, value in values.items() if not np.any(value)}
     elif isinstance(owner, ms.Contact):
