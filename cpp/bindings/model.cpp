@@ -135,6 +135,13 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
                           py::array_t<double>(values.size(), values.data()));
 }
 
+std::vector<Index> recut_faces(const Model& model) {
+    std::vector<Index> faces;
+    for (Index f = 0; f < model.sheet().n_faces(); ++f)
+        if (model.membrane_faces().shares(f)[1].part > 0.0) faces.push_back(model.sheet().faces.user[f]);
+    return faces;
+}
+
 }  // namespace
 
 void register_model(py::module_& module) {
@@ -169,6 +176,9 @@ void register_model(py::module_& module) {
                  model.set_magnetization(rows);
              })
         .def_property_readonly("size", &Model::size)
+        .def_property_readonly(
+            "recut_faces", &recut_faces,
+            "The caller's faces (k,) whose stretch is measured on other triangles than their own.")
         .def_property_readonly("analyses", &Model::analyses)
         .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
         .def_property_readonly("bytes", &Model::bytes)

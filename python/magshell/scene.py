@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import threading
 from contextlib import contextmanager
+from functools import cached_property
 
 import numpy as np
 
 from . import _constraints, _core, _surroundings
+from ._caps import Caps
 from ._checked_list import checked_list
 from ._quantity import quantity
 from ._values import Values
@@ -110,6 +112,7 @@ class Scene:
         n_directions, n_couples = len(constraints.directions), len(edges)
         self._constraints = constraints
         self._turn, self._solving = threading.RLock(), False
+        self._warned_of_caps = False
         # What the core holds now: a solve with other values puts its own there.
         self._values = self._in_core = Values(self, constraints)
         self._model = _core.Model(
@@ -138,6 +141,10 @@ class Scene:
                 yield
             finally:
                 self._solving = False
+
+    @cached_property
+    def _caps(self) -> Caps:
+        return Caps(self.shell, self._model.recut_faces)
 
     @property
     def mesh(self):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from ._quantity import quantity, real_numbers
 from .mesh import TriangleMesh, checked_mesh
+from .quality import MeshQuality
 
 BENDING = ("midedge", "hinge")
 
@@ -77,6 +80,11 @@ class Shell:
             found["thickness"] = found["thickness"] + by_face * self.mesh.face_areas * self.mass_density
             found["mass_density"] = by_face * self.face_volumes
         return found
+
+    @cached_property
+    def quality(self) -> MeshQuality:
+        """The shapes of its faces, their heights also beside the thickness."""
+        return MeshQuality(self.mesh, self.thickness)
 
     @property
     def face_volumes(self) -> np.ndarray:

@@ -83,7 +83,7 @@ def bow_tie():
 def spinning_bow_tie():
     return refused(
         lambda: ms.equilibrium(joined_at_a_vertex()),
-        "neutral: the sheet is free|rigid motion",
+        "leave the sheet free|rigid motion",
         ms.NotConverged,
     )
 

@@ -2,10 +2,11 @@
 
 namespace magshell {
 
-FaceLoop::FaceLoop(const Sheet& sheet, const Schedule& schedule, const SystemMatrix& matrix)
-    : faces_(sheet.n_faces()), corners_(&sheet.corners), schedule_(schedule) {
+FaceLoop::FaceLoop(const std::vector<std::array<Index, 3>>& corners, const Schedule& schedule,
+                   const SystemMatrix& matrix)
+    : faces_(static_cast<Index>(corners.size())), corners_(&corners), schedule_(schedule) {
     slots_.reserve(faces_);
-    for (const std::array<Index, 3>& nodes : sheet.corners) slots_.push_back(pair_slots<3>(matrix, nodes));
+    for (const std::array<Index, 3>& nodes : corners) slots_.push_back(pair_slots<3>(matrix, nodes));
 }
 
 }  // namespace magshell

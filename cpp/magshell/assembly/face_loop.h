@@ -8,7 +8,8 @@ namespace magshell {
 
 class FaceLoop {
   public:
-    FaceLoop(const Sheet& sheet, const Schedule& schedule, const SystemMatrix& matrix);
+    FaceLoop(const std::vector<std::array<Index, 3>>& corners, const Schedule& schedule,
+             const SystemMatrix& matrix);
 
     Index packs() const { return packs_for(faces_); }
     int lanes_in(Index pack) const { return std::min(Pack::width, faces_ - pack * Pack::width); }

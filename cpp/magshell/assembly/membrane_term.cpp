@@ -2,15 +2,16 @@
 
 namespace magshell {
 
-MembraneTerm::MembraneTerm(const Sheet& sheet, const FaceLoop& loop)
+MembraneTerm::MembraneTerm(const Sheet& sheet, const MembraneFaces& faces, const FaceLoop& loop)
     : sheet_(sheet),
+      faces_(faces),
       loop_(loop),
       elements_(loop.packs()),
       stress_(3 * loop.packs()),
       extrapolated_(3 * loop.packs()) {
     for (Index pack = 0; pack < loop.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
-            const std::array<Index, 3>& c = sheet.corners[loop.face(pack, lane)];
+            const std::array<Index, 3>& c = faces.corners()[loop.face(pack, lane)];
             for (int i = 0; i < 3; ++i)
                 elements_[pack].rest_squared_length[i].set(
                     lane, (sheet.rest[c[(i + 2) % 3]] - sheet.rest[c[(i + 1) % 3]]).squaredNorm());
@@ -22,8 +23,13 @@ void MembraneTerm::set_material(const std::vector<SheetMaterial>& materials) {
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = loop_.face(pack, lane);
-            set_lane(elements_[pack].stiffness, lane,
-                     RestFace(sheet_.rest_corners(f).data()).membrane_stiffness(materials[f]));
+            const std::array<Vec3, 3> corners = faces_.rest_corners(f);
+            Mat3 stiffness = Mat3::Zero();
+            for (const MembraneFaces::Share& share : faces_.shares(f))
+                if (share.part > 0.0)
+                    stiffness +=
+                        share.part * RestFace(corners.data()).membrane_stiffness(materials[share.face]);
+            set_lane(elements_[pack].stiffness, lane, stiffness);
         }
 }
 
@@ -78,6 +84,10 @@ void MembraneTerm::extrapolate(const double* p) {
 }
 
 void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, SceneGradient& out) {
+    // Of each share: work, and work by the Poisson ratio. A share may be of a face in another part.
+    using OfShares = std::array<Eigen::Vector2d, 2>;
+    std::vector<OfShares> by_shares(sheet_.n_faces(),
+                                    OfShares{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});
     loop_.each_pack([&](Index pack) {
         Pack3 x[3], along[3];
         Pack strain[3], rate[3];
@@ -89,16 +99,26 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, S
         membrane.strain_rate(along, rate);
         for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
             const Index f = loop_.face(pack, lane);
-            const SheetMaterial& m = materials_[f];
-            const double work = lane_of(rate, lane).dot(lane_of(&stress_[3 * pack], lane));
-            const Mat3 by_poisson_ratio =
-                RestFace(sheet_.rest_corners(f).data()).membrane_by_poisson_ratio(m);
-            const Index user = sheet_.faces.user[f];
-            out.young_modulus[user] += work / m.young_modulus;
-            out.thickness[user] += work / m.thickness;
-            out.poisson_ratio[user] += lane_of(rate, lane).dot(by_poisson_ratio * lane_of(strain, lane));
+            const Vec3 d = lane_of(strain, lane), along = lane_of(rate, lane);
+            const std::array<Vec3, 3> corners = faces_.rest_corners(f);
+            for (int k = 0; k < 2; ++k) {
+                const MembraneFaces::Share share = faces_.shares(f)[k];
+                if (share.part == 0.0) continue;
+                const RestFace rest(corners.data());
+                const SheetMaterial& m = materials_[share.face];
+                by_shares[f][k] =
+                    share.part * Eigen::Vector2d(along.dot(rest.membrane_stiffness(m) * d),
+                                                 along.dot(rest.membrane_by_poisson_ratio(m) * d));
+            }
         }
     });
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        for (int k = 0; k < 2; ++k) {
+            const Index face = faces_.shares(f)[k].face, user = sheet_.faces.user[face];
+            out.young_modulus[user] += by_shares[f][k][0] / materials_[face].young_modulus;
+            out.thickness[user] += by_shares[f][k][0] / materials_[face].thickness;
+            out.poisson_ratio[user] += by_shares[f][k][1];
+        }
 }
 
 void MembraneTerm::strains(const double* q, Strains& out) {
@@ -150,7 +170,7 @@ void MembraneTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
             }
             const double force = 2.0 * stress * std::sqrt(element.rest_squared_length[i][lane]);
             for (const int k : {(i + 1) % 3, (i + 2) % 3})
-                out.segment<3>(3 * sheet_.corners[f][k]).array() += force;
+                out.segment<3>(3 * faces_.corners()[f][k]).array() += force;
         }
     }
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/membrane_faces.h"
 #include "magshell/assembly/strain_history.h"
 #include "magshell/energy/material.h"
 #include "magshell/energy/membrane.h"
@@ -11,7 +12,7 @@ namespace magshell {
 
 class MembraneTerm final : public ElasticTerm {
   public:
-    MembraneTerm(const Sheet& sheet, const FaceLoop& loop);
+    MembraneTerm(const Sheet& sheet, const MembraneFaces& faces, const FaceLoop& loop);
 
     /// One material a face, in our numbering.
     void set_material(const std::vector<SheetMaterial>& materials);
@@ -33,6 +34,7 @@ class MembraneTerm final : public ElasticTerm {
 
   private:
     const Sheet& sheet_;
+    const MembraneFaces& faces_;
     const FaceLoop& loop_;
     std::vector<SheetMaterial> materials_;
     std::vector<Membrane::Element> elements_;

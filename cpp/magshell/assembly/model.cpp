@@ -64,7 +64,8 @@ Model::Model(SceneInput input)
       matrix_(sheet_.n_nodes(), sheet_.n_rotations(), all_stencils(sheet_, input)),
       reduction_(matrix_, renumbered(input.held, sheet_), sheet_.rest, sheet_.n_vertices()),
       schedule_(sheet_),
-      faces_(sheet_, schedule_, matrix_),
+      faces_(sheet_.corners, schedule_, matrix_),
+      membrane_faces_(sheet_, input.values.curvature_scale),
       metric_(area_metric(sheet_)),
       extent_(extent_of(input.mesh)),
       rest_reach_(input.mesh.rest_positions().lpNorm<Eigen::Infinity>()) {
@@ -83,7 +84,9 @@ T* Model::add(std::unique_ptr<T> term) {
 void Model::add_terms(const SceneInput& input) {
     const SceneValues& values = input.values;
     const VectorXd no_forces = VectorXd::Zero(3 * sheet_.n_nodes());
-    membrane_ = add(std::make_unique<MembraneTerm>(sheet_, faces_));
+    if (!membrane_faces_.own()) membrane_loop_.emplace(membrane_faces_.corners(), schedule_, matrix_);
+    membrane_ = add(
+        std::make_unique<MembraneTerm>(sheet_, membrane_faces_, membrane_loop_ ? *membrane_loop_ : faces_));
     bending_ = add(std::make_unique<BendingTerm>(sheet_, schedule_, matrix_));
     if (input.magnetic) magnetic_ = add(std::make_unique<MagneticTerm>(sheet_, faces_));
     if (!values.gravity.isZero(0.0))
@@ -383,7 +386,8 @@ void Model::set_memory(const Memory& memory) {
 }
 
 std::size_t Model::bytes() const {
-    std::size_t total = matrix_.bytes() + reduction_.bytes() + schedule_.bytes() + faces_.bytes();
+    std::size_t total = matrix_.bytes() + reduction_.bytes() + schedule_.bytes() + faces_.bytes() +
+                        membrane_faces_.bytes() + (membrane_loop_ ? membrane_loop_->bytes() : 0);
     for (const std::unique_ptr<Term>& term : terms_) total += term->bytes();
     return total;
 }

@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +35,7 @@ class Model {
     /// (n_f, 3) [A/m], rest frame, world axes. Only of a scene that was said to be magnetic.
     void set_magnetization(const Rows3& remanent_magnetization);
 
+    const MembraneFaces& membrane_faces() const { return membrane_faces_; }
     const Sheet& sheet() const { return sheet_; }
     const Reduction& reduction() const { return reduction_; }
     SystemMatrix& matrix() { return matrix_; }
@@ -134,6 +136,8 @@ class Model {
     Reduction reduction_;
     Schedule schedule_;
     FaceLoop faces_;
+    MembraneFaces membrane_faces_;
+    std::optional<FaceLoop> membrane_loop_;  // where those are not the sheet's own
     std::vector<std::unique_ptr<Term>> terms_;
     // By part: the nodes and rotations whose columns it is the first to add to, and so clears. Last:
     // nobody's.
