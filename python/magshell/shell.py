@@ -25,7 +25,8 @@ class Shell:
     mass_density: kg/m3, positive; only gravity asks for it.
     curvature_scale: positive factor on every bending strain, [Chen22] k_cur.
     bending: "midedge" (second order on irregular meshes too, see `quality`; one rotation an edge: the lowest-order
-        Hellan-Herrmann-Johnson element), or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several percent on irregular meshes).
+        Hellan-Herrmann-Johnson element), or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several percent on
+        irregular meshes).
 
     >>> import magshell as ms
     >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)

@@ -51,9 +51,9 @@ def with_flat_triangles() -> ms.TriangleMesh:
 
 
 def cut_inside(mesh: ms.TriangleMesh, chosen: np.ndarray, height: float) -> ms.TriangleMesh:
-    """These faces cut into three at a point by the middle of their edge 0, at this share of the height over it."""
+    """These faces cut into three at a point over the middle of their edge 0, at this share of their own height."""
     corners = mesh.faces[chosen]
-    weights = np.array([height, 0.5, 0.5 - height])
+    weights = np.array([height, 0.5 * (1 - height), 0.5 * (1 - height)])
     new = mesh.n_vertices + np.arange(len(corners))
     points = np.einsum("c,fci->fi", weights, mesh.rest_positions[corners])
     parts = [np.stack([corners[:, i], corners[:, (i + 1) % 3], new], axis=1) for i in range(3)]
