@@ -38,6 +38,32 @@ def elastic(thickness, bending):
     return build
 
 
+def capped_mesh(size):
+    """Two faces with an angle of 165 degrees, whose stretch is measured on other triangles than their own."""
+    mesh = flat_mesh(size)
+    long = mesh.interior_edges[[1, -2]]
+    faces = mesh.edge_faces[long, 0]
+    tips = [
+        np.setdiff1d(face, ends)[0] for face, ends in zip(mesh.faces[faces], mesh.edges[long], strict=True)
+    ]
+    x = mesh.rest_positions
+    points = 0.88 * mesh.edge_midpoints[long] + 0.12 * x[tips]
+    corners, new = mesh.faces[faces], mesh.n_vertices + np.arange(2)
+    parts = [np.stack([corners[:, i], corners[:, (i + 1) % 3], new], axis=1) for i in range(3)]
+    return ms.TriangleMesh(
+        np.concatenate([x, points]), np.concatenate([np.delete(mesh.faces, faces, axis=0), *parts])
+    )
+
+
+def capped(thickness):
+    def build(size):
+        scene = ms.Scene(shell(capped_mesh(size), thickness), allow_rigid_motions=True)
+        assert len(scene._model.recut_faces) == 4
+        return Problem(scene, Controls())
+
+    return build
+
+
 def soft(mesh, **options):
     """A sheet whose own energy is nothing beside that of what acts on it."""
     return ms.Shell(mesh, thickness=1e-2 * mesh.size, young_modulus=1e-9, **options)
@@ -158,6 +184,7 @@ IN_BOTH = Controls(applied_flux_density=np.array(FIELD), field_factor=0.8)
 # name -> (how to build it at a size, the term that must carry nearly all of the energy, or None)
 TERMS = {
     "membrane": (elastic(1e-6, "midedge"), "membrane"),
+    "membrane beside caps": (capped(1e-6), "membrane"),
     "bending, midedge": (elastic(1e3, "midedge"), "bending"),
     "bending, hinge": (elastic(1e3, "hinge"), "bending"),
     "magnetic, tangential": (magnetic(uniform, "tangential", IN_FIELD), "magnetic"),

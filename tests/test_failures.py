@@ -1,12 +1,14 @@
 """A solve that cannot finish says why, and hands back the last good state."""
 
 import os
+import re
 import signal
 import threading
 import time
 
 import numpy as np
 import pytest
+from crossed_cells import crossed
 
 import magshell as ms
 
@@ -76,6 +78,72 @@ def test_a_neutral_equilibrium_is_no_stable_one():
     with pytest.raises(ms.NotConverged) as caught:
         ms.equilibrium(scene)
     assert not caught.value.last_good.stable
+
+
+def bent_far(mesh):
+    """A thin strip in a field that makes beta = 300."""
+    shell = ms.Shell(mesh, thickness=LENGTH / 400, young_modulus=YOUNG, poisson_ratio=0.0)
+    scene = ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    flux_density = 300.0 * YOUNG * shell.thickness[0] ** 2 / (12.0 * 1e5 * LENGTH**2)
+    return ms.equilibrium(
+        scene,
+        remanent_magnetization=(1e5, 0, 0),
+        applied_flux_density=(-0.87 * flux_density, 0, 0.5 * flux_density),
+        solver=ms.MixedNewton(max_relaxation_steps=20),
+    )
+
+
+def with_a_cap(height):
+    """A strip with a vertex at this height above a boundary edge in its middle, over that edge's length."""
+    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=(20, 2))
+    edge = mesh.edges_at(y=0.0)[10]
+    face = mesh.edge_faces[edge].max()
+    tip = mesh.edge_midpoints[edge] + (0.0, height * mesh.edge_lengths[edge], 0.0)
+    a, b, c = mesh.faces[face]
+    new = mesh.n_vertices
+    faces = np.concatenate([np.delete(mesh.faces, face, axis=0), [[a, b, new], [b, c, new], [c, a, new]]])
+    return ms.TriangleMesh(np.concatenate([mesh.rest_positions, [tip]]), faces)
+
+
+def test_a_nearly_degenerate_face_is_named():
+    """A clamped sheet is not told to be held by supports."""
+    mesh = with_a_cap(1e-7)
+    worst = mesh.quality.worst(1)[0]
+    with pytest.raises(
+        ms.NotConverged, match=rf"Face {worst} \(.*\) is nearly degenerate.*leave such faces out"
+    ) as caught:
+        bent_far(mesh)
+    assert "smaller steps" not in str(caught.value) and "free" not in str(caught.value)
+
+
+def test_a_failure_says_where_and_what_was_tried():
+    solver = ms.MixedNewton(max_iterations=3, smallest_load_step=0.2, max_relaxation_steps=1)
+    with pytest.raises(ms.NotConverged) as caught:
+        ms.equilibrium(
+            cantilever(ms.UniformField()),
+            remanent_magnetization=(4e4, 0, 0),
+            applied_flux_density=(0, 0, 20e-3),
+            solver=solver,
+        )
+    text = str(caught.value)
+    assert "Load steps were shortened to 0.25 of the way." in text
+    assert "Relaxation took 1 step; it still moved the sheet by" in text
+    assert "The forces are out of balance most at vertices" in text
+    assert "max_relaxation_steps" in text and "first_load_step" not in text
+
+
+def test_a_failure_beside_flat_faces_names_them():
+    """Steps however short do not help there."""
+    mesh = crossed(LENGTH, WIDTH, (20, 2), [0.001, 0.5])
+    with pytest.raises(ms.NotConverged) as caught:
+        bent_far(mesh)
+    text = str(caught.value)
+    named = re.search(
+        r"faces, namely (\d+) \(largest angle 179\.\d+ deg, height .* of the thickness\).* almost flat", text
+    )
+    assert mesh.quality.largest_angles[int(named[1])] > np.radians(179)
+    assert "mend the mesh there first" in text and "smaller steps" not in text
+    assert "The energy still falls along a motion at vertices" in text
 
 
 def test_what_a_field_raises_comes_through():

@@ -232,8 +232,34 @@ def test_repr_answers_what_a_person_asks():
         "TriangleMesh: 671 vertices, 1200 faces, 1870 edges",
         "  size: 0.12 x 0.02 x 0 m, area 0.0024 m2",
         "  shape: 1 part, 1 boundary loop of 140 edges",
-        "  faces: edges 0.002 to 0.00283 m, smallest angle 45.0 deg, aspect at most 1.39",
+        "  faces: edges 0.002 to 0.00283 m, angles 45.0 to 90.0 deg, aspect at most 1.39",
     ]
+
+
+def test_quality_of_two_triangles_by_hand():
+    """One of 90, 60 and 30 degrees, and a cap of height 0.1 on its longest side."""
+    along = np.array([np.sqrt(3), 1.0, 0.0]) / 2
+    apex = 1.0 * along + 0.1 * np.array([-0.5, np.sqrt(3) / 2, 0.0])
+    mesh = ms.TriangleMesh([[0, 0, 0], [np.sqrt(3), 0, 0], 2 * along, apex], [[0, 1, 2], [0, 2, 3]])
+    quality = mesh.quality
+    assert np.degrees(quality.smallest_angles) == pytest.approx([30, np.degrees(np.arctan(0.1))])
+    assert np.degrees(quality.largest_angles) == pytest.approx([90, 180 - 2 * np.degrees(np.arctan(0.1))])
+    assert quality.heights == pytest.approx([np.sqrt(3) / 2, 0.1])
+    assert quality.heights_over_lengths == pytest.approx([np.sqrt(3) / 4, 0.05])
+    assert quality.aspects[0] == pytest.approx(2 / (2 * np.sqrt(3) * (np.sqrt(3) - 1) / 2))
+    assert quality.worst().tolist() == [1, 0]
+    assert "largest angles: 168.6 deg (face 1), 90.0 deg (face 0)" in repr(quality)
+    with pytest.raises(ValueError, match="ask the `quality` of a Shell"):
+        quality.heights_over_thickness  # noqa: B018
+    of_shell = ms.Shell(mesh, thickness=[0.5, 0.2], young_modulus=1e6).quality
+    assert of_shell.heights_over_thickness == pytest.approx([np.sqrt(3), 0.5])
+    assert "shortest height 0.1 m (0.5 of the thickness)" in repr(of_shell)
+
+
+def test_quality_is_exact_for_the_flattest_faces():
+    mesh = ms.TriangleMesh([[0, 0, 0], [1, 0, 0], [0.5, 1e-7, 0]], [[0, 1, 2]])
+    assert np.pi - mesh.quality.largest_angles[0] == pytest.approx(4e-7, rel=1e-6)
+    assert mesh.quality.heights[0] == pytest.approx(1e-7)
 
 
 # Selection

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import magshell as ms
-from magshell._mesh_summary import smallest_angle
 
 DIAGONALS = ("alternating", "aligned", "crossed")
 
@@ -300,7 +299,7 @@ def test_short_sides_are_graded_into_the_sheet(outline):
     angle = np.linspace(0, 2 * np.pi, 300, endpoint=False)
     mesh = outline(np.stack([np.cos(angle), np.sin(angle)], axis=1), size=0.1)
     assert mesh.n_faces < 4000  # 15000 if all were as small as the sides
-    assert smallest_angle(mesh) > np.radians(25)
+    assert mesh.quality.smallest_angles.min() > np.radians(25)
 
 
 def test_a_slit_from_a_hole_joins_its_boundary(outline):

@@ -55,6 +55,7 @@ std::vector<SheetInput> sheets_of(const py::list& given) {
         sheet.owner = each["owner"].cast<std::string>();
         sheet.mesh = each["mesh"].cast<std::shared_ptr<TriangleMesh>>();
         sheet.vertices = each["vertices"].cast<std::vector<Index>>();
+        sheet.curvature_scale = to_vector(each["curvature_scale"].cast<Array>());
         sheet.directors = each["directors"].cast<bool>();
         sheet.magnetic = each["magnetic"].cast<bool>();
         sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
@@ -129,6 +130,19 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
                           py::array_t<double>(values.size(), values.data()));
 }
 
+std::vector<Index> recut_faces(const Model& model) {
+    std::vector<Index> faces;
+    Index first = 0;  // of a body, in the numbers of all
+    for (Index body = 0; body < static_cast<Index>(model.bodies().sheets().size()); ++body) {
+        const Sheet& sheet = *model.bodies().sheets()[body];
+        for (Index f = 0; f < sheet.n_faces(); ++f)
+            if (model.membrane_faces(body).shares(f)[1].part > 0.0)
+                faces.push_back(first + sheet.faces.user[f]);
+        first += sheet.n_faces();
+    }
+    return faces;
+}
+
 }  // namespace
 
 void register_model(py::module_& module) {
@@ -154,6 +168,9 @@ void register_model(py::module_& module) {
             },
             "All of them, rows in the caller's order.")
         .def_property_readonly("size", &Model::size)
+        .def_property_readonly(
+            "recut_faces", &recut_faces,
+            "The caller's faces (k,) whose stretch is measured on other triangles than their own.")
         .def_property_readonly("analyses", &Model::analyses)
         .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
         .def_property_readonly("bytes", &Model::bytes)

@@ -48,6 +48,13 @@ void register_statics(py::module_& module) {
         .value("failed", Outcome::failed)
         .value("interrupted", Outcome::interrupted);
 
+    py::class_<FailedAttempt>(module, "FailedAttempt")
+        .def_readonly("state", &FailedAttempt::state)
+        .def_readonly("controls", &FailedAttempt::controls)
+        .def_readonly("shortest_step", &FailedAttempt::shortest_step)
+        .def_readonly("last_move", &FailedAttempt::last_move)
+        .def_readonly("falling", &FailedAttempt::falling);
+
     py::class_<StaticsResult>(module, "StaticsResult")
         .def_readonly("outcome", &StaticsResult::outcome)
         .def_readonly("state", &StaticsResult::state)
@@ -55,6 +62,7 @@ void register_statics(py::module_& module) {
         .def_readonly("controls", &StaticsResult::controls)
         .def_readonly("progress", &StaticsResult::progress)
         .def_readonly("reason", &StaticsResult::reason)
+        .def_readonly("failed", &StaticsResult::failed)
         .def_readonly("iterations", &StaticsResult::iterations)
         .def_readonly("factorizations", &StaticsResult::factorizations)
         .def_readonly("failed_factorizations", &StaticsResult::failed_factorizations)

@@ -15,28 +15,15 @@ def summary(mesh) -> str:
         boundary = f"1 boundary loop of {loops[0]} edges"
     else:
         boundary = f"{len(loops)} boundary loops of {min(loops)} to {max(loops)} edges"
+    quality = mesh.quality
     return (
         f"TriangleMesh: {mesh.n_vertices} vertices, {mesh.n_faces} faces, {mesh.n_edges} edges\n"
         f"  size: {' x '.join(f'{length:.4g}' for length in extent)} m, area {mesh.face_areas.sum():.4g} m2\n"
         f"  shape: {parts}, {boundary}\n"
         f"  faces: edges {mesh.edge_lengths.min():.3g} to {mesh.edge_lengths.max():.3g} m, "
-        f"smallest angle {np.degrees(smallest_angle(mesh)):.1f} deg, "
-        f"aspect at most {aspect_ratios(mesh).max():.3g}"
+        f"angles {np.degrees(quality.smallest_angles.min()):.1f} to "
+        f"{np.degrees(quality.largest_angles.max()):.1f} deg, aspect at most {quality.aspects.max():.3g}"
     )
-
-
-def smallest_angle(mesh) -> float:
-    """The smallest angle of any face, rad. It lies opposite the shortest edge."""
-    a, b, c = np.sort(mesh.edge_lengths[mesh.face_edges], axis=1).T
-    # b c sin = 2 A,   b c cos = (b^2 + c^2 - a^2) / 2
-    return float(np.arctan2(2 * mesh.face_areas, 0.5 * (b**2 + c**2 - a**2)).min())
-
-
-def aspect_ratios(mesh) -> np.ndarray:
-    """(n_f,): longest edge over inscribed radius, relative to the 2 sqrt(3) of an equilateral triangle."""
-    lengths = mesh.edge_lengths[mesh.face_edges]
-    inscribed_radius = 2 * mesh.face_areas / lengths.sum(axis=1)
-    return lengths.max(axis=1) / (2 * np.sqrt(3) * inscribed_radius)
 
 
 def boundary_loops(mesh) -> list[np.ndarray]:

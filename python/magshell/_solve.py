@@ -11,6 +11,8 @@ import numpy as np
 
 from . import _core
 from ._adjoint import Adjoint
+from ._caps import warn_of_caps
+from ._diagnosis import why_not
 from ._inputs import Inputs
 from ._replacements import SHELL_NAMES, requested
 from ._start import starting_point
@@ -92,7 +94,9 @@ def solve(inputs: Inputs, state: np.ndarray, memory: list, from_, to, options, p
     if found.outcome == _core.Outcome.interrupted or energies is None:
         raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
     if found.outcome == _core.Outcome.failed:
-        raise NotConverged(_failure(found, options.start_at_rest), result)
+        raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
+    positions = scene._model.positions(found.state)
+    warn_of_caps(scene, positions, inputs.values.shell, result.energies["bending"], "this equilibrium")
     return Solution(result, found, inputs)
 
 
@@ -150,20 +154,3 @@ def _flux_density(inputs: Inputs, found):
         return inputs.given_flux_density
     flux_density = inputs.scene._control_layout.part(found.controls, "scene", "applied_flux_density")
     return like(flux_density[0].copy(), *inputs.given)
-
-
-def _failure(found, at_rest: bool) -> str:
-    if found.progress >= 1.0:
-        return (
-            f"no stable equilibrium was found at the new controls, in {found.iterations} iterations: {found.reason}. "
-            "The unstable one is in `error.last_good`; require_stable=False accepts it."
-        )
-    advice = (
-        "Load it in smaller steps (first_load_step of the solver), or start from a nearby equilibrium."
-        if at_rest
-        else "Start from positions closer to an equilibrium."
-    )
-    return (
-        f"the solve stopped at {found.progress:.3g} of the way to the new controls, after {found.iterations} iterations: "
-        f"{found.reason}. {advice} The last converged state is in `error.last_good`."
-    )

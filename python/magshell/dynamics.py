@@ -7,13 +7,14 @@ import time
 import numpy as np
 
 from . import _core
+from ._caps import warn_of_caps
 from ._entry import solve_entry
 from ._inputs import Inputs
 from ._motion_adjoint import MotionAdjoint
 from ._motion_inputs import MotionInputs
 from ._progress import progress_bar
 from ._replacements import requested
-from ._tensors import dtype_like, like
+from ._tensors import detached, dtype_like, like
 from .errors import Interrupted, NotConverged
 from .integrators import TRBDF2, ImplicitEuler, Integrator
 from .scene import Scene
@@ -162,6 +163,11 @@ def simulate(
             f"{found.reason}. Take shorter steps. The motion until there is in `error.last_good`.",
             result,
         )
+    bending = result.energies["bending"]
+    most = int(np.argmax(bending))
+    positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
+    where = f"the motion, at {result.times[most]:.4g} s,"
+    warn_of_caps(scene, positions, inputs.values.shell, bending[most], where)
     return result
 
 

@@ -22,6 +22,10 @@ class EquilibriumJumped(DesignRejected):
     """Between two designs the equilibrium snapped or buckled. `last_good` holds the one before the jump."""
 
 
+class MeshQualityWarning(UserWarning):
+    """Faces of the mesh are so flat that a result cannot be trusted. See TriangleMesh.quality."""
+
+
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C stopped a solve. `last_good` holds the last converged state, as a result of the same kind; None where
     there is nothing before all of it is done, as of linear solves, or where the start was not yet known."""

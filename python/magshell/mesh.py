@@ -13,6 +13,7 @@ from ._arrays import index_array, positive
 from ._mesh_selection import MeshSelection
 from ._mesh_summary import boundary_loops, summary
 from ._quantity import quantity
+from .quality import MeshQuality
 
 
 class TriangleMesh(MeshSelection):
@@ -123,7 +124,10 @@ class TriangleMesh(MeshSelection):
 
     @cached_property
     def _area_vectors(self) -> np.ndarray:
-        x0, x1, x2 = np.moveaxis(self.rest_positions[self.faces], 1, 0)
+        return self._area_vectors_at(self.rest_positions)
+
+    def _area_vectors_at(self, positions: np.ndarray) -> np.ndarray:
+        x0, x1, x2 = np.moveaxis(positions[self.faces], 1, 0)
         return 0.5 * np.cross(x1 - x0, x2 - x0)
 
     @cached_property
@@ -155,10 +159,19 @@ class TriangleMesh(MeshSelection):
     @cached_property
     def vertex_normals(self) -> np.ndarray:
         """(n_v, 3) unit vectors: the normals around each vertex, weighted by area. Zero where they cancel."""
-        corners = self.faces.ravel()
-        total = np.stack([np.bincount(corners, np.repeat(area, 3)) for area in self._area_vectors.T], axis=1)
+        return _frozen(self.normals_at_vertices(self.rest_positions))
+
+    def normals_at_vertices(self, positions: np.ndarray) -> np.ndarray:
+        """The same (n_v, 3) where the vertices are at other positions, (n_v, 3) m."""
+        corners, areas = self.faces.ravel(), self._area_vectors_at(positions)
+        total = np.stack([np.bincount(corners, np.repeat(area, 3)) for area in areas.T], axis=1)
         length = np.linalg.norm(total, axis=1, keepdims=True)
-        return _frozen(np.divide(total, length, out=np.zeros_like(total), where=length > 0))
+        return np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+
+    @cached_property
+    def quality(self) -> MeshQuality:
+        """The shapes of its faces: angles, aspect, heights. A Shell's `quality` knows the thickness as well."""
+        return MeshQuality(self)
 
     # Other meshes from this one
 

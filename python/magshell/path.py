@@ -11,6 +11,7 @@ import numpy as np
 
 from . import _core
 from ._arrays import count, number, positive
+from ._caps import warn_of_caps
 from ._entry import solve_entry
 from ._inputs import Inputs
 from ._progress import progress_bar
@@ -187,6 +188,7 @@ def follow(
         found = _core.follow_path(
             scene._model, state, memory, from_, inputs.controls, options, until, _advance(bar)
         )
+        bending = _bending_energies(scene, found, inputs.controls)
     path = _path(inputs, found, from_, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {len(path)} points of the path", path)
@@ -196,7 +198,18 @@ def follow(
             f"{found.reason}. What it has so far is in `error.last_good`.",
             path,
         )
+    if len(bending):
+        most = int(np.argmax(bending))
+        where = f"the path, at parameter {path.parameters[most]:.4g},"
+        warn_of_caps(scene, path.positions[most], inputs.values.shell, bending[most], where)
     return path
+
+
+def _bending_energies(scene: Scene, found, controls) -> list[float]:
+    """Of its points, where faces are to be looked at for which that matters."""
+    if not scene._caps.faces.size:
+        return []
+    return [scene._model.energies(point.state, controls)["bending"] for point in found.points]
 
 
 _BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}{postfix}"

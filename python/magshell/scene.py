@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import threading
 from contextlib import contextmanager
+from functools import cached_property
 
 import numpy as np
 
 from . import _constraints, _core, _surroundings
+from ._caps import Caps
 from ._checked_list import checked_list
 from ._layout import Layout
 from ._quantity import quantity
@@ -113,6 +115,7 @@ class Scene:
         n_directions, n_couples = len(constraints.directions), len(edges)
         self._constraints, self._couple_edges = constraints, edges
         self._turn, self._solving = threading.RLock(), False
+        self._warned_of_caps = False
         self._model = _core.Model(
             n_vertices=mesh.n_vertices,
             sheets=[
@@ -120,6 +123,7 @@ class Scene:
                     "owner": "body 0",
                     "mesh": mesh._core,
                     "vertices": np.arange(mesh.n_vertices),
+                    "curvature_scale": shell.curvature_scale,
                     "directors": shell.bending == "midedge",
                     "magnetic": bool(self.fields),
                     "directed_edges": constraints.directed_edges,
@@ -174,6 +178,10 @@ class Scene:
                 yield
             finally:
                 self._solving = False
+
+    @cached_property
+    def _caps(self) -> Caps:
+        return Caps(self.shell, self._model.recut_faces)
 
     @property
     def mesh(self):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from ._owner import Owner
 from ._quantity import quantity, real_numbers
 from .mesh import TriangleMesh, checked_mesh
+from .quality import MeshQuality
 
 BENDING = ("midedge", "hinge")
 
@@ -22,8 +25,9 @@ class Shell(Owner):
     poisson_ratio: in (-1, 1/2].
     mass_density: kg/m3, positive; only gravity asks for it.
     curvature_scale: positive factor on every bending strain, [Chen22] k_cur.
-    bending: "midedge" (second order on any mesh, one rotation an edge: the lowest-order Hellan-Herrmann-Johnson
-        element), or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several percent on irregular meshes).
+    bending: "midedge" (second order on irregular meshes too, see `quality`; one rotation an edge: the lowest-order
+        Hellan-Herrmann-Johnson element), or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several percent on
+        irregular meshes).
 
     >>> import magshell as ms
     >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)
@@ -86,6 +90,11 @@ class Shell(Owner):
             found["thickness"] = found["thickness"] + by_face * self.mesh.face_areas * self.mass_density
             found["mass_density"] = by_face * self.face_volumes
         return found
+
+    @cached_property
+    def quality(self) -> MeshQuality:
+        """The shapes of its faces, their heights also beside the thickness."""
+        return MeshQuality(self.mesh, self.thickness)
 
     @property
     def face_volumes(self) -> np.ndarray:

@@ -9,7 +9,9 @@ namespace magshell {
 
 class FaceLoop {
   public:
-    FaceLoop(const Surface& surface, const PartLoop& parts, const SystemMatrix& matrix);
+    /// Of a surface's own triangles, or of others in their place.
+    FaceLoop(const std::vector<std::array<Index, 3>>& corners, const PartLoop& parts,
+             const SystemMatrix& matrix);
 
     Index packs() const { return packs_for(faces_); }
     int lanes_in(Index pack) const { return std::min(Pack::width, faces_ - pack * Pack::width); }

@@ -62,6 +62,16 @@ Model::Model(const SceneInput& input)
     share_out_columns();
 }
 
+void Model::add_loops(Index body, const VectorXd& curvature_scale) {
+    const Sheet& sheet = *bodies_.sheets()[body];
+    const PartLoop& parts = schedule_.of(body);
+    loops_.push_back(std::make_unique<FaceLoop>(sheet.corners, parts, matrix_));
+    membrane_faces_.push_back(std::make_unique<MembraneFaces>(sheet, nodes(), curvature_scale));
+    const MembraneFaces& faces = *membrane_faces_.back();
+    membrane_loops_.push_back(
+        faces.own() ? nullptr : std::make_unique<FaceLoop>(faces.corners(), parts, matrix_));
+}
+
 void Model::add_terms(const SceneInput& input) {
     const Index count = static_cast<Index>(bodies_.sheets().size());
     for (Index body = 0; body < count; ++body) {
@@ -312,7 +322,9 @@ Index Model::n_strains() const {
 
 std::size_t Model::bytes() const {
     std::size_t total = matrix_.bytes() + reduction_.bytes() + schedule_.bytes();
-    for (const std::unique_ptr<FaceLoop>& loop : loops_) total += loop->bytes();
+    for (std::size_t k = 0; k < loops_.size(); ++k)
+        total += loops_[k]->bytes() + membrane_faces_[k]->bytes() +
+                 (membrane_loops_[k] ? membrane_loops_[k]->bytes() : 0);
     for (const std::unique_ptr<Term>& term : terms_) total += term->bytes();
     return total;
 }

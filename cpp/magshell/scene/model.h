@@ -11,6 +11,7 @@
 
 #include "magshell/assembly/face_loop.h"
 #include "magshell/assembly/reduction.h"
+#include "magshell/body/membrane_faces.h"
 #include "magshell/linalg/factor.h"
 #include "magshell/scene/bodies.h"
 #include "magshell/term/elastic_term.h"
@@ -33,6 +34,7 @@ class Model {
 
     const Bodies& bodies() const { return bodies_; }
     const Nodes& nodes() const { return bodies_.nodes(); }
+    const MembraneFaces& membrane_faces(Index body) const { return *membrane_faces_[body]; }
     const Reduction& reduction() const { return reduction_; }
     SystemMatrix& matrix() { return matrix_; }
     const Residual& residual() const { return residual_; }
@@ -114,6 +116,7 @@ class Model {
     std::mutex& in_use() { return in_use_; }
 
   private:
+    void add_loops(Index body, const VectorXd& curvature_scale);
     void add_terms(const SceneInput& input);
     void add_couples(const SceneInput& input);
     void add_contacts(const SceneInput& input);
@@ -125,6 +128,8 @@ class Model {
     Reduction reduction_;
     Schedule schedule_;
     std::vector<std::unique_ptr<FaceLoop>> loops_;  // of each surface
+    std::vector<std::unique_ptr<MembraneFaces>> membrane_faces_;
+    std::vector<std::unique_ptr<FaceLoop>> membrane_loops_;  // nullptr where those are the sheet's own
     FieldSources sources_;
     std::vector<std::unique_ptr<Term>> terms_;
     std::vector<std::vector<const Term*>> of_body_;  // those assembled by its parts

@@ -22,6 +22,7 @@ struct SheetInput {
     std::string owner;  // under which its parameters are registered
     std::shared_ptr<const TriangleMesh> mesh;
     std::vector<Index> vertices;  // the scene's vertex of each vertex of the mesh
+    VectorXd curvature_scale;     // of each edge, as the scene was made with: where hinges are
     bool directors = true;        // midedge; false: hinge
     bool magnetic = false;
     std::vector<DirectedEdge> directed_edges;  // directions are rows of SceneInput::directions

@@ -46,18 +46,19 @@ class Relaxation {
             rate_ = std::max(rate_, forced_rate());
             report_.reason = factor.reason;
             if (newton_.relative_residual(q_, {}) > newton_.options().tolerance) return rate_ > 0.0;
-            report_.reason =
-                "the equilibrium is neutral: the sheet is free to move, or its Hessian is singular";
+            report_.reason = "the equilibrium is neutral: its Hessian is singular";
             return false;
         }
         const bool convex = factor.negative_pivots == 0;
+        if (convex) report_.falling.resize(0);
         if (!convex || rate_ == 0.0) {
             const bool at_rest = newton_.relative_residual(q_, {}) <= newton_.options().tolerance;
-            const Mode mode = most_unstable_mode(newton_, q_, controls_, factor.negative_pivots);
+            Mode mode = most_unstable_mode(newton_, q_, controls_, factor.negative_pivots);
             // Not far below a rate that was needed a moment ago.
             rate_ = std::max(above_instability * std::abs(mode.eigenvalue), rate_);
             if (mode.eigenvalue < 0.0 && (at_rest || last_move_ < settled * model_.extent()))
                 leave_saddle(mode);
+            if (mode.eigenvalue < 0.0) report_.falling = std::move(mode.shape);
         }
         report_.converged = convex && finish();
         return !report_.converged;
@@ -127,6 +128,7 @@ class Relaxation {
         q_ = trial;
         energy_ = energy;
         last_move_ = moved.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+        report_.last_move = last_move_;
         if (report.iterations <= quick_iterations) rate_ /= rate_decay;
         return true;
     }

@@ -15,6 +15,8 @@ struct RelaxationReport {
     bool converged = false;
     int steps = 0, saddles_left = 0;
     double residual = 0.0;
+    double last_move = 0.0;  // [m], of the last step that was taken
+    VectorXd falling;        // the mode along which the energy falls at the end, if one was found
     std::string reason;
 };
 

@@ -51,6 +51,7 @@ class Statics {
             newton_.model().set_memory(result_.memory);
             result_.reason = report.reason;
             failed_step = target - result_.progress;
+            result_.failed.shortest_step = std::min(result_.failed.shortest_step, failed_step);
             step = (report.lost ? 0.25 : 0.5) * failed_step;
             if (step >= options_.smallest_step * longest_step && options_.start_at_rest) continue;
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
@@ -107,6 +108,10 @@ class Statics {
             if (!report.converged) {
                 newton_.model().set_memory(result_.memory);
                 result_.reason = report.reason;
+                result_.failed.state = std::move(trial);
+                result_.failed.controls = controls;
+                result_.failed.last_move = report.last_move;
+                result_.failed.falling = report.falling;
                 return false;
             }
             accept(trial, controls, target, report.residual);

@@ -18,6 +18,15 @@ struct StaticsOptions {
 
 enum class Outcome { converged, failed, interrupted };
 
+/// Where the last attempt of a search gave up, for those who ask why.
+struct FailedAttempt {
+    VectorXd state;              // empty: nowhere in particular
+    Controls controls;           // that were to be reached
+    double shortest_step = 1.0;  // of the way, the smallest that was tried
+    double last_move = 0.0;      // [m], of the last relaxation step
+    VectorXd falling;            // a direction of all unknowns in which the energy falls there, or empty
+};
+
 struct StaticsResult {
     Outcome outcome = Outcome::failed;
     VectorXd state;         // the equilibrium, or the last good state
@@ -25,6 +34,7 @@ struct StaticsResult {
     Controls controls;      // at which `state` holds
     double progress = 0.0;  // how far the controls got, 0 to 1
     std::string reason;
+    FailedAttempt failed;
     int iterations = 0, factorizations = 0, failed_factorizations = 0, load_steps = 0, relaxation_steps = 0;
     int saddles_left = 0;
     double residual = 0.0;

@@ -2,18 +2,19 @@
 
 namespace magshell {
 
-MembraneTerm::MembraneTerm(const Surface& surface, Index body, const FaceLoop& loop, const Nodes& nodes,
-                           Registry& registry)
+MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces,
+                           const FaceLoop& loop, const Nodes& nodes, Registry& registry)
     : StrainScaffold(surface.n_faces()),
       surface_(surface),
       body_(body),
+      faces_(faces),
       loop_(loop),
       nodes_(nodes.n_nodes()),
       materials_(surface, registry),
       elements_(loop.packs()) {
     for (Index pack = 0; pack < loop.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
-            const std::array<Vec3, 3>& x = surface.rest_corners(loop.face(pack, lane));
+            const std::array<Vec3, 3> x = faces.rest_corners(loop.face(pack, lane));
             for (int i = 0; i < 3; ++i)
                 elements_[pack].rest_squared_length[i].set(lane,
                                                            (x[(i + 2) % 3] - x[(i + 1) % 3]).squaredNorm());
@@ -25,8 +26,13 @@ bool MembraneTerm::set_values(const Values& values) {
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = loop_.face(pack, lane);
-            set_lane(elements_[pack].stiffness, lane,
-                     RestFace(surface_.rest_corners(f).data()).membrane_stiffness(materials_[f]));
+            const std::array<Vec3, 3> corners = faces_.rest_corners(f);
+            Mat3 stiffness = Mat3::Zero();
+            for (const MembraneFaces::Share& share : faces_.shares(f))
+                if (share.part > 0.0)
+                    stiffness +=
+                        share.part * RestFace(corners.data()).membrane_stiffness(materials_[share.face]);
+            set_lane(elements_[pack].stiffness, lane, stiffness);
         }
     return true;
 }
@@ -82,20 +88,33 @@ void MembraneTerm::rate(Index pack, const double* p, Pack d[3]) const {
 }
 
 void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+    // Of each share: work, and work by the Poisson ratio. A share may be of a face in another part.
+    using OfShares = std::array<Eigen::Vector2d, 2>;
+    std::vector<OfShares> by_shares(surface_.n_faces(),
+                                    OfShares{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});
     loop_.each_pack([&](Index pack) {
-        Pack d[3], along[3];
-        strain(pack, q, d);
-        history_.apply(pack, d);
-        rate(pack, lambda, along);
+        Pack strains[3], rates[3];
+        strain(pack, q, strains);
+        history_.apply(pack, strains);
+        rate(pack, lambda, rates);
         for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
             const Index f = loop_.face(pack, lane);
-            const Mat3 by_poisson_ratio =
-                RestFace(surface_.rest_corners(f).data()).membrane_by_poisson_ratio(materials_[f]);
-            const Vec3 rates = lane_of(along, lane);
-            materials_.add_vjp(f, 1, rates.dot(lane_of(stress_.at(pack), lane)),
-                               rates.dot(by_poisson_ratio * lane_of(d, lane)), out);
+            const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
+            const std::array<Vec3, 3> corners = faces_.rest_corners(f);
+            for (int k = 0; k < 2; ++k) {
+                const MembraneFaces::Share share = faces_.shares(f)[k];
+                if (share.part == 0.0) continue;
+                const RestFace rest(corners.data());
+                const SheetMaterial& m = materials_[share.face];
+                by_shares[f][k] =
+                    share.part * Eigen::Vector2d(along.dot(rest.membrane_stiffness(m) * d),
+                                                 along.dot(rest.membrane_by_poisson_ratio(m) * d));
+            }
         }
     });
+    for (Index f = 0; f < surface_.n_faces(); ++f)
+        for (int k = 0; k < 2; ++k)
+            materials_.add_vjp(faces_.shares(f)[k].face, 1, by_shares[f][k][0], by_shares[f][k][1], out);
 }
 
 void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {
@@ -123,7 +142,7 @@ void MembraneTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
             }
             const double force = 2.0 * stress * std::sqrt(element.rest_squared_length[i][lane]);
             for (const int k : {(i + 1) % 3, (i + 2) % 3})
-                out.segment<3>(3 * surface_.corners[f][k]).array() += force;
+                out.segment<3>(3 * faces_.corners()[f][k]).array() += force;
         }
     }
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
+#include "magshell/body/membrane_faces.h"
 #include "magshell/energy/membrane.h"
 #include "magshell/term/elastic_term.h"
 #include "magshell/term/sheet_materials.h"
@@ -10,8 +11,9 @@ namespace magshell {
 
 class MembraneTerm final : public StrainScaffold<MembraneTerm> {
   public:
-    MembraneTerm(const Surface& surface, Index body, const FaceLoop& loop, const Nodes& nodes,
-                 Registry& registry);
+    /// `loop` goes over the corners of `faces`.
+    MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces, const FaceLoop& loop,
+                 const Nodes& nodes, Registry& registry);
 
     std::string_view name() const override { return Membrane::name; }
     Index body() const override { return body_; }
@@ -40,6 +42,7 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
 
     const Surface& surface_;
     const Index body_;
+    const MembraneFaces& faces_;
     const FaceLoop& loop_;
     const Index nodes_;
     SheetMaterials materials_;
