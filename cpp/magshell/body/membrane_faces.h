@@ -31,7 +31,9 @@ class MembraneFaces {
     };
     std::array<Share, 2> shares(Index face) const { return own() ? whole(face) : shares_[face]; }
 
-    std::size_t bytes() const { return corners_.capacity() * sizeof(corners_[0]) + shares_.capacity() * sizeof(shares_[0]); }
+    std::size_t bytes() const {
+        return corners_.capacity() * sizeof(corners_[0]) + shares_.capacity() * sizeof(shares_[0]);
+    }
 
   private:
     static std::array<Share, 2> whole(Index face) { return {Share{face, 1.0}, Share{face, 0.0}}; }

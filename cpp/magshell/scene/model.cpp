@@ -55,7 +55,7 @@ Model::Model(const SceneInput& input)
     for (const char* factor : {"field_factor", "load_factor", "gravity_factor"})
         registry_.controls.add("scene", factor, "1", 1, 1);
     for (Index body = 0; body < static_cast<Index>(bodies_.sheets().size()); ++body)
-        loops_.push_back(std::make_unique<FaceLoop>(*bodies_.sheets()[body], schedule_.of(body), matrix_));
+        add_loops(body, input.sheets[body].curvature_scale);
     add_terms(input);
     for (const std::unique_ptr<Term>& term : terms_)
         if (term->body() >= 0) of_body_[term->body()].push_back(term.get());
@@ -68,15 +68,16 @@ void Model::add_loops(Index body, const VectorXd& curvature_scale) {
     loops_.push_back(std::make_unique<FaceLoop>(sheet.corners, parts, matrix_));
     membrane_faces_.push_back(std::make_unique<MembraneFaces>(sheet, nodes(), curvature_scale));
     const MembraneFaces& faces = *membrane_faces_.back();
-    membrane_loops_.push_back(
-        faces.own() ? nullptr : std::make_unique<FaceLoop>(faces.corners(), parts, matrix_));
+    membrane_loops_.push_back(faces.own() ? nullptr
+                                          : std::make_unique<FaceLoop>(faces.corners(), parts, matrix_));
 }
 
 void Model::add_terms(const SceneInput& input) {
     const Index count = static_cast<Index>(bodies_.sheets().size());
     for (Index body = 0; body < count; ++body) {
-        std::unique_ptr<MembraneTerm> term =
-            std::make_unique<MembraneTerm>(*bodies_.sheets()[body], body, *loops_[body], nodes(), registry_);
+        std::unique_ptr<MembraneTerm> term = std::make_unique<MembraneTerm>(
+            *bodies_.sheets()[body], body, *membrane_faces_[body],
+            membrane_loops_[body] ? *membrane_loops_[body] : *loops_[body], nodes(), registry_);
         elastic_.push_back(term.get());
         terms_.push_back(std::move(term));
     }
