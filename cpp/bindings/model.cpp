@@ -3,6 +3,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/strains.h"
 #include "magshell/core/errors.h"
 
 namespace magshell::bindings {
@@ -135,6 +136,16 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
                           py::array_t<double>(values.size(), values.data()));
 }
 
+// (n_f, 4): of the membrane and of bending. Reads nothing that a solve of another thread changes.
+PrincipalStrains strains_at(const Model& model, const VectorXd& q, const VectorXd& thickness) {
+    const py::gil_scoped_release unlocked;
+    return principal_strains(model.sheet(), q, thickness);
+}
+
+py::tuple largest_at(const Model& model, const VectorXd& q, const VectorXd& thickness) {
+    return to_tuple(largest_of(strains_at(model, q, thickness)));
+}
+
 }  // namespace
 
 void register_model(py::module_& module) {
@@ -183,6 +194,8 @@ void register_model(py::module_& module) {
             "Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.")
         .def("positions", &Model::positions)
         .def("edge_rotations", &Model::edge_rotations)
+        .def("principal_strains", &strains_at, py::arg("q"), py::arg("thickness"))
+        .def("largest_strains", &largest_at, py::arg("q"), py::arg("thickness"))
         .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })
         .def("reduce", [](const Model& m, const VectorXd& full) { return m.reduction().vector(full); })
         .def(

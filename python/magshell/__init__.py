@@ -13,6 +13,7 @@ from .errors import (
     DesignRejected,
     EquilibriumJumped,
     Interrupted,
+    LargeStrainWarning,
     MultistartFailed,
     NoGradient,
     NotConverged,
@@ -36,6 +37,7 @@ from .shell import Shell
 from .solvers import MixedNewton, Newton
 from .starts import Multistart
 from .statics import equilibrium
+from .strains import Strains
 from .supports import Clamp, Pin, SymmetryPlane
 from .trajectory import MotionState, Trajectory
 from .vibration import VibrationModes, vibration_modes
@@ -63,6 +65,7 @@ __all__ = [
     "EquilibriumJumped",
     "ImplicitEuler",
     "Interrupted",
+    "LargeStrainWarning",
     "LinearResponse",
     "MagpylibField",
     "Minimum",
@@ -81,6 +84,7 @@ __all__ = [
     "SampledField",
     "Scene",
     "Shell",
+    "Strains",
     "SymmetryPlane",
     "Trajectory",
     "TriangleMesh",

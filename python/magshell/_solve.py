@@ -19,6 +19,7 @@ from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
 from .scene import Scene
 from .solvers import MixedNewton, Newton
+from .strains import Largest, largest_of, warn_if_large
 
 FACTORS = ("load_factor", "gravity_factor", "field_factor", "motion_factor")
 
@@ -92,12 +93,14 @@ def solve(inputs: Inputs, state: np.ndarray, memory: list, from_, to, options, p
         raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(_failure(found, options.start_at_rest), result)
+    warn_if_large(result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium")
     return Solution(result, found, inputs)
 
 
 def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibrium:
     model = scene._model
     positions, edge_rotations = _outputs(inputs, found)
+    strain = largest_of(scene, found.state, inputs.values.shell.thickness)
     return Equilibrium(
         scene=scene,
         positions=positions,
@@ -115,6 +118,8 @@ def _result(scene: Scene, inputs: Inputs, found, wall_time: float) -> Equilibriu
         saddles_left=found.saddles_left,
         residual=found.residual,
         progress=found.progress,
+        largest_membrane_strain=strain.membrane,
+        largest_bending_strain=strain.bending,
         wall_time=wall_time,
         linear_time=found.linear_time,
         memory=found.bytes,

@@ -45,5 +45,14 @@ class MultistartFailed(RuntimeError):
         self.last_good = last_good
 
 
+class LargeStrainWarning(UserWarning):
+    """A result has strains beyond 20 %, for which its material law is not meant. Said once a scene, and again where
+    strains have doubled since. Where warnings are made errors, `last_good` holds the result."""
+
+    def __init__(self, message: str, last_good=None):
+        super().__init__(message)
+        self.last_good = last_good
+
+
 class NoGradient(RuntimeError):
     """A gradient was asked for at a state that has none: not converged, or not stable."""

@@ -110,6 +110,7 @@ class Scene:
         n_directions, n_couples = len(constraints.directions), len(edges)
         self._constraints = constraints
         self._turn, self._solving = threading.RLock(), False
+        self._warned_of_strain = 0.0
         # What the core holds now: a solve with other values puts its own there.
         self._values = self._in_core = Values(self, constraints)
         self._model = _core.Model(

@@ -56,8 +56,6 @@ class BendingTerm final : public ElasticTerm {
                 body(pack);
         });
     }
-    Fold folds_at(Index first, Index last, const double* q) const;
-    double turn_from(double angle, Index fold) const;
     void strain(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const;
     double moment(const FoldStencil& fold, const Strains& stress) const;
     void store_folds(const double* q);
