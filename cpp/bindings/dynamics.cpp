@@ -125,7 +125,8 @@ Array directions_of(const MotionResult& motion, const Model& model) {
     const Index n_v = model.sheet().n_vertices(), size = 3 * (model.sheet().n_nodes() - n_v);
     Array rows({n, static_cast<py::ssize_t>(size)});
     for (py::ssize_t k = 0; k < n; ++k)
-        Eigen::Map<VectorXd>(rows.mutable_data(k, 0), size) = motion.recorded[k].q.segment(3 * n_v, size);
+        Eigen::Map<VectorXd>(rows.mutable_data() + k * size, size) =
+            motion.recorded[k].q.segment(3 * n_v, size);
     return rows;
 }
 

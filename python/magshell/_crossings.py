@@ -19,7 +19,13 @@ def told(mesh, states: np.ndarray) -> str:
     where = "" if count == 1 else " in any state" if len(pairs) == count else " in the last state"
     if not crossing:
         return f"does not pass through itself{where}"
-    at = "" if count == 1 else f" in state {crossing[0]}" if len(crossing) == 1 else f" in {len(crossing)} states"
+    at = (
+        ""
+        if count == 1
+        else f" in state {crossing[0]}"
+        if len(crossing) == 1
+        else f" in {len(crossing)} states"
+    )
     faces = f"{pairs[crossing[0]]} pairs of faces"
     faces += f", first in state {crossing[0]}" if len(crossing) > 1 else ""
     return f"PASSES THROUGH ITSELF{at} ({faces}), as nothing keeps parts of a sheet apart"

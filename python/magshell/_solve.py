@@ -93,7 +93,9 @@ def solve(inputs: Inputs, state: np.ndarray, memory: list, from_, to, options, p
         raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(_failure(found, options.start_at_rest), result)
-    warn_if_large(result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium")
+    warn_if_large(
+        result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
+    )
     return Solution(result, found, inputs)
 
 

@@ -40,10 +40,12 @@ class Largest(NamedTuple):
     bending: float
 
     def __str__(self) -> str:
-        text = f"largest strain {_percent(self.membrane)} of the membrane, {_percent(self.bending)} by bending"
+        text = (
+            f"largest strain {_percent(self.membrane)} of the membrane, {_percent(self.bending)} by bending"
+        )
         if is_small(max(self)):
             return text
-        return f"{text}: BEYOND THE MODEL, which is for small strains (below {SMALL:.0%})"
+        return f"{text}: BEYOND THE MODEL, which is for small strains (below {_percent(SMALL)})"
 
 
 class StrainHistory(NamedTuple):
@@ -100,8 +102,8 @@ def warn_if_large(result, largest: Largest, where: str, index: tuple = ()) -> No
 
 
 _ADVICE = (
-    "St. Venant-Kirchhoff material says nothing reliable there; `strains()` of the result has every face, and a "
-    "fold in one row of faces may only need a finer mesh"
+    "What St. Venant-Kirchhoff material does there is no prediction for a real one; strains() of the result has every "
+    "face"
 )
 
 

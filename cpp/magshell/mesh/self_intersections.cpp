@@ -5,13 +5,16 @@
 //
 // Then everything is decided twice more, after the sheet was moved by
 //
-//   u(X) = +- s a (b . X)        X: rest positions, s small, a and b in no direction that a mesh would have
+//   u = +- s a (b . X + c k)     X: rest positions, k: the number of the connected part, s small,
+//                                a and b in no direction that a mesh would have
 //
-// which tears nothing and moves the two parts that meet against each other, to one side or to the other.
-// Parts that cross do so both times; parts that touch come free in one of the two.
+// which tears nothing and moves what meets against each other, to one side or to the other. What crosses does
+// so both times; what touches comes free in one of the two. (A connected part whose *rest* shape goes through
+// itself right at its vertices is not moved against itself, and such a place not seen.)
 #include "magshell/mesh/self_intersections.h"
 
 #include <algorithm>
+#include <numeric>
 #include <unordered_set>
 
 #include "magshell/mesh/box_tree.h"
@@ -116,14 +119,40 @@ class Places {
     std::unordered_set<std::uint64_t> keys_;
 };
 
-/// Those of the touching pairs that cross once the sheet is moved a little, with those that cross anyway.
-std::vector<Pair> crossing_when_moved(const TriangleMesh& mesh, const Rows3& positions, double by,
+/// The number of the connected part of each vertex, from 0.
+std::vector<Index> parts_of(const TriangleMesh& mesh) {
+    std::vector<Index> lowest(mesh.n_vertices());
+    std::iota(lowest.begin(), lowest.end(), 0);
+    const auto root = [&](Index v) {
+        while (lowest[v] != v) v = lowest[v] = lowest[lowest[v]];
+        return v;
+    };
+    for (Index e = 0; e < mesh.n_edges(); ++e) {
+        const Index one = root(mesh.edges()(e, 0)), other = root(mesh.edges()(e, 1));
+        lowest[std::max(one, other)] = std::min(one, other);
+    }
+    std::vector<Index> part(mesh.n_vertices());
+    Index count = 0;
+    for (Index v = 0; v < mesh.n_vertices(); ++v) part[v] = root(v) == v ? count++ : part[root(v)];
+    return part;
+}
+
+/// b . X + c k at each vertex, at most 1.
+VectorXd shares(const TriangleMesh& mesh) {
+    const Vec3 b = Vec3(0.71, -0.43, 0.56).normalized();
+    const std::vector<Index> part = parts_of(mesh);
+    VectorXd share = (mesh.rest_positions().rowwise() - mesh.rest_positions().row(0)) * b;
+    const double c = 0.62 * share.cwiseAbs().maxCoeff();
+    for (Index v = 0; v < mesh.n_vertices(); ++v) share[v] += c * part[v];
+    return share / std::max(share.cwiseAbs().maxCoeff(), 1e-300);
+}
+
+/// Those of the touching pairs that cross once the sheet is moved so far, with those that cross anyway.
+std::vector<Pair> crossing_when_moved(const TriangleMesh& mesh, const Rows3& positions, const VectorXd& by,
                                       double close, const std::vector<Pair>& touching,
                                       std::vector<Pair> crossing) {
-    const Vec3 a = Vec3(0.53, 0.61, 0.59).normalized(), b = Vec3(0.71, -0.43, 0.56).normalized();
-    const VectorXd share = (mesh.rest_positions().rowwise() - mesh.rest_positions().row(0)) * b;
-    const double size = std::max(share.cwiseAbs().maxCoeff(), 1e-300);
-    const PlacedFaces moved(mesh, positions + (by / size) * share * a.transpose());
+    const Vec3 a = Vec3(0.53, 0.61, 0.59).normalized();
+    const PlacedFaces moved(mesh, positions + by * a.transpose());
     for (const Pair& pair : touching)
         if (moved.meeting(pair.first, pair.second, close) == Meeting::crossing) crossing.push_back(pair);
     return crossing;
@@ -143,7 +172,7 @@ std::vector<Pair> self_intersections(const TriangleMesh& mesh, const Rows3& posi
         if (found == Meeting::touching) touching.emplace_back(f, g);
     });
     if (!touching.empty()) {
-        const double by = moved_by * size;
+        const VectorXd by = moved_by * size * shares(mesh);
         const std::vector<Pair> there = crossing_when_moved(mesh, positions, by, close, touching, crossing);
         const std::vector<Pair> back = crossing_when_moved(mesh, positions, -by, close, touching, crossing);
         const Places places_there(mesh, there), places_back(mesh, back);
