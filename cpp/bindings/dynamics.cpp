@@ -3,6 +3,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/gradients.h"
+#include "bindings/strains.h"
 #include "bindings/watch.h"
 #include "magshell/adjoint/dynamic.h"
 #include "magshell/core/errors.h"
@@ -108,6 +109,30 @@ Array rotations_of(const Model& model, const MotionResult& motion) {
     return rows;
 }
 
+// (n, 3 n_d), as they stand between positions and rotations in a state.
+Array directions_of(const MotionResult& motion, const Model& model) {
+    const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size());
+    const Index n_v = model.nodes().n_vertices(), size = 3 * (model.nodes().n_nodes() - n_v);
+    Array rows({n, static_cast<py::ssize_t>(size)});
+    for (py::ssize_t k = 0; k < n; ++k)
+        Eigen::Map<VectorXd>(rows.mutable_data() + k * size, size) =
+            motion.recorded[k].q.segment(3 * n_v, size);
+    return rows;
+}
+
+// Of every recorded state.
+py::list largest_strains(const MotionResult& motion, const Model& model, const VectorXd& thickness) {
+    std::vector<LargestStrains> largest;
+    {
+        const py::gil_scoped_release unlocked;
+        for (const MotionState& each : motion.recorded)
+            largest.push_back(largest_of(principal_strains(model, each.q, thickness)));
+    }
+    py::list rows;
+    for (const LargestStrains& each : largest) rows.append(to_tuple(each));
+    return rows;
+}
+
 MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget, Keep keep,
                  const py::object& progress) {
     const Watch watch(progress);
@@ -196,7 +221,9 @@ void register_dynamics(py::module_& module) {
              [](const MotionResult& r, const Model& m) {
                  return positions_of(m, r, [](const MotionState& s) -> const VectorXd& { return s.v; });
              })
-        .def("edge_rotations", [](const MotionResult& r, const Model& m) { return rotations_of(m, r); });
+        .def("edge_rotations", [](const MotionResult& r, const Model& m) { return rotations_of(m, r); })
+        .def("directions", &directions_of)
+        .def("largest_strains", &largest_strains, py::arg("model"), py::arg("thickness"));
 
     module.def("simulate", &run, py::arg("model"), py::arg("input"), py::arg("gradients"), py::arg("budget"),
                py::arg("keep"), py::arg("progress") = py::none());

@@ -2,9 +2,9 @@
 #include <memory>
 #include <string>
 
-#include "bindings/bindings.h"
+#include "bindings/arrays.h"
 #include "magshell/core/errors.h"
-#include "magshell/mesh/triangle_mesh.h"
+#include "magshell/mesh/self_intersections.h"
 
 namespace magshell::bindings {
 
@@ -37,6 +37,22 @@ py::array view(const py::object& self) {
     return array;
 }
 
+// (k, 2) faces.
+IndexArray crossings(const TriangleMesh& mesh, const Array& positions) {
+    std::vector<std::pair<Index, Index>> pairs;
+    {
+        const Rows3 rows = to_rows3(positions);
+        const py::gil_scoped_release unlocked;
+        pairs = self_intersections(mesh, rows);
+    }
+    IndexArray array({static_cast<py::ssize_t>(pairs.size()), py::ssize_t{2}});
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+        array.mutable_at(k, 0) = pairs[k].first;
+        array.mutable_at(k, 1) = pairs[k].second;
+    }
+    return array;
+}
+
 }  // namespace
 
 void register_mesh(py::module_& module) {
@@ -46,7 +62,8 @@ void register_mesh(py::module_& module) {
         .def_property_readonly("faces", &view<&TriangleMesh::faces>)
         .def_property_readonly("edges", &view<&TriangleMesh::edges>)
         .def_property_readonly("edge_faces", &view<&TriangleMesh::edge_faces>)
-        .def_property_readonly("face_edges", &view<&TriangleMesh::face_edges>);
+        .def_property_readonly("face_edges", &view<&TriangleMesh::face_edges>)
+        .def("self_intersections", &crossings, py::arg("positions"));
 }
 
 }  // namespace magshell::bindings

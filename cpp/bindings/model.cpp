@@ -3,6 +3,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/strains.h"
 #include "magshell/core/errors.h"
 
 namespace magshell::bindings {
@@ -143,6 +144,16 @@ std::vector<Index> recut_faces(const Model& model) {
     return faces;
 }
 
+// (n_f, 4): of the membrane and of bending. Reads nothing that a solve of another thread changes.
+PrincipalStrains strains_at(const Model& model, const VectorXd& q, const VectorXd& thickness) {
+    const py::gil_scoped_release unlocked;
+    return principal_strains(model, q, thickness);
+}
+
+py::tuple largest_at(const Model& model, const VectorXd& q, const VectorXd& thickness) {
+    return to_tuple(largest_of(strains_at(model, q, thickness)));
+}
+
 }  // namespace
 
 void register_model(py::module_& module) {
@@ -186,6 +197,8 @@ void register_model(py::module_& module) {
             "Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.")
         .def("positions", [](const Model& m, const VectorXd& q) { return m.bodies().positions(q); })
         .def("edge_rotations", [](const Model& m, const VectorXd& q) { return m.bodies().edge_rotations(q); })
+        .def("principal_strains", &strains_at, py::arg("q"), py::arg("thickness"))
+        .def("largest_strains", &largest_at, py::arg("q"), py::arg("thickness"))
         .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })
         .def("reduce", [](const Model& m, const VectorXd& full) { return m.reduction().vector(full); })
         .def(

@@ -13,6 +13,7 @@ from .errors import (
     DesignRejected,
     EquilibriumJumped,
     Interrupted,
+    LargeStrainWarning,
     MeshQualityWarning,
     MultistartFailed,
     NoGradient,
@@ -37,6 +38,7 @@ from .shell import Shell
 from .solvers import MixedNewton, Newton
 from .starts import Multistart
 from .statics import equilibrium
+from .strains import Strains
 from .supports import Clamp, Pin, SymmetryPlane
 from .trajectory import MotionState, Trajectory
 from .vibration import VibrationModes, vibration_modes
@@ -64,6 +66,7 @@ __all__ = [
     "EquilibriumJumped",
     "ImplicitEuler",
     "Interrupted",
+    "LargeStrainWarning",
     "LinearResponse",
     "MagpylibField",
     "MeshQualityWarning",
@@ -83,6 +86,7 @@ __all__ = [
     "SampledField",
     "Scene",
     "Shell",
+    "Strains",
     "SymmetryPlane",
     "Trajectory",
     "TriangleMesh",

@@ -115,6 +115,9 @@ class TriangleMesh:
         rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int64],
     ) -> None: ...
+    def self_intersections(
+        self, positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.int32]: ...
     @property
     def edge_faces(self) -> numpy.ndarray: ...
     @property
@@ -290,9 +293,19 @@ class Model:
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
     ) -> tuple: ...
+    def largest_strains(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> tuple: ...
     def positions(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    def principal_strains(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]: ...
     def prescribed_rate(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -588,6 +601,7 @@ class Keep:
     def value(self) -> int: ...
 
 class MotionResult:
+    def directions(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
     def edge_rotations(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
     def last_maxwell_strain_rates(
         self, arg0: Model

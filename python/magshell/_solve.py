@@ -21,6 +21,7 @@ from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
 from .scene import Scene
 from .solvers import MixedNewton, Newton
+from .strains import Largest, largest_of, warn_if_large
 
 FACTORS = ("load_factor", "gravity_factor", "field_factor", "motion_factor")
 
@@ -97,6 +98,9 @@ def solve(inputs: Inputs, state: np.ndarray, memory: list, from_, to, options, p
         raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
     positions = scene._model.positions(found.state)
     warn_of_caps(scene, positions, inputs.values.shell, result.energies["bending"], "this equilibrium")
+    warn_if_large(
+        result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
+    )
     return Solution(result, found, inputs)
 
 
@@ -110,6 +114,7 @@ def _energies(scene: Scene, found) -> dict[str, float] | None:
 
 def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_time: float) -> Equilibrium:
     positions, edge_rotations = _outputs(inputs, found)
+    strain = largest_of(scene, found.state, inputs.values.shell.thickness)
     return Equilibrium(
         scene=scene,
         positions=positions,
@@ -127,6 +132,8 @@ def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_tim
         saddles_left=found.saddles_left,
         residual=found.residual,
         progress=found.progress,
+        largest_membrane_strain=strain.membrane,
+        largest_bending_strain=strain.bending,
         wall_time=wall_time,
         linear_time=found.linear_time,
         memory=found.bytes,

@@ -19,6 +19,7 @@ from .errors import Interrupted, NotConverged
 from .integrators import TRBDF2, ImplicitEuler, Integrator
 from .scene import Scene
 from .solvers import MixedNewton, Newton
+from .strains import StrainHistory, warn_if_large
 from .trajectory import MotionState, Trajectory
 
 
@@ -168,7 +169,16 @@ def simulate(
     positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
     where = f"the motion, at {result.times[most]:.4g} s,"
     warn_of_caps(scene, positions, inputs.values.shell, bending[most], where)
+    _warn(result)
     return result
+
+
+def _warn(result: Trajectory) -> None:
+    strain = StrainHistory(result.largest_membrane_strain, result.largest_bending_strain)
+    k = strain.worst
+    warn_if_large(
+        result, strain.at(k), f"the motion, in recorded state {k}, at {result.times[k]:.6g} s", (k,)
+    )
 
 
 def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
@@ -176,6 +186,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     positions, edge_rotations, velocities = _outputs(asked, found)
     recorded = len(found.kinetic_energy)
     names, ended = model.term_names, asked.clock.after(found.steps_done)
+    thickness = asked.inputs.values.shell.thickness
+    strain = StrainHistory.of(found.largest_strains(model, thickness))
     by_term = np.array(found.energies).reshape(recorded, len(names))
     return Trajectory(
         scene=scene,
@@ -188,6 +200,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         applied_flux_density=asked.recorded("applied_flux_density", recorded),
         kinetic_energy=np.array(found.kinetic_energy),
         energies={name: by_term[:, k] for k, name in enumerate(names)},
+        largest_membrane_strain=strain.membrane,
+        largest_bending_strain=strain.bending,
         steps=asked.steps,
         steps_done=found.steps_done,
         halved={step: len(parts) for step, parts in found.halved.items()},
@@ -210,6 +224,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         wall_time=wall_time,
         linear_time=found.linear_time,
         _field_factors=asked.recorded("field_factor", recorded),
+        _thickness=thickness,
+        _directions=found.directions(model),
         _placed=[
             (values.current(contact), [values.current(each) for each in contact.obstacles], values.shell)
             for contact in scene.contacts

@@ -38,6 +38,16 @@ class Equilibria(Sequence):
         return all(case.stable for case in self._cases)
 
     @property
+    def largest_membrane_strain(self) -> float:
+        """Of all cases."""
+        return max(case.largest_membrane_strain for case in self._cases)
+
+    @property
+    def largest_bending_strain(self) -> float:
+        """Of all cases."""
+        return max(case.largest_bending_strain for case in self._cases)
+
+    @property
     def wall_time(self) -> float:
         """s, in all."""
         return sum(case.wall_time for case in self._cases)

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ._crossings import told
 from ._tensors import detached
 from .scene import Scene
+from .strains import Largest, Strains, strains_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -19,6 +21,8 @@ class Equilibrium:
     remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
     energies: J, by term. stable: no direction lowers the energy; unstable_directions: how many do.
     residual: relative to the forces that cancel in it. progress: how far the controls got, 1 unless a solve failed.
+    largest_membrane_strain, largest_bending_strain: magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet leaves
+        the model, of which ms.LargeStrainWarning warns.
     wall_time, linear_time: s, in all and in factorizations and back-substitutions. memory: bytes, of the core.
     """
 
@@ -38,6 +42,8 @@ class Equilibrium:
     saddles_left: int
     residual: float
     progress: float
+    largest_membrane_strain: float
+    largest_bending_strain: float
     wall_time: float
     linear_time: float
     memory: int
@@ -66,6 +72,23 @@ class Equilibrium:
         """The potential energy, J."""
         return sum(self.energies.values())
 
+    def strains(self) -> Strains:
+        """The principal strains of every face.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+        >>> ends = [ms.Pin(mesh.vertices_at(x=0.0)), ms.Pin(mesh.vertices_at(x=0.1), displacement=(0.01, 0, 0))]
+        >>> rest = ms.equilibrium(ms.Scene(sheet, supports=ends))
+        >>> rest.strains().membrane[0].round(3)  # (1.1^2 - 1)/2 along, nothing across
+        array([0.105, 0.   ])
+        """
+        return strains_of(self.scene, self._state, self._values.shell.thickness)
+
+    def self_intersections(self) -> np.ndarray:
+        """The faces that pass through each other, as in TriangleMesh.self_intersections, (k, 2)."""
+        return self.scene.mesh.self_intersections(detached(self.positions))
+
     def __repr__(self) -> str:
         moved = float(np.linalg.norm(np.asarray(detached(self.displacements)), axis=1).max())
         kind = "stable" if self.stable else f"unstable in {self.unstable_directions} directions"
@@ -74,10 +97,14 @@ class Equilibrium:
         if self.progress < 1.0:
             kind += f", {self.progress:.1%} of the way"
         energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())
+        strain = Largest(self.largest_membrane_strain, self.largest_bending_strain)
+        crossings = told(self.scene.mesh, np.asarray(detached(self.positions))[None])
         extra = f", {self.saddles_left} saddles left" if self.saddles_left else ""
         extra += f", {self.relaxation_steps} relaxation steps" if self.relaxation_steps else ""
         return (
             f"Equilibrium: {kind}; largest displacement {moved:.4g} m\n"
+            f"  {strain}\n"
+            f"  {crossings}\n"
             f"  energy {self.energy:.6g} J ({energies})\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.load_steps} load steps{extra}\n"
             f"  residual {self.residual:.1e}, {self.wall_time:.3g} s, {self.memory / 1e6:.3g} MB, {self.factorization}"

@@ -52,6 +52,15 @@ class MultistartFailed(RuntimeError):
         self.last_good = last_good
 
 
+class LargeStrainWarning(UserWarning):
+    """A result has strains beyond 20 %, for which its material law is not meant. Said once a scene, and again where
+    strains have doubled since. Where warnings are made errors, `last_good` holds the result."""
+
+    def __init__(self, message: str, last_good=None):
+        super().__init__(message)
+        self.last_good = last_good
+
+
 class NoGradient(RuntimeError):
     """A gradient was asked for where there is none: at a state that did not converge or is not stable, by an input that
     has none, or of a gradient (second derivatives: take differences of gradients)."""

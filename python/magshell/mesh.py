@@ -173,6 +173,29 @@ class TriangleMesh(MeshSelection):
         """The shapes of its faces: angles, aspect, heights. A Shell's `quality` knows the thickness as well."""
         return MeshQuality(self)
 
+    # The surface somewhere else
+
+    def self_intersections(self, positions=None) -> np.ndarray:
+        """The pairs of faces that pass through each other, (k, 2), lower number first, sorted.
+
+        positions: (n_v, 3), m; by default those at rest. Faces that share an edge never do; those that share a vertex
+        may, beyond it. What only touches does not count: nearer than 1e-12 of the sheet's size is touching, unless the
+        sheet goes through there. Takes about 1 microsecond a face.
+
+        >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, -1], [0.3, 0.3, 1], [1, 1, 1]],
+        ...     [[0, 1, 2], [3, 4, 5]])
+        >>> mesh.self_intersections().tolist()
+        [[0, 1]]
+        """
+        if positions is None:
+            return self._core.self_intersections(self.rest_positions)
+        array = quantity("positions", "m", positions, ("n_v", 3))
+        if len(array) != self.n_vertices:
+            raise ValueError(
+                f"positions [m] must have shape (n_v, 3) = ({self.n_vertices}, 3), got {array.shape}"
+            )
+        return self._core.self_intersections(array)
+
     # Other meshes from this one
 
     def flipped(self) -> TriangleMesh:

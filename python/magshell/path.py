@@ -12,6 +12,7 @@ import numpy as np
 from . import _core
 from ._arrays import count, number, positive
 from ._caps import warn_of_caps
+from ._crossings import told
 from ._entry import solve_entry
 from ._inputs import Inputs
 from ._progress import progress_bar
@@ -21,6 +22,7 @@ from .equilibrium import Equilibrium
 from .errors import Interrupted, NotConverged
 from .scene import Scene
 from .solvers import MixedNewton, Newton
+from .strains import StrainHistory, Strains, strains_of, warn_if_large
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class Path:
     parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.
     unstable_directions: (n,), zero where the equilibrium is stable. critical: CriticalPoints, in order.
     remanent_magnetization: (n_f, 3) or (3,) A/m, or None.
+    largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
+        leaves the model, of which ms.LargeStrainWarning warns.
     """
 
     scene: Scene
@@ -54,6 +58,8 @@ class Path:
     unstable_directions: np.ndarray
     critical: tuple[CriticalPoint, ...]
     remanent_magnetization: Any
+    largest_membrane_strain: np.ndarray
+    largest_bending_strain: np.ndarray
     iterations: int
     factorizations: int
     failed_factorizations: int
@@ -72,6 +78,10 @@ class Path:
         options.require_stable = False
         point = self._points[index]
         return solve(self._inputs, point.state, point.memory, controls, controls, options).equilibrium
+
+    def strains(self, index: int = -1) -> Strains:
+        """The principal strains of every face at one of the points, by default the last."""
+        return strains_of(self.scene, self._points[index].state, self._inputs.values.shell.thickness)
 
     @property
     def applied_flux_densities(self) -> np.ndarray:
@@ -104,6 +114,8 @@ class Path:
             f"  {point.kind} at {point.parameter:.6g}, after point {point.after_point}"
             for point in self.critical
         ]
+        lines.append(f"  {StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)}")
+        lines.append(f"  {told(self.scene.mesh, self.positions)}")
         lines.append(
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s"
         )
@@ -202,6 +214,9 @@ def follow(
         most = int(np.argmax(bending))
         where = f"the path, at parameter {path.parameters[most]:.4g},"
         warn_of_caps(scene, path.positions[most], inputs.values.shell, bending[most], where)
+    strain = StrainHistory(path.largest_membrane_strain, path.largest_bending_strain)
+    k = strain.worst
+    warn_if_large(path, strain.at(k), f"the path, at point {k}, parameter {path.parameters[k]:.4g}", (k,))
     return path
 
 
@@ -227,6 +242,8 @@ def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
     scene = inputs.scene
     model = scene._model
     points = found.points
+    thickness = inputs.values.shell.thickness
+    strain = StrainHistory.of([model.largest_strains(point.state, thickness) for point in points])
     return Path(
         scene=scene,
         parameters=np.array([point.parameter for point in points]),
@@ -236,6 +253,8 @@ def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
         unstable_directions=np.array([point.unstable_directions for point in points], dtype=int),
         critical=tuple(_critical(model, point) for point in found.critical),
         remanent_magnetization=inputs.given_magnetization,
+        largest_membrane_strain=strain.membrane,
+        largest_bending_strain=strain.bending,
         iterations=found.iterations,
         factorizations=found.factorizations,
         failed_factorizations=found.failed_factorizations,

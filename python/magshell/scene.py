@@ -116,6 +116,7 @@ class Scene:
         self._constraints, self._couple_edges = constraints, edges
         self._turn, self._solving = threading.RLock(), False
         self._warned_of_caps = False
+        self._warned_of_strain = 0.0
         self._model = _core.Model(
             n_vertices=mesh.n_vertices,
             sheets=[

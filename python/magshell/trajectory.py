@@ -10,12 +10,14 @@ import numpy as np
 
 from ._arrays import index_array
 from ._clock import Clock, clock_of
+from ._crossings import told
 from ._files import replace_file
 from ._quantity import quantity
 from ._surroundings import near_kinks
 from ._tensors import detached
 from .integrators import Integrator
 from .scene import Scene
+from .strains import StrainHistory, Strains, strains_of
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,8 @@ class Trajectory:
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
     edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C came meanwhile.
     remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
+    largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
+        leaves the model, of which ms.LargeStrainWarning warns.
     steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
     taken}. end: the last state, from which another simulation goes on. bytes: kept for gradients.
     """
@@ -101,6 +105,8 @@ class Trajectory:
     applied_flux_density: np.ndarray
     kinetic_energy: np.ndarray
     energies: dict[str, np.ndarray]
+    largest_membrane_strain: np.ndarray
+    largest_bending_strain: np.ndarray
     steps: int
     steps_done: int
     halved: dict[int, int]
@@ -112,6 +118,8 @@ class Trajectory:
     wall_time: float
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
+    _thickness: np.ndarray = field(repr=False)
+    _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
     _placed: list = field(
         repr=False, default_factory=list
     )  # (contact, its obstacles where they were, the shell)
@@ -153,16 +161,33 @@ class Trajectory:
                 found[k] = every
         return found
 
+    def strains(self, index: int = -1) -> Strains:
+        """The principal strains of every face in a recorded state, by default the last."""
+        positions, rotations = (detached(each)[index] for each in (self.positions, self.edge_rotations))
+        model = self.scene._model
+        state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
+        before = 3 * self.scene.mesh.n_vertices
+        state[before : before + self._directions.shape[1]] = self._directions[index]
+        return strains_of(self.scene, state, self._thickness)
+
+    def self_intersections(self, index: int = -1) -> np.ndarray:
+        """The faces that pass through each other in a recorded state, as in TriangleMesh.self_intersections, (k, 2)."""
+        return self.scene.mesh.self_intersections(detached(self.positions)[index])
+
     def __len__(self) -> int:
         return len(self.times)
 
     def __repr__(self) -> str:
         stopped = "" if self.steps_done == self.steps else f" of {self.steps}"
         halved = f", {len(self.halved)} of them in parts" if self.halved else ""
+        strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
+        crossings = told(self.scene.mesh, detached(self.positions))
         a_step = 1e3 * self.wall_time / max(self.steps_done, 1)
         return (
             f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
             f"{type(self.integrator).__name__}\n"
+            f"  {strain}\n"
+            f"  {crossings}\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations\n"
             f"  {self.wall_time:.3g} s, {a_step:.3g} ms a step; for gradients: {self.keep}, {self.bytes / 1e6:.3g} MB"
         )

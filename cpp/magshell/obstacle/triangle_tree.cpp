@@ -1,22 +1,20 @@
 #include "magshell/obstacle/triangle_tree.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace magshell {
 namespace {
 
-double squared_distance_to_box(const Vec3& low, const Vec3& high, const Vec3& point) {
-    return (low - point).cwiseMax(point - high).cwiseMax(0.0).squaredNorm();
+double squared_distance_to_box(const Bounds& box, const Vec3& point) {
+    return (box.low - point).cwiseMax(point - box.high).cwiseMax(0.0).squaredNorm();
 }
 
 }  // namespace
 
 TriangleTree::TriangleTree(const TriangleMesh& mesh)
     : mesh_(mesh),
-      faces_(mesh.n_faces()),
+      tree_(tree_of_faces(mesh.rest_positions(), mesh.faces())),
       face_normals_(mesh.n_faces()),
       edge_normals_(mesh.n_edges(), Vec3(Vec3::Zero())),
       vertex_normals_(mesh.n_vertices(), Vec3(Vec3::Zero())) {
@@ -31,33 +29,6 @@ TriangleTree::TriangleTree(const TriangleMesh& mesh)
             vertex_normals_[mesh.faces()(f, i)] += angle * face_normals_[f];
         }
     }
-    std::iota(faces_.begin(), faces_.end(), 0);
-    build(0, mesh.n_faces());
-}
-
-// Halves the faces at the median of their centres along the longest side, until few are left.
-Index TriangleTree::build(Index first, Index count) {
-    constexpr Index few = 4;
-    constexpr double endless = std::numeric_limits<double>::infinity();
-    const Index node = static_cast<Index>(nodes_.size());
-    nodes_.push_back({Vec3::Constant(endless), Vec3::Constant(-endless), first, count, -1});
-    for (Index k = first; k < first + count; ++k) {
-        for (int i = 0; i < 3; ++i) {
-            nodes_[node].low = nodes_[node].low.cwiseMin(corner(faces_[k], i));
-            nodes_[node].high = nodes_[node].high.cwiseMax(corner(faces_[k], i));
-        }
-    }
-    if (count <= few) return node;
-    int axis;
-    (nodes_[node].high - nodes_[node].low).maxCoeff(&axis);
-    const auto centre = [&](Index f) { return corner(f, 0)[axis] + corner(f, 1)[axis] + corner(f, 2)[axis]; };
-    const auto begin = faces_.begin() + first;
-    std::nth_element(begin, begin + count / 2, begin + count,
-                     [&](Index a, Index b) { return centre(a) < centre(b); });
-    build(first, count / 2);
-    const Index right = build(first + count / 2, count - count / 2);
-    nodes_[node].right = right;
-    return node;
 }
 
 // By the Voronoi regions of the triangle's corners and sides; C. Ericson, Real-Time Collision
@@ -99,24 +70,23 @@ double TriangleTree::signed_distance(const Vec3& point, double bound) const {
     stack[top++] = 0;
     while (top > 0) {
         const Index index = stack[--top];
-        const Node& node = nodes_[index];
-        if (squared_distance_to_box(node.low, node.high, point) > least) continue;
+        const BoxTree::Node& node = tree_.nodes()[index];
+        if (squared_distance_to_box(node.bounds, point) > least) continue;
         if (node.right >= 0) {
             const Index left = index + 1;
-            const double to_left = squared_distance_to_box(nodes_[left].low, nodes_[left].high, point);
-            const double to_right =
-                squared_distance_to_box(nodes_[node.right].low, nodes_[node.right].high, point);
+            const double to_left = squared_distance_to_box(tree_.nodes()[left].bounds, point);
+            const double to_right = squared_distance_to_box(tree_.nodes()[node.right].bounds, point);
             stack[top++] = to_left < to_right ? node.right : left;
             stack[top++] = to_left < to_right ? left : node.right;
             continue;
         }
         for (Index k = node.first; k < node.first + node.count; ++k) {
-            const Nearest candidate = nearest_on(faces_[k], point);
+            const Nearest candidate = nearest_on(tree_.items()[k], point);
             const double squared = (point - candidate.point).squaredNorm();
             if (squared > least) continue;
             least = squared;
             nearest = candidate;
-            nearest_face = faces_[k];
+            nearest_face = tree_.items()[k];
         }
     }
     if (nearest_face < 0) return signed_distance(point, std::numeric_limits<double>::infinity());

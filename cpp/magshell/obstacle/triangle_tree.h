@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "magshell/mesh/box_tree.h"
 #include "magshell/mesh/triangle_mesh.h"
 
 namespace magshell {
@@ -20,18 +21,12 @@ class TriangleTree {
     double signed_distance(const Vec3& point, double bound) const;
 
   private:
-    struct Node {
-        Vec3 low, high;
-        Index first, count;  // of faces in a leaf; of an inner node, the left child follows it and
-        Index right;         // the right one is here; -1 in a leaf
-    };
     // Of a point, the nearest one of a face: on its inside (0), an edge (1 + i) or a vertex (4 + i).
     struct Nearest {
         Vec3 point;
         int feature;
     };
 
-    Index build(Index first, Index count);
     Nearest nearest_on(Index face, const Vec3& point) const;
     Vec3 corner(Index face, int i) const {
         return mesh_.rest_positions().row(mesh_.faces()(face, i)).transpose();
@@ -39,8 +34,7 @@ class TriangleTree {
     Vec3 pseudo_normal(Index face, int feature) const;
 
     const TriangleMesh& mesh_;
-    std::vector<Index> faces_;  // in the order of the leaves
-    std::vector<Node> nodes_;
+    BoxTree tree_;
     std::vector<Vec3> face_normals_, edge_normals_, vertex_normals_;
 };
 

@@ -1,7 +1,8 @@
 #include "magshell/term/bending_term.h"
 
 #include <cmath>
-#include <numbers>
+
+#include "magshell/assembly/folds.h"
 
 namespace magshell {
 
@@ -55,35 +56,17 @@ Vec3 BendingTerm::scales_of(Index face) const {
     return {curvature_scales_[e[0]], curvature_scales_[e[1]], curvature_scales_[e[2]]};
 }
 
-// Lanes past the last fold repeat it.
-Fold BendingTerm::folds_at(Index first, Index last, const double* q) const {
-    Pack3 x[4];
-    Pack right_is_point;
-    for (int lane = 0; lane < Pack::width; ++lane) {
-        const FoldStencil& fold = sheet_.folds[std::min(first + lane, last - 1)];
-        for (int k = 0; k < 4; ++k) set_lane(x[k], lane, q + 3 * fold.nodes[k]);
-        right_is_point.set(lane, fold.right_is_point ? 1.0 : 0.0);
-    }
-    return Fold(x[0], x[1], x[2], x[3], right_is_point);
-}
-
-// theta - theta~ in (-pi, pi]: a sheet rolled into a closed surface may have its rest angle on the other side
-// of pi.
-double BendingTerm::turn_from(double angle, Index fold) const {
-    return std::remainder(angle - sheet_.folds[fold].rest_angle, 2.0 * std::numbers::pi);
-}
-
 void BendingTerm::store_folds(const double* q) {
     parts_.each([&](const Part& part) {
         for (Index first = part.first_fold; first < part.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, part.last_fold);
-            const Fold fold = folds_at(first, last, q);
+            const Fold fold = folds_at(sheet_, first, last, q);
             const Pack angle = fold.angle();
             Pack3 g[4];
             fold.gradient(g);
             for (int lane = 0; lane < last - first; ++lane) {
                 FoldState& state = folds_[first + lane];
-                state.turn = turn_from(angle[lane], first + lane);
+                state.turn = turn_from(sheet_.folds[first + lane], angle[lane]);
                 for (int k = 0; k < 4; ++k) {
                     state.gradient[3 * k] = g[k].x[lane];
                     state.gradient[3 * k + 1] = g[k].y[lane];
@@ -96,15 +79,11 @@ void BendingTerm::store_folds(const double* q) {
 
 /// delta of a pack of faces from a number a fold and the rotations in q; linear, so it serves rates as well.
 void BendingTerm::measure(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const {
+    const auto turn_of = [&](Index fold) { return folds_[fold].*turn; };
     const double* rotation = q + first_scalar_;
     for (int lane = 0; lane < Pack::width; ++lane) {
         const std::array<FaceSide, 3>& sides = sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
-        for (int i = 0; i < 3; ++i) {
-            const FaceSide& side = sides[i];
-            double value = side.fold < 0 ? 0.0 : side.weight * (folds_[side.fold].*turn);
-            if (side.rotation >= 0) value += side.sign * rotation[side.rotation];
-            delta[i].set(lane, value);
-        }
+        for (int i = 0; i < 3; ++i) delta[i].set(lane, bending_strain(sides[i], turn_of, rotation));
     }
 }
 
@@ -113,20 +92,17 @@ double BendingTerm::energy(const double* q, const Controls&) const {
     parts_.each([&](const Part& part) {
         for (Index first = part.first_fold; first < part.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, part.last_fold);
-            const Pack angle = folds_at(first, last, q).angle();
-            for (Index h = first; h < last; ++h) turns[h] = turn_from(angle[h - first], h);
+            const Pack angle = folds_at(sheet_, first, last, q).angle();
+            for (Index h = first; h < last; ++h) turns[h] = turn_from(sheet_.folds[h], angle[h - first]);
         }
     });
+    const auto turn_of = [&](Index fold) { return turns[fold]; };
     const double* rotation = q + first_scalar_;
     return parts_.sum([&](const Part& part) {
         double total = 0.0;
         for (Index f = part.first; f < part.last; ++f) {
             double delta[3];
-            for (int i = 0; i < 3; ++i) {
-                const FaceSide& side = sheet_.sides[f][i];
-                delta[i] = side.fold < 0 ? 0.0 : side.weight * turns[side.fold];
-                if (side.rotation >= 0) delta[i] += side.sign * rotation[side.rotation];
-            }
+            for (int i = 0; i < 3; ++i) delta[i] = bending_strain(sheet_.sides[f][i], turn_of, rotation);
             const Symmetric3& stiffness = stiffness_[f / Pack::width];
             const int lane = f % Pack::width;
             for (int i = 0; i < 3; ++i)
@@ -230,7 +206,7 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
 
 void BendingTerm::assemble_folds(Index first, Index last, const double* q, const Strains& stress,
                                  SystemMatrix& out) const {
-    FoldCurvature curvature(folds_at(first, last, q));
+    FoldCurvature curvature(folds_at(sheet_, first, last, q));
     Pack moments(0.0);
     for (Index h = first; h < last; ++h) moments.set(h - first, moment(sheet_.folds[h], stress));
     for (Pack33& block : curvature.block) block = moments * block;

@@ -51,8 +51,6 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void each_pack(const Body& body) const {
         parts_.each([&](const Part& part) { FaceLoop::over_packs(part, body); });
     }
-    Fold folds_at(Index first, Index last, const double* q) const;
-    double turn_from(double angle, Index fold) const;
     void measure(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const;
     void begin_strains(const double* q) { store_folds(q); }
     void begin_rates(const double* p) { store_rates(p); }

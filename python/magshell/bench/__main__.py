@@ -65,6 +65,10 @@ def main(arguments: list[str] | None = None) -> int:
         return _all(rest)
     if name == "figure":
         return _figure(rest)
+    if name == "check":
+        from .check import check
+
+        return check(rest)
     if name not in PARTS:
         print(f"there is no part {name!r}\n{_overview()}", file=sys.stderr)
         return 2
@@ -148,6 +152,9 @@ def _overview() -> str:
     lines = ["usage: python -m magshell.bench PART [options]", "", "parts:"]
     lines += [f"  {name:<10} {part.summary}" for name, part in PARTS.items()]
     lines += ["", "  all FOLDER            every part, its numbers and its figure"]
+    lines += [
+        "  check                 all parts, quickly: targets that are missed, and what changed since the last release"
+    ]
     lines += ["  figure JSON PNG       draws what an earlier run wrote with --json"]
     return "\n".join([*lines, "", "python -m magshell.bench PART --help lists a part's options"])
 

@@ -11,6 +11,7 @@ import numpy as np
 
 import magshell as ms
 
+from .ratios import note
 from .report import print_table
 from .timing import peak_memory, resident_memory
 
@@ -48,9 +49,9 @@ def budget(scene: ms.Scene, integrator, steps: int) -> float:
     return min(0.6 * record * steps, 4e6)
 
 
-def measure(rounds: int, quick: bool) -> dict:
+def measure(rounds: int, quick: bool, cells: tuple[int, int]) -> dict:
     """Prints the tables, returns their numbers."""
-    cells, steps = ((6, 2), 5) if quick else ((48, 8), STEPS)
+    steps = 5 if quick else STEPS
     return {
         "step": _steps(strip(cells), steps, rounds),
         "gradient": _gradients(strip(cells), steps, rounds),
@@ -68,7 +69,9 @@ def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict:
             times.append((time.process_time() - began) / steps)
         name = type(integrator).__name__
         results[name] = {"step": min(times), "iterations": move.iterations / steps}
-        missed = " MISSED" if not isinstance(integrator, ms.SDIRK3) and min(times) > ALLOWED_STEP else ""
+        allowed = None if isinstance(integrator, ms.SDIRK3) else ALLOWED_STEP
+        missed = note("time", f"{name}: a step, s", min(times), at_most=allowed)
+        note("count", f"{name}: iterations of {steps} steps", move.iterations)
         rows.append([name, "", f"{move.iterations / steps:.2f}", f"{1e3 * min(times):.2f}{missed}"])
     print_table(
         f"A time step of {scene.mesh.n_faces} faces in a turning field (at most {1e3 * ALLOWED_STEP:g} ms)",
@@ -94,7 +97,10 @@ def _gradients(scene: ms.Scene, steps: int, rounds: int) -> dict:
                 "bytes": runs[0][2],
             }
             times = f"{1e3 * forward:.0f}", f"{1e3 * back:.0f}"
-            verdict = f"{share:.2f}" + (" MISSED" if share > allowed else "")
+            verdict = f"{share:.2f}" + note(
+                "share", f"{name}, {keep}: gradient over motion", share, at_most=allowed
+            )
+            note("memory", f"{name}, {keep}: bytes a step", runs[0][2] / steps)
             rows.append([name, keep, *times, verdict, f"{allowed:g}", f"{runs[0][2] / 1e6:.3g}"])
     print_table(
         f"The gradient of {steps} steps by the field of each and by the magnetization, {scene.mesh.n_faces} faces",

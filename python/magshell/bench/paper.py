@@ -12,6 +12,7 @@ from pathlib import Path
 import magshell as ms
 
 from .paper_rows import ROWS, Row
+from .ratios import note
 from .report import chosen, print_table
 from .timing import with_share
 
@@ -89,6 +90,7 @@ def _measured(row: Row, iterations: int) -> dict:
         return {**known, "absent": True}
     found, share = with_share(lambda: row.run(iterations))
     seconds = found.seconds * share
+    note("time", f"{row.name}: {row.of}, s", seconds)
     return {
         **known,
         "absent": False,

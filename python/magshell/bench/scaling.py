@@ -13,6 +13,7 @@ import magshell as ms
 from magshell import _core
 from magshell._inputs import Inputs
 
+from .ratios import note
 from .report import add_rounds, bar, chosen, print_table
 from .statics import strongly_bent
 from .timing import Clocked, clocked, peak_memory, resident_memory
@@ -211,16 +212,23 @@ def _print_targets(one: list[dict], two: list[dict], exponents: dict) -> None:
     print(f"\nUp to {last['faces']} faces:")
     exponent = exponents["iteration"]
     if exponent is not None:
-        missed = " MISSED" if exponent > ALLOWED_EXPONENT else ""
+        missed = note("share", "exponent of a Newton iteration", exponent, at_most=ALLOWED_EXPONENT)
         print(
             f"  a Newton iteration grows with the faces to the {exponent:.2f} (at most {ALLOWED_EXPONENT}){missed}"
         )
     if last["peak"] is not None:
         ratio = last["peak"] / last["factor"]
-        missed = " MISSED" if ratio > ALLOWED_MEMORY else ""
+        missed = note(
+            "resident", "growth of the process over the factor's memory", ratio, at_most=ALLOWED_MEMORY
+        )
         print(
             f"  the process grows by {ratio:.2f} times the factor's memory (at most {ALLOWED_MEMORY}){missed}"
         )
+    note("count", f"entries of L at {last['faces']} faces", last["entries"] / 8)
+    note("memory", f"bytes of the factor a face at {last['faces']} faces", last["factor"] / last["faces"])
+    for name in ("factorization", "analysis", "gradient"):
+        share = last["processor"][name] / last["processor"]["iteration"]
+        note("share", f"{TIMES[name]} over an iteration at {last['faces']} faces", share)
     ratios = [a["wall"]["iteration"] / b["wall"]["iteration"] for a, b in zip(one, two, strict=True)]
     print(f"  an iteration on two threads is {ratios[0]:.2f} times as fast at {first['faces']} faces", end="")
     print(f", {ratios[-1]:.2f} times at {last['faces']}" if len(one) > 1 else "")

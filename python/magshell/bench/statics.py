@@ -11,6 +11,7 @@ import magshell as ms
 from magshell import _core
 
 from .cases import hemisphere, magnetic_strip, shear_strip
+from .ratios import note
 from .report import add_rounds, chosen, print_table
 from .timing import clocked, measure, peak_memory
 
@@ -83,6 +84,9 @@ def _from_flat() -> dict:
                 counts = [found.factorizations, found.load_steps, found.iterations]
                 failed = found.progress < 1.0
                 shown = ["failed", "", ""] if failed else [str(count) for count in counts]
+                if bound:
+                    count = np.inf if failed else found.factorizations
+                    shown[0] += note("count", f"factorizations of {name}", count, at_most=allowed)
                 rows.append(
                     [name, f"{bending}, {solver_name} Newton", *shown, bound, f"{found.wall_time:.3f}"]
                 )
@@ -104,10 +108,13 @@ def _iteration(scene: ms.Scene, controls: dict, rounds: int) -> dict:
     best = min(runs, key=lambda run: run.wall_time)
     ratio = best.wall_time / best.linear_time
     memory = peak_memory()
+    missed = note("share", "an iteration over its factorization and solve", ratio, at_most=ALLOWED_RATIO)
+    note("count", "factorizations of the strongly bent sheet", best.factorizations)
+    note("memory", "bytes a face of the solve", best.memory / scene.mesh.n_faces)
     print(
         f"\nStrongly bent, {scene.mesh.n_faces} faces, {scene.n_unknowns} unknowns: {best.factorizations} factorizations, "
         f"{best.wall_time:.2f} s; an iteration takes {ratio:.2f} times its factorization and solve (at most "
-        f"{ALLOWED_RATIO}).\nModel and factorization: {best.memory / 1e6:.0f} MB"
+        f"{ALLOWED_RATIO}){missed}.\nModel and factorization: {best.memory / 1e6:.0f} MB"
         + ("." if memory is None else f"; peak of the process: {memory / 1e6:.0f} MB.")
     )
     return {
@@ -155,6 +162,7 @@ def _backends(scene: ms.Scene, controls: dict, rounds: int) -> dict:
         times = {"analysis": analysis.best, "factorization": numeric.best, "solve": solve.best}
         rows.append([name, "", *(f"{1e3 * value:.2f}" for value in times.values())])
         results[name] = times
+    note("time", "a factorization and solve", min(t["factorization"] + t["solve"] for t in results.values()))
     print_table("Factorization of its Hessian, ms", ["backend", "", *times], rows)
     return results
 
@@ -164,7 +172,7 @@ def _worth(scene: ms.Scene, controls: dict, backends: dict, rounds: int) -> floa
     whole = clocked(lambda: ms.equilibrium(scene, **controls), rounds=rounds).processor
     best = min(times["factorization"] + times["solve"] for times in backends.values())
     worth = whole / best
-    missed = " MISSED" if worth > ALLOWED_WORTH else ""
+    missed = note("share", "from flat to strongly bent, in factorizations", worth, at_most=ALLOWED_WORTH)
     print(
         f"\nFrom flat to strongly bent in {worth:.1f} factorizations' worth of time (at most {ALLOWED_WORTH:g}){missed}."
     )

@@ -8,6 +8,7 @@ import numpy as np
 
 import magshell as ms
 
+from .ratios import note
 from .report import print_table
 
 CELLS, QUICK_CELLS = ((48, 8), (128, 32)), ((6, 2),)
@@ -63,7 +64,14 @@ def measure(rounds: int, quick: bool) -> dict:
             ],
         )
         ratio = rows[EXACT]["step"] / free
-        print(f"With contact and friction {ratio:.2f} times a step without (at most {ALLOWED:g}).")
+        missed = ""
+        for name, row in rows.items():
+            note("count", f"{name}, {faces} faces: iterations of {steps} steps", row["iterations"] * steps)
+            if name != "none":
+                allowed = ALLOWED if name == EXACT else None
+                title = f"{name}, {faces} faces: a step over one without"
+                missed += note("share", title, row["step"] / free, at_most=allowed)
+        print(f"With contact and friction {ratio:.2f} times a step without (at most {ALLOWED:g}){missed}.")
     return results
 
 

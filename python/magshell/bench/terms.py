@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import magshell as ms
 
+from .ratios import note
 from .report import add_rounds, chosen, print_table
 from .timing import Clocked, clocked
 
@@ -158,6 +159,9 @@ def _print(faces: int, results: list[dict]) -> None:
     rows = []
     for k, each in enumerate(results):
         before = results[max(0, k - 1)]
+        if k:
+            for name in COLUMNS:
+                note("share", f"+ {each['part']}: {name} over the first", each[name] / results[0][name])
         row = [each["part"] if k == 0 else f"+ {each['part']}", str(each["unknowns"])]
         for name, digits in COLUMNS.items():
             row.append(f"{1e3 * each[name]:.{digits}f}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import index_array
+from .._crossings import AFFORDABLE
 from . import backend as backends
 from .colors import scalar_of
 from .limits import arrow_count, check_columns, checked_width
@@ -57,8 +58,9 @@ def plot(
     arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
     show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it.
     rest: the rest shape as a faint outline. mesh_lines: the edges of the mesh.
-    titles: one a state. overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light
-        shows a motion. columns: of panels, by default what fits best.
+    titles: one a state; that a sheet passes through itself is added, where there are at most 20,000 faces to look at.
+    overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light shows a motion.
+    columns: of panels, by default what fits best.
     view: (elevation, azimuth) in degrees of the eye, as in matplotlib; by default what suits the sheet.
     width: pixels, 400 to 8000; a picture has at most 16 million of them.
     backend: "pyvista" or "matplotlib"; by default the environment variable MAGSHELL_PLOT, else pyvista where
@@ -83,7 +85,7 @@ def plot(
         obstacles=obstacles,
     )
     drawn = _chosen(drawn, states)
-    titles = checked_titles(titles, drawn)
+    titles = noted_crossings(checked_titles(titles, drawn), drawn)
     unit = length_unit(size_of(drawn))
     scalar = scalar_of(drawn, color, color_label, color_range, unit)
     groups = [drawn] if overlay or fade else [[state] for state in drawn]
@@ -100,6 +102,18 @@ def checked_titles(titles, states: list[State]) -> list[str]:
     if len(listed) != len(states) or not all(isinstance(title, str) for title in listed):
         raise ValueError(f"titles must be {len(states)} strings, one a state, got {titles!r}")
     return listed
+
+
+def noted_crossings(titles: list[str], states: list[State]) -> list[str]:
+    """The titles, with a word where the sheet passes through itself. As they are where looking costs much."""
+    if sum(state.mesh.n_faces for state in states) > AFFORDABLE:
+        return titles
+    crosses = [len(state.mesh.self_intersections(state.positions)) > 0 for state in states]
+    word = "passes through itself"
+    return [
+        (f"{title}, {word}" if title else word) if crossing else title
+        for title, crossing in zip(titles, crosses, strict=True)
+    ]
 
 
 def _chosen(states: list[State], chosen) -> list[State]:

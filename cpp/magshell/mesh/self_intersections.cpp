@@ -1,0 +1,189 @@
+// Pairs of faces come from a tree of boxes that is held against itself. Of most the signs of a few volumes
+// tell at once whether they cross. Where a vertex or an edge lies in a face or on another edge, they do not:
+// the sheet may end there, touch, or go through with the pairs of faces at that place sharing no more than a
+// line.
+//
+// Then everything is decided twice more, after the sheet was moved by
+//
+//   u = +- s a (b . X + c k)     X: rest positions, k: the number of the connected part, s small,
+//                                a and b in no direction that a mesh would have
+//
+// which tears nothing and moves what meets against each other, to one side or to the other. What crosses does
+// so both times; what touches comes free in one of the two. (A connected part whose *rest* shape goes through
+// itself right at its vertices is not moved against itself, and such a place not seen.)
+#include "magshell/mesh/self_intersections.h"
+
+#include <algorithm>
+#include <numeric>
+#include <unordered_set>
+
+#include "magshell/mesh/box_tree.h"
+#include "magshell/mesh/triangle_crossing.h"
+
+namespace magshell {
+namespace {
+
+using Pair = std::pair<Index, Index>;
+
+constexpr double close_to = 1e-12;  // of the size of the sheet: nearer than that is touching
+constexpr double moved_by = 1e-6;   // of the size
+
+/// The faces of a mesh where they are now.
+class PlacedFaces {
+  public:
+    PlacedFaces(const TriangleMesh& mesh, const Rows3& positions) : mesh_(mesh) {
+        triangles_.reserve(mesh.n_faces());
+        for (Index f = 0; f < mesh.n_faces(); ++f) {
+            const auto at = [&](int i) { return Vec3(positions.row(mesh.faces()(f, i)).transpose()); };
+            triangles_.emplace_back(at(0), at(1), at(2));
+        }
+    }
+
+    Meeting meeting(Index f, Index g, double close) const {
+        int shared = 0, in_f = 0, in_g = 0;
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j)
+                if (mesh_.faces()(f, i) == mesh_.faces()(g, j)) {
+                    ++shared;
+                    in_f = i;
+                    in_g = j;
+                }
+        if (shared > 1) return Meeting::apart;
+        if (shared == 1) return meeting_beyond_vertex(triangles_[f], in_f, triangles_[g], in_g, close);
+        return magshell::meeting(triangles_[f], triangles_[g], close);
+    }
+
+    Bounds bounds(Index f) const { return bounds_around(triangles_[f].corner); }
+
+  private:
+    const TriangleMesh& mesh_;
+    std::vector<Triangle> triangles_;
+};
+
+/// visit(f, g) for the pairs of faces whose bounds meet, each once.
+template <class Visit>
+void near_pairs(const BoxTree& tree, const PlacedFaces& faces, double margin, const Visit& visit) {
+    std::vector<Pair> stack{{0, 0}};
+    while (!stack.empty()) {
+        const auto [one, other] = stack.back();
+        stack.pop_back();
+        const BoxTree::Node &a = tree.nodes()[one], &b = tree.nodes()[other];
+        if (one != other && !a.bounds.meets(b.bounds, margin)) continue;
+        const bool leaf_a = a.right < 0, leaf_b = b.right < 0;
+        if (one == other && !leaf_a) {
+            stack.insert(stack.end(), {{one + 1, one + 1}, {a.right, a.right}, {one + 1, a.right}});
+        } else if (!leaf_a && (leaf_b || a.count >= b.count)) {
+            stack.insert(stack.end(), {{one + 1, other}, {a.right, other}});
+        } else if (!leaf_b) {
+            stack.insert(stack.end(), {{one, other + 1}, {one, b.right}});
+        } else {
+            for (Index k = a.first; k < a.first + a.count; ++k)
+                for (Index l = one == other ? k + 1 : b.first; l < b.first + b.count; ++l) {
+                    const Index f = tree.items()[k], g = tree.items()[l];
+                    if (faces.bounds(f).meets(faces.bounds(g), margin)) visit(std::min(f, g), std::max(f, g));
+                }
+        }
+    }
+}
+
+/// Places where two parts of a sheet cross, to be found from pairs next to those that told of them.
+class Places {
+  public:
+    Places(const TriangleMesh& mesh, const std::vector<Pair>& pairs) : mesh_(mesh) {
+        for (const Pair& pair : pairs)
+            each_key(pair, [&](std::uint64_t key) {
+                keys_.insert(key);
+                return false;
+            });
+    }
+
+    bool has(const Pair& pair) const {
+        return each_key(pair, [&](std::uint64_t key) { return keys_.count(key) > 0; });
+    }
+
+  private:
+    // A vertex of one face and one of the other: faces around the same two vertices are at the same place.
+    template <class Stop>
+    bool each_key(const Pair& pair, const Stop& stop) const {
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) {
+                const auto [low, high] =
+                    std::minmax(mesh_.faces()(pair.first, i), mesh_.faces()(pair.second, j));
+                if (stop(static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint64_t>(high)))
+                    return true;
+            }
+        return false;
+    }
+
+    const TriangleMesh& mesh_;
+    std::unordered_set<std::uint64_t> keys_;
+};
+
+/// The number of the connected part of each vertex, from 0.
+std::vector<Index> parts_of(const TriangleMesh& mesh) {
+    std::vector<Index> lowest(mesh.n_vertices());
+    std::iota(lowest.begin(), lowest.end(), 0);
+    const auto root = [&](Index v) {
+        while (lowest[v] != v) v = lowest[v] = lowest[lowest[v]];
+        return v;
+    };
+    for (Index e = 0; e < mesh.n_edges(); ++e) {
+        const Index one = root(mesh.edges()(e, 0)), other = root(mesh.edges()(e, 1));
+        lowest[std::max(one, other)] = std::min(one, other);
+    }
+    std::vector<Index> part(mesh.n_vertices());
+    Index count = 0;
+    for (Index v = 0; v < mesh.n_vertices(); ++v) part[v] = root(v) == v ? count++ : part[root(v)];
+    return part;
+}
+
+/// b . X + c k at each vertex, at most 1.
+VectorXd shares(const TriangleMesh& mesh) {
+    const Vec3 b = Vec3(0.71, -0.43, 0.56).normalized();
+    const std::vector<Index> part = parts_of(mesh);
+    VectorXd share = (mesh.rest_positions().rowwise() - mesh.rest_positions().row(0)) * b;
+    const double c = 0.62 * share.cwiseAbs().maxCoeff();
+    for (Index v = 0; v < mesh.n_vertices(); ++v) share[v] += c * part[v];
+    return share / std::max(share.cwiseAbs().maxCoeff(), 1e-300);
+}
+
+/// Those of the touching pairs that cross once the sheet is moved so far, with those that cross anyway.
+std::vector<Pair> crossing_when_moved(const TriangleMesh& mesh, const Rows3& positions, const VectorXd& by,
+                                      double close, const std::vector<Pair>& touching,
+                                      std::vector<Pair> crossing) {
+    const Vec3 a = Vec3(0.53, 0.61, 0.59).normalized();
+    const PlacedFaces moved(mesh, positions + by * a.transpose());
+    for (const Pair& pair : touching)
+        if (moved.meeting(pair.first, pair.second, close) == Meeting::crossing) crossing.push_back(pair);
+    return crossing;
+}
+
+}  // namespace
+
+std::vector<Pair> self_intersections(const TriangleMesh& mesh, const Rows3& positions) {
+    const PlacedFaces faces(mesh, positions);
+    const double size = (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).norm();
+    // Coordinates are known to a unit of their round-off.
+    const double close = close_to * size + 1e-15 * positions.cwiseAbs().maxCoeff();
+    std::vector<Pair> crossing, touching;
+    near_pairs(tree_of_faces(positions, mesh.faces()), faces, close, [&](Index f, Index g) {
+        const Meeting found = faces.meeting(f, g, close);
+        if (found == Meeting::crossing) crossing.emplace_back(f, g);
+        if (found == Meeting::touching) touching.emplace_back(f, g);
+    });
+    if (!touching.empty()) {
+        const VectorXd by = moved_by * size * shares(mesh);
+        const std::vector<Pair> there = crossing_when_moved(mesh, positions, by, close, touching, crossing);
+        const std::vector<Pair> back = crossing_when_moved(mesh, positions, -by, close, touching, crossing);
+        const Places places_there(mesh, there), places_back(mesh, back);
+        for (const Pair& pair : there)
+            if (places_back.has(pair)) crossing.push_back(pair);
+        for (const Pair& pair : back)
+            if (places_there.has(pair)) crossing.push_back(pair);
+    }
+    std::sort(crossing.begin(), crossing.end());
+    crossing.erase(std::unique(crossing.begin(), crossing.end()), crossing.end());
+    return crossing;
+}
+
+}  // namespace magshell

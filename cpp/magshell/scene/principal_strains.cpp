@@ -1,0 +1,143 @@
+#include "magshell/scene/principal_strains.h"
+
+#include <cmath>
+
+#include "magshell/assembly/folds.h"
+#include "magshell/core/parallel.h"
+
+namespace magshell {
+namespace {
+
+constexpr Index block = 1024;  // of folds or faces; a multiple of every pack's width
+
+/// body(first, last) over [0, count), in blocks on all threads.
+template <class Body>
+void over_blocks(Index count, const Body& body) {
+    parallel_for((count + block - 1) / block,
+                 [&](int k) { body(k * block, std::min((k + 1) * block, count)); });
+}
+
+std::vector<double> turns_of(const Sheet& sheet, const double* q) {
+    std::vector<double> turns(sheet.folds.size());
+    over_blocks(static_cast<Index>(turns.size()), [&](Index from, Index to) {
+        for (Index first = from; first < to; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, to);
+            const Pack angle = folds_at(sheet, first, last, q).angle();
+            for (Index h = first; h < last; ++h) turns[h] = turn_from(sheet.folds[h], angle[h - first]);
+        }
+    });
+    return turns;
+}
+
+/// A symmetric 2x2 tensor a lane.
+struct Tensor2 {
+    Pack xx, xy, yy;
+
+    void principal(Pack& larger, Pack& smaller) const {
+        const Pack middle = Pack(0.5) * (xx + yy), half = Pack(0.5) * (xx - yy);
+        const Pack radius = sqrt(half * half + xy * xy);
+        larger = middle + radius;
+        smaller = middle - radius;
+    }
+};
+
+/// A face at rest in axes of its own: x0 at the origin, x1 = (along, 0), x2 = (across, height).
+struct FlatFace {
+    Pack along, across, height;
+
+    explicit FlatFace(const Pack3 rest[3]) {
+        const Pack3 d1 = rest[1] - rest[0], d2 = rest[2] - rest[0];
+        along = sqrt(squared_norm(d1));
+        across = dot(d1, d2) / along;
+        height = sqrt(squared_norm(cross(d1, d2))) / along;
+    }
+
+    /// From how the products of its two edges from x0 have changed.
+    Tensor2 green(const Pack3 rest[3], const Pack3 x[3]) const {
+        const Pack3 d1 = rest[1] - rest[0], d2 = rest[2] - rest[0], e1 = x[1] - x[0], e2 = x[2] - x[0];
+        const Pack c11 = squared_norm(e1) - squared_norm(d1), c12 = dot(e1, e2) - dot(d1, d2),
+                   c22 = squared_norm(e2) - squared_norm(d2);
+        const Pack slant = across / along, half(0.5);
+        return {half * c11 / (along * along), half * (c12 - slant * c11) / (along * height),
+                half * (c22 - Pack(2.0) * slant * c12 + slant * slant * c11) / (height * height)};
+    }
+
+    /// Edge i is opposite corner i: t~ = (y, -x) for an edge (x, y).
+    Tensor2 curvature(const Pack delta[3]) const {
+        const Pack x[3] = {across - along, -across, along}, y[3] = {height, -height, Pack(0.0)};
+        const Pack inverse_area = Pack(2.0) / (along * height);
+        Tensor2 sum{Pack(0.0), Pack(0.0), Pack(0.0)};
+        for (int i = 0; i < 3; ++i) {
+            const Pack weight = delta[i] * inverse_area / sqrt(x[i] * x[i] + y[i] * y[i]);
+            sum.xx += weight * y[i] * y[i];
+            sum.xy -= weight * x[i] * y[i];
+            sum.yy += weight * x[i] * x[i];
+        }
+        return sum;
+    }
+};
+
+// The rows of one sheet, whose first face is that row.
+void add_sheet(const Sheet& sheet, const MembraneFaces& membrane, Index first_scalar, const VectorXd& q,
+               const VectorXd& thickness, Index first_row, PrincipalStrains& out) {
+    const std::vector<double> turns = turns_of(sheet, q.data());
+    const auto turn_of = [&](Index fold) { return turns[fold]; };
+    const double* rotations = q.data() + first_scalar;
+    over_blocks(sheet.n_faces(), [&](Index from, Index to) {
+        for (Index first = from; first < to; first += Pack::width) {
+            Pack3 own_rest[3], rest[3], x[3];
+            Pack delta[3], half_thickness;
+            for (int lane = 0; lane < Pack::width; ++lane) {
+                const Index f = std::min(first + lane, to - 1);
+                const std::array<Vec3, 3> corners = membrane.rest_corners(f);
+                for (int k = 0; k < 3; ++k) {
+                    set_lane(own_rest[k], lane, sheet.rest_corners(f)[k]);
+                    set_lane(rest[k], lane, corners[k]);
+                    set_lane(x[k], lane, q.data() + 3 * membrane.corners()[f][k]);
+                    delta[k].set(lane, bending_strain(sheet.sides[f][k], turn_of, rotations));
+                }
+                half_thickness.set(lane, 0.5 * thickness[first_row + sheet.faces.user[f]]);
+            }
+            Pack values[4];
+            FlatFace(rest).green(rest, x).principal(values[0], values[1]);
+            FlatFace(own_rest).curvature(delta).principal(values[2], values[3]);
+            for (int lane = 0; lane < std::min(Pack::width, to - first); ++lane) {
+                const Index row = first_row + sheet.faces.user[first + lane];
+                for (int k = 0; k < 4; ++k)
+                    out(row, k) = k < 2 ? values[k][lane] : half_thickness[lane] * values[k][lane];
+            }
+        }
+    });
+}
+
+}  // namespace
+
+PrincipalStrains principal_strains(const Model& model, const VectorXd& q, const VectorXd& thickness) {
+    PrincipalStrains out(thickness.size(), 4);
+    Index first_row = 0;
+    for (Index body = 0; body < static_cast<Index>(model.bodies().sheets().size()); ++body) {
+        const Sheet& sheet = *model.bodies().sheets()[body];
+        add_sheet(sheet, model.membrane_faces(body), model.nodes().first_scalar(), q, thickness, first_row,
+                  out);
+        first_row += sheet.n_faces();
+    }
+    return out;
+}
+
+LargestStrains largest_of(const PrincipalStrains& strains) {
+    LargestStrains found;
+    const auto take = [](double value, Index face, double& largest, Index& at) {
+        if (std::isnan(largest) || value <= largest) return;  // what is no number counts as the largest
+        largest = value;
+        at = face;
+    };
+    for (Index f = 0; f < strains.rows(); ++f) {
+        for (int k = 0; k < 2; ++k) {
+            take(std::abs(strains(f, k)), f, found.membrane, found.membrane_face);
+            take(std::abs(strains(f, 2 + k)), f, found.bending, found.bending_face);
+        }
+    }
+    return found;
+}
+
+}  // namespace magshell
