@@ -12,11 +12,11 @@ most caps on other triangles (assembly/membrane_faces.h); this is about those th
 
 from __future__ import annotations
 
-import sys
 import warnings
 
 import numpy as np
 
+from ._callers import callers_level
 from .errors import MeshQualityWarning
 
 LEAST_ANGLE = np.radians(120.0)  # of faces that are looked at
@@ -86,7 +86,7 @@ def warn_of_caps(scene, positions: np.ndarray, shell, bending_energy: float, whe
         "the long edge, which such a face cannot follow: it makes the sheet too stiff. Move the vertex at the blunt "
         "corner away from that edge, or onto it and leave the face out. `mesh.quality` has the shapes of all faces",
         MeshQualityWarning,
-        stacklevel=_callers_level(),
+        stacklevel=callers_level(),
     )
 
 
@@ -101,11 +101,3 @@ def describe_faces(shell, faces: np.ndarray) -> str:
         return f"Face {shape} is"
     others = ", ".join(map(str, faces[1:_NAMED].tolist()))
     return f"{len(faces)} faces, {'among them' if len(faces) > _NAMED else 'namely'} {shape}, {others}, are"
-
-
-def _callers_level() -> int:
-    """The `stacklevel` of the line that called the package."""
-    frame, level = sys._getframe(1), 1
-    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "magshell":
-        frame, level = frame.f_back, level + 1
-    return level

@@ -18,6 +18,7 @@ __all__: list[str] = [
     "Dipoles",
     "Factor",
     "FactorReport",
+    "FailedAttempt",
     "Keep",
     "Model",
     "MotionInput",
@@ -301,17 +302,17 @@ class Model:
     def positions(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
-    def principal_strains(
-        self,
-        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]: ...
     def prescribed_rate(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.
         """
+    def principal_strains(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]: ...
     def reduce(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
@@ -342,6 +343,11 @@ class Model:
     def parameters(self) -> list:
         """
         (owner, name, unit, first, rows, width) of each, in the flat vector of set_values.
+        """
+    @property
+    def recut_faces(self) -> list[int]:
+        """
+        The caller's faces (k,) whose stretch is measured on other triangles than their own.
         """
     @property
     def size(self) -> int: ...
@@ -414,7 +420,7 @@ class Outcome:
 
 class FailedAttempt:
     @property
-    def controls(self) -> Controls: ...
+    def controls(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def falling(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
@@ -603,6 +609,9 @@ class Keep:
 class MotionResult:
     def directions(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
     def edge_rotations(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    def largest_strains(
+        self, model: Model, thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> list: ...
     def last_maxwell_strain_rates(
         self, arg0: Model
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from typing import NamedTuple
 
 import numpy as np
 
+from ._callers import callers_level
 from .errors import LargeStrainWarning
 
 SMALL = 0.2  # the largest strain for which St. Venant-Kirchhoff material is of use
@@ -97,7 +97,7 @@ def warn_if_large(result, largest: Largest, where: str, index: tuple = ()) -> No
         return
     strains = result.strains(*index)
     warning = LargeStrainWarning(f"{where}: {largest}. {_faces(strains)}. {_ADVICE}", result)
-    warnings.warn(warning, stacklevel=_callers_level())
+    warnings.warn(warning, stacklevel=callers_level())
     scene._warned_of_strain = worst if np.isfinite(worst) else np.inf
 
 
@@ -117,11 +117,3 @@ def _faces(strains: Strains) -> str:
 
 def _percent(strain: float) -> str:
     return f"{100 * strain:.3g} %"
-
-
-def _callers_level() -> int:
-    """The `stacklevel` of the line that called the package, for a warning of this one's caller."""
-    frame, level = sys._getframe(1), 1
-    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "magshell":
-        frame, level = frame.f_back, level + 1
-    return level

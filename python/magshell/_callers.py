@@ -1,0 +1,13 @@
+"""Which line of a caller a warning is about."""
+
+from __future__ import annotations
+
+import sys
+
+
+def callers_level() -> int:
+    """The `stacklevel` of the line that called the package."""
+    frame, level = sys._getframe(1), 1
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "magshell":
+        frame, level = frame.f_back, level + 1
+    return level
