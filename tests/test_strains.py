@@ -5,10 +5,9 @@ import warnings
 import numpy as np
 import pytest
 from directors import directors, turn_about
-from model_access import Problem
+from model_access import Controls, Problem
 
 import magshell as ms
-from magshell._core import Controls
 
 YOUNG, THICKNESS = 2e6, 2e-3  # Pa, m
 OBLIQUE = ms.supports.rotation_matrix(np.array([0.7, -1.1, 0.4]))
