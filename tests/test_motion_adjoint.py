@@ -5,6 +5,7 @@ import pytest
 from test_adjoint import MAGNETIZATION, MESH, N_E, N_V, RNG, SOLVE_INPUTS, YOUNG, everything
 
 import magshell as ms
+from magshell import _core
 
 torch = pytest.importorskip("torch")
 
@@ -159,6 +160,46 @@ def test_what_is_kept_does_not_matter(record_every, extra):
     assert move.keep == "factors"
     np.testing.assert_array_equal(found["stages"], found["checkpoints"])
     np.testing.assert_allclose(found["factors"], found["stages"], rtol=1e-9)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_kept_factors_serve_all_the_way_back(monkeypatch, integrator):
+    """One factorization serves several iterations on the way there, so those that are kept are of earlier ones."""
+    pull_back, counts = _core.pull_back_motion, []
+
+    def counted(*given):
+        gradient = pull_back(*given)
+        counts.append(gradient["factorizations"])
+        return gradient
+
+    monkeypatch.setattr(_core, "pull_back_motion", counted)
+    options = {"integrator": INTEGRATORS[integrator]}
+    move, _, _ = driven(30, keep="factors", **options)
+    assert move.iterations > 1.5 * move.factorizations
+    driven(30, keep="stages", **options)
+    stages = 30 * {"euler": 1, "tr_bdf2": 2, "sdirk2": 2, "sdirk3": 3}[integrator]
+    assert counts == [0, stages]
+
+
+def test_kept_factors_share_their_work_space():
+    mesh = ms.meshes.rectangle(0.12, 0.02, cells=(24, 4))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5, mass_density=1e3)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    magnetization = torch.tensor([3e4, 0.0, 0.0], dtype=torch.float64, requires_grad=True)
+    move = ms.simulate(
+        scene,
+        steps=3,
+        time_step=1e-3,
+        remanent_magnetization=magnetization,
+        applied_flux_density=(0, 0, 3e-3),
+        integrator=ms.ImplicitEuler(),
+        keep="factors",
+        progress=False,
+    )
+    n, starts, rows, values = scene._model.hessian(scene._model.rest_state(), _core.Controls())
+    one = _core.analyze(n, starts, rows)
+    one.factorize(values)
+    assert move.bytes < 0.8 * 3 * one.bytes
 
 
 def test_a_step_in_parts_has_its_gradient():

@@ -175,6 +175,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     result["stiffness_damping"] = gradient.viscosity.stiffness_damping;
     result["maxwell_modulus"] = gradient.viscosity.maxwell_modulus;
     result["maxwell_time"] = gradient.viscosity.maxwell_time;
+    result["factorizations"] = gradient.factorizations;
     return result;
 }
 

@@ -50,6 +50,7 @@ class Backward {
         }
         back_to_start();
         g_.values = std::move(scene_.values);
+        g_.factorizations = newton_.factorizations();
         return std::move(g_);
     }
 
@@ -164,14 +165,17 @@ class Backward {
         g_.time_step += share * by_dt;
     }
 
-    // With the Hessian at a stage, by the factorization that was kept from nearby if there is one.
+    // With the Hessian at a stage, which was evaluated last: by the factorization that was kept from nearby
+    // if there is one.
     VectorXd solve(const StageState& stage, const Controls& controls, const Anchor& anchor,
                    const VectorXd& rhs) {
         newton_.watch(0.0);
-        if (stage.factor)
-            if (const auto found = newton_.solve_nearby(stage.q, controls, anchor, *stage.factor, rhs))
-                return *found;
-        const FactorReport factor = newton_.factorize_at(stage.q, controls, anchor);
+        VectorXd solution = rhs;
+        if (stage.factor &&
+            newton_.solve_nearby(stage.q, controls, anchor, *stage.factor, solution).converged)
+            return solution;
+        Eigen::MatrixXd no_moves(stage.q.size(), 0);
+        const FactorReport factor = newton_.factorize(stage.q, controls, false, anchor, no_moves);
         if (!factor.succeeded) throw InvalidInput("the adjoint of a step: " + factor.reason);
         return newton_.solve_transposed(rhs);
     }
@@ -191,9 +195,9 @@ class Backward {
         model_.set_memory(stage.memory);
         model_.begin_step(record.begin.q, input_.controls_at(step, part.first));
         viscous.set_history(i);
-        model_.evaluate(stage.q, controls);
-        viscous.before_solve(i, by_x);
         const Anchor anchor{&algebra.weights(), &target, &motion};
+        newton_.evaluate(stage.q, controls, anchor);
+        viscous.before_solve(i, by_x);
         const VectorXd lambda = solve(stage, controls, anchor, -by_x);
         viscous.after_solve(i, lambda);
 

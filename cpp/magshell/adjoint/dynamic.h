@@ -24,6 +24,7 @@ struct MotionGradient {
     Viscosity viscosity{0.0, 0.0, 0.0};
     VectorXd values;                 // of the scene
     std::vector<Controls> controls;  // as MotionInput::controls
+    int factorizations = 0;          // that it took, those of steps taken again included
 };
 
 /// By everything, from the gradients by the recorded states: their unknowns and their velocities. Throws

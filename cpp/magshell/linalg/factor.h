@@ -87,7 +87,9 @@ class Factor {
     Index size() const { return pattern_->size; }
     virtual std::int64_t nonzeros() const = 0;  // entries of L, its diagonal included
     virtual double flops() const = 0;           // of one factorization, additions and multiplications
-    virtual std::size_t bytes() const = 0;      // of the factor and its work space
+    virtual std::size_t bytes() const = 0;      // of the factor, its analysis and its work space
+    /// Of these, what another factor of the same analysis takes.
+    virtual std::size_t own_bytes() const { return bytes(); }
 
   protected:
     const std::shared_ptr<const SparsePattern> pattern_;

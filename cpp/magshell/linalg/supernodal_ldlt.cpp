@@ -13,7 +13,6 @@
 #include "magshell/linalg/front.h"
 #include "magshell/linalg/ordering.h"
 #include "magshell/linalg/transfer.h"
-#include "magshell/linalg/work_spaces.h"
 
 namespace magshell {
 
@@ -30,20 +29,29 @@ constexpr double doubtful_growth = 1e8;  // half of the digits are gone: check b
 SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, Ordering ordering)
     : SupernodalLdlt(pattern, analysed(*pattern, ordering)) {}
 
-std::shared_ptr<const SupernodalLdlt::Analysis> SupernodalLdlt::analysed(const SparsePattern& pattern,
-                                                                         Ordering ordering) {
+std::shared_ptr<SupernodalLdlt::Analysis> SupernodalLdlt::analysed(const SparsePattern& pattern,
+                                                                   Ordering ordering) {
     AssemblyTree tree = ordered_assembly_tree(pattern, ordering);
-    Analysis analysis{{}, tree.nonzeros(), tree.flops()};
-    analysis.plan = assembly_plan(pattern, std::move(tree));
+    const std::shared_ptr<Analysis> analysis = std::make_shared<Analysis>();
+    analysis->nonzeros = tree.nonzeros();
+    analysis->flops = tree.flops();
+    analysis->plan = assembly_plan(pattern, std::move(tree));
 #ifdef __GLIBC__
     constexpr std::size_t large = 1000000;  // entries: what orderings leave behind then counts
     if (pattern.rows.size() > large) malloc_trim(0);
 #endif
-    return std::make_shared<const Analysis>(std::move(analysis));
+    return analysis;
+}
+
+std::shared_ptr<SharedWork> SupernodalLdlt::Analysis::shared_work() {
+    const std::lock_guard lock(mutex);
+    std::shared_ptr<SharedWork> shared = work.lock();
+    if (!shared) work = shared = std::make_shared<SharedWork>();
+    return shared;
 }
 
 SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern,
-                               std::shared_ptr<const Analysis> analysis)
+                               std::shared_ptr<Analysis> analysis)
     : Factor(std::move(pattern)), analysis_(std::move(analysis)) {
     scale_.resize(size());
     diagonal_.resize(size());
@@ -60,15 +68,17 @@ FactorReport SupernodalLdlt::factorize() {
     report_.reason = "the last factorize() did not finish";
     if (factor_.size() == 0) {  // an analysis that only has siblings needs none
         factor_ = slabs::Buffer(plan_.factor_doubles);
-        shared_work_ = slabs::Buffer(plan_.shared_doubles);
+        work_ = analysis_->shared_work();
     }
+    largest_scaled_ = equilibrate(*pattern_, values_, scale_);
+    WorkMemory work = work_->take();
+    if (work.shared.size() == 0) work.shared = slabs::Buffer(plan_.shared_doubles);
     const int subtrees = static_cast<int>(plan_.subtrees.size());
     const std::ptrdiff_t subtree_doubles = std::min(num_threads(), subtrees) * plan_.subtree_doubles;
-    if (subtree_work_.size() < subtree_doubles) subtree_work_ = slabs::Buffer(subtree_doubles);
-    WorkSpaces spaces(subtree_work_, plan_.subtree_doubles);
-    largest_scaled_ = equilibrate(*pattern_, values_, scale_);
+    if (work.subtrees.size() < subtree_doubles) work.subtrees = slabs::Buffer(subtree_doubles);
+    WorkSpaces spaces(work.subtrees, plan_.subtree_doubles);
 
-    double* const shared = shared_work_.data();
+    double* const shared = work.shared.data();
     std::vector<PivotTally> tallies(subtrees);
     parallel_for(subtrees, [&](int task) {
         const Subtree& subtree = plan_.subtrees[task];
@@ -80,6 +90,7 @@ FactorReport SupernodalLdlt::factorize() {
     PivotTally tally;
     for (const PivotTally& each : tallies) tally.add(each);
     for (const Index s : plan_.top) tally.add(process(s, shared, shared));
+    work_->give_back(std::move(work));
 
     report_.negative_pivots = tally.negative;
     report_.perturbed_pivots = tally.perturbed;
@@ -123,10 +134,13 @@ PivotTally SupernodalLdlt::process(Index s, double* from, double* to) {
 }
 
 std::size_t SupernodalLdlt::bytes() const {
-    const std::size_t doubles =
-        factor_.size() + shared_work_.size() + subtree_work_.size() + values_.size() + 3 * size();
-    return sizeof(double) * doubles + sizeof(Index) * (pattern_->rows.size() + 3 * plan_.rows.size()) +
+    return own_bytes() + (work_ ? work_->bytes() : 0) +
+           sizeof(Index) * (pattern_->rows.size() + 3 * plan_.rows.size()) +
            sizeof(PlacedEntry) * plan_.entries.size() + sizeof(Transfer) * plan_.transfers.size();
+}
+
+std::size_t SupernodalLdlt::own_bytes() const {
+    return sizeof(double) * (factor_.size() + values_.size() + 3 * size()) + sizeof(Index) * size();
 }
 
 }  // namespace magshell

@@ -16,6 +16,7 @@
 
 #include "magshell/linalg/assembly_plan.h"
 #include "magshell/linalg/pivot_block.h"
+#include "magshell/linalg/work_spaces.h"
 
 namespace magshell {
 
@@ -32,16 +33,21 @@ class SupernodalLdlt : public Factor {
     std::int64_t nonzeros() const override { return analysis_->nonzeros; }
     double flops() const override { return analysis_->flops; }
     std::size_t bytes() const override;
+    std::size_t own_bytes() const override;
 
   private:
     struct Analysis {
         AssemblyPlan plan;
         std::int64_t nonzeros;
         double flops;
+        std::mutex mutex;
+        std::weak_ptr<SharedWork> work;  // of the factors that there are
+
+        std::shared_ptr<SharedWork> shared_work();
     };
 
-    SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, std::shared_ptr<const Analysis> analysis);
-    static std::shared_ptr<const Analysis> analysed(const SparsePattern& pattern, Ordering ordering);
+    SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, std::shared_ptr<Analysis> analysis);
+    static std::shared_ptr<Analysis> analysed(const SparsePattern& pattern, Ordering ordering);
 
     /// Of a front: the work spaces that the updates of its children lie in, and that its own goes to.
     PivotTally process(Index front, double* from, double* to);
@@ -49,13 +55,14 @@ class SupernodalLdlt : public Factor {
     VectorXd refined_solution(const VectorXd& rhs) const;
     bool recovers_known_solution() const;
 
-    std::shared_ptr<const Analysis> analysis_;
+    std::shared_ptr<Analysis> analysis_;
     const AssemblyPlan& plan_ = analysis_->plan;
 
     // Once factorized, values_ are those of S A S.
     std::vector<double> scale_;    // S
     double largest_scaled_ = 0.0;  // |entry| of S A S
-    slabs::Buffer factor_, shared_work_, subtree_work_;
+    slabs::Buffer factor_;
+    std::shared_ptr<SharedWork> work_;
     std::vector<double> diagonal_, coupling_;  // D
     std::vector<Index> pivot_order_;           // within each front
 };

@@ -4,6 +4,7 @@
 #include <map>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "magshell/linalg/slabs.h"
@@ -37,6 +38,36 @@ class WorkSpaces {
     std::vector<double*> free_;
     std::vector<slabs::Buffer> extra_;
     std::map<std::thread::id, double*> taken_;
+};
+
+/// What one factorization writes besides the factor.
+struct WorkMemory {
+    slabs::Buffer shared, subtrees;
+
+    std::size_t bytes() const { return sizeof(double) * (shared.size() + subtrees.size()); }
+};
+
+/// Work memory that factors of one analysis share: it is needed only while one of them is computed, and many
+/// of them may be kept. Lives as long as one that was factorized does.
+class SharedWork {
+  public:
+    /// Empty where another thread has it.
+    WorkMemory take() {
+        const std::lock_guard lock(mutex_);
+        return std::exchange(memory_, {});
+    }
+    void give_back(WorkMemory memory) {
+        const std::lock_guard lock(mutex_);
+        memory_ = std::move(memory);
+    }
+    std::size_t bytes() {
+        const std::lock_guard lock(mutex_);
+        return memory_.bytes();
+    }
+
+  private:
+    std::mutex mutex_;
+    WorkMemory memory_;
 };
 
 }  // namespace magshell

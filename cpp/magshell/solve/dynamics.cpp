@@ -30,7 +30,7 @@ std::size_t bytes_of(const MotionState& state) {
 std::size_t bytes_of(const PartRecord& part) {
     std::size_t bytes = bytes_of(part.begin);
     for (const StageState& stage : part.stages)
-        bytes += sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->bytes() : 0);
+        bytes += sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->own_bytes() : 0);
     return bytes;
 }
 

@@ -11,7 +11,6 @@
 
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "magshell/linalg/factor.h"
@@ -75,10 +74,11 @@ class Newton {
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
                            const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves, bool cautious = false);
-    /// K^T p = rhs with the Hessian at q, by refinement with a factorization from nearby. Empty where that
-    /// does not converge quickly.
-    std::optional<VectorXd> solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
-                                         const Factor& nearby, const VectorXd& rhs);
+    /// Replaces rhs by the solution of K^T p = rhs with the Hessian at q, the last evaluated state, by GMRES
+    /// with a factorization from nearby; both among all unknowns, zero where held. Once converged, the
+    /// residual is 1e-14 of rhs, each component over the root of its own stiffness.
+    GmresReport solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
+                             const Factor& nearby, VectorXd& rhs);
     /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held. Only where
     /// forces make K unsymmetric the tolerance counts: of the residual, over the norm of rhs.
     VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
@@ -116,13 +116,8 @@ class Newton {
                   bool cautious = false);
     /// Whether steps with the last factorization will do, which are as good as free.
     bool factor_serves(double contraction, double residual, double last_step) const;
-    /// What was assembled last, of the free unknowns, with the anchor's weights.
-    void reduce_assembled(const Anchor& anchor, LargeVector<double>& values);
     /// As solve_with_factor with an unsymmetric K, or K^T, free unknowns.
     GmresReport solve_unsymmetric(bool transposed, const GmresOptions& options, VectorXd& reduced) const;
-    using LinearMap = std::function<VectorXd(const VectorXd&)>;
-    GmresReport solve_unsymmetric(const Factor& factor, const LinearMap& symmetric_part, bool transposed,
-                                  const GmresOptions& options, VectorXd& reduced) const;
     FactorReport factorize_assembled(const Anchor& anchor);
     VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
 
@@ -130,8 +125,7 @@ class Newton {
     NewtonOptions options_;
     Watch watch_;
     std::shared_ptr<Factor> factor_;
-    LargeVector<double> nearby_values_;  // of the matrix that solve_nearby() solves with
-    bool unsymmetric_ = false;           // whether what was assembled last has a remainder
+    bool unsymmetric_ = false;  // whether what was assembled last has a remainder
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     mutable double linear_time_ = 0.0;
 };
