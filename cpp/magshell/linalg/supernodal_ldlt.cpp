@@ -32,7 +32,7 @@ SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, Ord
 
 std::shared_ptr<const SupernodalLdlt::Analysis> SupernodalLdlt::analysed(const SparsePattern& pattern,
                                                                          Ordering ordering) {
-    AssemblyTree tree = ordered_assembly_tree(pattern, ordering);
+    AssemblyTree tree = ordered_assembly_tree(pattern, ordering, {}, [] {});
     Analysis analysis{{}, tree.nonzeros(), tree.flops()};
     analysis.plan = assembly_plan(pattern, std::move(tree));
 #ifdef __GLIBC__
