@@ -1,8 +1,6 @@
 #include "magshell/linalg/nested_dissection.h"
 
 #include <algorithm>
-#include <cstdlib>
-#include <cstdio>
 
 #include "magshell/core/parallel.h"
 #include "magshell/linalg/bisection.h"
@@ -85,10 +83,35 @@ Index place_beside(const std::vector<Piece>& pieces, const NodeGraph& graph, Ind
     return place;
 }
 
+// Puts the nodes that are no leaders beside these: piece_of and the pieces' nodes become complete.
+void place_followers(const NodeGraph& graph, const std::vector<char>& leads, std::vector<Piece>& pieces,
+                     std::vector<Index>& piece_of) {
+    std::vector<Index> followers;
+    for (Index node = 0; node < graph.size(); ++node) {
+        if (leads[node]) continue;
+        followers.push_back(node);
+        piece_of[node] = place_beside(pieces, graph, node, leads, piece_of);
+    }
+    // Few are neighbours across a separator: one of them joins it.
+    for (bool moved = true; moved;) {
+        moved = false;
+        for (const Index node : followers) {
+            for (const Index other : graph.around(node)) {
+                const Index common = common_ancestor(pieces, piece_of[node], piece_of[other]);
+                if (common == piece_of[node] || common == piece_of[other]) continue;
+                piece_of[node] = common;
+                moved = true;
+            }
+        }
+    }
+    for (const Index node : followers) pieces[piece_of[node]].nodes.push_back(node);
+}
+
 }  // namespace
 
 std::vector<Index> nested_dissection(const NodeGraph& graph, const std::function<void()>& watch) {
-    static const std::size_t few_nodes = std::getenv("FEW") ? std::atoi(std::getenv("FEW")) : 200;  // of all, in a part that is cut no more
+    if (graph.size() == 0) return {};
+    constexpr std::size_t few_nodes = 200;  // in a part that is cut no more
     const std::vector<char> leads = leaders(graph);
     std::vector<Index> leading, number(graph.size(), -1);
     for (Index node = 0; node < graph.size(); ++node) {
@@ -96,7 +119,7 @@ std::vector<Index> nested_dissection(const NodeGraph& graph, const std::function
         number[node] = static_cast<Index>(leading.size());
         leading.push_back(node);
     }
-    const std::size_t few = std::max<std::size_t>(1, few_nodes * leading.size() / std::max<std::size_t>(1, graph.size()));
+    const std::size_t few = few_nodes * leading.size() / static_cast<std::size_t>(graph.size());
     std::vector<Piece> pieces = dissect(induced(graph, leading, number), few, watch);
     std::vector<Index> piece_of(graph.size(), -1);
     for (std::size_t k = 0; k < pieces.size(); ++k) {
@@ -105,31 +128,14 @@ std::vector<Index> nested_dissection(const NodeGraph& graph, const std::function
             piece_of[node] = static_cast<Index>(k);
         }
     }
-    for (Index node = 0; node < graph.size(); ++node) {
-        if (leads[node]) continue;
-        piece_of[node] = place_beside(pieces, graph, node, leads, piece_of);
-    }
-    for (bool lifted = true; lifted;) {
-        lifted = false;
-        for (Index node = 0; node < graph.size(); ++node) {
-            if (leads[node]) continue;
-            for (const Index other : graph.around(node)) {
-                const Index common = common_ancestor(pieces, piece_of[node], piece_of[other]);
-                if (common == piece_of[node] || common == piece_of[other]) continue;
-                piece_of[node] = common;
-                lifted = true;
-            }
-        }
-    }
-    for (Index node = 0; node < graph.size(); ++node)
-        if (!leads[node]) pieces[piece_of[node]].nodes.push_back(node);
+    place_followers(graph, leads, pieces, piece_of);
     watch();
+
     std::vector<char> is_cut(pieces.size(), false);
     for (const Piece& piece : pieces)
         if (piece.parent >= 0) is_cut[piece.parent] = true;
     parallel_for(static_cast<int>(pieces.size()), [&](int k) {
-        if (!is_cut[k])
-            pieces[k].nodes = minimum_degree_order(graph, pieces[k].nodes, piece_of, number);
+        if (!is_cut[k]) pieces[k].nodes = minimum_degree_order(graph, pieces[k].nodes, piece_of, number);
     });
     std::vector<Index> order;
     order.reserve(graph.size());

@@ -1,5 +1,3 @@
-// Of SuiteSparse this file calls AMD (BSD) and METIS (Apache) through CHOLMOD's Core, Cholesky and Partition
-// modules (LGPL); nothing of its Supernodal module, which is GPL.
 #include "magshell/linalg/ordering.h"
 
 #include <Eigen/OrderingMethods>
@@ -59,14 +57,21 @@ std::vector<Index> metis(const SparsePattern&) {
 
 }  // namespace
 
-AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, Ordering ordering,
-                                   const std::vector<Vec3>& points, const std::function<void()>& watch) {
+AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, const FactorOptions& options) {
     if (pattern.size == 0) return {};
     const Quotient quotient = quotient_graph(pattern);
     const auto by_amd = [&] { return assembly_tree(quotient, nodes_in_order(quotient, eigen_amd(pattern))); };
-    if (ordering == Ordering::amd) return by_amd();
-    if (ordering == Ordering::metis) return assembly_tree(quotient, nodes_in_order(quotient, metis(pattern)));
-    return assembly_tree(quotient, nested_dissection(node_graph(quotient, points), watch));
+    if (options.ordering == Ordering::amd) return by_amd();
+    if (options.ordering == Ordering::metis) return assembly_tree(quotient, nodes_in_order(quotient, metis(pattern)));
+    AssemblyTree dissection = assembly_tree(quotient, nested_dissection(node_graph(quotient, options.points), options.watch));
+    if (options.ordering == Ordering::dissection) return dissection;
+    // AMD takes longer than a factorization. It does better than nested dissection where cuts are short beside
+    // the whole, on narrow strips above all, and may where nothing is known but the pattern.
+    constexpr double few_operations = 5e4;  // an unknown
+    if (!options.points.empty() && dissection.flops() > few_operations * pattern.size) return dissection;
+    options.watch();
+    AssemblyTree amd = by_amd();
+    return amd.flops() < dissection.flops() ? amd : dissection;
 }
 
 }  // namespace magshell

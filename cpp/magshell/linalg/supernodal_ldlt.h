@@ -21,7 +21,7 @@ namespace magshell {
 
 class SupernodalLdlt : public Factor {
   public:
-    SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, Ordering ordering);
+    SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, const FactorOptions& options);
 
     std::unique_ptr<Factor> sibling() const override;
     FactorReport factorize() override;
@@ -41,7 +41,8 @@ class SupernodalLdlt : public Factor {
     };
 
     SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, std::shared_ptr<const Analysis> analysis);
-    static std::shared_ptr<const Analysis> analysed(const SparsePattern& pattern, Ordering ordering);
+    static std::shared_ptr<const Analysis> analysed(const SparsePattern& pattern,
+                                                    const FactorOptions& options);
 
     /// Of a front: the work spaces that the updates of its children lie in, and that its own goes to.
     PivotTally process(Index front, double* from, double* to);
