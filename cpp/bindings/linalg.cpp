@@ -27,11 +27,10 @@ Choice chosen(const std::string& name, const char* what,
 
 const std::vector<std::pair<std::string, Backend>> backends{
     {"supernodal", Backend::supernodal}, {"cholmod", Backend::cholmod}, {"eigen", Backend::eigen}};
-const std::vector<std::pair<std::string, Ordering>> orderings{
-    {"best", Ordering::best},
-    {"dissection", Ordering::dissection},
-    {"amd", Ordering::amd},
-    {"metis", Ordering::metis}};
+const std::vector<std::pair<std::string, Ordering>> orderings{{"best", Ordering::best},
+                                                              {"dissection", Ordering::dissection},
+                                                              {"amd", Ordering::amd},
+                                                              {"metis", Ordering::metis}};
 
 std::vector<Index> to_indices(const IndexArray& array, const char* name) {
     if (array.ndim() != 1)

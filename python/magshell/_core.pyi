@@ -330,6 +330,11 @@ class Model:
     @property
     def bytes(self) -> int: ...
     @property
+    def free_points(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        Where each free unknown is at rest (n, 3) [m]: its vertex, or the middle of its edge.
+        """
+    @property
     def free_size(self) -> int: ...
     @property
     def size(self) -> int: ...
@@ -618,9 +623,10 @@ def analyze(
     rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
     backend: str = "supernodal",
     ordering: str = "best",
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
 ) -> Factor:
     """
-    Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, diagonal present.
+    Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, diagonal present. points (n, 3): where the unknowns are, which makes for better orderings.
     """
 
 def build_info() -> list[tuple[str, str]]: ...
@@ -651,6 +657,7 @@ def drag_gradients(
     """
 
 def factor_backends() -> list[str]: ...
+def factor_orderings() -> list[str]: ...
 def find_equilibrium(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],

@@ -40,7 +40,11 @@ class RestStiffness:
 
     def negative_directions(self, change: np.ndarray) -> int:
         """How many negative eigenvalues K plus a change of its values has, by another factorization."""
-        return _core.analyze(*self._pattern, points=self._model.free_points).factorize(self._values + change).negative_pivots
+        return (
+            _core.analyze(*self._pattern, points=self._model.free_points)
+            .factorize(self._values + change)
+            .negative_pivots
+        )
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """u (n,) of K u = forces (n,)."""

@@ -202,8 +202,7 @@ std::vector<Vec3> Model::free_points() const {
         for (int i = 0; i < 3; ++i) {
             const Index rotation = sheet_.sides[f][i].rotation;
             if (rotation >= 0)
-                points[3 * sheet_.n_nodes() + rotation] =
-                    0.5 * (corners[(i + 1) % 3] + corners[(i + 2) % 3]);
+                points[3 * sheet_.n_nodes() + rotation] = 0.5 * (corners[(i + 1) % 3] + corners[(i + 2) % 3]);
         }
     }
     return reduction_.free(points);

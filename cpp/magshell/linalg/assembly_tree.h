@@ -31,8 +31,8 @@ struct AssemblyTree {
 };
 
 /// Columns with the same structure become one front, and fronts are merged where the explicit zeros cost less
-/// time than handling them apart. `order` is any fill-reducing ordering of the quotient's nodes; the tree's own
-/// is equivalent to it up to those zeros.
+/// time than handling them apart. `order` is any fill-reducing ordering of the quotient's nodes; the tree's
+/// own is equivalent to it up to those zeros.
 AssemblyTree assembly_tree(const Quotient& quotient, std::vector<Index> order);
 
 }  // namespace magshell

@@ -30,7 +30,8 @@ Cut median_cut(const NodeGraph& graph, const std::vector<Index>& nodes, const Cu
     cut.at = *middle;
     if (std::none_of(sorted.begin(), middle, [&](double value) { return value < cut.at; })) {
         // More than half of them have the least of all.
-        const auto above = std::remove_if(sorted.begin(), sorted.end(), [&](double v) { return v <= cut.at; });
+        const auto above =
+            std::remove_if(sorted.begin(), sorted.end(), [&](double v) { return v <= cut.at; });
         if (above == sorted.begin()) return {};
         cut.at = *std::min_element(sorted.begin(), above);
     }
@@ -65,7 +66,8 @@ std::vector<Vec3> directions(const std::vector<Vec3>& points, const std::vector<
     std::vector<Vec3> candidates;
     for (int k = 2; k >= 0; --k) candidates.push_back(axes.col(k));
     for (int k = 0; k < 3; ++k) candidates.push_back(Vec3::Unit(k));
-    for (const double sign : {1.0, -1.0}) candidates.push_back((axes.col(2) + sign * axes.col(1)).normalized());
+    for (const double sign : {1.0, -1.0})
+        candidates.push_back((axes.col(2) + sign * axes.col(1)).normalized());
 
     constexpr double far_enough = 0.1;  // of the largest second moment
     const double enough = far_enough * moments.trace() / 3.0;
@@ -104,7 +106,10 @@ void find_levels(const NodeGraph& graph, const std::vector<Index>& nodes, CutSta
 }  // namespace
 
 CutState::CutState(const NodeGraph& graph)
-    : side(graph.size(), Side::left), level(graph.size()), beside(graph.size()), has_moved(graph.size(), false) {
+    : side(graph.size(), Side::left),
+      level(graph.size()),
+      beside(graph.size()),
+      has_moved(graph.size(), false) {
     if (graph.points.empty()) return;
     reach.assign(graph.size(), 0.0);
     for (Index node = 0; node < graph.size(); ++node) {

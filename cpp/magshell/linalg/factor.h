@@ -43,7 +43,7 @@ enum class Ordering {
 struct FactorOptions {
     Backend backend = Backend::supernodal;
     Ordering ordering = Ordering::best;
-    std::vector<Vec3> points = {};          // where each unknown is, for cuts through them; or none
+    std::vector<Vec3> points = {};        // where each unknown is, for cuts through them; or none
     std::function<void()> watch = [] {};  // called now and then during an analysis; may throw
 };
 

@@ -82,7 +82,8 @@ std::vector<Index> ordered(const Places& places) {
     for (Index k = 0; k < count; ++k) degree[k] = left.degree(k);
     order.reserve(count);
     for (Index step = 0; step < count; ++step) {
-        const Index pivot = static_cast<Index>(std::min_element(degree.begin(), degree.end()) - degree.begin());
+        const Index pivot =
+            static_cast<Index>(std::min_element(degree.begin(), degree.end()) - degree.begin());
         degree[pivot] = eliminated;
         order.push_back(places.nodes[pivot]);
         left.eliminate(pivot, [&](Index row) { degree[row] = left.degree(row); });

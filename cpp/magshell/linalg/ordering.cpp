@@ -62,12 +62,14 @@ AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, const FactorOpt
     const Quotient quotient = quotient_graph(pattern);
     const auto by_amd = [&] { return assembly_tree(quotient, nodes_in_order(quotient, eigen_amd(pattern))); };
     if (options.ordering == Ordering::amd) return by_amd();
-    if (options.ordering == Ordering::metis) return assembly_tree(quotient, nodes_in_order(quotient, metis(pattern)));
-    AssemblyTree dissection = assembly_tree(quotient, nested_dissection(node_graph(quotient, options.points), options.watch));
+    if (options.ordering == Ordering::metis)
+        return assembly_tree(quotient, nodes_in_order(quotient, metis(pattern)));
+    AssemblyTree dissection =
+        assembly_tree(quotient, nested_dissection(node_graph(quotient, options.points), options.watch));
     if (options.ordering == Ordering::dissection) return dissection;
-    // AMD takes longer than a factorization. It does better than nested dissection where cuts are short beside
-    // the whole, on narrow strips above all, and may where nothing is known but the pattern.
-    constexpr double few_operations = 5e4;  // an unknown
+    // AMD takes longer than a factorization. It does better than nested dissection where cuts are short
+    // beside the whole, on narrow strips above all, and may where nothing is known but the pattern.
+    constexpr double few_operations = 1.1e5;  // an unknown
     if (!options.points.empty() && dissection.flops() > few_operations * pattern.size) return dissection;
     options.watch();
     AssemblyTree amd = by_amd();

@@ -119,8 +119,9 @@ bool Refinement::improved_in_a_pass() {
     for (int in_vain = 0; in_vain < most_moves_in_vain; ++in_vain) {
         const Move *left = best(Side::left), *right = best(Side::right);
         if (!left && !right) break;
-        const bool to_left = !right || (left && (left->gain > right->gain ||
-                                                 (left->gain == right->gain && weight_[0] <= weight_[1])));
+        const bool to_left =
+            !right ||
+            (left && (left->gain > right->gain || (left->gain == right->gain && weight_[0] <= weight_[1])));
         apply((to_left ? left : right)->node, to_left ? Side::left : Side::right);
         if (cost() >= least) continue;
         least = cost();
