@@ -192,22 +192,6 @@ SheetStrains Model::stresses(const SheetStrains& strains) const {
     return stresses;
 }
 
-std::vector<Vec3> Model::free_points() const {
-    std::vector<Vec3> points;
-    points.reserve(size());
-    for (const Vec3& point : sheet_.rest) points.insert(points.end(), 3, point);
-    points.resize(size());
-    for (Index f = 0; f < sheet_.n_faces(); ++f) {
-        const std::array<Vec3, 3> corners = sheet_.rest_corners(f);
-        for (int i = 0; i < 3; ++i) {
-            const Index rotation = sheet_.sides[f][i].rotation;
-            if (rotation >= 0)
-                points[3 * sheet_.n_nodes() + rotation] = 0.5 * (corners[(i + 1) % 3] + corners[(i + 2) % 3]);
-        }
-    }
-    return reduction_.free(points);
-}
-
 std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
     if (spare_) return std::exchange(spare_, nullptr);
     if (!analysed_) {

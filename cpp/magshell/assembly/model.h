@@ -110,7 +110,7 @@ class Model {
     /// meanwhile, and may throw.
     std::shared_ptr<Factor> new_factor(const std::function<void()>& watch = [] {});
     /// Where each free unknown is at rest [m]: its vertex, or the middle of its edge.
-    std::vector<Vec3> free_points() const;
+    std::vector<Vec3> free_points() const { return reduction_.free(sheet_.unknown_points()); }
     /// One that nobody else holds, for the next who asks: fresh memory costs page faults. What is large goes
     /// back to the system.
     void keep_spare(std::shared_ptr<Factor> factor);

@@ -115,4 +115,17 @@ double Sheet::smallest_height(Index face) const {
     return (b - a).cross(c - a).norm() / longest;
 }
 
+std::vector<Vec3> Sheet::unknown_points() const {
+    std::vector<Vec3> points(n_unknowns());
+    for (Index node = 0; node < n_nodes(); ++node) std::fill_n(points.begin() + 3 * node, 3, rest[node]);
+    for (Index f = 0; f < n_faces(); ++f) {
+        const std::array<Vec3, 3> at = rest_corners(f);
+        for (int i = 0; i < 3; ++i) {
+            const Index rotation = sides[f][i].rotation;
+            if (rotation >= 0) points[3 * n_nodes() + rotation] = 0.5 * (at[(i + 1) % 3] + at[(i + 2) % 3]);
+        }
+    }
+    return points;
+}
+
 }  // namespace magshell

@@ -66,6 +66,8 @@ class Sheet {
     /// The largest coordinate at rest of the corners of a face [m]. A unit of its round-off is how exactly
     /// they are known.
     double largest_coordinate(Index face) const;
+    /// Where each unknown is at rest [m]: its vertex, or the middle of its edge.
+    std::vector<Vec3> unknown_points() const;
     /// The smallest height of a face at rest [m].
     double smallest_height(Index face) const;
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double largest_share = 0.6;  // of a side
 constexpr int most_passes = 3;
-constexpr int most_moves_in_vain = 30;
+constexpr int most_moves_in_vain = 100;
 
 int number(Side side) {
     return static_cast<int>(side);
