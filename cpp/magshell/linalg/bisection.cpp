@@ -63,16 +63,20 @@ std::vector<Vec3> directions(const std::vector<Vec3>& points, const std::vector<
     Eigen::SelfAdjointEigenSolver<Mat3> solver;
     solver.computeDirect(moments);
     const Mat3 axes = solver.eigenvectors();
-    std::vector<Vec3> candidates;
-    for (int k = 2; k >= 0; --k) candidates.push_back(axes.col(k));
-    for (int k = 0; k < 3; ++k) candidates.push_back(Vec3::Unit(k));
-    for (const double sign : {1.0, -1.0})
-        candidates.push_back((axes.col(2) + sign * axes.col(1)).normalized());
-
-    constexpr double far_enough = 0.1;  // of the largest second moment
+    constexpr double far_enough = 0.1;  // of the mean second moment
+    constexpr double alike = 0.99;      // cosine
     const double enough = far_enough * moments.trace() / 3.0;
-    std::erase_if(candidates, [&](const Vec3& d) { return !(d.dot(moments * d) > enough); });
-    return candidates;
+    std::vector<Vec3> chosen;
+    const auto consider = [&](const Vec3& direction) {
+        if (!(direction.dot(moments * direction) > enough)) return;
+        if (std::none_of(chosen.begin(), chosen.end(),
+                         [&](const Vec3& other) { return std::abs(other.dot(direction)) > alike; }))
+            chosen.push_back(direction);
+    };
+    for (int k = 2; k >= 0; --k) consider(axes.col(k));
+    for (int k = 0; k < 3; ++k) consider(Vec3::Unit(k));
+    for (const double sign : {1.0, -1.0}) consider((axes.col(2) + sign * axes.col(1)).normalized());
+    return chosen;
 }
 
 // How many steps each node is away from one at an end of the nodes that hang together. Sets of those follow

@@ -69,7 +69,7 @@ AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, const FactorOpt
     if (options.ordering == Ordering::dissection) return dissection;
     // AMD takes longer than a factorization. It does better than nested dissection where cuts are short
     // beside the whole, on narrow strips above all, and may where nothing is known but the pattern.
-    constexpr double few_operations = 1.1e5;  // an unknown
+    constexpr double few_operations = 5.5e4;  // an unknown
     if (!options.points.empty() && dissection.flops() > few_operations * pattern.size) return dissection;
     options.watch();
     AssemblyTree amd = by_amd();

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double largest_share = 0.6;  // of a side
 constexpr int most_passes = 3;
-constexpr int most_moves_in_vain = 100;
+constexpr int most_moves_in_vain = 200;  // nor more than the separator has nodes
 
 int number(Side side) {
     return static_cast<int>(side);
@@ -116,7 +116,8 @@ bool Refinement::improved_in_a_pass() {
     const auto before = cost();
     auto least = before;
     std::size_t kept = 0;  // of the log
-    for (int in_vain = 0; in_vain < most_moves_in_vain; ++in_vain) {
+    const int patience = std::min(most_moves_in_vain, static_cast<int>(separator_.size()));
+    for (int in_vain = 0; in_vain < patience; ++in_vain) {
         const Move *left = best(Side::left), *right = best(Side::right);
         if (!left && !right) break;
         const bool to_left =
