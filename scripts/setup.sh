@@ -3,13 +3,12 @@
 #
 #     scripts/setup.sh [python]          the interpreter to build for, python3 by default
 #
-# What is there already is left alone. What cannot be installed is named, and the script goes on: CHOLMOD, OpenBLAS
-# and the GL libraries are optional. Only a missing interpreter, venv module or compiler ends it with an error.
+# What is there already is left alone. What cannot be installed is named, and the script goes on: the GL libraries are
+# optional. Only a missing interpreter, venv module or compiler ends it with an error.
 set -euo pipefail
 
 python=${1:-python3}
 optional=(
-    libsuitesparse-dev libopenblas-dev                      # CHOLMOD and its BLAS: several times faster solves
     libegl1 libgl1 libgl1-mesa-dri libglu1-mesa             # off-screen pictures
     libxrender1 libxcursor1 libxft2 libxinerama1            # what the gmsh wheel links against
 )
@@ -74,7 +73,7 @@ if command -v dpkg-query >/dev/null && command -v apt-get >/dev/null; then
     [ "${#packages[@]}" -eq 0 ] || say "missing; as root: apt-get install ${packages[*]}"
 else
     say "not a Debian-like system: a C++20 compiler, Python's headers and Eigen 3.4 must be there;" \
-        "SuiteSparse, OpenBLAS and GL are used where they are"
+        "GL is used where it is"
 fi
 
 python_works || { say "there is no $python"; exit 1; }

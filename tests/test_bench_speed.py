@@ -102,6 +102,8 @@ def test_scaling_without_the_memory_for_it(monkeypatch, tmp_path, capsys) -> Non
         "entries": 9,
         "factor": 20,
         "peak": None,
+        "operations": {"best": 1.0, "amd": 1.0},
+        "metis": None,
     }
     size |= {clock: dict.fromkeys(TIMES, 1.0) for clock in ("processor", "wall")}
 

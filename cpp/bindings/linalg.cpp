@@ -1,8 +1,10 @@
 // Factorizations of sparse symmetric matrices, thread counts, and what this build is made of.
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <shared_mutex>
 
+#include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
@@ -25,8 +27,10 @@ Choice chosen(const std::string& name, const char* what,
 
 const std::vector<std::pair<std::string, Backend>> backends{
     {"supernodal", Backend::supernodal}, {"cholmod", Backend::cholmod}, {"eigen", Backend::eigen}};
-const std::vector<std::pair<std::string, Ordering>> orderings{
-    {"best", Ordering::best}, {"amd", Ordering::amd}, {"metis", Ordering::metis}};
+const std::vector<std::pair<std::string, Ordering>> orderings{{"best", Ordering::best},
+                                                              {"dissection", Ordering::dissection},
+                                                              {"amd", Ordering::amd},
+                                                              {"metis", Ordering::metis}};
 
 std::vector<Index> to_indices(const IndexArray& array, const char* name) {
     if (array.ndim() != 1)
@@ -38,11 +42,18 @@ std::vector<Index> to_indices(const IndexArray& array, const char* name) {
 class SharedFactor {
   public:
     SharedFactor(Index size, const IndexArray& column_starts, const IndexArray& rows,
-                 const std::string& backend, const std::string& ordering) {
+                 const std::string& backend, const std::string& ordering,
+                 const std::optional<Array>& points) {
         auto pattern = std::make_shared<const SparsePattern>(
             SparsePattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")});
-        const FactorOptions options{chosen(backend, "backend", backends),
-                                    chosen(ordering, "ordering", orderings)};
+        FactorOptions options{chosen(backend, "backend", backends), chosen(ordering, "ordering", orderings)};
+        if (points) {
+            if (points->ndim() != 2 || points->shape(1) != 3)
+                throw InvalidInput("points must have shape (n, 3), one for each unknown");
+            const Rows3 places = to_rows3(*points);
+            for (Eigen::Index k = 0; k < places.rows(); ++k)
+                options.points.push_back(places.row(k).transpose());
+        }
         entries_ = static_cast<py::ssize_t>(pattern->rows.size());
         const py::gil_scoped_release release;
         factor_ = analyze(std::move(pattern), options);
@@ -127,18 +138,25 @@ void register_linalg(py::module_& module) {
     module.def(
         "analyze",
         [](Index size, const IndexArray& column_starts, const IndexArray& rows, const std::string& backend,
-           const std::string& ordering) {
-            return std::make_unique<SharedFactor>(size, column_starts, rows, backend, ordering);
+           const std::string& ordering, const std::optional<Array>& points) {
+            return std::make_unique<SharedFactor>(size, column_starts, rows, backend, ordering, points);
         },
         py::arg("size"), py::arg("column_starts"), py::arg("rows"), py::arg("backend") = "supernodal",
-        py::arg("ordering") = "best",
+        py::arg("ordering") = "best", py::arg("points") = py::none(),
         "Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, "
-        "diagonal present.");
+        "diagonal present. points (n, 3): where the unknowns are, which makes for better orderings.");
 
     module.def("factor_backends", [] {
         std::vector<std::string> built;
         for (const auto& [name, backend] : backends) {
             if (is_built(backend)) built.push_back(name);
+        }
+        return built;
+    });
+    module.def("factor_orderings", [] {
+        std::vector<std::string> built;
+        for (const auto& [name, ordering] : orderings) {
+            if (is_built(ordering)) built.push_back(name);
         }
         return built;
     });

@@ -183,6 +183,16 @@ void register_model(py::module_& module) {
             "recut_faces", &recut_faces,
             "The caller's faces (k,) whose stretch is measured on other triangles than their own.")
         .def_property_readonly("analyses", &Model::analyses)
+        .def_property_readonly(
+            "free_points",
+            [](const Model& model) {
+                const std::vector<Vec3> points = model.free_points();
+                Rows3 rows(points.size(), 3);
+                for (std::size_t k = 0; k < points.size(); ++k)
+                    rows.row(static_cast<Eigen::Index>(k)) = points[k].transpose();
+                return rows;
+            },
+            "Where each free unknown is at rest (n, 3) [m]: its vertex, or the middle of its edge.")
         .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
         .def_property_readonly("bytes", &Model::bytes)
         .def_property_readonly("n_strains", &Model::n_strains)

@@ -662,9 +662,10 @@ def analyze(
     rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
     backend: str = "supernodal",
     ordering: str = "best",
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
 ) -> Factor:
     """
-    Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, diagonal present.
+    Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, diagonal present. points (n, 3): where the unknowns are, which makes for better orderings.
     """
 
 def build_info() -> list[tuple[str, str]]: ...
@@ -695,6 +696,7 @@ def drag_gradients(
     """
 
 def factor_backends() -> list[str]: ...
+def factor_orderings() -> list[str]: ...
 def find_equilibrium(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],

@@ -20,7 +20,7 @@ class RestStiffness:
         self._model = scene._model
         self.rest = self._model.rest_state()
         *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())
-        self._factor = _core.analyze(*self._pattern)
+        self._factor = _core.analyze(*self._pattern, points=self._model.free_points)
         report = self._factor.factorize(self._values)
         if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
             raise ValueError(
@@ -40,7 +40,11 @@ class RestStiffness:
 
     def negative_directions(self, change: np.ndarray) -> int:
         """How many negative eigenvalues K plus a change of its values has, by another factorization."""
-        return _core.analyze(*self._pattern).factorize(self._values + change).negative_pivots
+        return (
+            _core.analyze(*self._pattern, points=self._model.free_points)
+            .factorize(self._values + change)
+            .negative_pivots
+        )
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """u (n,) of K u = forces (n,)."""

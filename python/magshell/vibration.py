@@ -102,7 +102,7 @@ def vibration_modes(
             stiffness = model.hessian(model.rest_state(), scene._control_layout.zeros())
         else:
             stiffness = model.hessian(equilibrium._state, equilibrium._controls)
-    pencil = _Pencil(stiffness, masses, _slow_square(inputs.values.shell, scene.mesh.size))
+    pencil = _Pencil(stiffness, model.free_points, masses, _slow_square(inputs.values.shell, scene.mesh.size))
     squares, vectors = pencil.lowest(int(count))
     modes, edge_rotations = mode_shapes(model, vectors)
     return VibrationModes(
@@ -119,16 +119,17 @@ def vibration_modes(
 class _Pencil:
     """K and M, and a factorization of K - shift M with the shift below every square of a frequency.
 
-    stiffness: (n, column starts, rows, values), the lower triangle of K. masses: (n,), zero for edge rotations.
+    stiffness: (n, column starts, rows, values), the lower triangle of K. points: (n, 3), where the unknowns are.
+    masses: (n,), zero for edge rotations.
     slow_square: 1/s2, about as large as the lowest of a sheet that is held.
     """
 
-    def __init__(self, stiffness: tuple, masses: np.ndarray, slow_square: float):
+    def __init__(self, stiffness: tuple, points: np.ndarray, masses: np.ndarray, slow_square: float):
         *pattern, self._values = stiffness
         self._diagonal = pattern[1][:-1]
         self._masses = masses
         self._moving = np.flatnonzero(masses)
-        self._factor = _core.analyze(*pattern)
+        self._factor = _core.analyze(*pattern, points=points)
         self.factorizations = 0
         stiffest = self._values[self._diagonal][self._moving] / masses[self._moving]
         self._lost = _LOST * stiffest.max()

@@ -193,6 +193,13 @@ VectorXd Reduction::weights(const VectorXd& full) const {
     return reduced;
 }
 
+std::vector<Vec3> Reduction::free(const std::vector<Vec3>& full) const {
+    std::vector<Vec3> points;
+    points.reserve(free_unknowns_.size());
+    for (const Index unknown : free_unknowns_) points.push_back(full[unknown]);
+    return points;
+}
+
 VectorXd Reduction::expand(const VectorXd& reduced) const {
     VectorXd full = VectorXd::Zero(full_size_);
     for (Index k = 0; k < size(); ++k) full[free_unknowns_[k]] = reduced[k];

@@ -57,6 +57,8 @@ class Reduction {
     /// A diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses,
     /// areas.
     VectorXd weights(const VectorXd& full) const;
+    /// Of points of all unknowns, the same for the three of a node, those of the free ones.
+    std::vector<Vec3> free(const std::vector<Vec3>& full) const;
     /// A free vector back among all unknowns, zero where they are held.
     VectorXd expand(const VectorXd& reduced) const;
 

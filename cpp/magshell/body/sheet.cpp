@@ -70,4 +70,14 @@ void Sheet::add_stencils() {
         }
 }
 
+void Sheet::place_rotations(std::vector<Vec3>& points, Index first_scalar) const {
+    for (Index f = 0; f < n_faces(); ++f) {
+        const std::array<Vec3, 3>& at = rest_corners(f);
+        for (int i = 0; i < 3; ++i) {
+            const Index rotation = sides[f][i].rotation;
+            if (rotation >= 0) points[first_scalar + rotation] = 0.5 * (at[(i + 1) % 3] + at[(i + 2) % 3]);
+        }
+    }
+}
+
 }  // namespace magshell

@@ -48,6 +48,9 @@ class Sheet : public Surface {
     void add_folds(const TriangleMesh& mesh, const std::vector<DirectedEdge>& directed, bool directors,
                    Nodes& nodes);
 
+    /// Puts the middles of edges where their rotations stand among points of all unknowns.
+    void place_rotations(std::vector<Vec3>& points, Index first_scalar) const;
+
     Index n_edges() const { return static_cast<Index>(rotation_of_edge.size()); }
     /// Edge rotations are the scalars from `first_rotation` on.
     Index n_rotations() const { return static_cast<Index>(edge_of_rotation.size()); }

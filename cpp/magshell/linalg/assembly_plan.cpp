@@ -33,34 +33,29 @@ void place_entries(const SparsePattern& pattern, AssemblyPlan& plan) {
         std::fill_n(front_of.begin() + plan.fronts[s].shape.first, plan.fronts[s].shape.pivots, s);
     }
 
-    struct Entry {
-        Index row, column, entry;
-    };
-    std::vector<Entry> sorted(pattern.rows.size());  // by front
+    // Sorted by front: for now, with an entry's column in the matrix for its place.
+    plan.entries.resize(pattern.rows.size());
     std::vector<Index> next(plan.fronts.size() + 1, 0);
     const auto each_entry = [&](auto&& visit) {
-        for (Index j = 0; j < pattern.size; ++j) {
-            for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
-                const auto [column, row] = std::minmax(position[j], position[pattern.rows[k]]);
-                visit(front_of[column], Entry{row, column, k});
-            }
-        }
+        for (Index j = 0; j < pattern.size; ++j)
+            for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k)
+                visit(front_of[std::min(position[j], position[pattern.rows[k]])], PlacedEntry{k, j});
     };
-    each_entry([&](Index front, const Entry&) { ++next[front + 1]; });
+    each_entry([&](Index front, const PlacedEntry&) { ++next[front + 1]; });
     for (std::size_t s = 0; s + 1 < next.size(); ++s) next[s + 1] += next[s];
     for (std::size_t s = 0; s < plan.fronts.size(); ++s) plan.fronts[s].first_entry = next[s];
-    each_entry([&](Index front, const Entry& entry) { sorted[next[front]++] = entry; });
+    each_entry([&](Index front, const PlacedEntry& entry) { plan.entries[next[front]++] = entry; });
 
-    plan.entries.reserve(sorted.size());
     for (Index s = 0; s < plan.front_count(); ++s) {
         const FrontShape& front = plan.fronts[s].shape;
         for (Index k = 0; k < front.below; ++k) local_row[plan.rows[front.rows + k]] = k;
         for (Index k = plan.fronts[s].first_entry; k < plan.fronts[s + 1].first_entry; ++k) {
-            const Entry& entry = sorted[k];
-            const bool is_pivot = entry.row < front.first + front.pivots;
-            const Index row = is_pivot ? entry.row - front.first : local_row[entry.row];
-            const std::ptrdiff_t place = panel_place(front, row, is_pivot, entry.column - front.first);
-            plan.entries.push_back({entry.entry, static_cast<Index>(place)});
+            PlacedEntry& entry = plan.entries[k];
+            const auto [column, row] =
+                std::minmax(position[entry.place], position[pattern.rows[entry.entry]]);
+            const bool is_pivot = row < front.first + front.pivots;
+            const Index in_front = is_pivot ? row - front.first : local_row[row];
+            entry.place = static_cast<Index>(panel_place(front, in_front, is_pivot, column - front.first));
         }
     }
 }

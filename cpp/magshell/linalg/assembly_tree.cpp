@@ -29,22 +29,28 @@ std::vector<Index> relabel(const std::vector<Index>& parent, const std::vector<I
     return result;
 }
 
-// Columns whose structure differs only by the column itself, joined.
-std::vector<FrontShape> fundamental_fronts(const std::vector<Index>& parent,
-                                           const std::vector<Index>& counts) {
+// A front, and the nodes of the elimination tree that are its pivots: up to the first of the next front.
+struct NodeFront : FrontShape {
+    Index first_node = 0, end_node = 0;
+};
+
+// Nodes whose structure differs only by the node itself, joined.
+std::vector<NodeFront> fundamental_fronts(const std::vector<Index>& parent, const std::vector<Index>& counts,
+                                          const std::vector<Index>& weights) {
     const Index size = static_cast<Index>(parent.size());
-    std::vector<FrontShape> fronts;
+    std::vector<NodeFront> fronts;
     std::vector<Index> front_of(size);
     for (Index j = 0; j < size; ++j) {
-        const bool joins = j > 0 && parent[j - 1] == j && counts[j - 1] == counts[j] + 1;
-        if (!joins) fronts.push_back({.first = j});
-        FrontShape& front = fronts.back();
-        ++front.pivots;
-        front.below = counts[j] - 1;
+        const bool joins = j > 0 && parent[j - 1] == j && counts[j - 1] == counts[j] + weights[j - 1];
+        if (!joins) fronts.emplace_back().first_node = j;
+        NodeFront& front = fronts.back();
+        front.pivots += weights[j];
+        front.below = counts[j] - weights[j];
+        front.end_node = j + 1;
         front_of[j] = static_cast<Index>(fronts.size()) - 1;
     }
-    for (FrontShape& front : fronts) {
-        const Index above = parent[front.first + front.pivots - 1];
+    for (NodeFront& front : fronts) {
+        const Index above = parent[front.end_node - 1];
         front.parent = above == -1 ? -1 : front_of[above];
     }
     return fronts;
@@ -54,7 +60,7 @@ std::vector<FrontShape> fundamental_fronts(const std::vector<Index>& parent,
 //
 // A child merged into its parent takes all rows of the parent: pivots add up, the rows below stay the
 // parent's.
-std::vector<Index> merge_fronts(const std::vector<FrontShape>& fronts) {
+std::vector<Index> merge_fronts(const std::vector<NodeFront>& fronts) {
     const Index count = static_cast<Index>(fronts.size());
     std::vector<std::vector<Index>> children(count);
     for (Index s = 0; s < count; ++s) {
@@ -86,22 +92,26 @@ std::vector<Index> merge_fronts(const std::vector<FrontShape>& fronts) {
     return absorbed_by;
 }
 
-// The rows below each front, by following every row's entries up the tree of fronts.
-std::vector<Index> rows_below(const UpperPattern& upper, const std::vector<FrontShape>& fronts) {
-    const Index size = static_cast<Index>(upper.starts.size()) - 1;
-    std::vector<Index> front_of(size), rows, last_row(fronts.size(), -1);
+// The rows below each front, by following every node's entries up the tree of fronts. `ends`: where the
+// nodes' unknowns end, in the order of elimination.
+std::vector<Index> rows_below(const UpperPattern& upper, const std::vector<Index>& ends,
+                              const std::vector<FrontShape>& fronts) {
+    const Index size = static_cast<Index>(ends.size());
+    std::vector<Index> front_of(size), rows, last_node(fronts.size(), -1);
     std::vector<std::ptrdiff_t> next(fronts.size());
+    Index node = 0;
     for (std::size_t s = 0; s < fronts.size(); ++s) {
-        std::fill_n(front_of.begin() + fronts[s].first, fronts[s].pivots, static_cast<Index>(s));
+        while (node < size && ends[node] <= fronts[s].first + fronts[s].pivots)
+            front_of[node++] = static_cast<Index>(s);
         next[s] = fronts[s].rows;
     }
     if (!fronts.empty()) rows.resize(fronts.back().rows + fronts.back().below);
     for (Index i = 0; i < size; ++i) {
         for (Index k = upper.starts[i]; k < upper.starts[i + 1]; ++k) {
-            for (Index s = front_of[upper.rows[k]]; s != front_of[i] && last_row[s] != i;
+            for (Index s = front_of[upper.rows[k]]; s != front_of[i] && last_node[s] != i;
                  s = fronts[s].parent) {
-                last_row[s] = i;
-                rows[next[s]++] = i;
+                last_node[s] = i;
+                for (Index row = i > 0 ? ends[i - 1] : 0; row < ends[i]; ++row) rows[next[s]++] = row;
             }
         }
     }
@@ -129,17 +139,18 @@ std::int64_t AssemblyTree::nonzeros() const {
     return sum;
 }
 
-AssemblyTree assembly_tree(const SparsePattern& pattern, const std::vector<Index>& order) {
-    AssemblyTree tree;
-    tree.order = order;
-    UpperPattern upper = permuted_upper(pattern, tree.order);
+AssemblyTree assembly_tree(const Quotient& quotient, std::vector<Index> order) {
+    UpperPattern upper = permuted_upper(quotient.pattern, order);
     std::vector<Index> parent = elimination_tree(upper);
-    const std::vector<Index> columns = postorder(parent);
-    reorder(tree.order, columns);
-    parent = relabel(parent, columns);
-    upper = permuted_upper(pattern, tree.order);
+    const std::vector<Index> by_subtrees = postorder(parent);
+    reorder(order, by_subtrees);
+    parent = relabel(parent, by_subtrees);
+    upper = permuted_upper(quotient.pattern, order);
 
-    const std::vector<FrontShape> simple = fundamental_fronts(parent, column_counts(upper, parent));
+    std::vector<Index> weights;
+    for (const Index node : order) weights.push_back(static_cast<Index>(quotient.members(node).size()));
+    const std::vector<NodeFront> simple =
+        fundamental_fronts(parent, column_counts(upper, parent, weights), weights);
     const std::vector<Index> absorbed_by = merge_fronts(simple);
 
     // The merged fronts form a tree; its postorder, and within a front the old order, is the new order of
@@ -154,31 +165,43 @@ AssemblyTree assembly_tree(const SparsePattern& pattern, const std::vector<Index
         const Index above = simple[s].parent;
         merged_parent.push_back(above == -1 ? -1 : merged_label[absorbed_by[above]]);
     }
-    std::vector<std::vector<Index>> members(survivors.size());
+    std::vector<std::vector<Index>> absorbed(survivors.size());
     for (std::size_t s = 0; s < simple.size(); ++s) {
-        members[merged_label[absorbed_by[s]]].push_back(static_cast<Index>(s));
+        absorbed[merged_label[absorbed_by[s]]].push_back(static_cast<Index>(s));
     }
     const std::vector<Index> front_order = postorder(merged_parent);
     const std::vector<Index> front_parent = relabel(merged_parent, front_order);
 
-    std::vector<Index> columns_by_front;
-    columns_by_front.reserve(pattern.size);
+    AssemblyTree tree;
+    std::vector<Index> by_fronts, ends;
+    by_fronts.reserve(order.size());
+    ends.reserve(order.size());
+    Index end = 0;
     std::ptrdiff_t next_row = 0;
     for (std::size_t k = 0; k < front_order.size(); ++k) {
         const Index label = front_order[k];
-        FrontShape front{.first = static_cast<Index>(columns_by_front.size()),
+        FrontShape front{.first = end,
                          .below = simple[survivors[label]].below,
                          .parent = front_parent[k],
                          .rows = next_row};
-        for (const Index s : members[label]) {
-            for (Index j = 0; j < simple[s].pivots; ++j) columns_by_front.push_back(simple[s].first + j);
+        for (const Index s : absorbed[label]) {
+            for (Index node = simple[s].first_node; node < simple[s].end_node; ++node) {
+                by_fronts.push_back(node);
+                end += weights[node];
+                ends.push_back(end);
+            }
         }
-        front.pivots = static_cast<Index>(columns_by_front.size()) - front.first;
+        front.pivots = end - front.first;
         next_row += front.below;
         tree.fronts.push_back(front);
     }
-    reorder(tree.order, columns_by_front);
-    tree.rows = rows_below(permuted_upper(pattern, tree.order), tree.fronts);
+    reorder(order, by_fronts);
+    tree.rows = rows_below(permuted_upper(quotient.pattern, order), ends, tree.fronts);
+    tree.order.reserve(end);
+    for (const Index node : order) {
+        const std::span<const Index> members = quotient.members(node);
+        tree.order.insert(tree.order.end(), members.begin(), members.end());
+    }
     return tree;
 }
 

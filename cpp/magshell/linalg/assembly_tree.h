@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "magshell/linalg/factor.h"
+#include "magshell/linalg/quotient_graph.h"
 
 namespace magshell {
 
@@ -31,8 +31,8 @@ struct AssemblyTree {
 };
 
 /// Columns with the same structure become one front, and fronts are merged where the explicit zeros cost less
-/// time than handling them apart. `order` is any fill-reducing ordering; the tree's own is equivalent to it
-/// up to those zeros.
-AssemblyTree assembly_tree(const SparsePattern& pattern, const std::vector<Index>& order);
+/// time than handling them apart. `order` is any fill-reducing ordering of the quotient's nodes; the tree's
+/// own is equivalent to it up to those zeros.
+AssemblyTree assembly_tree(const Quotient& quotient, std::vector<Index> order);
 
 }  // namespace magshell

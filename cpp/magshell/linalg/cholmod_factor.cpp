@@ -35,7 +35,8 @@ class CholmodFactor : public Factor {
         common_->supernodal = CHOLMOD_SUPERNODAL;
         common_->nmethods = 0;
         for (const Ordering each : {Ordering::amd, Ordering::metis}) {
-            if (ordering != Ordering::best && ordering != each) continue;
+            const bool one_is_wanted = ordering == Ordering::amd || ordering == Ordering::metis;
+            if (one_is_wanted && ordering != each) continue;
             common_->method[common_->nmethods++].ordering =
                 each == Ordering::amd ? CHOLMOD_AMD : CHOLMOD_METIS;
         }

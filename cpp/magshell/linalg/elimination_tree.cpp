@@ -74,15 +74,16 @@ std::vector<Index> postorder(const std::vector<Index>& parent) {
 
 // Row i of L has an entry in column j exactly when j lies on a path of the tree from an entry of row i of A
 // up to i.
-std::vector<Index> column_counts(const UpperPattern& upper, const std::vector<Index>& parent) {
+std::vector<Index> column_counts(const UpperPattern& upper, const std::vector<Index>& parent,
+                                 const std::vector<Index>& weights) {
     const Index size = static_cast<Index>(parent.size());
-    std::vector<Index> counts(size, 1), seen(size, -1);
+    std::vector<Index> counts = weights, seen(size, -1);
     for (Index i = 0; i < size; ++i) {
         seen[i] = i;
         for (Index k = upper.starts[i]; k < upper.starts[i + 1]; ++k) {
             for (Index j = upper.rows[k]; seen[j] != i; j = parent[j]) {
                 seen[j] = i;
-                ++counts[j];
+                counts[j] += weights[i];
             }
         }
     }

@@ -9,9 +9,12 @@ namespace magshell {
 
 std::unique_ptr<Factor> analyze(std::shared_ptr<const SparsePattern> pattern, const FactorOptions& options) {
     check_pattern(*pattern);
+    check_points(*pattern, options.points);
+    if (!is_built(options.ordering))
+        throw InvalidInput("magshell was built without METIS; use the ordering \"best\"");
     switch (options.backend) {
         case Backend::supernodal:
-            return std::make_unique<SupernodalLdlt>(std::move(pattern), options.ordering);
+            return std::make_unique<SupernodalLdlt>(std::move(pattern), options);
         case Backend::cholmod:
             return make_cholmod_factor(std::move(pattern), options.ordering);
         case Backend::eigen:
@@ -34,13 +37,20 @@ VectorXd product(const SparsePattern& pattern, const double* values, const Vecto
     return y;
 }
 
-bool is_built(Backend backend) {
 #ifdef MAGSHELL_HAS_CHOLMOD
-    (void)backend;
+bool is_built(Backend) {
     return true;
-#else
-    return backend != Backend::cholmod;
-#endif
 }
+bool is_built(Ordering) {
+    return true;
+}
+#else
+bool is_built(Backend backend) {
+    return backend != Backend::cholmod;
+}
+bool is_built(Ordering ordering) {
+    return ordering != Ordering::metis;
+}
+#endif
 
 }  // namespace magshell

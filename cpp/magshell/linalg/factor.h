@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -32,11 +33,18 @@ enum class Backend {
     eigen,       // Eigen's simplicial L D L^T; always there
 };
 
-enum class Ordering { best, amd, metis };  // best: whichever of the two needs fewer operations
+enum class Ordering {
+    best,        // nested dissection, or AMD where that may need fewer operations, and does
+    dissection,  // magshell's own nested dissection
+    amd,         // Eigen's minimum degree
+    metis,       // METIS's nested dissection, to compare with; only where CHOLMOD is. It takes over signals
+};
 
 struct FactorOptions {
     Backend backend = Backend::supernodal;
     Ordering ordering = Ordering::best;
+    std::vector<Vec3> points = {};        // where each unknown is, for cuts through them; or none
+    std::function<void()> watch = [] {};  // called now and then during an analysis; may throw
 };
 
 /// How a factorization went.
@@ -97,12 +105,13 @@ class Factor {
     FactorReport report_;
 };
 
-/// Orders and analyses a pattern. Throws InvalidInput when the pattern is malformed or the backend was not
-/// built.
+/// Orders and analyses a pattern. Throws InvalidInput when the pattern is malformed, when the points are not
+/// as many as the unknowns or not finite, or when the backend or the ordering was not built.
 std::unique_ptr<Factor> analyze(std::shared_ptr<const SparsePattern> pattern,
                                 const FactorOptions& options = {});
 
 /// Whether this build contains the backend.
 bool is_built(Backend backend);
+bool is_built(Ordering ordering);
 
 }  // namespace magshell

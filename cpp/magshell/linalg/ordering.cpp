@@ -1,11 +1,10 @@
-// Of SuiteSparse this file calls AMD (BSD) and METIS (Apache) through CHOLMOD's Core, Cholesky and Partition
-// modules (LGPL); nothing of its Supernodal module, which is GPL.
 #include "magshell/linalg/ordering.h"
 
 #include <Eigen/OrderingMethods>
 #include <mutex>
 
-#include "magshell/linalg/quotient_graph.h"
+#include "magshell/core/errors.h"
+#include "magshell/linalg/nested_dissection.h"
 #ifdef MAGSHELL_HAS_CHOLMOD
 #include "magshell/linalg/cholmod_workspace.h"
 #endif
@@ -24,48 +23,57 @@ std::vector<Index> eigen_amd(const SparsePattern& pattern) {
     return {permutation.indices().begin(), permutation.indices().end()};
 }
 
-// order[k] = the node to eliminate k-th.
-std::vector<Index> order_nodes(const SparsePattern& pattern, Ordering ordering) {
+// Nodes in the order of the first of their unknowns.
+std::vector<Index> nodes_in_order(const Quotient& quotient, const std::vector<Index>& unknowns) {
+    std::vector<Index> node_of(unknowns.size()), order;
+    for (Index node = 0; node < quotient.pattern.size; ++node)
+        for (const Index unknown : quotient.members(node)) node_of[unknown] = node;
+    std::vector<char> is_in(quotient.pattern.size, false);
+    order.reserve(quotient.pattern.size);
+    for (const Index unknown : unknowns) {
+        if (is_in[node_of[unknown]]) continue;
+        is_in[node_of[unknown]] = true;
+        order.push_back(node_of[unknown]);
+    }
+    return order;
+}
+
 #ifdef MAGSHELL_HAS_CHOLMOD
+std::vector<Index> metis(const SparsePattern& pattern) {
     static std::mutex one_at_a_time;  // METIS keeps the state of its random numbers in a global variable
     const std::lock_guard lock(one_at_a_time);
     CholmodCommon common;
     cholmod_sparse view = cholmod_view(pattern, nullptr);
     std::vector<Index> order(pattern.size);
-    if (ordering == Ordering::metis && cholmod_metis(&view, nullptr, 0, 0, order.data(), common))
-        return order;
-    if (cholmod_amd(&view, nullptr, 0, order.data(), common)) return order;
-#endif
-    (void)ordering;
-    return eigen_amd(pattern);
-}
-
-std::vector<Index> order_unknowns(const SparsePattern& pattern, const Quotient& quotient, Ordering ordering) {
-    if (!quotient.is_even()) return order_nodes(pattern, ordering);
-    std::vector<Index> order;
-    order.reserve(pattern.size);
-    for (const Index node : order_nodes(quotient.pattern, ordering)) {
-        order.insert(order.end(), quotient.members[node].begin(), quotient.members[node].end());
-    }
+    if (!cholmod_metis(&view, nullptr, 0, 0, order.data(), common))
+        throw InvalidInput("METIS could not order the matrix");
     return order;
 }
+#else
+std::vector<Index> metis(const SparsePattern&) {
+    throw InvalidInput("magshell was built without METIS; use the ordering \"best\"");
+}
+#endif
 
 }  // namespace
 
-AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, Ordering ordering) {
+AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, const FactorOptions& options) {
     if (pattern.size == 0) return {};
     const Quotient quotient = quotient_graph(pattern);
-    if (ordering != Ordering::best)
-        return assembly_tree(pattern, order_unknowns(pattern, quotient, ordering));
-
-    // With three unknowns a vertex METIS saves a fifth of the operations. With one an edge besides, it has to
-    // order the unknowns themselves: that takes longer than many factorizations of 30,000 faces, of which it
-    // saves a third, and as long as three of 130,000, of which it saves half (measured).
-    constexpr double many_operations = 2.5e5;  // an unknown
-    AssemblyTree amd = assembly_tree(pattern, order_unknowns(pattern, quotient, Ordering::amd));
-    if (!quotient.is_even() && amd.flops() < many_operations * pattern.size) return amd;
-    AssemblyTree metis = assembly_tree(pattern, order_unknowns(pattern, quotient, Ordering::metis));
-    return metis.flops() < amd.flops() ? metis : amd;
+    const auto by_amd = [&] { return assembly_tree(quotient, nodes_in_order(quotient, eigen_amd(pattern))); };
+    if (options.ordering == Ordering::amd) return by_amd();
+    if (options.ordering == Ordering::metis)
+        return assembly_tree(quotient, nodes_in_order(quotient, metis(pattern)));
+    AssemblyTree dissection =
+        assembly_tree(quotient, nested_dissection(node_graph(quotient, options.points), options.watch));
+    if (options.ordering == Ordering::dissection) return dissection;
+    // AMD takes longer than a factorization. It does better than nested dissection where cuts are short
+    // beside the whole, on narrow strips above all, and may where nothing is known but the pattern.
+    constexpr double few_operations = 5.5e4;  // an unknown
+    if (!options.points.empty() && dissection.flops() > few_operations * pattern.size) return dissection;
+    options.watch();
+    AssemblyTree amd = by_amd();
+    return amd.flops() < dissection.flops() ? amd : dissection;
 }
 
 }  // namespace magshell

@@ -55,6 +55,15 @@ void check_pattern(const SparsePattern& pattern) {
     }
 }
 
+void check_points(const SparsePattern& pattern, const std::vector<Vec3>& points) {
+    if (points.empty()) return;
+    if (points.size() != static_cast<std::size_t>(pattern.size))
+        throw InvalidInput("points must be one for each of the " + text(pattern.size) + " unknowns, got " +
+                           std::to_string(points.size()));
+    for (Index j = 0; j < pattern.size; ++j)
+        if (!points[j].allFinite()) throw InvalidInput("points[" + text(j) + "] is not finite");
+}
+
 void check_finite(const LargeVector<double>& values) {
     bool all_finite = true;  // without a branch, so that the usual case is one vectorized pass
     for (std::size_t k = 0; k < values.size(); ++k)

@@ -8,6 +8,9 @@ namespace magshell {
 /// Throws InvalidInput unless the pattern is a sorted lower triangle with its whole diagonal.
 void check_pattern(const SparsePattern& pattern);
 
+/// Throws InvalidInput unless there are no points, or a finite one for each unknown.
+void check_points(const SparsePattern& pattern, const std::vector<Vec3>& points);
+
 /// Throws InvalidInput naming the first value that is not finite.
 void check_finite(const LargeVector<double>& values);
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <map>
+#include <numeric>
 
 namespace magshell {
 namespace {
@@ -14,44 +14,76 @@ std::uint64_t mixed(
     return value ^ (value >> 31);
 }
 
-}  // namespace
-
-bool Quotient::is_even() const {
-    std::map<std::size_t, std::size_t> nodes_of_size;
-    for (const std::vector<Index>& each : members) ++nodes_of_size[each.size()];
-    std::size_t most = 0;
-    for (const auto& [size, nodes] : nodes_of_size) most = std::max(most, nodes);
-    return 10 * most >= 9 * members.size();
-}
-
-Quotient quotient_graph(const SparsePattern& pattern) {
-    // Equal sums over the neighbours stand for equal neighbours; a coincidence would spoil the ordering's
-    // quality only.
-    std::vector<std::uint64_t> fingerprint(pattern.size, 0);
+// Equal sums over the neighbours, and the unknown itself, stand for equal neighbours.
+std::vector<std::uint64_t> fingerprints(const SparsePattern& pattern) {
+    std::vector<std::uint64_t> sum(pattern.size, 0);
     for (Index j = 0; j < pattern.size; ++j) {
         const std::uint64_t own = mixed(static_cast<std::uint64_t>(j) + 1);
-        fingerprint[j] += own;
+        std::uint64_t below = own;
         for (Index k = pattern.column_starts[j] + 1; k < pattern.column_starts[j + 1]; ++k) {
-            fingerprint[j] += mixed(static_cast<std::uint64_t>(pattern.rows[k]) + 1);
-            fingerprint[pattern.rows[k]] += own;
+            below += mixed(static_cast<std::uint64_t>(pattern.rows[k]) + 1);
+            sum[pattern.rows[k]] += own;
+        }
+        sum[j] += below;
+    }
+    return sum;
+}
+
+// Whether the pattern is that of the quotient: no entry is without one there, and there are as many.
+bool stands_for(const Quotient& quotient, const std::vector<Index>& node, const SparsePattern& pattern) {
+    const SparsePattern& nodes = quotient.pattern;
+    std::vector<Index> last(nodes.size, -1);  // the last node that this one is in the column of
+    std::size_t pairs = 0;
+    for (Index b = 0; b < nodes.size; ++b) {
+        const std::size_t own = quotient.members(b).size();
+        pairs += own * (own + 1) / 2;
+        last[b] = b;
+        for (Index k = nodes.column_starts[b] + 1; k < nodes.column_starts[b + 1]; ++k) {
+            last[nodes.rows[k]] = b;
+            pairs += own * quotient.members(nodes.rows[k]).size();
+        }
+        for (const Index j : quotient.members(b)) {
+            for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
+                const Index a = node[pattern.rows[k]];
+                if (last[a] == b) continue;
+                const auto column = nodes.rows.begin();  // where members of two nodes are numbered in turn
+                if (a > b || !std::binary_search(column + nodes.column_starts[a],
+                                                 column + nodes.column_starts[a + 1], b))
+                    return false;
+            }
         }
     }
+    return pairs == pattern.rows.size();
+}
+
+Quotient each_by_itself(const SparsePattern& pattern) {
+    Quotient result{pattern, std::vector<Index>(pattern.size + 1), std::vector<Index>(pattern.size)};
+    std::iota(result.starts.begin(), result.starts.end(), 0);
+    std::iota(result.unknowns.begin(), result.unknowns.end(), 0);
+    return result;
+}
+
+}  // namespace
+
+Quotient quotient_graph(const SparsePattern& pattern) {
+    const std::vector<std::uint64_t> fingerprint = fingerprints(pattern);
     Quotient result;
     std::vector<Index> node(pattern.size, -1);
     std::vector<Index> first_member;
     for (Index j = 0; j < pattern.size; ++j) {
         if (node[j] != -1) continue;
-        const Index label = static_cast<Index>(result.members.size());
-        result.members.emplace_back();
+        const Index label = static_cast<Index>(first_member.size());
         first_member.push_back(j);
+        result.starts.push_back(static_cast<Index>(result.unknowns.size()));
         for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
             const Index i = pattern.rows[k];
             if (fingerprint[i] != fingerprint[j]) continue;
             node[i] = label;
-            result.members[label].push_back(i);
+            result.unknowns.push_back(i);
         }
     }
-    result.pattern.size = static_cast<Index>(result.members.size());
+    result.starts.push_back(static_cast<Index>(result.unknowns.size()));
+    result.pattern.size = static_cast<Index>(first_member.size());
     result.pattern.column_starts.push_back(0);
     for (const Index j : first_member) {
         for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
@@ -60,7 +92,8 @@ Quotient quotient_graph(const SparsePattern& pattern) {
         }
         result.pattern.column_starts.push_back(static_cast<Index>(result.pattern.rows.size()));
     }
-    return result;
+    // Two sums may agree by chance.
+    return stands_for(result, node, pattern) ? result : each_by_itself(pattern);
 }
 
 }  // namespace magshell

@@ -26,12 +26,13 @@ constexpr double doubtful_growth = 1e8;  // half of the digits are gone: check b
 
 }  // namespace
 
-SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, Ordering ordering)
-    : SupernodalLdlt(pattern, analysed(*pattern, ordering)) {}
+SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, const FactorOptions& options)
+    : SupernodalLdlt(pattern, analysed(*pattern, options)) {}
 
 std::shared_ptr<SupernodalLdlt::Analysis> SupernodalLdlt::analysed(const SparsePattern& pattern,
-                                                                   Ordering ordering) {
-    AssemblyTree tree = ordered_assembly_tree(pattern, ordering);
+                                                                   const FactorOptions& options) {
+    AssemblyTree tree = ordered_assembly_tree(pattern, options);
+    options.watch();
     const std::shared_ptr<Analysis> analysis = std::make_shared<Analysis>();
     analysis->nonzeros = tree.nonzeros();
     analysis->flops = tree.flops();

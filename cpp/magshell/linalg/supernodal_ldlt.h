@@ -22,7 +22,7 @@ namespace magshell {
 
 class SupernodalLdlt : public Factor {
   public:
-    SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, Ordering ordering);
+    SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, const FactorOptions& options);
 
     std::unique_ptr<Factor> sibling() const override;
     FactorReport factorize() override;
@@ -47,7 +47,7 @@ class SupernodalLdlt : public Factor {
     };
 
     SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, std::shared_ptr<Analysis> analysis);
-    static std::shared_ptr<Analysis> analysed(const SparsePattern& pattern, Ordering ordering);
+    static std::shared_ptr<Analysis> analysed(const SparsePattern& pattern, const FactorOptions& options);
 
     /// Of a front: the work spaces that the updates of its children lie in, and that its own goes to.
     PivotTally process(Index front, double* from, double* to);

@@ -84,6 +84,14 @@ VectorXd Bodies::vertex_weights(const VectorXd& by_vertex) const {
     return weights;
 }
 
+std::vector<Vec3> Bodies::unknown_points() const {
+    std::vector<Vec3> points(nodes_.n_unknowns());
+    for (Index node = 0; node < nodes_.n_nodes(); ++node)
+        std::fill_n(points.begin() + 3 * node, 3, nodes_.rest[node]);
+    for (const Sheet* sheet : sheets_) sheet->place_rotations(points, nodes_.first_scalar());
+    return points;
+}
+
 double Bodies::extent() const {
     double largest = 0.0;
     for (const Sheet* sheet : sheets_) largest = std::max(largest, sheet->extent());

@@ -29,6 +29,8 @@ class Bodies {
     /// One number a vertex of the caller as one for each unknown, zero for those that are no vertex.
     VectorXd vertex_weights(const VectorXd& by_vertex) const;
 
+    /// Where each unknown is at rest [m]: its vertex, or the middle of its edge.
+    std::vector<Vec3> unknown_points() const;
     /// Of the largest body: the diagonal of its bounding box at rest [m].
     double extent() const;
     /// The largest coordinate at rest [m].

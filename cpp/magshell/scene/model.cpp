@@ -190,10 +190,10 @@ StrainSet Model::stresses(const StrainSet& strains) const {
     return stresses;
 }
 
-std::shared_ptr<Factor> Model::new_factor() {
+std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
     if (spare_) return std::exchange(spare_, nullptr);
     if (!analysed_) {
-        analysed_ = analyze(reduction_.pattern());
+        analysed_ = analyze(reduction_.pattern(), {.points = free_points(), .watch = watch});
         ++analyses_;
     }
     return analysed_->sibling();

@@ -3,6 +3,7 @@
 // Not for two threads at once: evaluations keep what the assembly after them needs.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -99,8 +100,11 @@ class Model {
     /// How many numbers a set of strains has.
     Index n_strains() const;
 
-    /// A factorization for the reduced Hessian, analysed once for all of them.
-    std::shared_ptr<Factor> new_factor();
+    /// A factorization for the reduced Hessian, analysed once for all of them. `watch` is called now and then
+    /// meanwhile, and may throw.
+    std::shared_ptr<Factor> new_factor(const std::function<void()>& watch = [] {});
+    /// Where each free unknown is at rest [m]: its vertex, or the middle of its edge.
+    std::vector<Vec3> free_points() const { return reduction_.free(bodies_.unknown_points()); }
     /// One that nobody else holds, for the next who asks: fresh memory costs page faults. What is large goes
     /// back to the system.
     void keep_spare(std::shared_ptr<Factor> factor);

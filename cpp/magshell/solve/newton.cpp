@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "magshell/core/errors.h"
 
@@ -76,12 +77,10 @@ class Stopwatch {
 }  // namespace
 
 Newton::Newton(Model& model, const NewtonOptions& options, Watch watch)
-    : model_(model), options_(options), watch_(std::move(watch)), factor_(model.new_factor()) {}
+    : model_(model), options_(options), watch_(std::move(watch)) {}
 
 std::shared_ptr<Factor> Newton::release_factor() {
-    std::shared_ptr<Factor> released = std::move(factor_);
-    factor_ = model_.new_factor();
-    return released;
+    return std::exchange(factor_, nullptr);
 }
 
 VectorXd Newton::gradient(const VectorXd& q, const Anchor& anchor) const {
@@ -109,6 +108,7 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
 }
 
 FactorReport Newton::factorize_assembled(const Anchor& anchor) {
+    if (!factor_) factor_ = model_.new_factor([this] { watch(watched_); });
     LargeVector<double>& values = factor_->values();
     model_.reduction().matrix(model_.matrix(), values);
     if (anchor.weights) {

@@ -47,7 +47,7 @@ struct Anchor {
 /// A model with its factorization, counting what it costs. Everything that solves goes through here.
 class Newton {
   public:
-    /// Called once an iteration; throws to stop.
+    /// Called once an iteration, and now and then while a pattern is analysed; throws to stop.
     using Watch = std::function<void(double residual)>;
 
     Newton(Model& model, const NewtonOptions& options, Watch watch = {});
@@ -92,6 +92,7 @@ class Newton {
     bool still_holds(const VectorXd& q, const Controls& controls);
 
     Model& model() { return model_; }
+    /// Null until something has been factorized.
     const std::shared_ptr<Factor>& factor() const { return factor_; }
     const NewtonOptions& options() const { return options_; }
     int factorizations() const { return factorizations_; }
@@ -102,6 +103,7 @@ class Newton {
     double linear_time() const { return linear_time_; }  // [s] in factorizations and solves
     void count_iteration() { ++iterations_; }
     void watch(double residual) const {
+        watched_ = residual;
         if (watch_) watch_(residual);
     }
 
@@ -124,6 +126,7 @@ class Newton {
     Model& model_;
     NewtonOptions options_;
     Watch watch_;
+    mutable double watched_ = 1.0;  // the residual that the watch was told last
     std::shared_ptr<Factor> factor_;
     bool unsymmetric_ = false;  // whether what was assembled last has a remainder
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;

@@ -156,8 +156,11 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model:
     result.factorizations = newton.factorizations();
     result.failed_factorizations = newton.failed_factorizations();
     result.linear_time = newton.linear_time();
-    result.bytes = model.bytes() + newton.factor()->bytes();
-    result.factorization = newton.factor()->name();
+    result.bytes = model.bytes();
+    if (const std::shared_ptr<Factor>& factor = newton.factor()) {
+        result.bytes += factor->bytes();
+        result.factorization = factor->name();
+    }
     if (options.keep_factor && result.outcome == Outcome::converged && result.stable)
         result.factor = newton.factor();
     return result;

@@ -23,7 +23,7 @@ class Sheet:
         self.masses = self._model.free_weights(scene.shell.vertex_masses)
         *pattern, _ = self._model.hessian(self._rest, self._free)
         self._diagonal = pattern[1][:-1]
-        self._factor = _core.analyze(*pattern)
+        self._factor = _core.analyze(*pattern, points=self._model.free_points)
         moving = self.masses > 0.0
         self._inverse_masses = np.where(moving, 1.0 / np.where(moving, self.masses, 1.0), 0.0)
         self.moving = moving.astype(float)

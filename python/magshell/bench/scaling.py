@@ -24,6 +24,8 @@ THREADS = (1, 2)
 FIELDS = 0.02, 0.05  # of the one that turns the sheet up: from the first to the second is what is timed
 ALLOWED_EXPONENT = 1.4  # of a Newton iteration
 ALLOWED_MEMORY = 1.3  # what the process grows by, over the factor's own
+ALLOWED_ANALYSIS = 0.5  # of a factorization, from 100,000 faces on
+ALLOWED_FILL = 1.1  # operations over those of the best of other orderings
 
 _WHY = "as systems do with one that takes more memory than there is"
 
@@ -62,6 +64,7 @@ def run(options: argparse.Namespace) -> dict:
     exponents = _exponents(one)
     _print_times(one, two, exponents)
     _print_memory(one, exponents)
+    _print_orderings(one)
     _print_targets(one, two, exponents)
     if ended is not None:
         print(f"\nThe process of {ended} faces was ended, {_WHY}. It and larger sizes are left out.")
@@ -127,6 +130,7 @@ def costs(faces: int, threads: int, bending: str, rounds: int) -> dict:
     whole = clocked(solve, rounds=rounds)
     peak = peak_memory()
     algebra, nonzeros = _linear_algebra(scene, found, rounds)
+    operations, metis = _orderings(scene, found)
     times = {
         "iteration": Clocked(*(seconds / found.factorizations for seconds in whole)),
         "gradient": _gradient(scene, inputs, found, rounds),
@@ -136,6 +140,8 @@ def costs(faces: int, threads: int, bending: str, rounds: int) -> dict:
         "faces": scene.mesh.n_faces,
         "unknowns": scene.n_unknowns,
         "factorizations": found.factorizations,
+        "operations": operations,
+        "metis": metis,
         "processor": {name: each.processor for name, each in times.items()},
         "wall": {name: each.wall for name, each in times.items()},
         "model": scene._model.bytes,
@@ -165,14 +171,43 @@ def _linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> tupl
     """Each step of an iteration by itself, at the equilibrium; and how many entries L has."""
     model, state, controls = scene._model, found._state, found._controls
     n, starts, rows, values = model.hessian(state, controls)
-    factor, right = _core.analyze(n, starts, rows), np.ones(n)
+    points = model.free_points
+    factor, right = _core.analyze(n, starts, rows, points=points), np.ones(n)
     steps = {
         "assembly": lambda: model.assemble(state, controls),
-        "analysis": lambda: _core.analyze(n, starts, rows),
+        "analysis": lambda: _core.analyze(n, starts, rows, points=points),
         "factorization": lambda: factor.factorize(values),
         "solve": lambda: factor.solve(right),
     }
     return {name: clocked(step, rounds=rounds) for name, step in steps.items()}, factor.nonzeros
+
+
+def _orderings(scene: ms.Scene, found: ms.Equilibrium) -> tuple[dict[str, float], float | None]:
+    """Operations of a factorization by each ordering there is, and the time [s] of METIS's analysis if it was built."""
+    n, starts, rows, _ = scene._model.hessian(found._state, found._controls)
+    points = scene._model.free_points
+    operations = {
+        name: _core.analyze(n, starts, rows, ordering=name, points=points).flops
+        for name in _core.factor_orderings()
+    }
+    if "metis" not in operations:
+        return operations, None
+    return operations, clocked(lambda: _core.analyze(n, starts, rows, ordering="metis"), rounds=1).processor
+
+
+def _print_orderings(sizes: list[dict]) -> None:
+    """What the ordering in use costs, and what it is worth beside others."""
+    others = [name for name in sizes[0]["operations"] if name not in ("best", "dissection")]
+    rows = []
+    for size in sizes:
+        operations, times = size["operations"], size["processor"]
+        ratios = [f"{operations['best'] / operations[name]:.2f}" for name in others]
+        metis = "not built" if size["metis"] is None else f"{size['metis'] / times['factorization']:.2f}"
+        rows.append(
+            [f"{size['faces']}", "", *ratios, f"{times['analysis'] / times['factorization']:.2f}", metis]
+        )
+    headings = [*(f"operations over {name}'s" for name in others), "analysis", "analysis by METIS"]
+    print_table("The ordering; analyses in factorizations", ["faces", "", *headings], rows)
 
 
 def _print_times(one: list[dict], two: list[dict], exponents: dict) -> None:
@@ -229,6 +264,18 @@ def _print_targets(one: list[dict], two: list[dict], exponents: dict) -> None:
     for name in ("factorization", "analysis", "gradient"):
         share = last["processor"][name] / last["processor"]["iteration"]
         note("share", f"{TIMES[name]} over an iteration at {last['faces']} faces", share)
+    for size in one:
+        others = [size["operations"][name] for name in ("amd", "metis") if name in size["operations"]]
+        ratio = size["operations"]["best"] / min(others)
+        missed = note(
+            "count", f"operations over another ordering's, {size['faces']} faces", ratio, at_most=ALLOWED_FILL
+        )
+        if missed:
+            print(f"  {ratio:.2f} times another ordering's operations (at most {ALLOWED_FILL}){missed}")
+    if last["faces"] >= 100_000:
+        ratio = last["processor"]["analysis"] / last["processor"]["factorization"]
+        missed = note("share", "analysis over factorization", ratio, at_most=ALLOWED_ANALYSIS)
+        print(f"  an analysis takes {ratio:.2f} factorizations (at most {ALLOWED_ANALYSIS}){missed}")
     ratios = [a["wall"]["iteration"] / b["wall"]["iteration"] for a, b in zip(one, two, strict=True)]
     print(f"  an iteration on two threads is {ratios[0]:.2f} times as fast at {first['faces']} faces", end="")
     print(f", {ratios[-1]:.2f} times at {last['faces']}" if len(one) > 1 else "")

@@ -150,13 +150,15 @@ def _backends(scene: ms.Scene, controls: dict, rounds: int) -> dict:
     """The Hessian of the bent sheet, factorized by each backend there is."""
     found = ms.equilibrium(scene, **controls)
     n, starts, matrix_rows, values = scene._model.hessian(found._state, found._controls)
+    points = scene._model.free_points
     right = np.random.default_rng(0).standard_normal(n)
     rows, results = [], {}
     for name in _core.factor_backends():
         analysis = measure(
-            lambda name=name: _core.analyze(n, starts, matrix_rows, backend=name), rounds=rounds
+            lambda name=name: _core.analyze(n, starts, matrix_rows, backend=name, points=points),
+            rounds=rounds,
         )
-        factor = _core.analyze(n, starts, matrix_rows, backend=name)
+        factor = _core.analyze(n, starts, matrix_rows, backend=name, points=points)
         numeric = measure(lambda factor=factor: factor.factorize(values), rounds=rounds)
         solve = measure(lambda factor=factor: factor.solve(right), rounds=rounds)
         times = {"analysis": analysis.best, "factorization": numeric.best, "solve": solve.best}

@@ -1,0 +1,159 @@
+#include "magshell/linalg/bisection.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace magshell {
+namespace {
+
+// Nodes whose coordinate is less than `at` go to the left.
+struct Cut {
+    Index weight = std::numeric_limits<Index>::max();  // of the lighter border
+    bool left_border = true;                           // whether that one is the left side's
+    double at = 0.0;
+};
+
+// The cut at the median. `reach` bounds by how much the coordinates of neighbours differ, so that only nodes
+// near the cut are looked at more closely.
+template <class Coordinate, class Reach>
+Cut median_cut(const NodeGraph& graph, const std::vector<Index>& nodes, const CutState& state,
+               const Coordinate& coordinate, const Reach& reach) {
+    std::vector<double> values;
+    values.reserve(nodes.size());
+    for (const Index node : nodes) values.push_back(coordinate(node));
+    std::vector<double> sorted = values;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    Cut cut;
+    cut.at = *middle;
+    if (std::none_of(sorted.begin(), middle, [&](double value) { return value < cut.at; })) {
+        // More than half of them have the least of all.
+        const auto above =
+            std::remove_if(sorted.begin(), sorted.end(), [&](double v) { return v <= cut.at; });
+        if (above == sorted.begin()) return {};
+        cut.at = *std::min_element(sorted.begin(), above);
+    }
+    Index borders[2] = {0, 0};
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+        if (std::abs(values[k] - cut.at) > reach(nodes[k])) continue;
+        const bool left = values[k] < cut.at;
+        for (const Index beside : graph.around(nodes[k])) {
+            if (state.side[beside] == Side::settled || (coordinate(beside) < cut.at) == left) continue;
+            borders[left] += graph.weights[nodes[k]];
+            break;
+        }
+    }
+    cut.left_border = borders[1] <= borders[0];
+    cut.weight = std::min(borders[0], borders[1]);
+    return cut;
+}
+
+// Unit vectors along which the points extend far enough for a cut across them to be short.
+std::vector<Vec3> directions(const std::vector<Vec3>& points, const std::vector<Index>& nodes) {
+    Vec3 center = Vec3::Zero();
+    for (const Index node : nodes) center += points[node];
+    center /= static_cast<double>(nodes.size());
+    Mat3 moments = Mat3::Zero();
+    for (const Index node : nodes) {
+        const Vec3 arm = points[node] - center;
+        moments += arm * arm.transpose();
+    }
+    Eigen::SelfAdjointEigenSolver<Mat3> solver;
+    solver.computeDirect(moments);
+    const Mat3 axes = solver.eigenvectors();
+    constexpr double far_enough = 0.1;  // of the mean second moment
+    constexpr double alike = 0.99;      // cosine
+    const double enough = far_enough * moments.trace() / 3.0;
+    std::vector<Vec3> chosen;
+    const auto consider = [&](const Vec3& direction) {
+        if (!(direction.dot(moments * direction) > enough)) return;
+        if (std::none_of(chosen.begin(), chosen.end(),
+                         [&](const Vec3& other) { return std::abs(other.dot(direction)) > alike; }))
+            chosen.push_back(direction);
+    };
+    for (int k = 2; k >= 0; --k) consider(axes.col(k));
+    for (int k = 0; k < 3; ++k) consider(Vec3::Unit(k));
+    for (const double sign : {1.0, -1.0}) consider((axes.col(2) + sign * axes.col(1)).normalized());
+    return chosen;
+}
+
+// How many steps each node is away from one at an end of the nodes that hang together. Sets of those follow
+// one another.
+void find_levels(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state) {
+    std::vector<Index> reached;  // of this set
+    const auto search = [&](Index from, Index first_level) {
+        reached.assign(1, from);
+        state.level[from] = first_level;
+        for (std::size_t k = 0; k < reached.size(); ++k) {
+            const Index next_level = state.level[reached[k]] + 1;
+            for (const Index beside : graph.around(reached[k])) {
+                if (state.side[beside] == Side::settled || state.level[beside] >= 0) continue;
+                state.level[beside] = next_level;
+                reached.push_back(beside);
+            }
+        }
+    };
+    for (const Index node : nodes) state.level[node] = -1;
+    Index first_level = 0;
+    for (const Index node : nodes) {
+        if (state.level[node] >= 0) continue;
+        search(node, first_level);
+        const Index end = reached.back();
+        for (const Index each : reached) state.level[each] = -1;
+        search(end, first_level);
+        first_level = state.level[reached.back()] + 2;
+    }
+}
+
+}  // namespace
+
+CutState::CutState(const NodeGraph& graph)
+    : side(graph.size(), Side::left),
+      level(graph.size()),
+      beside(graph.size()),
+      has_moved(graph.size(), false) {
+    if (graph.points.empty()) return;
+    reach.assign(graph.size(), 0.0);
+    for (Index node = 0; node < graph.size(); ++node) {
+        for (const Index beside_it : graph.around(node))
+            reach[node] = std::max(reach[node], (graph.points[beside_it] - graph.points[node]).squaredNorm());
+        reach[node] = std::sqrt(reach[node]) * (1.0 + 1e-9);  // rounding
+    }
+}
+
+std::vector<Index> bisect(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state) {
+    find_levels(graph, nodes, state);
+    const auto level = [&](Index node) { return static_cast<double>(state.level[node]); };
+    Cut best = median_cut(graph, nodes, state, level, [](Index) { return 1.0; });
+    Vec3 across = Vec3::Zero();
+    if (!graph.points.empty()) {
+        for (const Vec3& direction : directions(graph.points, nodes)) {
+            const auto along = [&](Index node) { return direction.dot(graph.points[node]); };
+            const Cut cut =
+                median_cut(graph, nodes, state, along, [&](Index node) { return state.reach[node]; });
+            if (cut.weight >= best.weight) continue;
+            best = cut;
+            across = direction;
+        }
+    }
+    if (best.weight == std::numeric_limits<Index>::max()) return {};
+    for (const Index node : nodes) {
+        const double at = across.isZero(0.0) ? level(node) : across.dot(graph.points[node]);
+        if (!(at < best.at)) state.side[node] = Side::right;
+    }
+    const Side thinned = best.left_border ? Side::left : Side::right;
+    std::vector<Index> separator;
+    for (const Index node : nodes) {
+        if (state.side[node] != thinned) continue;
+        const std::span<const Index> around = graph.around(node);
+        if (std::any_of(around.begin(), around.end(),
+                        [&](Index beside) { return state.side[beside] == other(thinned); }))
+            separator.push_back(node);
+    }
+    for (const Index node : separator) state.side[node] = Side::between;
+    return separator;
+}
+
+}  // namespace magshell

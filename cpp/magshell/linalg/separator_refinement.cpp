@@ -1,0 +1,150 @@
+#include "magshell/linalg/separator_refinement.h"
+
+#include <algorithm>
+#include <queue>
+#include <utility>
+
+namespace magshell {
+namespace {
+
+constexpr double largest_share = 0.6;  // of a side
+constexpr int most_passes = 3;
+constexpr int most_moves_in_vain = 200;  // nor more than the separator has nodes
+
+int number(Side side) {
+    return static_cast<int>(side);
+}
+
+class Refinement {
+  public:
+    Refinement(const NodeGraph& graph, const std::vector<Index>& nodes, std::vector<Index>& separator,
+               CutState& state)
+        : graph_(graph), separator_(separator), state_(state) {
+        for (const Index node : nodes) weight_[number(state.side[node])] += graph.weights[node];
+        const double whole = static_cast<double>(weight_[0]) + weight_[1] + weight_[2];
+        largest_ = std::max({static_cast<Index>(largest_share * whole), weight_[0], weight_[1]});
+    }
+
+    void run() {
+        for (int pass = 0; pass < most_passes && improved_in_a_pass(); ++pass) {
+        }
+    }
+
+  private:
+    // Less is better: the separator's weight, then how unlike the sides are.
+    std::pair<Index, Index> cost() const { return {weight_[2], std::max(weight_[0], weight_[1])}; }
+
+    struct Move {
+        Index gain, node;
+        friend bool operator<(const Move& a, const Move& b) {
+            return std::pair(a.gain, b.node) < std::pair(b.gain, a.node);
+        }
+    };
+
+    // How much lighter the separator becomes if a node of it goes to a side.
+    Index gain(Index node, Side to) const {
+        return graph_.weights[node] - state_.beside[node][number(other(to))];
+    }
+    void offer(Index node, Side to) { moves_[number(to)].push({gain(node, to), node}); }
+    void enter(Index node) {
+        std::array<Index, 2>& beside = state_.beside[node];
+        beside = {0, 0};
+        for (const Index each : graph_.around(node))
+            if (state_.side[each] == Side::left || state_.side[each] == Side::right)
+                beside[number(state_.side[each])] += graph_.weights[each];
+        for (const Side to : {Side::left, Side::right}) offer(node, to);
+    }
+
+    // The best move to a side that is still what it was offered as.
+    const Move* best(Side to) {
+        std::priority_queue<Move>& moves = moves_[number(to)];
+        for (; !moves.empty(); moves.pop()) {
+            const Move& move = moves.top();
+            if (state_.side[move.node] != Side::between || state_.has_moved[move.node]) continue;
+            if (gain(move.node, to) != move.gain) continue;
+            const Index after = weight_[number(to)] + graph_.weights[move.node];
+            if (after <= largest_ || weight_[number(to)] < weight_[number(other(to))]) return &move;
+            return nullptr;
+        }
+        return nullptr;
+    }
+    bool improved_in_a_pass();
+    void change_side(Index node, Side to) {
+        weight_[number(state_.side[node])] -= graph_.weights[node];
+        weight_[number(to)] += graph_.weights[node];
+        state_.side[node] = to;
+    }
+    void apply(Index node, Side to);
+
+    const NodeGraph& graph_;
+    std::vector<Index>& separator_;  // while nodes move, also those that have left it
+    CutState& state_;
+    Index weight_[3] = {0, 0, 0};
+    Index largest_;
+    std::priority_queue<Move> moves_[2];
+    std::vector<std::pair<Index, Side>> log_;  // nodes and where they were
+};
+
+// To a side from the separator, or back.
+void Refinement::apply(Index node, Side to) {
+    log_.emplace_back(node, Side::between);
+    change_side(node, to);
+    state_.has_moved[node] = true;
+    const Side across = other(to);
+    for (const Index beside : graph_.around(node)) {
+        if (state_.side[beside] == Side::between) {
+            state_.beside[beside][number(to)] += graph_.weights[node];
+            offer(beside, across);
+        } else if (state_.side[beside] == across) {
+            log_.emplace_back(beside, across);
+            change_side(beside, Side::between);
+            separator_.push_back(beside);
+            enter(beside);
+            for (const Index each : graph_.around(beside)) {
+                if (state_.side[each] != Side::between) continue;
+                state_.beside[each][number(across)] -= graph_.weights[beside];
+                offer(each, to);
+            }
+        }
+    }
+}
+
+bool Refinement::improved_in_a_pass() {
+    for (std::priority_queue<Move>& moves : moves_) moves = {};
+    for (const Index node : separator_) enter(node);
+    log_.clear();
+    const auto before = cost();
+    auto least = before;
+    std::size_t kept = 0;  // of the log
+    const int patience = std::min(most_moves_in_vain, static_cast<int>(separator_.size()));
+    for (int in_vain = 0; in_vain < patience; ++in_vain) {
+        const Move *left = best(Side::left), *right = best(Side::right);
+        if (!left && !right) break;
+        const bool to_left =
+            !right ||
+            (left && (left->gain > right->gain || (left->gain == right->gain && weight_[0] <= weight_[1])));
+        apply((to_left ? left : right)->node, to_left ? Side::left : Side::right);
+        if (cost() >= least) continue;
+        least = cost();
+        kept = log_.size();
+        in_vain = 0;
+    }
+    for (const auto& [node, side] : log_) state_.has_moved[node] = false;
+    while (log_.size() > kept) {
+        change_side(log_.back().first, log_.back().second);
+        log_.pop_back();
+    }
+    std::erase_if(separator_, [&](Index node) { return state_.side[node] != Side::between; });
+    std::sort(separator_.begin(), separator_.end());  // one that left and came back is there twice
+    separator_.erase(std::unique(separator_.begin(), separator_.end()), separator_.end());
+    return least < before;
+}
+
+}  // namespace
+
+void refine_separator(const NodeGraph& graph, const std::vector<Index>& nodes, std::vector<Index>& separator,
+                      CutState& state) {
+    Refinement(graph, nodes, separator, state).run();
+}
+
+}  // namespace magshell
