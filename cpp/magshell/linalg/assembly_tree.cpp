@@ -140,17 +140,24 @@ std::int64_t AssemblyTree::nonzeros() const {
 }
 
 AssemblyTree assembly_tree(const Quotient& quotient, std::vector<Index> order) {
-    UpperPattern upper = permuted_upper(quotient.pattern, order);
-    std::vector<Index> parent = elimination_tree(upper);
+    const auto weights_of = [&](const std::vector<Index>& nodes) {
+        std::vector<Index> weights;
+        weights.reserve(nodes.size());
+        for (const Index node : nodes) weights.push_back(static_cast<Index>(quotient.members(node).size()));
+        return weights;
+    };
+    std::vector<Index> parent, counts;
+    {
+        const UpperPattern upper = permuted_upper(quotient.pattern, order);
+        parent = elimination_tree(upper);
+        counts = column_counts(upper, parent, weights_of(order));
+    }
     const std::vector<Index> by_subtrees = postorder(parent);
     reorder(order, by_subtrees);
+    reorder(counts, by_subtrees);
     parent = relabel(parent, by_subtrees);
-    upper = permuted_upper(quotient.pattern, order);
-
-    std::vector<Index> weights;
-    for (const Index node : order) weights.push_back(static_cast<Index>(quotient.members(node).size()));
-    const std::vector<NodeFront> simple =
-        fundamental_fronts(parent, column_counts(upper, parent, weights), weights);
+    const std::vector<Index> weights = weights_of(order);
+    const std::vector<NodeFront> simple = fundamental_fronts(parent, counts, weights);
     const std::vector<Index> absorbed_by = merge_fronts(simple);
 
     // The merged fronts form a tree; its postorder, and within a front the old order, is the new order of

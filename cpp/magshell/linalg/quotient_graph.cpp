@@ -7,8 +7,8 @@
 namespace magshell {
 namespace {
 
-std::uint64_t mixed(
-    std::uint64_t value) {  // the finalizer of splitmix64: each bit depends on all bits of the argument
+// The finalizer of splitmix64: each bit depends on all bits of the argument.
+std::uint64_t mixed(std::uint64_t value) {
     value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9u;
     value = (value ^ (value >> 27)) * 0x94d049bb133111ebu;
     return value ^ (value >> 31);
@@ -16,13 +16,13 @@ std::uint64_t mixed(
 
 // Equal sums over the neighbours, and the unknown itself, stand for equal neighbours.
 std::vector<std::uint64_t> fingerprints(const SparsePattern& pattern) {
-    std::vector<std::uint64_t> sum(pattern.size, 0);
+    std::vector<std::uint64_t> own(pattern.size), sum(pattern.size, 0);
+    for (Index j = 0; j < pattern.size; ++j) own[j] = mixed(static_cast<std::uint64_t>(j) + 1);
     for (Index j = 0; j < pattern.size; ++j) {
-        const std::uint64_t own = mixed(static_cast<std::uint64_t>(j) + 1);
-        std::uint64_t below = own;
+        std::uint64_t below = own[j];
         for (Index k = pattern.column_starts[j] + 1; k < pattern.column_starts[j + 1]; ++k) {
-            below += mixed(static_cast<std::uint64_t>(pattern.rows[k]) + 1);
-            sum[pattern.rows[k]] += own;
+            below += own[pattern.rows[k]];
+            sum[pattern.rows[k]] += own[j];
         }
         sum[j] += below;
     }
