@@ -12,7 +12,7 @@ def pattern_of(mesh: ms.TriangleMesh, bending: str) -> tuple[tuple, np.ndarray]:
     """(size, column starts, rows) of a sheet clamped at an edge of its border, and where its unknowns are."""
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, bending=bending)
     scene = ms.Scene(sheet, supports=[ms.Clamp(np.flatnonzero((mesh.edge_faces < 0).any(axis=1))[:1])])
-    *pattern, _ = scene._model.hessian(scene._model.rest_state(), _core.Controls())
+    *pattern, _ = scene._model.hessian(scene._model.rest_state(), scene._control_layout.zeros())
     return tuple(pattern), scene._model.free_points
 
 
