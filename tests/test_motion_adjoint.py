@@ -196,7 +196,7 @@ def test_kept_factors_share_their_work_space():
         keep="factors",
         progress=False,
     )
-    n, starts, rows, values = scene._model.hessian(scene._model.rest_state(), _core.Controls())
+    n, starts, rows, values = scene._model.hessian(scene._model.rest_state(), scene._control_layout.zeros())
     one = _core.analyze(n, starts, rows)
     one.factorize(values)
     assert move.bytes < 0.8 * 3 * one.bytes
