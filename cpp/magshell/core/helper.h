@@ -20,12 +20,6 @@ inline Nanoseconds clock_now() {
         .count();
 }
 
-/// Of this thread; 0 where the system does not tell.
-Nanoseconds processor_time();
-
-/// Lets another thread have this processor if one waits for it, and returns how long that took.
-Nanoseconds give_way();
-
 /// Less than this passes unnoticed: the system's own work takes a processor for some ten microseconds.
 inline constexpr Nanoseconds moment = 100'000;
 
@@ -43,8 +37,7 @@ class Rest {
     Nanoseconds end_ = 0, length_ = 0, worked_ = 0;
 };
 
-// What the helper and the caller of a loop tell each other. A line of the cache each, that they look at
-// without disturbing others.
+// What a helper and the caller of loops tell each other, apart from what others do.
 struct alignas(64) Helper {
     std::thread thread;
     Rest rest;  // the caller's
@@ -55,6 +48,27 @@ struct alignas(64) Helper {
 
     std::atomic<Nanoseconds> worked{0}, put_aside{0};  // since the caller last asked
     std::atomic<Nanoseconds> put_aside_in_part{0};     // of it, the most in one part
+};
+
+// How a helper finds out that it was put aside: by comparing the clock with its share of the processor, now
+// and then.
+class Watch {
+  public:
+    explicit Watch(Helper& helper);
+
+    void begin_part() { part_began_ = clock_now(); }
+    void end_part();
+
+    /// Lets another thread have this processor if one waits for it, now and then. True if one had it for more
+    /// than a moment, now or since.
+    bool give_way();
+
+  private:
+    Nanoseconds put_aside();
+
+    Helper& helper_;
+    Nanoseconds compared_, processor_;  // the clock, and this thread's share of it until then
+    Nanoseconds part_began_ = 0, gave_way_ = 0;
 };
 
 }  // namespace magshell

@@ -47,7 +47,7 @@ void set_num_threads(int count) {
     thread_count.store(std::max(1, count));
 }
 
-void parallel_for(int count, const std::function<void(int)>& body) {
+void parallel_for(int count, const std::function<void(int)>& body, PartTime& part_time) {
     const int wanted = num_threads() - 1;
     if (wanted < 1 || count < 2) return run_serially(count, body);
     const Claim claim;
@@ -62,7 +62,7 @@ void parallel_for(int count, const std::function<void(int)>& body) {
         pool = new Pool(wanted);
         pool_owner = getpid();
     }
-    pool->run(count, body);
+    pool->run(count, body, part_time);
 }
 
 }  // namespace magshell

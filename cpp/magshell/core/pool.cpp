@@ -1,7 +1,6 @@
 #include "magshell/core/pool.h"
 
 #include <algorithm>
-#include <system_error>
 #include <utility>
 
 namespace magshell {
@@ -10,9 +9,8 @@ namespace {
 // To wake a sleeping thread takes 10 us of the caller's time and 30 until it comes, so a loop must be worth
 // it. Loops follow each other closely: helpers look for the next one for a while before they sleep.
 constexpr Nanoseconds worth_waking = 100'000, worth_a_helper = 50'000;
-constexpr Nanoseconds patience = 200'000;      // of a helper, for the next loop
-constexpr Nanoseconds short_wait = 100'000;    // of the caller, awake
-constexpr Nanoseconds between_yields = 5'000;  // while a helper looks for a loop
+constexpr Nanoseconds patience = 200'000;    // of a helper, for the next loop
+constexpr Nanoseconds short_wait = 100'000;  // of the caller, awake
 
 void pause() {
     for (int k = 0; k < 8; ++k) {
@@ -37,31 +35,36 @@ Pool::~Pool() {
     for (int k = 0; k < started_; ++k) helpers_[k].thread.join();
 }
 
-void Pool::run(int count, const std::function<void(int)>& body) {
+void Pool::run(int count, const std::function<void(int)>& body, PartTime& part_time) {
     body_ = &body;
     count_ = count;
     finished_.store(0, std::memory_order_relaxed);
     left_.store(count, std::memory_order_release);
-    const int own = work(count, body);
+    const int own = work(count, body, part_time);
     settle(wait_for(count - own));
     if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
-/// The caller's share of the loop, and how many parts it was.
-int Pool::work(int count, const std::function<void(int)>& body) {
+/// The caller's share of the loop, and how many parts it was. Helpers who sleep are woken at once where the
+/// same loop was long enough before, and else when it turns out to be.
+int Pool::work(int count, const std::function<void(int)>& body, PartTime& part_time) {
     const Nanoseconds begin = clock_now();
-    bool woken = false;
+    bool woken = wake_for(count - 1, part_time.load(std::memory_order_relaxed));
     int own = 0;
     for (int left; take(left);) {
         own += done(count - left, body);
-        const int others = left_.load(std::memory_order_relaxed);
-        if (woken || others <= 0) continue;
-        const Nanoseconds work_left = others * ((clock_now() - begin) / own);
-        if (work_left < worth_waking) continue;
-        wake(static_cast<int>(std::min<Nanoseconds>(others, work_left / worth_a_helper)));
-        woken = true;
+        if (woken) continue;
+        woken = wake_for(left_.load(std::memory_order_relaxed), (clock_now() - begin) / own);
     }
+    if (own > 0) part_time.store((clock_now() - begin) / own, std::memory_order_relaxed);
     return own;
+}
+
+bool Pool::wake_for(int parts, Nanoseconds part_time) {
+    const Nanoseconds work = parts * part_time;
+    if (work < worth_waking) return false;
+    wake(static_cast<int>(std::min<Nanoseconds>(parts, work / worth_a_helper)));
+    return true;
 }
 
 /// One of the parts that are left, counted from the end.
@@ -106,7 +109,7 @@ bool Pool::start(Helper& helper) {
     if (no_more_threads_) return false;
     try {
         helper.thread = std::thread([this, &helper] { serve(helper); });
-    } catch (const std::system_error&) {  // the system gives no more: those that run do the work
+    } catch (const std::exception&) {  // the system gives no more: those that run do the work
         no_more_threads_ = true;
         return false;
     }
@@ -152,21 +155,14 @@ void Pool::serve(Helper& self) {
 
 /// Helps with one loop after the other, until none comes or the processor is wanted by others.
 void Pool::stay_awake(Helper& self) {
-    Nanoseconds last_loop = clock_now(), last_yield = 0;
+    Watch watch(self);
+    Nanoseconds last_loop = clock_now();
     while (!stop_.load(std::memory_order_relaxed) && !self.resting.load(std::memory_order_relaxed)) {
-        const Nanoseconds now = clock_now();
-        if (now - last_yield > between_yields) {
-            const Nanoseconds put_aside = give_way();
-            last_yield = now + put_aside;
-            if (put_aside > moment) {
-                self.put_aside.fetch_add(put_aside, std::memory_order_relaxed);
-                if (left_.load(std::memory_order_relaxed) <= 0) return;
-            }
-        }
+        const bool put_aside = watch.give_way();
         if (left_.load(std::memory_order_relaxed) > 0) {
-            help(self);
-            last_loop = last_yield = clock_now();
-        } else if (now - last_loop > patience) {
+            help(watch);
+            last_loop = clock_now();
+        } else if (put_aside || clock_now() - last_loop > patience) {
             return;
         } else {
             pause();
@@ -174,21 +170,13 @@ void Pool::stay_awake(Helper& self) {
     }
 }
 
-void Pool::help(Helper& self) {
-    for (int left; take(left);) {
-        const Nanoseconds begin = clock_now(), processor = processor_time();
+void Pool::help(Watch& watch) {
+    for (int left; take(left); watch.give_way()) {
+        watch.begin_part();
         const int parts = done(count_ - left, *body_);
-        const Nanoseconds worked = processor_time() - processor;
-        const Nanoseconds put_aside = clock_now() - begin - worked;
-        self.worked.fetch_add(worked, std::memory_order_relaxed);
-        if (put_aside > moment) {
-            self.put_aside.fetch_add(put_aside, std::memory_order_relaxed);
-            self.put_aside_in_part.store(put_aside, std::memory_order_relaxed);
-        }
+        watch.end_part();
         finished_.fetch_add(parts, std::memory_order_release);
         finished_.notify_one();
-        const Nanoseconds gave_way = give_way();
-        if (gave_way > moment) self.put_aside.fetch_add(gave_way, std::memory_order_relaxed);
     }
 }
 

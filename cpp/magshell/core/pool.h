@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "magshell/core/helper.h"
+#include "magshell/core/parallel.h"
 
 namespace magshell {
 
@@ -22,13 +23,14 @@ class Pool {
 
     int helpers() const { return helper_count_; }
 
-    /// body(i) for every i in [0, count), as parallel_for. One loop at a time, and none from within another.
-    void run(int count, const std::function<void(int)>& body);
+    /// As parallel_for. One loop at a time, and none from within another.
+    void run(int count, const std::function<void(int)>& body, PartTime& part_time);
 
   private:
-    int work(int count, const std::function<void(int)>& body);
+    int work(int count, const std::function<void(int)>& body, PartTime& part_time);
     bool take(int& left);
     int done(int part, const std::function<void(int)>& body);
+    bool wake_for(int parts, Nanoseconds part_time);
     void wake(int wanted);
     bool start(Helper& helper);
     Nanoseconds wait_for(int finished);
@@ -36,7 +38,7 @@ class Pool {
 
     void serve(Helper& self);
     void stay_awake(Helper& self);
-    void help(Helper& self);
+    void help(Watch& watch);
 
     const int helper_count_;
     const std::unique_ptr<Helper[]> helpers_;
