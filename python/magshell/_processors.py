@@ -24,7 +24,9 @@ def first_threads(environment: Mapping[str, str], root: Path = Path("/")) -> int
                 f"MAGSHELL_NUM_THREADS must be an integer between 1 and {MOST_THREADS}, got {ours!r}"
             )
         return int(ours)
-    everyones = environment.get("OMP_NUM_THREADS", "").partition(",")[0].strip()  # a number for each nested loop
+    everyones = (
+        environment.get("OMP_NUM_THREADS", "").partition(",")[0].strip()
+    )  # a number for each nested loop
     said = int(everyones) if everyones.isdecimal() else 0
     return min(processors(root), said if 1 <= said <= MOST_THREADS else MOST_BY_DEFAULT)
 

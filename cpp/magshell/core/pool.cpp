@@ -22,6 +22,11 @@ void pause() {
     }
 }
 
+// Parts look long when the system takes the processor from the caller, too. That alone is to wake nobody.
+Nanoseconds believable(Nanoseconds part_time, Nanoseconds before) {
+    return before > 0 ? std::min(part_time, 4 * before) : part_time;
+}
+
 }  // namespace
 
 Pool::Pool(int helpers) : helper_count_(helpers), helpers_(new Helper[helpers]) {}
@@ -48,15 +53,16 @@ void Pool::run(int count, const std::function<void(int)>& body, PartTime& part_t
 /// The caller's share of the loop, and how many parts it was. Helpers who sleep are woken at once where the
 /// same loop was long enough before, and else when it turns out to be.
 int Pool::work(int count, const std::function<void(int)>& body, PartTime& part_time) {
-    const Nanoseconds begin = clock_now();
-    bool woken = wake_for(count - 1, part_time.load(std::memory_order_relaxed));
+    const Nanoseconds begin = clock_now(), before = part_time.load(std::memory_order_relaxed);
+    bool woken = wake_for(count - 1, before);
     int own = 0;
     for (int left; take(left);) {
         own += done(count - left, body);
         if (woken) continue;
-        woken = wake_for(left_.load(std::memory_order_relaxed), (clock_now() - begin) / own);
+        const Nanoseconds a_part = believable((clock_now() - begin) / own, before);
+        woken = wake_for(left_.load(std::memory_order_relaxed), a_part);
     }
-    if (own > 0) part_time.store((clock_now() - begin) / own, std::memory_order_relaxed);
+    if (own > 0) part_time.store(believable((clock_now() - begin) / own, before), std::memory_order_relaxed);
     return own;
 }
 
