@@ -187,6 +187,33 @@ for _ in range(5):
 os._exit(0)
 """
 
+# Forks come at any time of another thread's loops: their processes have a pool of their own all the same.
+FORKED = """
+import threading
+ms.set_num_threads(2)
+other, stop = cantilever((60, 18)), threading.Event()
+
+def solve():
+    while not stop.is_set():
+        bits(other)
+
+solving = threading.Thread(target=solve)
+solving.start()
+children = []
+for _ in range(8):
+    stop.wait(5e-3)
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)
+        alone = len(threads()) == 1
+        os._exit(0 if alone and bits(scene) == expected and len(threads()) == 2 else 1)
+    children.append(child)
+stop.set()
+solving.join()
+assert [os.waitpid(child, 0)[1] for child in children] == [0] * len(children)
+assert bits(scene) == expected
+"""
+
 CROWDED = """
 ms.set_num_threads(12)
 for _ in range(3):
@@ -195,7 +222,7 @@ assert len(threads() - before) > 1
 """
 
 SMALL = """
-small = cantilever((10, 10))
+small = cantilever((8, 8))  # 128 faces
 undisturbed = False
 for attempt in range(20):  # a system that takes the processor from us makes a part look long
     ms.set_num_threads(2 + attempt % 2)
@@ -210,6 +237,11 @@ assert bits(scene) == expected and len(threads() - before) == 1
 @LINUX
 def test_a_loop_ends_without_helpers_that_were_stopped():
     printed_by(SHEET + STOPPED, timeout=100)
+
+
+@LINUX
+def test_a_forked_process_has_helpers_of_its_own():
+    printed_by(SHEET + FORKED)
 
 
 @LINUX

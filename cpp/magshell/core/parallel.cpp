@@ -15,22 +15,27 @@ std::atomic<int> thread_count{1};
 // Never destroyed at exit: after a fork, or while Python ends, its threads cannot be joined.
 Pool* pool = nullptr;
 pid_t pool_owner = 0;
-std::atomic_flag pool_in_use;
+std::atomic<pid_t> pool_user{0};  // the process whose loop it runs
 
-// The pool for one loop, if no other has it. A flag and not a mutex: the thread that has it may ask again,
-// from within its loop, which a mutex leaves undefined.
+// The pool for one loop, if no other has it. Not a mutex: the thread that has it may ask again, from within
+// its loop, which a mutex leaves undefined. A process that was forked in the middle of another thread's loop
+// finds its parent's name there, and that loop is none of its own.
 class Claim {
   public:
-    Claim() : granted_(!pool_in_use.test_and_set(std::memory_order_acquire)) {}
+    explicit Claim(pid_t process) {
+        pid_t user = pool_user.load(std::memory_order_relaxed);
+        granted_ =
+            user != process && pool_user.compare_exchange_strong(user, process, std::memory_order_acquire);
+    }
     Claim(const Claim&) = delete;
     Claim& operator=(const Claim&) = delete;
     ~Claim() {
-        if (granted_) pool_in_use.clear(std::memory_order_release);
+        if (granted_) pool_user.store(0, std::memory_order_release);
     }
     bool granted() const { return granted_; }
 
   private:
-    const bool granted_;
+    bool granted_;
 };
 
 void run_serially(int count, const std::function<void(int)>& body) {
@@ -50,17 +55,18 @@ void set_num_threads(int count) {
 void parallel_for(int count, const std::function<void(int)>& body, PartTime& part_time) {
     const int wanted = num_threads() - 1;
     if (wanted < 1 || count < 2) return run_serially(count, body);
-    const Claim claim;
+    const pid_t process = getpid();
+    const Claim claim(process);
     if (!claim.granted()) return run_serially(count, body);
 
-    if (pool_owner != getpid()) pool = nullptr;  // its threads stayed in the parent
+    if (pool_owner != process) pool = nullptr;  // its threads stayed in the parent
     if (pool && pool->helpers() != wanted) {
         delete pool;
         pool = nullptr;
     }
     if (!pool) {
         pool = new Pool(wanted);
-        pool_owner = getpid();
+        pool_owner = process;
     }
     pool->run(count, body, part_time);
 }
