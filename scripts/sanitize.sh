@@ -45,5 +45,5 @@ export LD_PRELOAD="$preload$(path_of libstdc++.so)"
 export ASAN_OPTIONS=detect_leaks=0:halt_on_error=1:max_malloc_fill_size=2147483647:malloc_fill_byte=255
 export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
 export TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1
-export PYTHONPATH="$PWD/$build/site" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+export PYTHONPATH="$PWD/$build/site" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MAGSHELL_NUM_THREADS=2
 exec "${run[@]}" "$python" -m pytest -p no:cacheprovider --capture=sys "$@"

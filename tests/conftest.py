@@ -1,4 +1,4 @@
-"""What every test runs under: one BLAS thread, no display, the same random numbers every time."""
+"""What every test runs under: one BLAS thread, two of ours, no display, the same random numbers every time."""
 
 import os
 from collections.abc import Iterator
@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 # Before numpy is imported: its BLAS reads these once.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
+os.environ.setdefault("MAGSHELL_NUM_THREADS", "2")  # which would follow OMP_NUM_THREADS
 os.environ["MPLBACKEND"] = "Agg"
 os.environ["PYVISTA_OFF_SCREEN"] = "true"
 

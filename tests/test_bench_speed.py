@@ -11,6 +11,7 @@ from bench_figures import is_a_picture
 import magshell as ms
 from magshell.bench import timing
 from magshell.bench.__main__ import main
+from magshell.bench.busy_machine import COMPANY
 from magshell.bench.paper import examples_folder
 from magshell.bench.paper_rows import ROWS
 from magshell.bench.scaling import MEMORIES, TIMES, fitted_exponent
@@ -78,7 +79,7 @@ def test_dynamics(tmp_path, capsys) -> None:
 
 
 def test_scaling(tmp_path, capsys) -> None:
-    results = run("scaling", tmp_path, "--faces", "512", "128", "--bending", "hinge")
+    results = run("scaling", tmp_path, "--faces", "512", "128", "--bending", "hinge", "--quick")
     printed = capsys.readouterr().out
     assert "a Newton iteration grows with the faces to the" in printed and "Two threads" in printed
     assert results["sizes"].keys() == {"1", "2"}
@@ -90,6 +91,9 @@ def test_scaling(tmp_path, capsys) -> None:
     assert small["entries"] < small["factor"] < large["factor"] and small["model"] < large["model"]
     assert results["exponents"].keys() == TIMES.keys() | MEMORIES.keys()
     assert 0.9 < results["exponents"]["model"] < 1.1
+    assert results["busy machine"]["company"].keys() == COMPANY.keys()
+    assert all(name in printed for name in COMPANY)
+    assert all(min(times.values()) > 0 for times in results["busy machine"]["company"].values())
 
 
 def test_scaling_without_the_memory_for_it(monkeypatch, tmp_path, capsys) -> None:
@@ -113,7 +117,7 @@ def test_scaling_without_the_memory_for_it(monkeypatch, tmp_path, capsys) -> Non
         return size
 
     monkeypatch.setattr("magshell.bench.scaling._in_its_own_process", measured)
-    results = run("scaling", tmp_path, "--faces", "8", "32", "128")
+    results = run("scaling", tmp_path, "--faces", "8", "32", "128", "--quick")
     assert results["ended"] == 32 and results["sizes"]["2"] == [size]
     assert "The process of 32 faces was ended" in capsys.readouterr().out
     with pytest.raises(SystemExit, match="no size was measured: the process of 32 faces was ended"):

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import numbers
+import os
 
 from . import _core
+from ._processors import MOST_THREADS, first_threads
+
+_core.set_num_threads(first_threads(os.environ))
 
 
 def num_threads() -> int:
@@ -15,14 +19,17 @@ def num_threads() -> int:
 def set_num_threads(count: int) -> None:
     """Let magshell's parallel loops use ``count`` threads (at least 1). Results are the same bits for any.
 
-    At first it is the number of processors, at most 8, or ``MAGSHELL_NUM_THREADS`` from the environment.
+    At first it is ``MAGSHELL_NUM_THREADS`` from the environment. Without that, it is the number of processors that this
+    process may use, by its affinity and the quotas of its control groups, and at most ``OMP_NUM_THREADS`` or, where
+    nothing is said, 8. The caller works on every loop itself; the others help where they have a processor to
+    themselves, and leave loops alone for a while where they do not.
 
     >>> set_num_threads(2)
     """
     if isinstance(count, bool) or not isinstance(count, numbers.Integral):
         raise TypeError(f"the number of threads must be an integer, got {count!r}")
-    if not 1 <= count <= 1024:
-        raise ValueError(f"the number of threads must be between 1 and 1024, got {count}")
+    if not 1 <= count <= MOST_THREADS:
+        raise ValueError(f"the number of threads must be between 1 and {MOST_THREADS}, got {count}")
     _core.set_num_threads(int(count))
 
 

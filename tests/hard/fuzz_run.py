@@ -25,6 +25,7 @@ from pathlib import Path
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("MAGSHELL_NUM_THREADS", "2")
 
 import numpy as np
 from fuzz_calls import Call, Sample, calls

@@ -1,4 +1,5 @@
-"""python -m magshell.bench scaling: time and memory against the number of faces, and the exponents they grow with."""
+"""python -m magshell.bench scaling: time and memory against the number of faces, the exponents they grow with, and what
+threads gain and cost."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ import magshell as ms
 from magshell import _core
 from magshell._inputs import Inputs
 
+from . import busy_machine
 from .ratios import note
 from .report import add_rounds, bar, chosen, print_table
 from .statics import strongly_bent
@@ -26,6 +28,7 @@ ALLOWED_EXPONENT = 1.4  # of a Newton iteration
 ALLOWED_MEMORY = 1.3  # what the process grows by, over the factor's own
 ALLOWED_ANALYSIS = 0.5  # of a factorization, from 100,000 faces on
 ALLOWED_FILL = 1.1  # operations over those of the best of other orderings
+REQUIRED_GAIN, GAINING_FACES = 1.7, 8192  # of two threads over one in an iteration, from so many faces on
 
 _WHY = "as systems do with one that takes more memory than there is"
 
@@ -69,6 +72,7 @@ def run(options: argparse.Namespace) -> dict:
     if ended is not None:
         print(f"\nThe process of {ended} faces was ended, {_WHY}. It and larger sizes are left out.")
     return {
+        "busy machine": busy_machine.measure(options.quick),
         "bending": options.bending,
         "sizes": {str(threads): each for threads, each in zip(THREADS, (one, two), strict=True)},
         "exponents": exponents,
@@ -277,8 +281,11 @@ def _print_targets(one: list[dict], two: list[dict], exponents: dict) -> None:
         missed = note("share", "analysis over factorization", ratio, at_most=ALLOWED_ANALYSIS)
         print(f"  an analysis takes {ratio:.2f} factorizations (at most {ALLOWED_ANALYSIS}){missed}")
     ratios = [a["wall"]["iteration"] / b["wall"]["iteration"] for a, b in zip(one, two, strict=True)]
+    gains = [gain for gain, size in zip(ratios, one, strict=True) if size["faces"] >= GAINING_FACES]
+    missed = note("share", "gain of two threads", min(gains), at_least=REQUIRED_GAIN) if gains else ""
     print(f"  an iteration on two threads is {ratios[0]:.2f} times as fast at {first['faces']} faces", end="")
-    print(f", {ratios[-1]:.2f} times at {last['faces']}" if len(one) > 1 else "")
+    print(f", {ratios[-1]:.2f} times at {last['faces']}" if len(one) > 1 else "", end="")
+    print(f" (at least {REQUIRED_GAIN} from {GAINING_FACES} faces on){missed}")
 
 
 def _exponent(value: float | None) -> str:

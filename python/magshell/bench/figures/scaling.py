@@ -5,6 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, NullLocator
 
+from ..busy_machine import COMPANY, ratio
 from ..scaling import ALLOWED_EXPONENT, ALLOWED_MEMORY, MEMORIES, TIMES
 from .style import (
     BLUE,
@@ -14,6 +15,7 @@ from .style import (
     INK,
     SKY,
     VERMILION,
+    label_bars,
     machine,
     new_figure,
     note,
@@ -29,8 +31,8 @@ _MEMORY_COLOURS = dict(zip(MEMORIES, (GREEN, SKY, BLUE, VERMILION), strict=True)
 def draw(results: dict, setting: dict) -> Figure:
     one, two = (results["sizes"][threads] for threads in ("1", "2"))
     faces = [size["faces"] for size in one]
-    figure = new_figure(12.0, 4.4)
-    times, faster, memory = figure.subplots(1, 3, width_ratios=(1.35, 0.9, 1.1))
+    figure = new_figure(14.5, 4.4)
+    times, faster, memory, company = figure.subplots(1, 4, width_ratios=(1.35, 0.9, 1.1, 0.8))
     exponents = results["exponents"]
     for name, label in TIMES.items():
         _line(
@@ -70,11 +72,27 @@ def draw(results: dict, setting: dict) -> Figure:
         axes.xaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel("faces", fontsize=9)
+    _company(company, results["busy machine"])
     note(
         figure,
         f"a square sheet bent by a field, {results['bending']}; {machine(setting).replace('1 thread, ', '')}",
     )
     return figure
+
+
+def _company(axes, results: dict) -> None:
+    """Two threads' time over one's, with what each may be at most."""
+    places, ratios = range(len(COMPANY)), [ratio(results["company"][name]) for name in COMPANY]
+    axes.barh(places, ratios, color=SKY, height=0.55)
+    for place, (_, _, allowed) in zip(places, COMPANY.values(), strict=True):
+        if allowed:
+            axes.plot([allowed] * 2, [place - 0.36, place + 0.36], color=VERMILION, linewidth=1.6)
+    label_bars(axes, places, ratios, ".2f")
+    axes.set_yticks(places, COMPANY)
+    axes.set(xlim=(0, 1.25 * max(1.15, *ratios)))
+    axes.invert_yaxis()
+    tidy(axes, grid=None)
+    panel_title(axes, "Two threads' time over one's", f"{results['faces']} faces in motion; red: at most")
 
 
 def _line(axes, faces, values, colour: str, label: str, exponent: float | None) -> None:

@@ -1,0 +1,68 @@
+#include "magshell/core/helper.h"
+
+#include <time.h>
+
+#include <algorithm>
+
+namespace magshell {
+
+namespace {
+
+constexpr Nanoseconds between_ways = 50'000;  // to give way and to compare takes 1 us where nobody waits
+
+void add(std::atomic<Nanoseconds>& told, Nanoseconds more) {
+    told.fetch_add(more, std::memory_order_relaxed);
+}
+
+Nanoseconds processor_time() {
+    timespec time{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return time.tv_sec * Nanoseconds{1'000'000'000} + time.tv_nsec;
+}
+
+}  // namespace
+
+Watch::Watch(Helper& helper) : helper_(helper), compared_(clock_now()), processor_(processor_time()) {}
+
+/// For how long since it was last asked, if that was more than a moment.
+Nanoseconds Watch::put_aside() {
+    const Nanoseconds clock = compared_, processor = processor_;
+    processor_ = processor_time();
+    compared_ = clock_now();
+    const Nanoseconds time = (compared_ - clock) - (processor_ - processor);
+    if (time <= moment) return 0;
+    add(helper_.put_aside, time);
+    return time;
+}
+
+void Watch::end_part() {
+    const Nanoseconds took = clock_now() - part_began_;
+    if (took <= moment) return add(helper_.worked, took);
+    const Nanoseconds aside = std::min(put_aside(), took);
+    add(helper_.worked, took - aside);
+    add(helper_.put_aside_in_part, aside);
+}
+
+bool Watch::give_way() {
+    if (clock_now() - gave_way_ < between_ways) return false;
+    std::this_thread::yield();
+    const Nanoseconds time = put_aside();
+    gave_way_ = compared_;
+    return time > 0;
+}
+
+void Rest::settle(Nanoseconds now, Nanoseconds worked, Nanoseconds put_aside, Nanoseconds waited) {
+    constexpr Nanoseconds of_waiting = 16, shortest = 2'000'000, longest = 1'000'000'000, forgiven = 4;
+    const Nanoseconds cost = std::min(put_aside, waited);
+    const bool of_no_use = put_aside > moment && put_aside > worked;
+    if (cost <= moment && !of_no_use) {
+        worked_ += worked;
+        if (worked_ > length_ / forgiven) length_ = 0;
+        return;
+    }
+    length_ = std::min(longest, std::max({2 * length_, of_waiting * cost, shortest}));
+    end_ = now + length_;
+    worked_ = 0;
+}
+
+}  // namespace magshell
