@@ -63,14 +63,16 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
 
 def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
     """A body that starts deeper in an obstacle than half its thickness would be shot out of it."""
+    allowed = np.empty(scene.mesh.n_vertices)
+    for part, sheet in zip(scene._bodies.parts, values.sheets, strict=True):
+        allowed[part.vertices] = 0.5 * np.max(sheet.thickness)
     for contact in scene.contacts:
         vertices, weights = scene._bodies.contact_points(contact)
-        thickness = max(np.max(sheet.thickness) for sheet in values.touching(contact))
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])
         offset = values.current(contact).offset
         for obstacle in contact.obstacles:
             depth = offset - values.current(obstacle).signed_distance(where, time)
-            inside = np.flatnonzero(depth > 0.5 * thickness)
+            inside = np.flatnonzero(depth > allowed[vertices[:, 0]])
             if inside.size:
                 worst = inside[np.argmax(depth[inside])]
                 touched = np.unique(vertices[inside][vertices[inside] >= 0])

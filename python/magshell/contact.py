@@ -118,7 +118,7 @@ class Contact(Owner):
         return self.vertices is None
 
     def points(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """What of a body touches: vertices (k, 3), -1 where there are fewer, and their weights (k, 3); those on faces last."""
+        """What of a body touches: vertices (k, 3), -1 where there are fewer, and weights (k, 3); those on faces last."""
         chosen = np.arange(mesh.n_vertices) if self.vertices is None else None
         if chosen is None:
             chosen = indices("Contact vertices", self.vertices, mesh.n_vertices)
