@@ -234,11 +234,11 @@ def test_pictures_films_pages_and_files_hold_all_of_them(pair, tmp_path):
     np.testing.assert_array_equal(state.remanent_magnetization, rest.remanent_magnetization)
     np.testing.assert_array_equal(states_of(scene)[0].remanent_magnetization, rest.remanent_magnetization)
     ms.plot(rest).save(tmp_path / "rest.png")
-    ms.write_page(tmp_path / "rest.html", rest)
+    ms.write_page(rest, tmp_path / "rest.html")
     move = ms.simulate(
         scene, steps=3, time_step=5e-3, applied_flux_density=STRONG, record_every=1, progress=False
     )
-    ms.animate(move, tmp_path / "move.gif", width=300, progress=False)
+    ms.animate(move, tmp_path / "move.gif", width=400, progress=False)
     pytest.importorskip("meshio")
     ms.write_series(tmp_path / "move.pvd", move, progress=False)
     mesh = ms.read_mesh(tmp_path / "move" / "move_3.vtu")
