@@ -5,9 +5,12 @@ import pickle
 
 import numpy as np
 import pytest
+from crossed_cells import crossed
 
 import magshell as ms
 from magshell import obstacles as ob
+from magshell.bench.cases import magnetic_strip
+from magshell.bench.cases.magnetic_strip import LENGTH, WIDTH
 from magshell.plotting.states import states_of
 
 FAR = 0.5  # m, between sheets of 0.1 m
@@ -311,6 +314,42 @@ def test_the_free_motions_of_each_body_are_told():
     sheets = [strip(k, remanent_magnetization=None) for k in (0, 1)]
     with pytest.raises(ValueError, match="of part 1"):
         ms.Scene(sheets, supports=[ms.Clamp(sheets[0].mesh.edges_at(x=0.0), body=sheets[0])])
+
+
+def test_strains_are_those_of_each_sheet(pair):
+    _, scene, alone = pair
+    both = ms.equilibrium(scene, applied_flux_density=STRONG, **EXACT)
+    move = ms.simulate(scene, steps=2, time_step=4e-3, applied_flux_density=STRONG, progress=False)
+    for one, part in zip(alone, scene._bodies.parts, strict=True):
+        single = ms.equilibrium(one, applied_flux_density=STRONG, **EXACT)
+        np.testing.assert_allclose(
+            both.strains().bending[part.faces], single.strains().bending, rtol=0, atol=1e-8
+        )
+        own = ms.simulate(one, steps=2, time_step=4e-3, applied_flux_density=STRONG, progress=False)
+        np.testing.assert_allclose(
+            move.strains().bending[part.faces], own.strains().bending, rtol=0, atol=1e-8
+        )
+    assert len(both.self_intersections()) == 0
+
+
+def test_caps_of_the_second_sheet_are_told_by_their_number_in_the_scene():
+    good = magnetic_strip.scene(ms.meshes.rectangle(LENGTH, WIDTH, cells=(40, 4)), "midedge").shell
+    capped = crossed(LENGTH, WIDTH, (40, 4), [0.01, 0.5, 0.5, 0.5]).transformed(translation=(0, FAR, 0))
+    bad = magnetic_strip.scene(capped, "midedge").shell
+    held = [ms.Clamp(each.mesh.edges_at(x=0.0), body=each) for each in (good, bad)]
+    scene = ms.Scene([good, bad], supports=held, field=ms.UniformField())
+    with pytest.warns(ms.MeshQualityWarning, match="this equilibrium cannot be trusted") as told:
+        ms.equilibrium(scene, **magnetic_strip.controls(1.0, (0.0, 0.0, 1.0)))
+    named = int(str(told[0].message).split("among them ")[1].split()[0])
+    assert np.degrees(scene.mesh.quality.largest_angles[named]) > 177
+
+
+def test_a_failure_looks_at_all_sheets(pair):
+    _, scene, _ = pair
+    solver = ms.MixedNewton(max_iterations=1, max_relaxation_steps=1)
+    with pytest.raises(ms.NotConverged, match="out of balance most at") as told:
+        ms.equilibrium(scene, applied_flux_density=50 * STRONG, solver=solver)
+    assert told.value.last_good.positions.shape == (scene.mesh.n_vertices, 3)
 
 
 A, B, STRANGER = strip(0, remanent_magnetization=None), strip(1, remanent_magnetization=None), strip(2)
