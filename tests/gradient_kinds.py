@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from gradient_scenes import Kind
-from test_adjoint import BENDINGS, DEFAULTS, MAGNETIZATION, MESH, N_V, everything
+from test_adjoint import BENDINGS, DEFAULTS, DIPOLES, MAGNETIZATION, MESH, N_V, everything
 
 import magshell as ms
 from magshell import obstacles as ob
@@ -198,6 +198,85 @@ def let_go() -> Kind:
     return Kind(everything(), controls, ms.simulate, from_an_equilibrium, fixed, 1e-5, REACH)
 
 
+def two_sheets():
+    """Of different bending, each with its own magnetization."""
+    mesh = MESH.transformed(translation=(0.01, 0.09, 4e-4))
+    sheet = ms.Shell(
+        MESH,
+        thickness=1e-3,
+        young_modulus=1e6,
+        poisson_ratio=0.4,
+        mass_density=1e3,
+        remanent_magnetization=RNG.uniform(-2e4, 2e4, (MESH.n_faces, 3)),
+    )
+    other = ms.Shell(
+        mesh,
+        thickness=RNG.uniform(1.1e-3, 1.4e-3, mesh.n_faces),
+        young_modulus=2e6,
+        poisson_ratio=0.3,
+        mass_density=600.0,
+        bending="hinge",
+        remanent_magnetization=(1e4, 3e3, -1e4),
+    )
+    return sheet, other
+
+
+def two_sheets_at_rest() -> Kind:
+    """One floor under both, and loads on each."""
+    sheet, other = two_sheets()
+    mesh = other.mesh
+    supports = [
+        ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0), body=sheet),
+        ms.Clamp(mesh.edges_at(x=0.01), displacement=(1e-4, 0, 5e-4), rotation=(0, 0.1, 0.05), body=other),
+    ]
+    loads = [
+        ms.EdgeCouple(mesh.edges_at(x=0.11), 2e-4, body=other),
+        ms.EdgeCouple(MESH.edges_at(x=0.1), (0, 3e-4, 0), body=sheet),
+        ms.PointLoad(mesh.vertices_at(x=0.11), (1e-4, 2e-4, -2e-4), body=other),
+        ms.EdgeLoad(MESH.edges_at(x=0.1), (0, 1e-2, -1e-2), body=sheet),
+        ms.AreaLoad((0.1, 0, 0.2)),
+    ]
+    floor = ms.Contact(under(ob.Plane, -3e-3, rotation=(0.02, 0.01, 0)), contact_stiffness=5.0, offset=1e-3)
+    scene = ms.Scene(
+        [sheet, other],
+        supports=supports,
+        loads=loads,
+        contacts=[floor],
+        field=[ms.UniformField(), DIPOLES],
+        gravity=(0.2, 0.1, -9.81),
+    )
+    controls = {**FACTORS, "applied_flux_density": (1e-3, -5e-4, 2e-3)}
+    return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
+
+
+def two_sheets_in_motion() -> Kind:
+    """In water, and one of them onto a ball on which it rubs."""
+    sheet, other = two_sheets()
+    ball = under(ob.Sphere, -1e-3)
+    rubbing = ms.Contact(ball, contact_stiffness=50.0, offset=1e-4, friction_coefficient=0.4, body=sheet)
+    scene = ms.Scene(
+        [sheet, other],
+        supports=[ms.Clamp(other.mesh.edges_at(x=0.01), rotation=(0, 0.1, 0), body=other)],
+        contacts=[rubbing],
+        field=ms.UniformField(),
+        gravity=(0, 0.3, -9.81),
+        water=ms.Water(800.0, (0.05, -0.02, 0.01), added_mass=0.6),
+        allow_rigid_motions=True,
+    )
+    n_v = scene.mesh.n_vertices
+    controls = {
+        "applied_flux_density": (1e-3, 0.0, 4e-3),
+        "motion_factor": np.linspace(0, 0.7, 7),
+        "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * RNG.standard_normal((n_v, 3)),
+        "damping": RNG.uniform(1e-4, 2e-4, n_v),
+        "stiffness_damping": 1e-3,
+        "time_step": 2e-3,
+    }
+    reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
+    fixed = {**EXACT, "steps": 6, "integrator": ms.SDIRK2(), "progress": False}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+
+
 RUBS = {"friction_coefficient": 0.4}
 MAKERS = {
     **{
@@ -231,6 +310,8 @@ MAKERS = {
     "through water": lambda: thrown(None, ms.TRBDF2(), swims=True),
     "through water onto a Plane": lambda: thrown(ob.Plane, ms.TRBDF2(), True, extra=VISCOUS, **RUBS),
     "in a corner": in_a_corner,
+    "two sheets at rest": two_sheets_at_rest,
+    "two sheets in motion": two_sheets_in_motion,
 }
 
 

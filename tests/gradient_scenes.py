@@ -73,8 +73,12 @@ class Kind:
         """{(None, keyword): its value}: controls, and what a keyword too can say of the objects, as one number."""
         own = {(None, name): np.array(value, dtype=np.float64) for name, value in self.controls.items()}
         for (owner, name), value in self.of_objects.items():
-            if name in continuous(self.function) and owner in (self.scene, self.scene.shell):
-                own[None, name] = value.mean() if owner is self.scene.shell else value
+            if owner is self.scene and name in continuous(self.function):
+                own[None, name] = value
+            if self.scene.bodies == (owner,) and name in continuous(
+                self.function
+            ):  # of several: by values only
+                own[None, name] = value.mean()
         return own
 
     @cached_property
@@ -140,16 +144,20 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
         values = {"gravity": scene.gravity, "vertex_loads": loads}
         absent = {name for name, value in values.items() if not np.any(value)}
     elif isinstance(owner, ms.Contact):
-        values = dict(zip(names, owner.law(scene.shell), strict=True))
+        values = dict(zip(names, owner.law(*scene._values.touching(owner)), strict=True))
         absent = set() if scene.has_forces_of_motion else {"friction_coefficient"}
     elif isinstance(owner, ms.Pin | ms.Clamp):
-        motion = owner.held(scene.mesh)[0].motion
+        motion = owner.held(scene._bodies.of(owner).mesh)[0].motion
         values = {} if motion is None else {**motion._asdict(), "displacement": motion.translation}
         absent = set(names) if motion is None else set()
     elif isinstance(owner, ms.SampledField):
         values, absent = owner._made_from, set()
     else:
         values = {name: getattr(owner, name) for name in names}
-        weightless = owner is scene.shell and not (moving or scene.gravity.any())
-        absent = {"mass_density"} if weightless else set()
+        absent = set()
+        if isinstance(owner, ms.Shell):
+            weightless = not (moving or scene.gravity.any())
+            absent = {"mass_density"} if weightless else set()
+            if owner.remanent_magnetization is None:  # the solve says it
+                absent.add("remanent_magnetization")
     return {name: values[name] for name in names if name not in absent}

@@ -197,6 +197,25 @@ def test_a_factor_recovers_from_a_failure(backend):
     assert abs(matrix @ factor.solve(np.ones(64)) - 1.0).max() < 1e-12
 
 
+def test_many_bodies_in_one_matrix_are_solved_on_any_number_of_threads():
+    """Each is small beside the whole, and goes through both substitutions by itself."""
+    bodies = [shell_like(6, seed) for seed in range(20)]
+    matrix = sp.csc_matrix(sp.block_diag(bodies))
+    rhs = np.random.default_rng(14).standard_normal(matrix.shape[0])
+    threads, results = num_threads(), []
+    try:
+        for count in (1, 2):
+            set_num_threads(count)
+            results.append(factorized(matrix)[0].solve(rhs))
+    finally:
+        set_num_threads(threads)
+    assert np.array_equal(*results) and backward_error(matrix, results[0], rhs) < 1e-12
+    ends = np.cumsum([0, *(body.shape[0] for body in bodies)])
+    for body, first, end in zip(bodies, ends, ends[1:], strict=False):
+        alone = factorized(body)[0].solve(rhs[first:end])
+        np.testing.assert_allclose(results[0][first:end], alone, rtol=0, atol=1e-9 * abs(alone).max())
+
+
 def test_the_same_bits_on_any_number_of_threads():
     matrix = shell_like(60, 30)
     starts, rows, values = lower(matrix)

@@ -1,6 +1,7 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
 from . import control, meshes, objectives, obstacles, optim, parametrize
+from ._body_result import BodyResult
 from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
 from .buckling import Buckling, linear_buckling
@@ -52,6 +53,7 @@ __all__ = [
     "TRBDF2",
     "AppliedField",
     "AreaLoad",
+    "BodyResult",
     "Buckling",
     "Clamp",
     "Contact",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh import TriangleMesh
+from ._bodies import Bodies, Part
 from .supports import DirectedEdges, Held, RigidMotion
 
 _LOOKED_AT = (0.37, 1.0)  # a full turn ends where it began, but is elsewhere on its way
@@ -16,19 +16,20 @@ _LOOKED_AT = (0.37, 1.0)  # a full turn ends where it began, but is elsewhere on
 class Constraints:
     """What the core takes. Nodes are vertices, followed by directions."""
 
-    directed_edges: np.ndarray  # (k, 2): edge, direction
+    directed_edges: np.ndarray  # (k, 2): the scene's edge, direction
     directions: np.ndarray  # (n_d, 3)
     held_nodes: np.ndarray  # (m, 3): node, how many directions, motion or -1
     held_frames: np.ndarray  # (m, 3, 3): columns, the held directions first
     motions: tuple[RigidMotion, ...]
 
 
-def gather(mesh: TriangleMesh, supports, free_directions: np.ndarray) -> Constraints:
+def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints:
     """All supports of a scene as one. `free_directions` (k, 3) are appended to the directions, held and still."""
     motions: list[RigidMotion] = []
-    nodes, frames = _held_vertices(mesh, [held for s in supports for held in s.held(mesh)], motions)
+    mesh, places = bodies.mesh, [(s, bodies.of(s)) for s in supports]
+    nodes, frames = _held_vertices(bodies, [h for s, part in places for h in _held(s, part)], motions)
     pairs, directions, direction_motions = _directed_edges(
-        [d for s in supports for d in s.directed(mesh)], motions
+        [d for s, part in places for d in _directed(s, part)], motions
     )
     directions = np.concatenate([directions, free_directions])
     direction_motions += [-1] * len(free_directions)
@@ -44,21 +45,31 @@ def gather(mesh: TriangleMesh, supports, free_directions: np.ndarray) -> Constra
     )
 
 
-def free_rigid_motions(mesh: TriangleMesh, constraints: Constraints) -> list[str]:
+def _held(support, part: Part) -> list[Held]:
+    """With the scene's vertices."""
+    return [held._replace(vertices=held.vertices + part.first_vertex) for held in support.held(part.mesh)]
+
+
+def _directed(support, part: Part) -> list[DirectedEdges]:
+    """With the scene's edges."""
+    return [each._replace(edges=each.edges + part.first_edge) for each in support.directed(part.mesh)]
+
+
+def free_rigid_motions(bodies: Bodies, constraints: Constraints) -> list[str]:
     """The rigid motions that no support prevents, in words; of every connected part."""
-    found = []
+    found, mesh, size = [], bodies.mesh, bodies.size
     for part in range(mesh.n_components):
         vertices = np.flatnonzero(mesh.components == part)
         center = mesh.rest_positions[vertices].mean(axis=0)
-        rows = _prevented(mesh, constraints, mesh.components == part, center)
+        rows = _prevented(bodies, constraints, mesh.components == part, center)
         _, values, modes = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]))
         for mode in modes[values < 1e-8 * max(values[0], 1e-300)]:
             where = f" of part {part} (with vertex {vertices[0]})" if mesh.n_components > 1 else ""
-            found.append(_in_words(mode, center, mesh.size) + where)
+            found.append(_in_words(mode, center, size) + where)
     return found
 
 
-def _held_vertices(mesh, held: list[Held], motions: list[RigidMotion]):
+def _held_vertices(bodies: Bodies, held: list[Held], motions: list[RigidMotion]):
     directions: dict[int, list[np.ndarray]] = {}
     motion_of: dict[int, RigidMotion] = {}
     for support in held:
@@ -66,8 +77,8 @@ def _held_vertices(mesh, held: list[Held], motions: list[RigidMotion]):
             directions.setdefault(vertex, []).extend(along)
             if support.motion is not None:
                 known = motion_of.setdefault(vertex, support.motion)
-                _check_same_motion(mesh, vertex, known, support.motion)
-    _check_against_still(mesh, held, motion_of)
+                _check_same_motion(bodies, vertex, known, support.motion)
+    _check_against_still(bodies, held, motion_of)
     numbers: dict[int, int] = {}
     nodes, frames = [], []
     for vertex, along in sorted(directions.items()):
@@ -87,16 +98,16 @@ def _number(motion: RigidMotion | None, motions: list[RigidMotion], numbers: dic
     return numbers[id(motion)]
 
 
-def _check_same_motion(mesh, vertex: int, a: RigidMotion, b: RigidMotion) -> None:
+def _check_same_motion(bodies, vertex: int, a: RigidMotion, b: RigidMotion) -> None:
     if a is b:
         return
-    point = mesh.rest_positions[[vertex]]
+    point = bodies.mesh.rest_positions[[vertex]]
     apart = max(np.abs(a.moved(point, at) - b.moved(point, at)).max() for at in _LOOKED_AT)
-    if apart > 1e-12 * mesh.size or not np.allclose(a.rotation, b.rotation):
+    if apart > 1e-12 * bodies.size or not np.allclose(a.rotation, b.rotation):
         raise ValueError(f"two supports move vertex {vertex} to different places")
 
 
-def _check_against_still(mesh, held: list[Held], motion_of: dict[int, RigidMotion]) -> None:
+def _check_against_still(bodies, held: list[Held], motion_of: dict[int, RigidMotion]) -> None:
     """A support that stays may share a vertex with one that moves, as long as it is not moved along what it holds."""
     for support in held:
         if support.motion is not None:
@@ -105,9 +116,9 @@ def _check_against_still(mesh, held: list[Held], motion_of: dict[int, RigidMotio
             motion = motion_of.get(vertex)
             if motion is None:
                 continue
-            point = mesh.rest_positions[[vertex]]
+            point = bodies.mesh.rest_positions[[vertex]]
             moves = np.array([(motion.moved(point, at) - point)[0] for at in _LOOKED_AT])
-            if np.abs(moves @ along.T).max() > 1e-9 * mesh.size:
+            if np.abs(moves @ along.T).max() > 1e-9 * bodies.size:
                 raise ValueError(
                     f"one support holds vertex {vertex} along a direction in which another moves it"
                 )
@@ -145,13 +156,13 @@ def _directed_edges(directed: list[DirectedEdges], motions: list[RigidMotion]):
     return pairs, np.array(directions).reshape(-1, 3), direction_motions
 
 
-def _prevented(mesh, constraints: Constraints, in_part: np.ndarray, center: np.ndarray) -> np.ndarray:
+def _prevented(bodies, constraints: Constraints, in_part: np.ndarray, center: np.ndarray) -> np.ndarray:
     """Rows (k, 6) of the infinitesimal rigid motions (translation, size-scaled rotation) that supports see."""
-    rows = [np.zeros((1, 6))]
+    rows, mesh, size = [np.zeros((1, 6))], bodies.mesh, bodies.size
     for (node, count, _), frame in zip(constraints.held_nodes, constraints.held_frames, strict=True):
         if node < mesh.n_vertices and in_part[node]:
             along = frame[:, :count].T
-            arm = (mesh.rest_positions[node] - center) / mesh.size
+            arm = (mesh.rest_positions[node] - center) / size
             rows.append(np.concatenate([along, np.cross(arm, along)], axis=1))
     if len(constraints.directed_edges):
         ends = mesh.edges[constraints.directed_edges[:, 0]]

@@ -33,7 +33,7 @@ def why_not(inputs, found, at_rest: bool) -> str:
     sentences = [f"{head}: {found.reason}."]
     near = np.zeros(0, dtype=int)  # vertices that have to do with it
     if failed.state.size:
-        sentences += _attempts(found, at_rest and not whole, scene.mesh.size)
+        sentences += _attempts(found, at_rest and not whole, scene._bodies.size)
         told, near = _places(inputs, found)
         sentences += told
     return " ".join([*sentences, _advice(inputs, found, at_rest, near), kept])
@@ -83,7 +83,7 @@ def _places(inputs, found) -> tuple[list[str], np.ndarray]:
 
 
 def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
-    scene, shell = inputs.scene, inputs.values.shell
+    scene, shell = inputs.scene, inputs.values.whole
     mesh, quality = scene.mesh, shell.quality
     tiny = np.flatnonzero(quality.heights < NEARLY_NONE * np.median(mesh.edge_lengths))
     if tiny.size:
@@ -92,7 +92,7 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
             "beside their stiffness, that of the rest is lost in round-off. Merge their vertices, or leave such faces "
             "out of the mesh; `mesh.quality` has the shapes of all."
         )
-    free = free_rigid_motions(mesh, scene._constraints) if "singular" in found.reason else []
+    free = free_rigid_motions(scene._bodies, scene._constraints) if "singular" in found.reason else []
     if free:
         return (
             f"The supports leave the sheet free ({'; '.join(free)}): hold it, unless a field or gravity does."
@@ -104,7 +104,7 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
             f"{describe_faces(shell, flat[np.argsort(-quality.largest_angles[flat], kind='stable')])} beside that, and "
             "almost flat: mend the mesh there first."
         )
-    if _still_moves(found.failed, mesh.size):
+    if _still_moves(found.failed, scene._bodies.size):
         return "Allow it more steps (max_relaxation_steps of the solver), or start from a nearby equilibrium."
     if not at_rest:
         return "Start from positions closer to an equilibrium."

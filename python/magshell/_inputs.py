@@ -7,11 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._quantity import quantity, real_numbers
+from ._magnetization import check_given_once, of_all_bodies
+from ._quantity import quantity
 from ._replacements import checked
 from ._tensors import detached, is_tensor, to_array, wants_gradient
 from ._values import Values
 from .scene import Scene
+from .shell import magnetization_of
 
 
 class Leaf(NamedTuple):
@@ -32,6 +34,9 @@ class Leaf(NamedTuple):
 
 class Inputs:
     """The controls, the magnetization and the scene's values of one solve. Raises ValueError where they do not fit.
+
+    given_magnetization: of all bodies, as it was given, a tensor in its graph.
+    magnetization: (n_f of all, 3) A/m, where it was an argument.
 
     `replaced`: {object of the scene: {name: value}}. `leaves`: the tensors that a gradient goes back to; without
     `differentiable` they are refused. `moving`: the solve is in time.
@@ -58,19 +63,23 @@ class Inputs:
         self.scene = scene
         self.given = []
         self.leaves: list[Leaf] = []
-        self.given_magnetization, self.given_flux_density = remanent_magnetization, applied_flux_density
+        self.given_flux_density = applied_flux_density
         self._differentiable = differentiable
-        self.magnetization = self._magnetization(
-            self._numbers("remanent_magnetization", remanent_magnetization)
-        )
+        replaced = replaced or {}
+        check_given_once(scene, remanent_magnetization, replaced)
+        numbers = self._numbers("remanent_magnetization", remanent_magnetization)
+        self.magnetization = None if numbers is None else magnetization_of(numbers, scene.mesh.n_faces)
         flux_density = self._flux_density(self._numbers("applied_flux_density", applied_flux_density))
-        numbers = {
+        controls = {
             ("scene", key): float(quantity(key, "1", self._numbers(key, value), ()))
             for key, value in factors.items()
         }
-        numbers["scene", "applied_flux_density"] = flux_density
-        self.controls = scene._control_layout.packed(numbers, scene._control_layout.zeros())
-        self.values = self._values(replaced or {})
+        controls["scene", "applied_flux_density"] = flux_density
+        self.controls = scene._control_layout.packed(controls, scene._control_layout.zeros())
+        self.values = self._values(replaced)
+        self.given_magnetization = (
+            of_all_bodies(scene, replaced) if remanent_magnetization is None else remanent_magnetization
+        )
 
     @property
     def tensors(self) -> list:
@@ -109,24 +118,6 @@ class Inputs:
         if not arrays and self.magnetization is None:
             return scene._values
         return Values(scene, arrays, self.magnetization)
-
-    def _magnetization(self, given) -> np.ndarray | None:
-        if not self.scene.fields:
-            if given is not None:
-                raise ValueError(
-                    "remanent_magnetization was given, but the scene has no field: Scene(..., field=...)"
-                )
-            return None
-        if given is None:
-            raise ValueError("the scene has a field, so remanent_magnetization [A/m] is needed")
-        n_faces = self.scene.mesh.n_faces
-        given = real_numbers("remanent_magnetization [A/m]", given)
-        shape = given.shape
-        if shape not in ((3,), (n_faces, 3)):
-            raise ValueError(
-                f"remanent_magnetization [A/m] must have shape (n_f, 3) = ({n_faces}, 3) or (3,), got {shape}"
-            )
-        return np.broadcast_to(quantity("remanent_magnetization", "A/m", given, shape), (n_faces, 3))
 
     def _flux_density(self, given) -> np.ndarray:
         if given is None:

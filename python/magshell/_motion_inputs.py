@@ -62,7 +62,7 @@ class MotionInputs:
         self.time_step = float(quantity("time_step", "s", inputs.take("time_step", time_step), ()))
         if not self.time_step > 0:
             raise ValueError(f"time_step [s] must be positive, got {self.time_step}")
-        self._mass = inputs.values.shell.vertex_masses
+        self._mass = inputs.values.vertex_masses
         self._damping = self._checked_damping(inputs.take("damping", damping))
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
         self.start = self._begin(start, velocities)

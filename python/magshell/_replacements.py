@@ -6,7 +6,8 @@ from ._quantity import quantity
 from .loads import EdgeCouple
 from .shell import Shell
 
-SHELL_NAMES = Shell._replaceable
+# Those of a scene's one body that have a keyword of their own.
+SHELL_NAMES = tuple(name for name in Shell._replaceable if name != "remanent_magnetization")
 
 
 def requested(scene, vertex_loads, values, moving: bool = False, **shell) -> dict[object, dict[str, object]]:
@@ -24,7 +25,7 @@ def requested(scene, vertex_loads, values, moving: bool = False, **shell) -> dic
         asked[owner] = dict(named)
     for name, value in shell.items():
         if value is not None:
-            _add(asked, scene.shell, name, value)
+            _add(asked, _one_body(scene, name), name, value)
     if vertex_loads is not None:
         _add(asked, scene, "vertex_loads", vertex_loads)
     _check_against_scene(scene, asked, moving)
@@ -45,6 +46,15 @@ def _add(asked: dict, owner, name: str, value) -> None:
     asked[owner][name] = value
 
 
+def _one_body(scene, name: str) -> Shell:
+    if len(scene.bodies) > 1:
+        raise ValueError(
+            f"{name} was given as an argument, but the scene has {len(scene.bodies)} bodies: say whose it is, "
+            f"values={{body: {{{name!r}: ...}}}}"
+        )
+    return scene.bodies[0]
+
+
 def _check(scene, owner, named) -> None:
     if not any(owner is item for item in (scene, *scene.parts)):
         raise ValueError(f"values has a key that is not the scene, nor an object of it: {owner!r}")
@@ -61,7 +71,8 @@ def _check(scene, owner, named) -> None:
 
 def _check_against_scene(scene, asked: dict, moving: bool) -> None:
     heavy = bool(scene.gravity.any())
-    idle_density = "mass_density" in asked.get(scene.shell, {}) and not moving
+    dense = any("mass_density" in asked.get(body, {}) for body in scene.bodies)
+    idle_density = dense and not moving
     if not heavy and ("gravity" in asked.get(scene, {}) or idle_density):
         raise ValueError(
             "gravity or mass_density was given, but the scene has no gravity: Scene(..., gravity=...)"

@@ -97,7 +97,7 @@ def solve(inputs: Inputs, state: np.ndarray, memory: list, from_, to, options, p
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
     positions = scene._model.positions(found.state)
-    warn_of_caps(scene, positions, inputs.values.shell, result.energies["bending"], "this equilibrium")
+    warn_of_caps(scene, positions, inputs.values.whole, result.energies["bending"], "this equilibrium")
     warn_if_large(
         result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
     )
@@ -114,7 +114,7 @@ def _energies(scene: Scene, found) -> dict[str, float] | None:
 
 def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_time: float) -> Equilibrium:
     positions, edge_rotations = _outputs(inputs, found)
-    strain = largest_of(scene, found.state, inputs.values.shell.thickness)
+    strain = largest_of(scene, found.state, inputs.values.whole.thickness)
     return Equilibrium(
         scene=scene,
         positions=positions,

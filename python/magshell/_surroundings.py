@@ -10,12 +10,12 @@ def obstacles_of(contacts) -> tuple:
     return tuple({id(each): each for contact in contacts for each in contact.obstacles}.values())
 
 
-def contact_inputs(contacts, mesh) -> list[dict]:
+def contact_inputs(contacts, bodies) -> list[dict]:
     """What of the contacts no solve can change."""
     numbers = {id(each): k for k, each in enumerate(obstacles_of(contacts))}
     inputs = []
     for contact in contacts:
-        vertices, weights = contact.points(mesh)
+        vertices, weights = bodies.contact_points(contact)
         inputs.append(
             {
                 "obstacles": [numbers[id(each)] for each in contact.obstacles],
@@ -42,11 +42,14 @@ def poses(obstacles, times: np.ndarray) -> np.ndarray:
 KINKED = 0.3  # rad, by which normals of smooth bodies do not turn within the smoothing of a contact
 
 
-def near_kinks(contact, obstacles, shell, positions: np.ndarray, time: float) -> np.ndarray:
-    """Vertices (k,) of points that touch one of the obstacles closer than the smoothing to a kink of its distance."""
-    vertices, weights = contact.points(shell.mesh)
+def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: float) -> np.ndarray:
+    """Vertices (k,) of points that touch one of the obstacles closer than the smoothing to a kink of its distance.
+
+    sheets: those that touch, as they are in this solve.
+    """
+    vertices, weights = bodies.contact_points(contact)
     places = np.einsum("pk,pkc->pc", weights, positions[vertices])
-    reach = contact.law(shell)[1] * np.concatenate([np.eye(3), -np.eye(3)])
+    reach = contact.law(*sheets)[1] * np.concatenate([np.eye(3), -np.eye(3)])
     found = [np.zeros(0, dtype=vertices.dtype)]
     for obstacle in obstacles:
         touching = obstacle.signed_distance(places, time) < contact.offset
@@ -60,13 +63,16 @@ def near_kinks(contact, obstacles, shell, positions: np.ndarray, time: float) ->
 
 def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
     """A body that starts deeper in an obstacle than half its thickness would be shot out of it."""
+    allowed = np.empty(scene.mesh.n_vertices)
+    for part, sheet in zip(scene._bodies.parts, values.sheets, strict=True):
+        allowed[part.vertices] = 0.5 * np.max(sheet.thickness)
     for contact in scene.contacts:
-        vertices, weights = contact.points(scene.mesh)
+        vertices, weights = scene._bodies.contact_points(contact)
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])
         offset = values.current(contact).offset
         for obstacle in contact.obstacles:
             depth = offset - values.current(obstacle).signed_distance(where, time)
-            inside = np.flatnonzero(depth > 0.5 * np.max(values.shell.thickness))
+            inside = np.flatnonzero(depth > allowed[vertices[:, 0]])
             if inside.size:
                 worst = inside[np.argmax(depth[inside])]
                 touched = np.unique(vertices[inside][vertices[inside] >= 0])

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from . import _constraints
+from ._bodies import Whole, joined
+from .shell import Shell
 
 
 class Values:
     """A scene's values, its own or with `replaced`: {object of the scene: {name: array}}.
 
-    The scene itself has the names "gravity" and "vertex_loads". magnetization: (n_f, 3) A/m, of a scene in a field.
+    The scene itself has the names "gravity" and "vertex_loads". magnetization: (n_f of all, 3) A/m, of a scene in a field,
+    in place of the bodies' own.
     numbers: (n,), all of them, in the core's layout.
     Raises ValueError where a value does not fit.
     """
@@ -25,7 +28,7 @@ class Values:
         self._now = {
             item: item.replaced(**values) for item, values in (replaced or {}).items() if item is not scene
         }
-        self.shell = self.current(scene.shell)
+        self.sheets = tuple(self.current(body) for body in scene.bodies)
         self.constraints = scene._constraints
         if any(support in self._now for support in scene.supports):
             self.constraints = self._moved()
@@ -35,11 +38,12 @@ class Values:
         for owner, label in scene._labels:
             self.current(owner).add_numbers(label, self, numbers)
         if ("gravity", "forces") in scene._value_layout:
-            numbers["gravity", "forces"] = self.shell.vertex_masses[:, None] * self.gravity
+            numbers["gravity", "forces"] = self.vertex_masses[:, None] * self.gravity
         if "vertex_loads" in own:
             numbers["loads", "forces"] = own["vertex_loads"]
         if magnetization is not None:
-            numbers["body 0", "remanent_magnetization"] = magnetization
+            for k, part in enumerate(scene._bodies.parts):
+                numbers[f"body {k}", "remanent_magnetization"] = magnetization[part.faces]
         self.numbers = scene._value_layout.packed(numbers)
 
     def same_as(self, other: Values) -> bool:
@@ -54,15 +58,37 @@ class Values:
         if ("loads", "forces") in self.scene._value_layout:
             found["vertex_loads"] = gradient.value("loads", "forces")
         if (by_weights := self.by_weights(gradient)) is not None:
-            found["gravity"] = self.shell.vertex_masses @ by_weights
+            found["gravity"] = self.vertex_masses @ by_weights
         return found
 
     @property
     def contacts(self) -> list[tuple]:
-        """(contact, its label) of all, as they are in this solve."""
-        return [
-            (self.current(each), label) for each, label in self.scene._labels if each in self.scene.contacts
-        ]
+        """(contact, its label, the sheets that touch) of all, as they are in this solve."""
+        labels = [(each, label) for each, label in self.scene._labels if each in self.scene.contacts]
+        return [(self.current(each), label, self.touching(each)) for each, label in labels]
+
+    @property
+    def whole(self) -> Shell | Whole:
+        """All sheets as one, for what looks at their faces."""
+        return self.sheets[0] if len(self.sheets) == 1 else Whole(self.scene.mesh, self.sheets)
+
+    def touching(self, contact) -> tuple:
+        """The sheets that a contact is about, as they are in this solve."""
+        return self.sheets[self.scene._bodies.of(contact).bodies]
+
+    def part_of(self, sheet):
+        """Where one of `sheets` stands among them."""
+        return next(
+            part for part, each in zip(self.scene._bodies.parts, self.sheets, strict=True) if each is sheet
+        )
+
+    @property
+    def vertex_masses(self) -> np.ndarray:
+        """Of all bodies, (n_v,), kg. Raises ValueError where one has no mass density."""
+        for k, sheet in enumerate(self.sheets):
+            if sheet.mass_density is None and len(self.sheets) > 1:
+                raise ValueError(f"body {k} of the scene has no mass_density [kg/m3]")
+        return joined([sheet.vertex_masses for sheet in self.sheets])
 
     def by_masses(self, gradient: Gradient) -> np.ndarray | None:
         """By the masses of the vertices (n_v,), of gravity and of inertia; None where they have no part."""
@@ -85,7 +111,7 @@ class Values:
         """The same constraints with other motions."""
         scene = self.scene
         supports = [self.current(support) for support in scene.supports]
-        moved = _constraints.gather(scene.mesh, supports, scene._couple_directions)
+        moved = _constraints.gather(scene._bodies, supports, scene._couple_directions)
         if not np.array_equal(moved.held_nodes, scene._constraints.held_nodes):
             raise ValueError(
                 "a support that stays cannot be moved by a solve: "
@@ -104,6 +130,9 @@ class Gradient:
         self._scene, self._values, self._controls = scene, values, controls
         self.others = others or {}
 
+    def has(self, owner: str, name: str) -> bool:
+        return (owner, name) in self._scene._value_layout
+
     def value(self, owner: str, name: str) -> np.ndarray:
         return self._scene._value_layout.part(self._values, owner, name)
 
@@ -112,6 +141,6 @@ class Gradient:
         if name in self.others:
             return self.others[name]
         if name == "remanent_magnetization":
-            return self.value("body 0", name)
+            return joined([self.value(f"body {k}", name) for k in range(len(self._scene.bodies))])
         by_control = self._scene._control_layout.part(self._controls, "scene", name)
         return by_control[..., 0, :] if name == "applied_flux_density" else by_control[..., 0]

@@ -98,7 +98,7 @@ def linear_buckling(
         displacement = float(np.abs(model.positions(response)).max())
         change = _stiffness_change(scene, stiffness, response, displacement, inputs)
     factors, vectors = _lowest(
-        stiffness, change, modes, _LARGEST_DISPLACEMENT * scene.mesh.size, displacement
+        stiffness, change, modes, _LARGEST_DISPLACEMENT * scene._bodies.size, displacement
     )
     shapes, edge_rotations = mode_shapes(model, vectors)
     return Buckling(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bodies import checked_body, joined, on_body
 from ._checked_list import checked_list
 from ._owner import Owner
 from ._quantity import quantity
 from ._selections import indices, selection
 from .mesh import TriangleMesh
 from .obstacles import Obstacle
+from .shell import Shell
 
 _FACE_POINTS = {  # barycentric coordinates of the points on a face
     0: np.zeros((0, 3)),
@@ -17,7 +19,7 @@ _FACE_POINTS = {  # barycentric coordinates of the points on a face
     3: np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0,
 }
 _SMOOTHING = 1e-2  # of the mean thickness
-_STICKING = 1e-2  # of the sheet's extent, a second
+_STICKING = 1e-2  # of the largest sheet's extent, a second
 
 
 class Contact(Owner):
@@ -27,13 +29,15 @@ class Contact(Owner):
     contact_stiffness: N/m, of every point: a force that grows with the depth, from a short parabola on.
     friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
     sticking_speed: m/s. Below it friction holds: a point that carries a share r of its greatest friction creeps at
-        sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's extent in a second.
+        sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's extent in a second
+        (of the largest where there are several).
     smoothing: m, the length of the parabola; by default a hundredth of the thickness.
     offset: m, the distance from the obstacle at which the force begins; half the thickness lets the face of the sheet
         touch instead of its middle surface.
     lagged_friction: take normal forces and normals of friction from the beginning of each step. The matrix stays
         symmetric; the friction is late by a step.
     vertices: those that touch; all by default.
+    body: the Shell that touches; by default all, where no vertices are given.
     face_samples: points on every face that touch too: 0, 1 or 3, for meshes that are coarse beside the obstacle.
 
     >>> import magshell as ms
@@ -60,7 +64,9 @@ class Contact(Owner):
         lagged_friction: bool = False,
         vertices=None,
         face_samples: int = 0,
+        body: Shell | None = None,
     ):
+        self.body = checked_body(body)
         listed = checked_list("obstacles", obstacles, (Obstacle,), "objects of ms.obstacles")
         if not listed or len({id(item) for item in listed}) < len(listed):
             raise ValueError("obstacles must hold at least one obstacle, and each of them once")
@@ -101,12 +107,18 @@ class Contact(Owner):
                 "lagged_friction": self.lagged_friction,
                 "vertices": self.vertices,
                 "face_samples": self.face_samples,
+                "body": self.body,
                 **values,
             },
         )
 
+    @property
+    def for_all(self) -> bool:
+        """Whether it is about all bodies where it names none."""
+        return self.vertices is None
+
     def points(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """What touches: vertices (k, 3), -1 where there are fewer, and their weights (k, 3); those on faces last."""
+        """What of a body touches: vertices (k, 3), -1 where there are fewer, and weights (k, 3); those on faces last."""
         chosen = np.arange(mesh.n_vertices) if self.vertices is None else None
         if chosen is None:
             chosen = indices("Contact vertices", self.vertices, mesh.n_vertices)
@@ -120,30 +132,31 @@ class Contact(Owner):
             np.concatenate([np.tile([1.0, 0.0, 0.0], (len(alone), 1)), np.tile(weights, (len(faces), 1))]),
         )
 
-    def law(self, shell) -> tuple[float, ...]:
-        """The numbers of `_replaceable` for this sheet: N/m, m, m, 1, m/s."""
-        extent = np.linalg.norm(np.ptp(shell.mesh.rest_positions, axis=0))
+    def law(self, *sheets: Shell) -> tuple[float, ...]:
+        """The numbers of `_replaceable` for the sheets that touch: N/m, m, m, 1, m/s."""
+        extent = max(np.linalg.norm(np.ptp(sheet.mesh.rest_positions, axis=0)) for sheet in sheets)
+        thickness = joined([sheet.thickness for sheet in sheets])
         return (
             self.contact_stiffness,
-            _SMOOTHING * float(np.mean(shell.thickness)) if self.smoothing is None else self.smoothing,
+            _SMOOTHING * float(np.mean(thickness)) if self.smoothing is None else self.smoothing,
             self.offset,
             self.friction_coefficient or 0.0,
             _STICKING * extent if self.sticking_speed is None else self.sticking_speed,
         )
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
-        for name, number in zip(self._replaceable, self.law(values.shell), strict=True):
+        for name, number in zip(self._replaceable, self.law(*values.touching(self)), strict=True):
             numbers[label, name] = number
 
-    def by_thickness(self, label: str, shell, gradient) -> np.ndarray:
-        """By the sheet's thickness (n_f,), which a default in `law` is made from."""
+    def by_thickness(self, label: str, sheets, gradient) -> float:
+        """By the thickness of each face of the sheets that touch, which a default in `law` is made from."""
         by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
-        return np.full(shell.thickness.shape, _SMOOTHING * by_smoothing / shell.thickness.size)
+        return _SMOOTHING * by_smoothing / sum(sheet.thickness.size for sheet in sheets)
 
     def __repr__(self) -> str:
         friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
         with_what = ", ".join(repr(each) for each in self.obstacles)
-        return f"Contact({with_what}; {self.contact_stiffness:g} N/m{friction})"
+        return f"Contact({with_what}; {self.contact_stiffness:g} N/m{friction}{on_body(self.body)})"
 
 
 def _positive(name: str, unit: str, value) -> float:

@@ -168,7 +168,7 @@ def simulate(
     most = int(np.argmax(bending))
     positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
     where = f"the motion, at {result.times[most]:.4g} s,"
-    warn_of_caps(scene, positions, inputs.values.shell, bending[most], where)
+    warn_of_caps(scene, positions, inputs.values.whole, bending[most], where)
     _warn(result)
     return result
 
@@ -185,10 +185,10 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     scene, model, values = asked.inputs.scene, asked.inputs.scene._model, asked.inputs.values
     positions, edge_rotations, velocities = _outputs(asked, found)
     recorded = len(found.kinetic_energy)
-    names, ended = model.term_names, asked.clock.after(found.steps_done)
-    thickness = asked.inputs.values.shell.thickness
+    ended = asked.clock.after(found.steps_done)
+    thickness = values.whole.thickness
     strain = StrainHistory.of(found.largest_strains(model, thickness))
-    by_term = np.array(found.energies).reshape(recorded, len(names))
+    by_term = np.array(found.energies).reshape(recorded, -1)
     return Trajectory(
         scene=scene,
         integrator=asked.integrator,
@@ -199,7 +199,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         remanent_magnetization=asked.inputs.given_magnetization,
         applied_flux_density=asked.recorded("applied_flux_density", recorded),
         kinetic_energy=np.array(found.kinetic_energy),
-        energies={name: by_term[:, k] for k, name in enumerate(names)},
+        energies=_by_name(model.term_names, by_term),
         largest_membrane_strain=strain.membrane,
         largest_bending_strain=strain.bending,
         steps=asked.steps,
@@ -227,10 +227,23 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         _thickness=thickness,
         _directions=found.directions(model),
         _placed=[
-            (values.current(contact), [values.current(each) for each in contact.obstacles], values.shell)
+            (
+                values.current(contact),
+                [values.current(each) for each in contact.obstacles],
+                values.touching(contact),
+                scene._bodies,
+            )
             for contact in scene.contacts
         ],
     )
+
+
+def _by_name(names: list[str], by_term: np.ndarray) -> dict[str, np.ndarray]:
+    """Of each (n, terms), (n,); those of one name, of several bodies, as one."""
+    sums: dict[str, np.ndarray] = {}
+    for name, each in zip(names, by_term.T, strict=True):
+        sums[name] = sums[name] + each if name in sums else each
+    return sums
 
 
 def _outputs(asked: MotionInputs, found):

@@ -6,8 +6,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from ._body_result import BodyResult
 from ._tensors import is_tensor
 from .equilibrium import Equilibrium
+from .shell import Shell
 
 
 class Equilibria(Sequence):
@@ -61,6 +63,9 @@ class Equilibria(Sequence):
         return len(self._cases)
 
     def __getitem__(self, index):
+        """A case, some of them, or what all say of one body of the scene."""
+        if isinstance(index, Shell):
+            return BodyResult(self, index)
         chosen = self._cases[index]
         return Equilibria(chosen) if isinstance(index, slice) else chosen
 

@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from ._body_result import BodyResult
 from ._crossings import told
 from ._tensors import detached
 from .scene import Scene
+from .shell import Shell
 from .strains import Largest, Strains, strains_of
 
 
 @dataclass(frozen=True, repr=False)
 class Equilibrium:
-    """A scene at rest.
+    """A scene at rest. With several bodies, rows are those of one after another; `equilibrium[body]` has those of one.
 
     positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
     remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
@@ -59,6 +61,10 @@ class Equilibrium:
             "edge_rotations and energies"
         )
 
+    def __getitem__(self, body: Shell) -> BodyResult:
+        """What it says of one body of the scene."""
+        return BodyResult(self, body)
+
     @property
     def displacements(self):
         """(n_v, 3) m, from the rest shape."""
@@ -83,7 +89,7 @@ class Equilibrium:
         >>> rest.strains().membrane[0].round(3)  # (1.1^2 - 1)/2 along, nothing across
         array([0.105, 0.   ])
         """
-        return strains_of(self.scene, self._state, self._values.shell.thickness)
+        return strains_of(self.scene, self._state, self._values.whole.thickness)
 
     def self_intersections(self) -> np.ndarray:
         """The faces that pass through each other, as in TriangleMesh.self_intersections, (k, 2)."""

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bodies import checked_body
 from ._owner import Owner
 from ._quantity import quantity, real_numbers
 from ._selections import indices, selection
 from .mesh import TriangleMesh
+from .shell import Shell
 
 
 class DeadLoad(Owner):
-    """Forces that keep size and direction, given by one value: so much of it on each of some parts of the mesh."""
+    """Forces that keep size and direction, given by one value: so much of it on each of some parts of the mesh.
 
-    def __init__(self, label: str, values):
+    body: the Shell that they act on, or None. Meshes are that body's, and so are indices.
+    """
+
+    for_all = False  # whether it acts on all bodies where it names none
+
+    def __init__(self, label: str, values, body: Shell | None):
         """label: the name and unit of the value."""
-        self._label = label
+        self._label, self.body = label, checked_body(body)
         setattr(self, self._replaceable[0], _vectors(*label.rstrip("]").split(" [", 1), values))
 
     def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
@@ -26,11 +33,15 @@ class DeadLoad(Owner):
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         key = ("loads", "forces")
-        numbers[key] = numbers.get(key, 0.0) + self.vertex_forces(values.scene.mesh)
+        part = values.scene._bodies.of(self)
+        forces = np.zeros((values.scene.mesh.n_vertices, 3)) if key not in numbers else numbers[key]
+        forces[part.vertices] += self.vertex_forces(part.mesh)
+        numbers[key] = forces
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
-        vertices, weights = self._shares(values.scene.mesh)
-        by_forces = gradient.value("loads", "forces")
+        part = values.scene._bodies.of(self)
+        vertices, weights = self._shares(part.mesh)
+        by_forces = gradient.value("loads", "forces")[part.vertices]
         return {self._replaceable[0]: by_forces[vertices].sum(axis=1) * weights}
 
     def _shares(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
@@ -39,16 +50,19 @@ class DeadLoad(Owner):
 
 
 class PointLoad(DeadLoad):
-    """A force [N] on each of some vertices: `force` (3,) on every one of them, or (k, 3), one each."""
+    """A force [N] on each of some vertices: `force` (3,) on every one of them, or (k, 3), one each.
+
+    body: the Shell whose vertices they are, in a scene of several.
+    """
 
     _replaceable = ("force",)
 
-    def __init__(self, vertices, force):
+    def __init__(self, vertices, force, body: Shell | None = None):
         self.vertices = selection("PointLoad vertices", vertices)
-        super().__init__("force [N]", force)
+        super().__init__("force [N]", force, body)
 
     def replaced(self, *, force) -> PointLoad:
-        return PointLoad(self.vertices, force)
+        return PointLoad(self.vertices, force, self.body)
 
     def _shares(self, mesh: TriangleMesh):
         vertices = indices("PointLoad vertices", self.vertices, mesh.n_vertices)
@@ -56,16 +70,19 @@ class PointLoad(DeadLoad):
 
 
 class EdgeLoad(DeadLoad):
-    """A force per rest length [N/m] along some edges, half to each end: (3,) or (k, 3), one an edge."""
+    """A force per rest length [N/m] along some edges, half to each end: (3,) or (k, 3), one an edge.
+
+    body: the Shell whose edges they are, in a scene of several.
+    """
 
     _replaceable = ("force_per_length",)
 
-    def __init__(self, edges, force_per_length):
+    def __init__(self, edges, force_per_length, body: Shell | None = None):
         self.edges = selection("EdgeLoad edges", edges)
-        super().__init__("force_per_length [N/m]", force_per_length)
+        super().__init__("force_per_length [N/m]", force_per_length, body)
 
     def replaced(self, *, force_per_length) -> EdgeLoad:
-        return EdgeLoad(self.edges, force_per_length)
+        return EdgeLoad(self.edges, force_per_length, self.body)
 
     def _shares(self, mesh: TriangleMesh):
         edges = indices("EdgeLoad edges", self.edges, mesh.n_edges)
@@ -73,16 +90,20 @@ class EdgeLoad(DeadLoad):
 
 
 class AreaLoad(DeadLoad):
-    """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face."""
+    """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face.
+
+    body: the Shell that it acts on; by default all, where no faces are given.
+    """
 
     _replaceable = ("force_per_area",)
 
-    def __init__(self, force_per_area, faces=None):
+    def __init__(self, force_per_area, faces=None, body: Shell | None = None):
         self.faces = None if faces is None else selection("AreaLoad faces", faces)
-        super().__init__("force_per_area [N/m2]", force_per_area)
+        self.for_all = faces is None
+        super().__init__("force_per_area [N/m2]", force_per_area, body)
 
     def replaced(self, *, force_per_area) -> AreaLoad:
-        return AreaLoad(force_per_area, self.faces)
+        return AreaLoad(force_per_area, self.faces, self.body)
 
     def _shares(self, mesh: TriangleMesh):
         faces = (
@@ -99,11 +120,14 @@ class EdgeCouple(Owner):
     couple_per_length: a number, about the edge's direction with the sheet on its left (seen from the side its normals
         point to); positive lifts nothing but turns as a right hand along that direction does. Or a vector (3,), of which
         the part along each rest edge counts. The axis follows the edge.
+    body: the Shell whose edges they are, in a scene of several.
     """
 
     _replaceable = ("couple_per_length",)
+    for_all = False
 
-    def __init__(self, edges, couple_per_length):
+    def __init__(self, edges, couple_per_length, body: Shell | None = None):
+        self.body = checked_body(body)
         self.edges = selection("EdgeCouple edges", edges)
         array = real_numbers("couple_per_length [N]", couple_per_length)
         if array.shape not in ((), (3,)):
@@ -117,17 +141,20 @@ class EdgeCouple(Owner):
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         key, turned = ("couples", "couples"), values.scene._couple_edges
-        edges, couples = self.edge_couples(values.scene.mesh)
-        by_edge = np.bincount(edges, weights=couples, minlength=values.scene.mesh.n_edges)
+        part = values.scene._bodies.of(self)
+        edges, couples = self.edge_couples(part.mesh)
+        n_edges = values.scene.mesh.n_edges
+        by_edge = np.bincount(part.first_edge + edges, weights=couples, minlength=n_edges)
         numbers[key] = numbers.get(key, 0.0) + by_edge[turned]
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
-        edges, along = self._along(values.scene.mesh)
-        of_edges = np.searchsorted(values.scene._couple_edges, edges)
+        part = values.scene._bodies.of(self)
+        edges, along = self._along(part.mesh)
+        of_edges = np.searchsorted(values.scene._couple_edges, part.first_edge + edges)
         return {"couple_per_length": gradient.value("couples", "couples")[of_edges] @ along}
 
     def replaced(self, *, couple_per_length) -> EdgeCouple:
-        changed = EdgeCouple(self.edges, couple_per_length)
+        changed = EdgeCouple(self.edges, couple_per_length, self.body)
         if changed.couple_per_length.shape != self.couple_per_length.shape:
             raise ValueError(
                 f"couple_per_length [N] must keep its shape {self.couple_per_length.shape}, "

@@ -81,7 +81,7 @@ class Path:
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face at one of the points, by default the last."""
-        return strains_of(self.scene, self._points[index].state, self._inputs.values.shell.thickness)
+        return strains_of(self.scene, self._points[index].state, self._inputs.values.whole.thickness)
 
     @property
     def applied_flux_densities(self) -> np.ndarray:
@@ -213,7 +213,7 @@ def follow(
     if len(bending):
         most = int(np.argmax(bending))
         where = f"the path, at parameter {path.parameters[most]:.4g},"
-        warn_of_caps(scene, path.positions[most], inputs.values.shell, bending[most], where)
+        warn_of_caps(scene, path.positions[most], inputs.values.whole, bending[most], where)
     strain = StrainHistory(path.largest_membrane_strain, path.largest_bending_strain)
     k = strain.worst
     warn_if_large(path, strain.at(k), f"the path, at point {k}, parameter {path.parameters[k]:.4g}", (k,))
@@ -242,7 +242,7 @@ def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
     scene = inputs.scene
     model = scene._model
     points = found.points
-    thickness = inputs.values.shell.thickness
+    thickness = inputs.values.whole.thickness
     strain = StrainHistory.of([model.largest_strains(point.state, thickness) for point in points])
     return Path(
         scene=scene,

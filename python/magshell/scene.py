@@ -1,14 +1,16 @@
-"""A scene: a shell, how it is held, and what acts on it."""
+"""A scene: one shell or several, how they are held, and what acts on them."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 from contextlib import contextmanager
 from functools import cached_property
 
 import numpy as np
 
 from . import _constraints, _core, _surroundings
+from ._bodies import Bodies
 from ._caps import Caps
 from ._checked_list import checked_list
 from ._layout import Layout
@@ -17,6 +19,7 @@ from ._values import Values
 from .contact import Contact
 from .field import AppliedField, UniformField
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
+from .mesh import TriangleMesh
 from .shell import Shell
 from .supports import Clamp, Pin, SymmetryPlane, continuations
 from .water import Water
@@ -29,11 +32,12 @@ class Scene:
     """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
     needs and, up to 256 MB, the memory of its last factorization.
 
-    shell: Shell.
-    supports: Pin, Clamp and SymmetryPlane objects.
-    loads: PointLoad, EdgeLoad, AreaLoad and EdgeCouple objects.
+    bodies: a Shell, or several that do not touch each other. Positions and faces of a result are those of one body after
+        another, and `result[body]` has those of one; each may have its own `bending`.
+    supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
+    loads: PointLoad, EdgeLoad, AreaLoad and EdgeCouple objects; likewise.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
-    gravity: (3,), m/s2; needs the shell's mass density.
+    gravity: (3,), m/s2; needs the mass density of all bodies.
     contacts: Contact objects, each with the obstacles that it is about.
     water: what the sheet moves through, in ms.simulate only.
     allow_rigid_motions: accept a scene that supports do not hold entirely, because a field or gravity does.
@@ -43,13 +47,24 @@ class Scene:
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5)
     >>> ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField()).n_unknowns
     160
+
+    >>> other = ms.Shell(mesh.transformed(translation=(0, 0, 0.05)), thickness=5e-4, young_modulus=1e5, bending="hinge")
+    >>> held = [ms.Clamp(mesh.edges_at(x=0.0), body=body) for body in (sheet, other)]
+    >>> pair = ms.Scene([sheet, other], supports=held, field=ms.UniformField())
+    >>> rest = ms.equilibrium(
+    ...     pair,
+    ...     applied_flux_density=(0, 0, 1e-4),
+    ...     values={sheet: {"remanent_magnetization": (2e4, 0, 0)}, other: {"remanent_magnetization": (-1e4, 0, 0)}},
+    ... )
+    >>> rest[other].positions.shape, bool(rest[sheet].displacements[-1, 2] > 0 > rest[other].displacements[-1, 2])
+    ((33, 3), True)
     """
 
     _replaceable = ("gravity", "vertex_loads")
 
     def __init__(
         self,
-        shell: Shell,
+        bodies: Shell | Iterable[Shell],
         *,
         supports=(),
         loads=(),
@@ -59,9 +74,7 @@ class Scene:
         water: Water | None = None,
         allow_rigid_motions: bool = False,
     ):
-        if not isinstance(shell, Shell):
-            raise ValueError(f"shell must be a Shell, got {type(shell).__name__}")
-        self.shell = shell
+        self._bodies = Bodies(bodies)
         self.supports = checked_list("supports", supports, _SUPPORTS)
         self.loads = checked_list("loads", loads, _LOADS)
         self.fields = () if field is None else checked_list("field", field, (AppliedField,))
@@ -85,7 +98,7 @@ class Scene:
     def __getstate__(self) -> dict:
         """What a copy, or another process, makes the scene from again."""
         return {
-            "shell": self.shell,
+            "bodies": self.bodies,
             "supports": self.supports,
             "loads": self.loads,
             "field": self.fields,
@@ -99,14 +112,14 @@ class Scene:
         self.__init__(**arguments)
 
     def _build(self, allow_rigid_motions: bool) -> None:
-        shell, mesh = self.shell, self.shell.mesh
-        edges = _couple_edges(mesh, self.loads)
+        bodies, mesh = self._bodies, self.mesh
+        edges = _couple_edges(bodies, self.loads)
         self._couple_directions = _couple_directions(mesh, edges)
-        constraints = _constraints.gather(mesh, self.supports, self._couple_directions)
+        constraints = _constraints.gather(bodies, self.supports, self._couple_directions)
         held = np.intersect1d(edges, constraints.directed_edges[:, 0])
         if held.size:
             raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
-        free = [] if allow_rigid_motions else _constraints.free_rigid_motions(mesh, constraints)
+        free = [] if allow_rigid_motions else _constraints.free_rigid_motions(bodies, constraints)
         if free:
             raise ValueError(
                 f"the supports leave the sheet free: {'; '.join(free)}. Hold it, or say allow_rigid_motions=True if a "
@@ -119,28 +132,18 @@ class Scene:
         self._warned_of_strain = 0.0
         self._model = _core.Model(
             n_vertices=mesh.n_vertices,
-            sheets=[
-                {
-                    "owner": "body 0",
-                    "mesh": mesh._core,
-                    "vertices": np.arange(mesh.n_vertices),
-                    "curvature_scale": shell.curvature_scale,
-                    "directors": shell.bending == "midedge",
-                    "magnetic": bool(self.fields),
-                    "directed_edges": constraints.directed_edges,
-                }
-            ],
+            sheets=self._sheets(constraints),
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
             held_frames=constraints.held_frames,
             motions=len(constraints.motions),
             couples=np.stack(
-                [np.zeros(n_couples), edges, n_directions - n_couples + np.arange(n_couples)], axis=1
+                [*bodies.split(edges), n_directions - n_couples + np.arange(n_couples)], axis=1
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
             loads=any(not isinstance(load, EdgeCouple) for load in self.loads),
             field_sources=[source._core for source in self._sources],
-            contacts=_surroundings.contact_inputs(self.contacts, mesh),
+            contacts=_surroundings.contact_inputs(self.contacts, bodies),
             obstacles=[{"shape": each._core, "moves": each.motion is not None} for each in self.obstacles],
             water=None if self.water is None else self.water._core,
         )
@@ -150,6 +153,23 @@ class Scene:
         self._values = self._in_core = Values(self)
         self._model.set_values(self._values.numbers)
 
+    def _sheets(self, constraints: _constraints.Constraints) -> list[dict]:
+        """The bodies as the core takes them."""
+        of, edges = self._bodies.split(constraints.directed_edges[:, 0])
+        pairs = np.stack([edges, constraints.directed_edges[:, 1]], axis=1).astype(np.int32)
+        return [
+            {
+                "owner": f"body {k}",
+                "mesh": part.mesh._core,
+                "vertices": np.arange(part.vertices.start, part.vertices.stop),
+                "curvature_scale": shell.curvature_scale,
+                "directors": shell.bending == "midedge",
+                "magnetic": bool(self.fields),
+                "directed_edges": pairs[of == k],
+            }
+            for k, (shell, part) in enumerate(zip(self.bodies, self._bodies.parts, strict=True))
+        ]
+
     @property
     def _sources(self) -> list[AppliedField]:
         return [field for field in self.fields if not isinstance(field, UniformField)]
@@ -158,7 +178,7 @@ class Scene:
     def _labels(self) -> list[tuple[object, str]]:
         """Every object of it with the name that the core has for its values."""
         kinds = (
-            ("body", (self.shell,)),
+            ("body", self.bodies),
             ("support", self.supports),
             ("load", self.loads),
             ("field", self._sources),
@@ -182,18 +202,30 @@ class Scene:
 
     @cached_property
     def _caps(self) -> Caps:
-        return Caps(self.shell, self._model.recut_faces)
+        return Caps(self._values.whole, self._model.recut_faces)
 
     @property
-    def mesh(self):
-        return self.shell.mesh
+    def bodies(self) -> tuple[Shell, ...]:
+        return self._bodies.shells
+
+    @property
+    def shell(self) -> Shell:
+        """The one body. Raises ValueError where there are several."""
+        if len(self.bodies) > 1:
+            raise ValueError(f"the scene has {len(self.bodies)} bodies: say which, scene.bodies[k]")
+        return self.bodies[0]
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """Of all bodies: vertices, edges and faces of one after another."""
+        return self._bodies.mesh
 
     @property
     def parts(self) -> tuple:
         """Every object of it, always in the same order. What a solve's `values` may name beside the scene itself."""
         water = () if self.water is None else (self.water,)
         return (
-            self.shell,
+            *self.bodies,
             *self.supports,
             *self.loads,
             *self.fields,
@@ -219,11 +251,14 @@ class Scene:
         return self._model.free_size
 
     def __repr__(self) -> str:
-        lines = [f"Scene: {self.shell!r}"]
-        lines += [f"  held by {support!r}" for support in self.supports]
-        lines += [f"  loaded by {type(load).__name__}" for load in self.loads]
+        several = len(self.bodies) > 1
+        lines = [f"Scene: {len(self.bodies)} bodies" if several else f"Scene: {self.bodies[0]!r}"]
+        if several:
+            lines += [f"  body {k}: {body!r}" for k, body in enumerate(self.bodies)]
+        lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
+        lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
         lines += [f"  in {field!r}" for field in self.fields]
-        lines += [f"  kept out by {contact!r}" for contact in self.contacts]
+        lines += [f"  kept out by {contact!r}{self._whose(contact)}" for contact in self.contacts]
         if self.water is not None:
             lines.append(f"  in {self.water!r}")
         if self.gravity.any():
@@ -231,10 +266,17 @@ class Scene:
         lines.append(f"  {self.n_unknowns} unknowns")
         return "\n".join(lines)
 
+    def _whose(self, item) -> str:
+        """For the repr of a scene with several bodies."""
+        if len(self.bodies) == 1 or item.body is None:
+            return ""
+        return f" (body {self._bodies.number(item.body)})"
 
-def _couple_edges(mesh, loads) -> np.ndarray:
-    """Edges that couples turn, ascending, (k,)."""
-    edges = [load.edge_couples(mesh)[0] for load in loads if isinstance(load, EdgeCouple)]
+
+def _couple_edges(bodies: Bodies, loads) -> np.ndarray:
+    """The scene's edges that couples turn, ascending, (k,)."""
+    places = [(load, bodies.of(load)) for load in loads if isinstance(load, EdgeCouple)]
+    edges = [part.first_edge + load.edge_couples(part.mesh)[0] for load, part in places]
     return np.unique(np.concatenate(edges)) if edges else np.zeros(0, dtype=np.int64)
 
 

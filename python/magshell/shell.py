@@ -28,13 +28,21 @@ class Shell(Owner):
     bending: "midedge" (second order on irregular meshes too, see `quality`; one rotation an edge: the lowest-order
         Hellan-Herrmann-Johnson element), or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several percent on
         irregular meshes).
+    remanent_magnetization: (3,) or (n_f, 3) A/m, in a scene with a field, where a solve says nothing else.
 
     >>> import magshell as ms
     >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)
     Shell(40 faces, thickness 0.001 m, young_modulus 100000 Pa, poisson_ratio 0.5, bending midedge)
     """
 
-    _replaceable = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "curvature_scale")
+    _replaceable = (
+        "thickness",
+        "young_modulus",
+        "poisson_ratio",
+        "mass_density",
+        "curvature_scale",
+        "remanent_magnetization",
+    )
 
     def __init__(
         self,
@@ -46,6 +54,7 @@ class Shell(Owner):
         mass_density=None,
         curvature_scale=1.0,
         bending: str = "midedge",
+        remanent_magnetization=None,
     ):
         if bending not in BENDING:
             raise ValueError(f"bending must be one of {BENDING}, got {bending!r}")
@@ -65,6 +74,9 @@ class Shell(Owner):
             None if mass_density is None else _positive("mass_density", "kg/m3", mass_density, faces)
         )
         self.curvature_scale = _positive("curvature_scale", "1", curvature_scale, ("n_e", mesh.n_edges))
+        self.remanent_magnetization = (
+            None if remanent_magnetization is None else magnetization_of(remanent_magnetization, mesh.n_faces)
+        )
 
     def replaced(self, **values) -> Shell:
         """The same sheet with other properties."""
@@ -74,7 +86,10 @@ class Shell(Owner):
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         for name in ("thickness", "young_modulus", "poisson_ratio", "curvature_scale"):
             numbers[label, name] = getattr(self, name)
-        numbers[label, "remanent_magnetization"] = np.zeros((self.mesh.n_faces, 3))  # a solve brings it
+        magnetization = self.remanent_magnetization
+        if magnetization is None:  # a solve brings it
+            magnetization = np.zeros((self.mesh.n_faces, 3))
+        numbers[label, "remanent_magnetization"] = magnetization
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
         """With what its values do to the masses of the vertices, and to what contacts make of the thickness."""
@@ -82,11 +97,14 @@ class Shell(Owner):
             name: gradient.value(label, name)
             for name in ("thickness", "young_modulus", "poisson_ratio", "curvature_scale")
         }
-        for contact, of_contact in values.contacts:
-            found["thickness"] = found["thickness"] + contact.by_thickness(of_contact, self, gradient)
+        if gradient.has(label, "remanent_magnetization"):
+            found["remanent_magnetization"] = gradient.value(label, "remanent_magnetization")
+        for contact, of_contact, sheets in values.contacts:
+            if any(self is sheet for sheet in sheets):
+                found["thickness"] = found["thickness"] + contact.by_thickness(of_contact, sheets, gradient)
         by_masses = values.by_masses(gradient)
         if by_masses is not None:
-            by_face = by_masses[self.mesh.faces].sum(axis=1) / 3.0
+            by_face = by_masses[values.part_of(self).vertices][self.mesh.faces].sum(axis=1) / 3.0
             found["thickness"] = found["thickness"] + by_face * self.mesh.face_areas * self.mass_density
             found["mass_density"] = by_face * self.face_volumes
         return found
@@ -122,6 +140,16 @@ class Shell(Owner):
             if values is not None:
                 parts.append(f"{name} {_range(values)}{unit}")
         return f"Shell({', '.join(parts)}, bending {self.bending})"
+
+
+def magnetization_of(given, n_faces: int) -> np.ndarray:
+    """(n_f, 3) A/m, of one vector for all faces or one a face."""
+    given = real_numbers("remanent_magnetization [A/m]", given)
+    if given.shape not in ((3,), (n_faces, 3)):
+        raise ValueError(
+            f"remanent_magnetization [A/m] must have shape (n_f, 3) = ({n_faces}, 3) or (3,), got {given.shape}"
+        )
+    return np.broadcast_to(quantity("remanent_magnetization", "A/m", given, given.shape), (n_faces, 3))
 
 
 def _property(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:

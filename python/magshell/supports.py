@@ -7,10 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._bodies import checked_body, on_body
 from ._owner import Owner
 from ._quantity import quantity
 from ._selections import indices, selection
 from .mesh import TriangleMesh
+from .shell import Shell
 
 _AXES = "xyz"
 _ORDERS = {"".join(axes) for n in (1, 2, 3) for axes in permutations(_AXES, n)}
@@ -50,7 +52,12 @@ class DirectedEdges(NamedTuple):
 
 
 class Support(Owner):
-    """What moves of a support are the rigid motions of the nodes that it holds, all alike."""
+    """What moves of a support are the rigid motions of the nodes that it holds, all alike.
+
+    body: the Shell that it holds, or None. Meshes are that body's, and so are indices.
+    """
+
+    for_all = False  # whether it holds all bodies where it names none
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         for owner, motion in self._motions(values):
@@ -76,6 +83,7 @@ class Pin(Support):
 
     displacement: (3,) m, where the pinned vertices are moved to while the solve goes on.
     rotation: (3,) rad, a rotation vector by which they are turned about `center` (3,) m, by default their mean.
+    body: the Shell whose vertices they are, in a scene of several.
 
     >>> import magshell as ms
     >>> ms.Pin([0, 1], components="z", displacement=(0, 0, 1e-3))
@@ -84,7 +92,17 @@ class Pin(Support):
 
     _replaceable = ("displacement", "rotation", "center")
 
-    def __init__(self, vertices, components: str = "xyz", *, displacement=None, rotation=None, center=None):
+    def __init__(
+        self,
+        vertices,
+        components: str = "xyz",
+        *,
+        displacement=None,
+        rotation=None,
+        center=None,
+        body: Shell | None = None,
+    ):
+        self.body = checked_body(body)
         self.vertices = selection("Pin vertices", vertices)
         if not isinstance(components, str) or components not in _ORDERS:
             raise ValueError(f'components must be some of "x", "y", "z", got {components!r}')
@@ -106,16 +124,20 @@ class Pin(Support):
 
     def replaced(self, **values) -> Pin:
         """The same Pin with another displacement, rotation or center."""
-        return Pin(self.vertices, self.components, **{**self._motion.as_arguments(), **values})
+        return Pin(
+            self.vertices, self.components, body=self.body, **{**self._motion.as_arguments(), **values}
+        )
 
     def __repr__(self) -> str:
-        return f"Pin({len(self.vertices)} vertices, components {self.components}{self._motion.summary()})"
+        done = self._motion.summary() + on_body(self.body)
+        return f"Pin({len(self.vertices)} vertices, components {self.components}{done})"
 
 
 class Clamp(Support):
     """Holds edges: the positions of their vertices and the direction of the sheet across them.
 
     displacement, rotation, center: as for Pin; the direction turns along.
+    body: the Shell whose edges they are, in a scene of several.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -125,7 +147,8 @@ class Clamp(Support):
 
     _replaceable = ("displacement", "rotation", "center")
 
-    def __init__(self, edges, *, displacement=None, rotation=None, center=None):
+    def __init__(self, edges, *, displacement=None, rotation=None, center=None, body: Shell | None = None):
+        self.body = checked_body(body)
         self.edges = selection("Clamp edges", edges)
         self._motion = _Motion(displacement, rotation, center)
 
@@ -140,7 +163,7 @@ class Clamp(Support):
 
     def replaced(self, **values) -> Clamp:
         """The same Clamp with another displacement, rotation or center."""
-        return Clamp(self.edges, **{**self._motion.as_arguments(), **values})
+        return Clamp(self.edges, body=self.body, **{**self._motion.as_arguments(), **values})
 
     def _checked(self, mesh: TriangleMesh) -> np.ndarray:
         return indices("Clamp edges", self.edges, mesh.n_edges)
@@ -149,7 +172,7 @@ class Clamp(Support):
         return self._motion.about(mesh.rest_positions[np.unique(mesh.edges[self._checked(mesh)])], self)
 
     def __repr__(self) -> str:
-        return f"Clamp({len(self.edges)} edges{self._motion.summary()})"
+        return f"Clamp({len(self.edges)} edges{self._motion.summary()}{on_body(self.body)})"
 
 
 class SymmetryPlane(Support):
@@ -158,9 +181,20 @@ class SymmetryPlane(Support):
     normal: (3,), of the plane; any length but zero.
     point: (3,) m, in the plane.
     tolerance: m, how far off a vertex may be; by default 1e-9 of the mesh's size.
+    body: the Shell that it holds; by default all.
     """
 
-    def __init__(self, normal, point=(0.0, 0.0, 0.0), *, tolerance: float | None = None):
+    for_all = True
+
+    def __init__(
+        self,
+        normal,
+        point=(0.0, 0.0, 0.0),
+        *,
+        tolerance: float | None = None,
+        body: Shell | None = None,
+    ):
+        self.body = checked_body(body)
         normal = quantity("normal", "1", normal, (3,))
         length = np.linalg.norm(normal)
         if length == 0.0:
@@ -206,7 +240,9 @@ class SymmetryPlane(Support):
         return [DirectedEdges(edges, outwards[:, None] * self.normal, None)]
 
     def __repr__(self) -> str:
-        return f"SymmetryPlane(normal {_numbers(self.normal)}, point {_numbers(self.point)})"
+        return (
+            f"SymmetryPlane(normal {_numbers(self.normal)}, point {_numbers(self.point)}{on_body(self.body)})"
+        )
 
 
 def rotation_matrix(vector: np.ndarray) -> np.ndarray:

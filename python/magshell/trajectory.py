@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ._arrays import index_array
+from ._body_result import BodyResult
 from ._clock import Clock, clock_of
 from ._crossings import told
 from ._files import replace_file
@@ -17,6 +18,7 @@ from ._surroundings import near_kinks
 from ._tensors import detached
 from .integrators import Integrator
 from .scene import Scene
+from .shell import Shell
 from .strains import StrainHistory, Strains, strains_of
 
 
@@ -84,7 +86,7 @@ _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains
 
 @dataclass(frozen=True, repr=False)
 class Trajectory:
-    """A motion.
+    """A motion. With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
     edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C came meanwhile.
@@ -122,7 +124,11 @@ class Trajectory:
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
     _placed: list = field(
         repr=False, default_factory=list
-    )  # (contact, its obstacles where they were, the shell)
+    )  # the first arguments of near_kinks, of each contact
+
+    def __getitem__(self, body: Shell) -> BodyResult:
+        """What it says of one body of the scene."""
+        return BodyResult(self, body)
 
     @property
     def displacements(self):

@@ -92,7 +92,7 @@ def vibration_modes(
         raise ValueError(f"count must be an integer of at least 1, got {count!r}")
     began = time.perf_counter()
     model = scene._model
-    masses = model.free_weights(inputs.values.shell.vertex_masses)
+    masses = model.free_weights(inputs.values.vertex_masses)
     if count >= np.count_nonzero(masses):
         raise ValueError(
             f"count must be below the {np.count_nonzero(masses)} unknowns with mass, got {count}"
@@ -102,7 +102,8 @@ def vibration_modes(
             stiffness = model.hessian(model.rest_state(), scene._control_layout.zeros())
         else:
             stiffness = model.hessian(equilibrium._state, equilibrium._controls)
-    pencil = _Pencil(stiffness, model.free_points, masses, _slow_square(inputs.values.shell, scene.mesh.size))
+    slow = min(map(_slow_square, inputs.values.sheets))
+    pencil = _Pencil(stiffness, model.free_points, masses, slow)
     squares, vectors = pencil.lowest(int(count))
     modes, edge_rotations = mode_shapes(model, vectors)
     return VibrationModes(
@@ -210,7 +211,7 @@ def _inputs(scene: Scene, equilibrium: Equilibrium | None) -> Inputs:
     return inputs
 
 
-def _slow_square(shell: Shell, size: float) -> float:
+def _slow_square(shell: Shell) -> float:
     """D / (rho h size^4), 1/s2: the square of the slowest angular frequency of a held sheet, but for a factor."""
     per_face = shell.young_modulus * shell.thickness**2 / shell.mass_density
-    return float(per_face.mean()) / (12.0 * size**4)
+    return float(per_face.mean()) / (12.0 * shell.mesh.size**4)

@@ -159,11 +159,7 @@ class WarmStart:
         expected = model.positions(expected)
         moved = model.positions(there.found.state - last.found.state)
         strayed, size = _largest(moved - expected), _largest(expected)
-        return strayed <= max(_FAR * size, _SMALL * self._extent)
-
-    @property
-    def _extent(self) -> float:
-        return float(np.ptp(self.scene.mesh.rest_positions, axis=0).max())
+        return strayed <= max(_FAR * size, _SMALL * self.scene._bodies.extent)
 
     def _check(self, cases: list[dict] | None) -> None:
         count = 1 if cases is None else len(cases)

@@ -174,10 +174,20 @@ void substitute_one(const FactorView& factor, double* x) {
         for (Index k = 0; k < root.below; ++k) body(own[k], x[plan.rows[root.rows + k]]);
     };
 
+    const auto backward = [&](const Subtree& subtree, Fronts& fronts, double* own) {
+        for (Index s = subtree.end - 1; s >= subtree.begin; --s) fronts.backward(s, own, subtree.first);
+        std::copy_n(own, subtree.unknowns, x + subtree.first);
+    };
+    // A body of its own among many: both ways at once, while its part of L is in the cache.
+    const auto is_whole = [&](const Subtree& subtree) {
+        return plan.fronts[subtree.end - 1].shape.below == 0;
+    };
+
     for_subtrees([&](const Subtree& subtree, Fronts& fronts, double* own) {
         std::copy_n(x + subtree.first, subtree.unknowns, own);
         for_rows_below(subtree, [](double& mine, double&) { mine = 0.0; });
         for (Index s = subtree.begin; s < subtree.end; ++s) fronts.forward(s, own, subtree.first);
+        if (is_whole(subtree)) backward(subtree, fronts, own);
     });
     for (const Subtree& subtree : plan.subtrees)
         for_rows_below(subtree, [](double& mine, double& shared) { shared += mine; });
@@ -185,9 +195,9 @@ void substitute_one(const FactorView& factor, double* x) {
     for (const Index s : plan.top) fronts.forward(s, x, 0);
     for (auto s = plan.top.rbegin(); s != plan.top.rend(); ++s) fronts.backward(*s, x, 0);
     for_subtrees([&](const Subtree& subtree, Fronts& fronts, double* own) {
+        if (is_whole(subtree)) return;
         for_rows_below(subtree, [](double& mine, double& shared) { mine = shared; });
-        for (Index s = subtree.end - 1; s >= subtree.begin; --s) fronts.backward(s, own, subtree.first);
-        std::copy_n(own, subtree.unknowns, x + subtree.first);
+        backward(subtree, fronts, own);
     });
 }
 

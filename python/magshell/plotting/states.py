@@ -97,7 +97,7 @@ def states_of(
     if isinstance(what, TriangleMesh):
         return _states(what, given)
     if isinstance(what, Shell):
-        return _states(what.mesh, given)
+        return _states(what.mesh, _magnetized(given, [what]))
     if isinstance(what, Scene):
         return _states(what.mesh, _with_own(given, what), what.fields)
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
@@ -219,8 +219,19 @@ def _flux_densities(values, count: int) -> list[np.ndarray | None]:
 
 
 def _with_own(given: dict[str, Any], scene: Scene) -> dict[str, Any]:
-    """With the scene's obstacles, unless others are given."""
+    """With the scene's obstacles and its bodies' magnetization, unless others are given."""
+    given = _magnetized(given, scene.bodies)
     return {**given, "obstacles": scene.obstacles} if given["obstacles"] is None else given
+
+
+def _magnetized(given: dict[str, Any], bodies) -> dict[str, Any]:
+    """With the magnetization that the bodies themselves have, unless another is given."""
+    own = [body.remanent_magnetization for body in bodies]
+    if given["remanent_magnetization"] is not None or all(each is None for each in own):
+        return given
+    pairs = zip(own, bodies, strict=True)
+    rows = [np.zeros((body.mesh.n_faces, 3)) if each is None else each for each, body in pairs]
+    return {**given, "remanent_magnetization": np.concatenate(rows)}
 
 
 def _obstacles(values) -> tuple[Obstacle, ...]:
