@@ -78,17 +78,12 @@ double sign(double x, double face) {
     return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : face;
 }
 
-const FarPotential& far_away() {
-    static const FarPotential points = FarPotential::cuboid();
-    return points;
-}
-
 }  // namespace
 
-Cuboid::Cuboid(const Vec3& dimensions) : half_(0.5 * dimensions) {}
+Cuboid::Cuboid(const Vec3& dimensions) : half_(0.5 * dimensions), far_(FarShape::cuboid, half_) {}
 
 void Cuboid::set_sizes(std::span<const double> dimensions) {
-    half_ = 0.5 * Vec3(dimensions.data());
+    *this = Cuboid(Vec3(dimensions.data()));
 }
 
 bool Cuboid::contains(const Vec3& y) const {
@@ -124,7 +119,7 @@ void Cuboid::for_each_piece(const Vec3& y, int order, const Add& add) const {
 }
 
 void Cuboid::derivatives(const Vec3& y, int order, PotentialDerivatives& out) const {
-    if (far_away().holds(y, half_)) return far_away().add(y, half_, order, out);
+    if (far_.holds(y)) return far_.add(y, order, out);
     for_each_piece(y, order, [&](double factor, const Vec3&, const PotentialDerivatives& piece) {
         out.add(factor, piece, order);
     });
@@ -132,8 +127,8 @@ void Cuboid::derivatives(const Vec3& y, int order, PotentialDerivatives& out) co
 
 void Cuboid::derivatives_by_size(const Vec3& y, PotentialDerivatives& out,
                                  std::span<PotentialDerivatives> by_size) const {
-    if (far_away().holds(y, half_)) {
-        far_away().add_with_sizes(y, half_, out, by_size);
+    if (far_.holds(y)) {
+        far_.add_with_sizes(y, out, by_size);
         for (PotentialDerivatives& each : by_size) each.scale(0.5);
         return;
     }

@@ -36,6 +36,7 @@ class Cuboid {
     void for_each_piece(const Vec3& y, int order, const Add& add) const;
 
     Vec3 half_;
+    FarPotential far_;
 };
 
 }  // namespace magshell

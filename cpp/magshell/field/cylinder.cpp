@@ -25,7 +25,8 @@ namespace {
 //
 // All components are along x, away from the axis, y around it and z along it; odd ones in y vanish.
 
-/// The independent derivatives of a function that is harmonic, or has constant sources, and symmetric to y = 0.
+/// The independent derivatives of a function that is harmonic, or has constant sources, and symmetric to y =
+/// 0.
 struct SymmetricDerivatives {
     double xx = 0, yy = 0, xz = 0, xxx = 0, xyy = 0, xxz = 0, yyz = 0;
     double xxxx = 0, xxyy = 0, yyyy = 0, xxxz = 0, xyyz = 0;
@@ -104,16 +105,21 @@ class Ring {
 RingSums ring_sums(double radius, double rho, double z, double t, int order, bool with_plain) {
     Ring ring(radius, rho, z, t, order, with_plain);
     const double across = rho - radius, largest = (rho + radius) * (rho + radius) + z * z;
-    const double m = 4.0 * radius * rho / largest;
-    double complementary = std::sqrt((across * across + z * z) / largest);
-    if (complementary == 0.0) complementary = std::numeric_limits<double>::quiet_NaN();
+    const Modulus modulus{4.0 * radius * rho / largest, (across * across + z * z) / largest};
+    if (!(modulus.complement > 0.0)) {  // on the ring, or nowhere
+        constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+        ring.add(nan, nan, nan);
+        return ring.sums();
+    }
+    const double complementary = std::sqrt(modulus.complement);
     // a floor so that the number of points has a bound
     const double mean = arithmetic_geometric_mean(1.0, std::max(complementary, 1e-16));
-    const double other = arithmetic_geometric_mean(1.0, std::max(std::sqrt(m), 1e-16));
+    const double other = arithmetic_geometric_mean(1.0, std::max(std::sqrt(modulus.square), 1e-16));
     const double ratio = other / mean;  // K/K'
-    const int quarter = static_cast<int>(std::ceil(0.25 * (12.0 + 13.0 * ratio)));
+    const int quarter = static_cast<int>(std::ceil(0.25 * (12.0 + 14.0 * ratio)));
     const double step = 0.25 * std::numbers::pi / (mean * quarter);  // K is 2 quarter steps
-    const Jacobi one_half = jacobi_near_zero(0.5 * step, m), one = sum_of_arguments(one_half, one_half, m);
+    const Jacobi one_half = jacobi_near_zero(0.5 * step, modulus),
+                 one = sum_of_arguments(one_half, one_half, modulus);
     Jacobi at = one_half;
     const double arc = 4.0 * radius * step;
     for (int n = 0; n < quarter; ++n) {
@@ -121,7 +127,7 @@ RingSums ring_sums(double radius, double rho, double z, double t, int order, boo
         // as far from the other end, u = K, which is next to the point
         const double inverse = 1.0 / at.dn, k = complementary * inverse;
         ring.add(at.cn * inverse, k * at.sn, arc * k);
-        at = sum_of_arguments(at, one, m);
+        at = sum_of_arguments(at, one, modulus);
     }
     return ring.sums();
 }
@@ -129,11 +135,6 @@ RingSums ring_sums(double radius, double rho, double z, double t, int order, boo
 /// A sign that belongs to the outside where the point is in the plane of an end.
 double sign(double z, double end) {
     return z > 0.0 ? 1.0 : z < 0.0 ? -1.0 : end;
-}
-
-const FarPotential& far_away() {
-    static const FarPotential points = FarPotential::cylinder();
-    return points;
 }
 
 /// A cylinder without ends, and its derivative by the radius.
@@ -159,7 +160,8 @@ RingSums endless(double radius, double rho) {
 
 }  // namespace
 
-Cylinder::Cylinder(double radius, double height) : radius_(radius), half_height_(0.5 * height) {}
+Cylinder::Cylinder(double radius, double height)
+    : radius_(radius), half_height_(0.5 * height), far_(FarShape::cylinder, {radius, radius, 0.5 * height}) {}
 
 void Cylinder::set_sizes(std::span<const double> radius_and_height) {
     *this = Cylinder(radius_and_height[0], radius_and_height[1]);
@@ -194,7 +196,7 @@ void Cylinder::for_each_piece(const Vec3& y, int order, bool by_radius, const Ad
 
 void Cylinder::derivatives(const Vec3& y, int order, PotentialDerivatives& out) const {
     const Vec3 here = frame(y).transpose() * y;
-    if (far_away().holds(here, half())) return far_away().add(here, half(), order, out);
+    if (far_.holds(here)) return far_.add(here, order, out);
     for_each_piece(y, order, false, [&](double, double factor, const RingSums& piece) {
         out.add(factor, piece.charged.all(), order);
     });
@@ -204,9 +206,9 @@ void Cylinder::derivatives_by_size(const Vec3& y, PotentialDerivatives& out,
                                    std::span<PotentialDerivatives> by_size) const {
     PotentialDerivatives &by_radius = by_size[0], &by_height = by_size[1];
     const Vec3 here = frame(y).transpose() * y;
-    if (far_away().holds(here, half())) {
+    if (far_.holds(here)) {
         std::array<PotentialDerivatives, 3> by_half{};
-        far_away().add_with_sizes(here, half(), out, by_half);
+        far_.add_with_sizes(here, out, by_half);
         by_radius.add(1.0, by_half[0], 3);
         by_radius.add(1.0, by_half[1], 3);
         by_height.add(0.5, by_half[2], 3);

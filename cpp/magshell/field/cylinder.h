@@ -30,11 +30,11 @@ class Cylinder {
                              std::span<PotentialDerivatives> by_size) const;
 
   private:
-    Vec3 half() const { return {radius_, radius_, half_height_}; }
     template <class Add>
     void for_each_piece(const Vec3& y, int order, bool by_radius, const Add& add) const;
 
     double radius_, half_height_;
+    FarPotential far_;
 };
 
 }  // namespace magshell

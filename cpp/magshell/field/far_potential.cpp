@@ -1,65 +1,108 @@
 #include "magshell/field/far_potential.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace magshell {
 namespace {
 
-// Gauss points and weights on (-1, 1): exact for polynomials of degree 7. 1/|y - y'| is harmonic in y', so
-// that the error begins with the eighth power of size over distance.
-std::array<std::pair<double, double>, 4> gauss_points() {
-    const double root = 2.0 / 7.0 * std::sqrt(6.0 / 5.0), weight = std::sqrt(30.0) / 36.0;
-    const double near = std::sqrt(3.0 / 7.0 - root), far = std::sqrt(3.0 / 7.0 + root);
-    return {{{-far, 0.5 - weight}, {-near, 0.5 + weight}, {near, 0.5 + weight}, {far, 0.5 - weight}}};
+constexpr double pi = std::numbers::pi;
+constexpr int most = 12;
+
+/// Points and weights on (-1, 1).
+struct GaussRule {
+    int count;
+    std::array<double, most> place, weight;
+};
+
+GaussRule gauss_rule(int count) {
+    GaussRule rule{count, {}, {}};
+    for (int k = 0; k < count; ++k) {
+        double x = std::cos(pi * (k + 0.75) / (count + 0.5)), slope = 1.0;
+        for (int iteration = 0; iteration < 8; ++iteration) {  // Newton, on Legendre's polynomial
+            double before = 1.0, value = x;
+            for (int n = 2; n <= count; ++n) {
+                const double next = ((2 * n - 1) * x * value - (n - 1) * before) / n;
+                before = value;
+                value = next;
+            }
+            slope = count * (before - x * value) / (1.0 - x * x);
+            x -= value / slope;
+        }
+        rule.place[k] = x;
+        rule.weight[k] = 2.0 / ((1.0 - x * x) * slope * slope);
+    }
+    return rule;
+}
+
+const GaussRule& rule_of(int count) {
+    static const std::array<GaussRule, most> rules = [] {
+        std::array<GaussRule, most> all;
+        for (int n = 1; n <= most; ++n) all[n - 1] = gauss_rule(n);
+        return all;
+    }();
+    return rules[std::clamp(count, 1, most) - 1];
+}
+
+/// n points are exact for polynomials of degree 2n - 1, and 1/|y - y'| is harmonic in y': the error begins
+/// with the power 2n of size over distance, to be 1e-13.
+int points_for(double ratio) {
+    return static_cast<int>(std::ceil(15.0 / std::log(1.0 / ratio)));
 }
 
 }  // namespace
 
-FarPotential FarPotential::cuboid() {
-    FarPotential result;
-    for (const auto& [x, wx] : gauss_points())
-        for (const auto& [y, wy] : gauss_points())
-            for (const auto& [z, wz] : gauss_points())
-                result.charges_.push_back({Vec3(x, y, z), wx * wy * wz});
-    return result;
+FarPotential::FarPotential(FarShape shape, const Vec3& half) : shape_(shape), half_(half) {
+    const double nearest = std::max(3.0 * half.norm(), std::cbrt(8e3 * half.prod()));
+    nearest_squared_ = nearest * nearest;
 }
 
-FarPotential FarPotential::cylinder() {
-    constexpr int directions = 8;
-    FarPotential result;
-    for (const double side : {-1.0, 1.0}) {  // two Gauss points of the square of the radius
-        const double radius = std::sqrt(0.5 + side * 0.5 / std::numbers::sqrt3);
-        for (int d = 0; d < directions; ++d) {
-            const double angle = 2.0 * std::numbers::pi * (d + 0.5) / directions;
-            for (const auto& [z, wz] : gauss_points())
-                result.charges_.push_back({Vec3(radius * std::cos(angle), radius * std::sin(angle), z),
-                                           0.5 * std::numbers::pi / directions * wz});
+template <class Add>
+void FarPotential::for_each_charge(const Vec3& y, const Add& add) const {
+    const double inverse = 1.0 / y.norm();
+    const int across = points_for(half_[0] * inverse);
+    const GaussRule& along = rule_of(points_for(half_[2] * inverse));
+    if (shape_ == FarShape::cuboid) {
+        const GaussRule &first = rule_of(across), &second = rule_of(points_for(half_[1] * inverse));
+        for (int i = 0; i < first.count; ++i)
+            for (int j = 0; j < second.count; ++j)
+                for (int k = 0; k < along.count; ++k)
+                    add(Vec3(first.place[i], second.place[j], along.place[k]),
+                        half_.prod() * first.weight[i] * second.weight[j] * along.weight[k]);
+        return;
+    }
+    const int directions = 2 * across + 2;
+    const GaussRule& outward = rule_of((across + 1) / 2);  // in the square of the radius
+    for (int d = 0; d < directions; ++d) {
+        const double angle = 2.0 * pi * (d + 0.5) / directions, cos = std::cos(angle), sin = std::sin(angle);
+        for (int i = 0; i < outward.count; ++i) {
+            const double radius = std::sqrt(0.5 + 0.5 * outward.place[i]);
+            for (int k = 0; k < along.count; ++k)
+                add(Vec3(radius * cos, radius * sin, along.place[k]),
+                    half_.prod() * 0.5 * pi / directions * outward.weight[i] * along.weight[k]);
         }
     }
-    return result;
 }
 
-void FarPotential::add(const Vec3& y, const Vec3& half, int order, PotentialDerivatives& out) const {
-    const double volume = half.prod();
-    for (const Charge& charge : charges_)
-        add_point_charge(volume * charge.weight, y - half.cwiseProduct(charge.place), order, out);
+void FarPotential::add(const Vec3& y, int order, PotentialDerivatives& out) const {
+    for_each_charge(y, [&](const Vec3& place, double charge) {
+        add_point_charge(charge, y - half_.cwiseProduct(place), order, out);
+    });
 }
 
-void FarPotential::add_with_sizes(const Vec3& y, const Vec3& half, PotentialDerivatives& out,
+void FarPotential::add_with_sizes(const Vec3& y, PotentialDerivatives& out,
                                   std::span<PotentialDerivatives> by_half) const {
-    const double volume = half.prod();
     PotentialDerivatives sum;
-    for (const Charge& charge : charges_) {
+    for_each_charge(y, [&](const Vec3& place, double charge) {
         PotentialDerivatives one;
-        add_point_charge(volume * charge.weight, y - half.cwiseProduct(charge.place), 4, one);
+        add_point_charge(charge, y - half_.cwiseProduct(place), 4, one);
         sum.add(1.0, one, 4);
-        for (int a = 0; a < 3; ++a) by_half[a].add_slope(-charge.place[a], one, a);
-    }
+        for (int a = 0; a < 3; ++a) by_half[a].add_slope(-place[a], one, a);
+    });
     out.add(1.0, sum, 4);
-    for (int a = 0; a < 3; ++a) by_half[a].add(1.0 / half[a], sum, 3);
+    for (int a = 0; a < 3; ++a) by_half[a].add(1.0 / half_[a], sum, 3);
 }
 
 }  // namespace magshell

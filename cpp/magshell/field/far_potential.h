@@ -2,35 +2,37 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "magshell/field/potential_derivatives.h"
 
 namespace magshell {
 
-/// Point charges that stand for a uniform body, of a size of its own along each axis.
+enum class FarShape { cuboid, cylinder };
+
+/// Point charges that stand for a uniform body about the origin: Gauss points, as many as the distance asks
+/// for. A cylinder has its axis along the third axis, and its radius as half size along the other two.
 class FarPotential {
   public:
-    /// The Gauss points of the cube |y_i| < 1.
-    static FarPotential cuboid();
-    /// Points of the cylinder y_1^2 + y_2^2 < 1, |y_3| < 1, alike in eight directions.
-    static FarPotential cylinder();
+    FarPotential(FarShape shape, const Vec3& half);
 
-    /// Whether y is so far from a body with these half sizes that the charges give full accuracy.
-    bool holds(const Vec3& y, const Vec3& half) const { return y.squaredNorm() > 144.0 * half.squaredNorm(); }
+    /// Whether y is so far away that sums over the surface lose more than the charges err, 1e-12 of the
+    /// whole.
+    bool holds(const Vec3& y) const { return y.squaredNorm() > nearest_squared_; }
 
     /// Adds the derivatives up to the order.
-    void add(const Vec3& y, const Vec3& half, int order, PotentialDerivatives& out) const;
+    void add(const Vec3& y, int order, PotentialDerivatives& out) const;
     /// Adds all of them, and the second and third by each of the half sizes.
-    void add_with_sizes(const Vec3& y, const Vec3& half, PotentialDerivatives& out,
+    void add_with_sizes(const Vec3& y, PotentialDerivatives& out,
                         std::span<PotentialDerivatives> by_half) const;
 
   private:
-    struct Charge {
-        Vec3 place;
-        double weight;
-    };
-    std::vector<Charge> charges_;
+    /// Calls add(place, charge) for all of them, places in half sizes.
+    template <class Add>
+    void for_each_charge(const Vec3& y, const Add& add) const;
+
+    FarShape shape_;
+    Vec3 half_;
+    double nearest_squared_;
 };
 
 }  // namespace magshell
