@@ -105,7 +105,7 @@ def pinned() -> Kind:
 def among_magnets() -> Kind:
     """Next to magnets, far from small ones, and inside large weak ones: each way to their field."""
     fields = []
-    for size, far, strength in ((0.03, 0.07, 5e5), (0.006, 0.2, 5e7), (0.4, 0.02, 2e3)):
+    for size, far, strength in ((0.03, 0.07, 3e4), (0.006, 0.2, 6e6), (0.4, 0.02, 120.0)):
         place = {
             "remanent_magnetization": strength * np.array([0.3, -0.5, 0.9]),
             "rotation": (0.3, -0.2, 0.5),
@@ -115,7 +115,7 @@ def among_magnets() -> Kind:
         fields.append(ms.CylinderMagnet(0.4 * size, 0.7 * size, center=above, **place))
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4)
     scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=fields)
-    controls = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.9}
+    controls = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.2}
     return Kind(scene, controls, fixed=EXACT, reach=REACH)
 
 
