@@ -51,7 +51,8 @@ class CuboidMagnet(Magnet):
 
     The closed form (charges on six faces: arctangents and logarithms at eight corners, e.g. Engel-Herbert and
     Hesjedal 2005) with its first two derivatives, in a form that holds on the lines and planes that prolong edges
-    and faces. Beyond 12 half diagonals it gives way to 64 charges in the body, which lose no digits there.
+    and faces. Where it would lose digits, from some 12 half diagonals of a cube on (from 4 to 6 of a rod or a plate),
+    charges at Gauss points in the body take over.
 
     Args:
         dimensions: (3,) m, the lengths of its edges along the axes of its own frame.
@@ -63,7 +64,7 @@ class CuboidMagnet(Magnet):
 
     >>> cube = CuboidMagnet((0.01, 0.01, 0.01), remanent_magnetization=(0, 0, 1e6))
     >>> cube.flux_density([0, 0, 0.02]).round(4)
-    array([0.    , 0.    , 0.0249])
+    array([0.    , 0.    , 0.0247])
     """
 
     _replaceable = ("dimensions", "remanent_magnetization", "center", "rotation")
@@ -88,7 +89,7 @@ class CylinderMagnet(Magnet):
     Exact to round-off: the charge on its shell, integrated along the axis in closed form and around it by the
     trapezoidal rule in Jacobi's parameter of the complete elliptic integrals that the closed forms (Derby and Olbert
     2010, Caciagli et al. 2018) are made of. That converges exponentially, with 12 points at least and 100 a millionth
-    of the radius from an edge, and has all derivatives. Beyond 12 half diagonals 64 charges in the body take over.
+    of the radius from an edge, and has all derivatives. From afar charges in the body take over, as for the cuboid.
 
     Args:
         radius: m.
@@ -101,7 +102,7 @@ class CylinderMagnet(Magnet):
 
     >>> disk = CylinderMagnet(radius=0.01, height=0.005, remanent_magnetization=(0, 0, 1e6))
     >>> disk.flux_density([0, 0, 0.02]).round(4)
-    array([0.    , 0.    , 0.0326])
+    array([0.    , 0.    , 0.0286])
     """
 
     _replaceable = ("radius", "height", "remanent_magnetization", "center", "rotation")

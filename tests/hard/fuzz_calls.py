@@ -184,9 +184,6 @@ def _scenes(s: Sample) -> Iterator[Call]:
 def _fields(s: Sample) -> Iterator[Call]:
     points = s.mesh.rest_positions
     yield Call("Dipoles", ms.Dipoles, {"positions": np.ones((2, 3)), "moments": np.ones((2, 3))})
-    place = {"remanent_magnetization": (0, 0, 1e6), "center": (0, 0, -1), "rotation": (0.1, 0, 0)}
-    yield Call("CuboidMagnet", ms.CuboidMagnet, {"dimensions": (0.1, 0.2, 0.1), **place})
-    yield Call("CylinderMagnet", ms.CylinderMagnet, {"radius": 0.1, "height": 0.2, **place})
     sampled = {"origin": (0, 0, 0), "spacing": (1, 1, 1), "flux_density": np.ones((2, 3, 4, 3))}
     yield Call("SampledField", ms.SampledField, sampled)
     function = {"function": lambda x: 0.1 * x, "lower": (0, 0, 0), "upper": (1, 1, 1), "counts": (2, 2, 3)}
