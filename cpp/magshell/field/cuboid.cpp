@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 namespace magshell {
 namespace {
@@ -73,11 +72,6 @@ PotentialDerivatives corner(const Vec3& x, const Vec3& side, int order) {
     return out;
 }
 
-/// A sign that belongs to the outside where the point is in the plane of a face.
-double sign(double x, double face) {
-    return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : face;
-}
-
 }  // namespace
 
 Cuboid::Cuboid(const Vec3& dimensions) : half_(0.5 * dimensions), far_(FarShape::cuboid, half_) {}
@@ -97,7 +91,7 @@ void Cuboid::for_each_piece(const Vec3& y, int order, const Add& add) const {
     const std::array<Vec3, 2> from = {y + half_, y - half_};  // the lower faces, and the upper ones
     std::array<Vec3, 2> signs;
     for (int a = 0; a < 3; ++a)
-        for (int s = 0; s < 2; ++s) signs[s][a] = sign(from[s][a], 2 * s - 1);
+        for (int s = 0; s < 2; ++s) signs[s][a] = outward_sign(from[s][a], 2 * s - 1);
     for (int n = 0; n < 8; ++n) {
         const std::array<int, 3> s = {n & 1, (n >> 1) & 1, n >> 2};
         const Vec3 x(from[s[0]][0], from[s[1]][1], from[s[2]][2]);

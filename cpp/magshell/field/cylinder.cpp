@@ -132,11 +132,6 @@ RingSums ring_sums(double radius, double rho, double z, double t, int order, boo
     return ring.sums();
 }
 
-/// A sign that belongs to the outside where the point is in the plane of an end.
-double sign(double z, double end) {
-    return z > 0.0 ? 1.0 : z < 0.0 ? -1.0 : end;
-}
-
 /// A cylinder without ends, and its derivative by the radius.
 RingSums endless(double radius, double rho) {
     constexpr double pi = std::numbers::pi;
@@ -186,7 +181,7 @@ void Cylinder::for_each_piece(const Vec3& y, int order, bool by_radius, const Ad
     const double rho = std::hypot(y[0], y[1]);
     double signs = 0.0;
     for (const double side : {-1.0, 1.0}) {
-        const double z = y[2] - side * half_height_, t = sign(z, side);
+        const double z = y[2] - side * half_height_, t = outward_sign(z, side);
         signs += t;
         const RingSums sums = ring_sums(radius_, rho, z, t, order, by_radius);
         add(side, side, sums);

@@ -87,7 +87,13 @@ struct PotentialDerivatives {
     }
 };
 
-/// Of 1/|x|: with e = x/|x|, its n-th derivatives are polynomials of e over |x|^(n+1).
+/// The sign of x, the coordinate from a face; on the face itself that of the side, so that it belongs to the
+/// outside.
+inline double outward_sign(double x, double side) {
+    return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : side;
+}
+
+/// Adds those of 1/|x|: with e = x/|x|, its n-th derivatives are polynomials of e over |x|^(n+1).
 inline void add_point_charge(double charge, const Vec3& x, int order, PotentialDerivatives& out) {
     const double inverse = 1.0 / x.norm(), k3 = charge * inverse * inverse * inverse;
     const double k4 = 3.0 * k3 * inverse, k5 = k4 * inverse;
