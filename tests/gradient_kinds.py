@@ -102,6 +102,23 @@ def pinned() -> Kind:
     return Kind(scene, {"load_factor": 0.9, "motion_factor": 0.8}, fixed=EXACT, reach=REACH)
 
 
+def among_magnets() -> Kind:
+    """Next to magnets, far from small ones, and inside large weak ones: each way to their field."""
+    fields = []
+    for size, far, strength in ((0.03, 0.07, 3e4), (0.006, 0.2, 6e6), (0.4, 0.02, 120.0)):
+        place = {
+            "remanent_magnetization": strength * np.array([0.3, -0.5, 0.9]),
+            "rotation": (0.3, -0.2, 0.5),
+        }
+        below, above = MIDDLE - far * np.array([0.2, 0.1, 1.0]), MIDDLE + far * np.array([0.1, -0.3, 1.0])
+        fields.append(ms.CuboidMagnet(size * np.array([1.0, 0.8, 0.7]), center=below, **place))
+        fields.append(ms.CylinderMagnet(0.4 * size, 0.7 * size, center=above, **place))
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=fields)
+    controls = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.2}
+    return Kind(scene, controls, fixed=EXACT, reach=REACH)
+
+
 def load_cases() -> Kind:
     fields = np.array([DEFAULTS["applied_flux_density"], (0, 0, -2e-3)])
     controls = {**DEFAULTS, **FACTORS, "applied_flux_density": fields, "load_factor": np.array([0.9, 0.2])}
@@ -287,6 +304,7 @@ MAKERS = {
     },
     "at rest, pinned": pinned,
     "at rest, load cases": load_cases,
+    "at rest among magnets": among_magnets,
     "at rest, warm start": lambda: Kind(
         everything(), {**DEFAULTS, **FACTORS}, solve=warm, fixed=EXACT, reach=REACH
     ),

@@ -23,6 +23,8 @@ def magnet():
 
 FIELDS = {
     "dipoles": lambda: ms.Dipoles([[0, 0, -0.1], [0.1, 0, -0.2]], [[0, 0, 1.0], [0, 1.0, 0]]),
+    "cuboid": lambda: ms.CuboidMagnet((0.1, 0.2, 0.1), (0, 1e5, 0), (0, 0, -0.2), (0.1, 0, 0.3)),
+    "cylinder": lambda: ms.CylinderMagnet(0.1, 0.2, (0, 1e5, 0), (0, 0, -0.2), (0.1, 0, 0.3)),
     "sampled": lambda: ms.SampledField.from_function(swirl, [-1, -1, -1], [1, 1, 1], [4, 4, 4]),
     "custom": lambda: ms.CustomField(swirl, length_scale=1.0),
     "magpylib": magnet,

@@ -45,6 +45,18 @@ def from_magpylib():
 # One row a kind of field: how to make it.
 FIELDS = {
     "dipoles": lambda: DIPOLES,
+    "cuboid magnet": lambda: ms.CuboidMagnet(
+        (0.02, 0.03, 0.01), (3e5, -7e5, 9e5), center=POSITIONS[0], rotation=(0.3, -0.5, 0.9)
+    ),
+    "cylinder magnet": lambda: ms.CylinderMagnet(
+        0.01, 0.03, (3e5, -7e5, 9e5), center=POSITIONS[0], rotation=(0.3, -0.5, 0.9)
+    ),
+    "inside a cuboid magnet": lambda: ms.CuboidMagnet(
+        (0.2, 0.3, 0.15), (3e5, -7e5, 9e5), rotation=(0.3, 0, 0.1)
+    ),
+    "inside a cylinder magnet": lambda: ms.CylinderMagnet(
+        0.15, 0.2, (3e5, -7e5, 9e5), rotation=(0.3, 0, 0.1)
+    ),
     "sampled": lambda: sampled((9, 8, 7)),
     "sampled in a plane": lambda: sampled((9, 1, 7)),
     "sampled along a line": lambda: sampled((1, 1, 7)),

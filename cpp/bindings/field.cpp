@@ -9,6 +9,7 @@
 #include "bindings/call_python.h"
 #include "magshell/core/errors.h"
 #include "magshell/field/dipoles.h"
+#include "magshell/field/magnet.h"
 #include "magshell/field/sampled_field.h"
 
 namespace magshell::bindings {
@@ -134,6 +135,25 @@ void register_field(py::module_& module) {
                                                   to_vectors(moments, "moments"));
              }),
              py::arg("positions"), py::arg("moments"));
+
+    using Numbers = std::array<double, 3>;
+    py::class_<CuboidMagnet, AppliedField, std::shared_ptr<CuboidMagnet>>(module, "CuboidMagnet")
+        .def(py::init([](const Numbers& dimensions, const Numbers& magnetization, const Numbers& center,
+                         const Numbers& rotation) {
+                 return std::make_shared<CuboidMagnet>(Cuboid(Vec3(dimensions.data())),
+                                                       Vec3(magnetization.data()), Vec3(center.data()),
+                                                       Vec3(rotation.data()));
+             }),
+             py::arg("dimensions"), py::arg("remanent_magnetization"), py::arg("center"),
+             py::arg("rotation"));
+    py::class_<CylinderMagnet, AppliedField, std::shared_ptr<CylinderMagnet>>(module, "CylinderMagnet")
+        .def(py::init([](double radius, double height, const Numbers& magnetization, const Numbers& center,
+                         const Numbers& rotation) {
+                 return std::make_shared<CylinderMagnet>(Cylinder(radius, height), Vec3(magnetization.data()),
+                                                         Vec3(center.data()), Vec3(rotation.data()));
+             }),
+             py::arg("radius"), py::arg("height"), py::arg("remanent_magnetization"), py::arg("center"),
+             py::arg("rotation"));
 
     py::class_<SampledField, AppliedField, std::shared_ptr<SampledField>>(module, "SampledField")
         .def(py::init(&make_sampled_field), py::arg("origin"), py::arg("spacing"), py::arg("flux_density"))

@@ -27,6 +27,7 @@ from .integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
 from .io import read_fields, read_mesh, write_mesh
 from .linear import LinearResponse, linear_response
 from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
+from .magnets import CuboidMagnet, CylinderMagnet
 from .mesh import TriangleMesh
 from .minimum import Minimum
 from .multistart import multistart
@@ -58,7 +59,9 @@ __all__ = [
     "Clamp",
     "Contact",
     "CriticalPoint",
+    "CuboidMagnet",
     "CustomField",
+    "CylinderMagnet",
     "DesignRejected",
     "Dipoles",
     "EdgeCouple",

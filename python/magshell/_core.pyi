@@ -15,6 +15,8 @@ __all__: list[str] = [
     "AttackCurve",
     "CriticalKind",
     "CriticalPoint",
+    "CuboidMagnet",
+    "CylinderMagnet",
     "Dipoles",
     "Factor",
     "FactorReport",
@@ -141,6 +143,39 @@ class Dipoles(AppliedField):
         self,
         positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         moments: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> None: ...
+
+class CuboidMagnet(AppliedField):
+    def __init__(
+        self,
+        dimensions: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        remanent_magnetization: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        center: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        rotation: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+    ) -> None: ...
+
+class CylinderMagnet(AppliedField):
+    def __init__(
+        self,
+        radius: typing.SupportsFloat | typing.SupportsIndex,
+        height: typing.SupportsFloat | typing.SupportsIndex,
+        remanent_magnetization: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        center: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        rotation: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
     ) -> None: ...
 
 class SampledField(AppliedField):

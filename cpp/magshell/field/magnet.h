@@ -1,0 +1,56 @@
+// The flux density of uniformly magnetised permanent magnets, with its first and second derivatives.
+//
+// With Phi, the integral of 1/|x - x'| over the magnet, and M_r, its remanent magnetization,
+//
+//   B = mu_0/(4 pi) (d2 Phi + 4 pi [inside]) M_r
+//
+// so that a shape is known by the derivatives of Phi from the second to the fourth. Field and gradients
+// follow for all shapes at once.
+#pragma once
+
+#include <vector>
+
+#include "magshell/field/applied_field.h"
+#include "magshell/field/cuboid.h"
+#include "magshell/field/cylinder.h"
+
+namespace magshell {
+
+/// A magnet of a shape with its own frame: x = center + R(rotation) y. The remanent magnetization [A/m] is
+/// given in that frame and turns with it. A point on the surface counts as outside; on an edge the field is
+/// NaN.
+///
+/// A Shape has `name`, `sizes` (its parameters), and its potential: see Cuboid.
+template <class Shape>
+class Magnet final : public AppliedField {
+  public:
+    Magnet(Shape shape, const Vec3& magnetization, const Vec3& center, const Vec3& rotation);
+
+    std::string_view name() const override { return Shape::name; }
+    void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
+                     FieldSamples& out) const override;
+
+    /// The sizes of the shape, and then remanent_magnetization, center and rotation.
+    std::vector<FieldParameter> parameters() const override;
+    std::shared_ptr<AppliedField> clone() const override { return std::make_shared<Magnet>(*this); }
+    void set_values(std::span<const double> values) override;
+    void add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
+                 std::span<double> out) const override;
+
+  private:
+    static constexpr int n_values = Shape::n_sizes + 9;
+    using Row = Eigen::Matrix<double, n_values, 1>;
+
+    void place(const Vec3& magnetization, const Vec3& center, const Vec3& rotation);
+    /// Of one point, by sizes, magnetization, center, and turns in the world's axes.
+    Row gradient_at(const Vec3& point, const Vec3& u, const Vec3& m, const Vec3& v) const;
+
+    Shape shape_;
+    Vec3 magnetization_, center_, rotation_;
+    Mat3 turn_;
+};
+
+using CuboidMagnet = Magnet<Cuboid>;
+using CylinderMagnet = Magnet<Cylinder>;
+
+}  // namespace magshell
