@@ -139,7 +139,8 @@ def test_a_failure_beside_flat_faces_names_them():
         bent_far(mesh)
     text = str(caught.value)
     named = re.search(
-        r"faces, namely (\d+) \(largest angle 179\.\d+ deg, height .* of the thickness\).* almost flat", text
+        r"(?:faces, namely|Face) (\d+) \(largest angle 179\.\d+ deg, height .* of the thickness\).* almost flat",
+        text,
     )
     assert mesh.quality.largest_angles[int(named[1])] > np.radians(179)
     assert "mend the mesh there first" in text and "smaller steps" not in text

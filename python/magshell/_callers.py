@@ -8,6 +8,9 @@ import sys
 def callers_level() -> int:
     """The `stacklevel` of the line that called the package. torch may stand in between: its compiler calls solves."""
     frame, level = sys._getframe(1), 1
-    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in ("magshell", "torch"):
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in (
+        "magshell",
+        "torch",
+    ):
         frame, level = frame.f_back, level + 1
     return level

@@ -43,6 +43,7 @@ __all__: list[str] = [
     "drag_faces",
     "drag_gradients",
     "factor_backends",
+    "factor_orderings",
     "find_equilibrium",
     "first_order_change",
     "follow_path",
@@ -369,6 +370,11 @@ class Model:
     def controls(self) -> list:
         """
         Likewise, in the flat vectors of controls.
+        """
+    @property
+    def free_points(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        Where each free unknown is at rest (n, 3) [m]: its vertex, or the middle of its edge.
         """
     @property
     def free_size(self) -> int: ...

@@ -109,6 +109,10 @@ class Shell(Owner):
             found["mass_density"] = by_face * self.face_volumes
         return found
 
+    def __getstate__(self) -> dict:
+        """What a copy is made from: not what was looked up meanwhile."""
+        return {name: value for name, value in vars(self).items() if name != "quality"}
+
     @cached_property
     def quality(self) -> MeshQuality:
         """The shapes of its faces, their heights also beside the thickness."""

@@ -24,7 +24,7 @@ class Newton:
     max_iterations: int = 20
     first_load_step: float = 1.0
     smallest_load_step: float = 1.0 / 64.0
-    max_relaxation_steps: int = 200
+    max_relaxation_steps: int = 500
 
     _mixed = False
 

@@ -12,7 +12,7 @@ struct StaticsOptions {
     double smallest_step = 1.0 / 64.0;
     bool require_stable = true;  // false: hand back what Newton found, a saddle too
     bool start_at_rest = true;   // the start is an equilibrium at the old controls: worth halving load steps
-    int max_relaxation_steps = 200;
+    int max_relaxation_steps = 500;
     bool keep_factor = false;  // for gradients
 };
 
