@@ -16,6 +16,7 @@ from ._rest import RestStiffness
 from .errors import NotConverged
 from .scene import Scene
 
+_LARGEST_CHANGE = 1e100  # over the stiffness itself: its square still is a number
 _PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured, over the mean edge length
 _LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
 
@@ -124,6 +125,11 @@ def _stiffness_change(
     change = (values(step) - values(-step)) / (2.0 * step)
     if not change.any():
         raise ValueError("the controls neither load the sheet nor change its stiffness: nothing buckles it")
+    largest = np.abs(change).max()
+    if not largest < _LARGEST_CHANGE * abs(stiffness.matrix).max():  # NaN too
+        raise ValueError(
+            f"the controls change the stiffness by {largest:g} N/m, beyond what numbers hold: are their units right?"
+        )
     return change
 
 

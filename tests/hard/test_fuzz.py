@@ -10,8 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from fuzz_calls import NOT_CALLED, Sample, calls
+from fuzz_calls import Sample, calls
 from fuzz_contact_calls import contact_calls
+from fuzz_not_called import NOT_CALLED
 
 import magshell as ms
 
