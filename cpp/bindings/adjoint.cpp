@@ -1,5 +1,4 @@
-// Adjoints to Python: a gradient by positions and edge rotations in, gradients by everything a solve takes
-// out.
+// Adjoints to Python: a gradient by positions and edge rotations in, gradients by everything a solve takes out.
 #include "bindings/gradients.h"
 #include "magshell/adjoint/static.h"
 

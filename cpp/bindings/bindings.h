@@ -1,5 +1,4 @@
-// What the binding files share: one register function a family, and C-order float64 arrays checked in one
-// place.
+// What the binding files share: one register function a family, and C-order float64 arrays checked in one place.
 #pragma once
 
 #include <pybind11/numpy.h>

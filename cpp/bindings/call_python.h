@@ -8,8 +8,7 @@
 
 namespace magshell::bindings {
 
-/// With the GIL. Ctrl-C while the function runs ends the solve as it does anywhere else; what else it raises
-/// passes.
+/// With the GIL. Ctrl-C while the function runs ends the solve as it does anywhere else; what else it raises passes.
 template <class... Arguments>
 py::object call_python(const py::object& function, Arguments&&... arguments) {
     try {

@@ -1,5 +1,4 @@
-// Called from inside a long solve: looks for Ctrl-C and tells Python how far things are, a few times a
-// second.
+// Called from inside a long solve: looks for Ctrl-C and tells Python how far things are, a few times a second.
 #pragma once
 
 #include <chrono>

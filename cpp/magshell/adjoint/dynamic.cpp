@@ -180,8 +180,7 @@ class Backward {
         return newton_.solve_transposed(rhs);
     }
 
-    // lambda of a stage, and what its forces say of how it moved; adds what it says of the scene and of the
-    // controls.
+    // lambda of a stage, and what its forces say of how it moved; adds what it says of the scene and of the controls.
     std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const Rates& at, int i,
                                                          const PartRecord& record, Index step,
                                                          const std::pair<double, double>& part,

@@ -1,5 +1,4 @@
-// The adjoint of a motion, backwards through its stages. With the notation of solve/stepper.h and bars for
-// gradients,
+// The adjoint of a motion, backwards through its stages. With the notation of solve/stepper.h and bars for gradients,
 //
 //   v_i = (x_i - x^_i)/(a dt),  w_i = (v_i - v^_i)/(a dt):
 //       v'_i += w'_i/(a dt),  v^'_i -= w'_i/(a dt),  x'_i += v'_i/(a dt),  x^'_i -= v'_i/(a dt)

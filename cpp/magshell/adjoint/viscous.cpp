@@ -76,8 +76,7 @@ void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {
     pass_on(i);
 }
 
-// d^_i = d + dt sum a_ij d'_j, and e^_i alike. What the step began with is passed on once all stages are
-// done.
+// d^_i = d + dt sum a_ij d'_j, and e^_i alike. What the step began with is passed on once all stages are done.
 void ViscousAdjoint::pass_on(int i) {
     by_d_begin.add(1.0, by_d_hat_[i]);
     by_begin.e.add(1.0, by_e_hat_[i]);

@@ -1,5 +1,4 @@
-// What every term on faces shares: fetching the corners of a pack of faces, and adding forces and blocks to
-// them.
+// What every term on faces shares: fetching the corners of a pack of faces, and adding forces and blocks to them.
 #pragma once
 
 #include "magshell/assembly/lanes.h"

@@ -60,8 +60,7 @@ inline void scatter_node(Residual& out, Index node, const Pack3& force, int lane
 template <int N>
 using PairSlots = std::array<SystemMatrix::Slot, N*(N - 1) / 2>;
 
-/// The slot of two places of an element that one node takes: across two sides of a face, at a vertex of
-/// three.
+/// The slot of two places of an element that one node takes: across two sides of a face, at a vertex of three.
 constexpr SystemMatrix::Slot same_node = -2;
 
 template <int N, class Nodes>

@@ -1,5 +1,4 @@
-// From all unknowns to the free ones: supports hold nodes along some directions and may move them as rigid
-// bodies.
+// From all unknowns to the free ones: supports hold nodes along some directions and may move them as rigid bodies.
 //
 // A node held along directions that are not the world's axes is turned into a frame of its own, in which it
 // is held along the first one or two axes. Nodes without supports cost nothing here.
@@ -54,8 +53,7 @@ class Reduction {
     /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first.
     void matrix(SystemMatrix& full, LargeVector<double>& values) const;
     VectorXd vector(const VectorXd& full) const;
-    /// A diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses,
-    /// areas.
+    /// A diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses, areas.
     VectorXd weights(const VectorXd& full) const;
     /// Of points of all unknowns, the same for the three of a node, those of the free ones.
     std::vector<Vec3> free(const std::vector<Vec3>& full) const;

@@ -18,8 +18,7 @@ struct SupportMotion {
     Vec3 point_rate(const Vec3& rest, double progress) const;
     Vec3 direction_rate(const Vec3& rest, double progress) const;
 
-    /// Adds the gradients by the motion's own vectors of `by_place` . point(rest), and of `by_place` .
-    /// direction(rest).
+    /// Adds the gradients by the motion's own vectors of `by_place` . point(rest), and of `by_place` . direction(rest).
     void point_vjp(const Vec3& rest, double progress, const Vec3& by_place, SupportMotion& out) const;
     void direction_vjp(const Vec3& rest, double progress, const Vec3& by_place, SupportMotion& out) const;
 };

@@ -19,8 +19,7 @@ namespace magshell {
 
 class SystemMatrix {
   public:
-    /// Where a block of two nodes goes: twice its position, plus one where it is to be transposed. Negative:
-    /// nowhere.
+    /// Where a block of two nodes goes: twice its position, plus one where it is to be transposed. Negative: nowhere.
     using Slot = Index;
 
     SystemMatrix() = default;

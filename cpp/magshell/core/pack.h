@@ -1,5 +1,4 @@
-// A pack of doubles, one a lane: the scalar of every element kernel, so that one instruction serves several
-// elements.
+// A pack of doubles, one a lane: the scalar of every element kernel, so that one instruction serves several elements.
 //
 // Lanes never meet: each holds one element's numbers, so an element's result does not depend on its
 // neighbours in the pack. Written with the compilers' vector extension; -march decides what it becomes.

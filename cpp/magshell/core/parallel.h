@@ -16,8 +16,7 @@ namespace magshell {
 int num_threads();
 void set_num_threads(int count);
 
-/// How long a part of a loop took when it last ran, by which it is decided whether the next is worth waking
-/// others.
+/// How long a part of a loop took when it last ran, by which it is decided whether the next is worth waking others.
 using PartTime = std::atomic<std::int64_t>;  // ns
 
 void parallel_for(int count, const std::function<void(int)>& body, PartTime& part_time);

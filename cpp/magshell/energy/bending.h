@@ -7,8 +7,7 @@
 //   delta_i = c_i (theta_i - theta~_i) + s_i phi_i
 //
 // with the fold angle theta of the edge, the rotation phi of its director, c = 1/2 between two faces and 1 at
-// a clamped edge, s = +1 and -1 on the two sides. `hinge` has no phi; a free edge has no theta. One face a
-// lane.
+// a clamped edge, s = +1 and -1 on the two sides. `hinge` has no phi; a free edge has no theta. One face a lane.
 #pragma once
 
 #include <string_view>
@@ -20,8 +19,7 @@ namespace magshell {
 
 /// The J^T C J part of a face's Hessian; the curvature of theta itself is added per fold.
 struct BendingFace {
-    // delta_i / d(node): `corner[i][k]` for the face's own vertex k, `beyond[i]` for the vertex across edge
-    // i.
+    // delta_i / d(node): `corner[i][k]` for the face's own vertex k, `beyond[i]` for the vertex across edge i.
     Pack3 corner[3][3];
     Pack3 beyond[3];
     Pack sign[3];  // d delta_i / d phi_i

@@ -11,8 +11,7 @@
 
 namespace magshell {
 
-/// What an energy m . B(x) and its derivatives need at n points. Fields add into it, so that several
-/// superpose.
+/// What an energy m . B(x) and its derivatives need at n points. Fields add into it, so that several superpose.
 struct FieldSamples {
     std::vector<Vec3> flux;       // B                                      [T]
     std::vector<Mat3> gradient;   // G_ij = dB_i/dx_j                       [T/m]             from order 1 on

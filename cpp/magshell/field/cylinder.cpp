@@ -25,8 +25,7 @@ namespace {
 //
 // All components are along x, away from the axis, y around it and z along it; odd ones in y vanish.
 
-/// The independent derivatives of a function that is harmonic, or has constant sources, and symmetric to y =
-/// 0.
+/// The independent derivatives of a function that is harmonic, or has constant sources, and symmetric to y = 0.
 struct SymmetricDerivatives {
     double xx = 0, yy = 0, xz = 0, xxx = 0, xyy = 0, xxz = 0, yyz = 0;
     double xxxx = 0, xxyy = 0, yyyy = 0, xxxz = 0, xyyz = 0;
@@ -174,8 +173,7 @@ Mat3 Cylinder::frame(const Vec3& y) const {
     return axes;
 }
 
-/// Calls add(side, derivatives, by radius) for the ring of each end, and for the shell without ends between
-/// them.
+/// Calls add(side, derivatives, by radius) for the ring of each end, and for the shell without ends between them.
 template <class Add>
 void Cylinder::for_each_piece(const Vec3& y, int order, bool by_radius, const Add& add) const {
     const double rho = std::hypot(y[0], y[1]);

@@ -71,8 +71,7 @@ void Dipoles::add_samples(std::span<const Vec3> points, std::span<const Vec3> mo
 }
 
 // B and dB/dx are linear in p and, as matrices that take p to u . B and m . dB/dx v, symmetric: by p they are
-// the flux of u and the gradient of m along v. By the place of the dipole they change as by the point,
-// reversed.
+// the flux of u and the gradient of m along v. By the place of the dipole they change as by the point, reversed.
 std::vector<FieldParameter> Dipoles::parameters() const {
     const Index n = static_cast<Index>(positions_.size());
     return {{"positions", "m", n, 3}, {"moments", "A m^2", n, 3}};

@@ -15,8 +15,7 @@ class FarPotential {
   public:
     FarPotential(FarShape shape, const Vec3& half);
 
-    /// Whether y is so far away that sums over the surface lose more than the charges err, 1e-12 of the
-    /// whole.
+    /// Whether y is so far away that sums over the surface lose more than the charges err, 1e-12 of the whole.
     bool holds(const Vec3& y) const { return y.squaredNorm() > nearest_squared_; }
 
     /// Adds the derivatives up to the order.

@@ -17,8 +17,7 @@
 namespace magshell {
 
 /// A magnet of a shape with its own frame: x = center + R(rotation) y. The remanent magnetization [A/m] is
-/// given in that frame and turns with it. A point on the surface counts as outside; on an edge the field is
-/// NaN.
+/// given in that frame and turns with it. A point on the surface counts as outside; on an edge the field is NaN.
 ///
 /// A Shape has `name`, `sizes` (its parameters), and its potential: see Cuboid.
 template <class Shape>

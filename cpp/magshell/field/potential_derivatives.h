@@ -87,8 +87,7 @@ struct PotentialDerivatives {
     }
 };
 
-/// The sign of x, the coordinate from a face; on the face itself that of the side, so that it belongs to the
-/// outside.
+/// The sign of x, the coordinate from a face; on the face itself that of the side, so that it belongs to the outside.
 inline double outward_sign(double x, double side) {
     return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : side;
 }

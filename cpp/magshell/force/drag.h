@@ -46,8 +46,7 @@ class Drag {
   public:
     using Corners = std::array<Vec3, 3>;
 
-    /// Of the force on each corner. A corner's own velocity or acceleration enters by a third of what is
-    /// here.
+    /// Of the force on each corner. A corner's own velocity or acceleration enters by a third of what is here.
     struct Jacobian {
         std::array<Mat3, 3> by_position;  // each corner's               [N/m]
         Mat3 by_velocity;                 // the mean of the corners'    [N s/m]

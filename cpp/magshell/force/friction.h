@@ -4,12 +4,10 @@
 //   beyond
 //
 // v is the velocity relative to the obstacle, N the normal force, e the sticking speed: what would stick
-// creeps slower than e, under a load that is a share r of mu N at e (1 - sqrt(1 - r)). s as in Li et al. 2020
-// (IPC).
+// creeps slower than e, under a load that is a share r of mu N at e (1 - sqrt(1 - r)). s as in Li et al. 2020 (IPC).
 //
 // A Newton step from sliding knows nothing of sticking, as f does not change with u there, and overshoots.
-// With the secant s/u in place of the slope it never does: f is then bounded from above by a quadratic
-// potential.
+// With the secant s/u in place of the slope it never does: f is then bounded from above by a quadratic potential.
 #pragma once
 
 #include <algorithm>

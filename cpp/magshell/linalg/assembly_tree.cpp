@@ -8,8 +8,7 @@
 namespace magshell {
 namespace {
 
-// The time a front takes [ns], fitted to measurements: a constant, arithmetic, panel entries and update
-// entries.
+// The time a front takes [ns], fitted to measurements: a constant, arithmetic, panel entries and update entries.
 double front_time(double pivots, double below) {
     const double panel_entries = pivots * (0.5 * pivots + below);
     return 600.0 + 0.020 * elimination_flops(pivots, below) + 0.6 * panel_entries + 0.25 * below * below;
@@ -58,8 +57,7 @@ std::vector<NodeFront> fundamental_fronts(const std::vector<Index>& parent, cons
 
 // Which front absorbs each front: itself, or an ancestor.
 //
-// A child merged into its parent takes all rows of the parent: pivots add up, the rows below stay the
-// parent's.
+// A child merged into its parent takes all rows of the parent: pivots add up, the rows below stay the parent's.
 std::vector<Index> merge_fronts(const std::vector<NodeFront>& fronts) {
     const Index count = static_cast<Index>(fronts.size());
     std::vector<std::vector<Index>> children(count);
@@ -160,8 +158,7 @@ AssemblyTree assembly_tree(const Quotient& quotient, std::vector<Index> order) {
     const std::vector<NodeFront> simple = fundamental_fronts(parent, counts, weights);
     const std::vector<Index> absorbed_by = merge_fronts(simple);
 
-    // The merged fronts form a tree; its postorder, and within a front the old order, is the new order of
-    // elimination.
+    // The merged fronts form a tree; its postorder, and within a front the old order, is the new order of elimination.
     std::vector<Index> merged_parent, merged_label(simple.size(), -1), survivors;
     for (std::size_t s = 0; s < simple.size(); ++s) {
         if (absorbed_by[s] != static_cast<Index>(s)) continue;

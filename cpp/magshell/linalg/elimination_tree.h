@@ -7,8 +7,7 @@
 
 namespace magshell {
 
-/// The strict upper triangle by columns (equally: the strict lower one by rows), for nodes in elimination
-/// order.
+/// The strict upper triangle by columns (equally: the strict lower one by rows), for nodes in elimination order.
 struct UpperPattern {
     std::vector<Index> starts, rows;  // rows of column j, all smaller than j, in no particular order
 };

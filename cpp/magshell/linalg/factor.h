@@ -1,8 +1,7 @@
 // Factorizations of sparse symmetric matrices, definite or not, behind one face.
 //
 // A scene's Hessian keeps its pattern, so the work that needs only the pattern (a fill-reducing ordering and
-// the symbolic analysis) is done once, by analyze(); factorize() and solve() may then be called any number of
-// times.
+// the symbolic analysis) is done once, by analyze(); factorize() and solve() may then be called any number of times.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,4 @@
-// L D L^T of a small dense symmetric block, with 1x1 and 2x2 pivots chosen inside it (Bunch and Kaufman
-// 1977).
+// L D L^T of a small dense symmetric block, with 1x1 and 2x2 pivots chosen inside it (Bunch and Kaufman 1977).
 #pragma once
 
 #include <array>
@@ -15,8 +14,7 @@ struct Pivots {
     double* coupling;
 };
 
-// D z = y for the 1x1 or 2x2 pivot that begins at k; T is a number or eight of them. Returns how many rows it
-// has.
+// D z = y for the 1x1 or 2x2 pivot that begins at k; T is a number or eight of them. Returns how many rows it has.
 template <class T>
 Index divide_by_pivot(const Pivots& d, Index k, T& first, T* second) {
     const double a = d.diagonal[k], b = d.coupling[k];
@@ -43,8 +41,7 @@ struct PivotTally {
 };
 
 // The matrix is scaled so that its largest entries are about 1. A pivot below `tiny_pivot` is rounding; it is
-// replaced by `perturbed_pivot`, large enough to divide by and small enough for a few steps of refinement to
-// undo.
+// replaced by `perturbed_pivot`, large enough to divide by and small enough for a few steps of refinement to undo.
 inline constexpr double tiny_pivot = 1e-14;
 inline constexpr double perturbed_pivot = 1e-8;
 

@@ -18,8 +18,7 @@ struct Quotient {
     }
 };
 
-/// Every entry of `pattern` stands for a pair of members of an entry of the quotient's, and the other way
-/// round.
+/// Every entry of `pattern` stands for a pair of members of an entry of the quotient's, and the other way round.
 Quotient quotient_graph(const SparsePattern& pattern);
 
 }  // namespace magshell

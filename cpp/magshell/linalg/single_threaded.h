@@ -22,8 +22,7 @@ class SingleThreaded {
     int openmp_levels_;
 };
 
-/// The file of the BLAS that CHOLMOD calls, and what it says of itself; "" where there is none, or it cannot
-/// tell.
+/// The file of the BLAS that CHOLMOD calls, and what it says of itself; "" where there is none, or it cannot tell.
 std::string blas_path();
 std::string blas_config();
 

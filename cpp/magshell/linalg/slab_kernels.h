@@ -9,8 +9,7 @@ namespace magshell::slabs {
 inline constexpr int group = native_bytes == 64 ? 3 : 1;
 inline constexpr int columns_at_once = native_bytes == 64 ? 8 : native_bytes == 32 ? 4 : 2;
 
-/// sum(8 S, 8) -= rows(8 S, depth) columns(depth, 8); `columns` holds eight numbers every `Stride` for each
-/// step.
+/// sum(8 S, 8) -= rows(8 S, depth) columns(depth, 8); `columns` holds eight numbers every `Stride` for each step.
 template <int S, int Stride>
 [[gnu::always_inline]] inline void subtract_multiple(Lanes (&sum)[S][width], const double* const (&rows)[S],
                                                      const double* columns, Index depth) {

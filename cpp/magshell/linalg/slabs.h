@@ -103,8 +103,7 @@ struct Rectangle {
     }
 };
 
-/// The eliminated columns of a front: the pivots' own rows on top (a triangle), the other rows below (a
-/// rectangle).
+/// The eliminated columns of a front: the pivots' own rows on top (a triangle), the other rows below (a rectangle).
 struct Panel {
     Triangle top;
     Rectangle below;

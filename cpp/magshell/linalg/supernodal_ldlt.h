@@ -1,13 +1,11 @@
-// magshell's own factorization: multifrontal L D L^T (Duff and Reid 1983) of a symmetric matrix, definite or
-// not.
+// magshell's own factorization: multifrontal L D L^T (Duff and Reid 1983) of a symmetric matrix, definite or not.
 //
 //     P S A S P^T = L D L^T
 //
 // S scales rows and columns by powers of two, so that the result does not depend on units. Pivots are 1x1 or
 // 2x2 and are chosen among the 32 columns of a block, never across fronts: the pattern of L is fixed by the
 // analysis and definite and indefinite matrices cost the same. A pivot that vanishes to rounding is replaced;
-// solutions are then refined, and if even that does not recover a known solution the matrix is reported as
-// singular.
+// solutions are then refined, and if even that does not recover a known solution the matrix is reported as singular.
 //
 // Every sum is formed in an order that depends on the pattern alone: the same bits for any number of threads.
 #pragma once

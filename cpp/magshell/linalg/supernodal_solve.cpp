@@ -1,5 +1,4 @@
-// The solving half of SupernodalLdlt: scaling, substitution, and refinement where the factorization was not
-// exact.
+// The solving half of SupernodalLdlt: scaling, substitution, and refinement where the factorization was not exact.
 #include <algorithm>
 #include <cmath>
 

@@ -1,7 +1,6 @@
 // Pairs of faces come from a tree of boxes that is held against itself. Of most the signs of a few volumes
 // tell at once whether they cross. Where a vertex or an edge lies in a face or on another edge, they do not:
-// the sheet may end there, touch, or go through with the pairs of faces at that place sharing no more than a
-// line.
+// the sheet may end there, touch, or go through with the pairs of faces at that place sharing no more than a line.
 //
 // Then everything is decided twice more, after the sheet was moved by
 //

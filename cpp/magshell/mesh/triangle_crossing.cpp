@@ -18,8 +18,7 @@ Range range_of(const Triangle& t, const Vec3& origin, const Vec3& direction) {
     return {std::min({d[0], d[1], d[2]}), std::max({d[0], d[1], d[2]})};
 }
 
-/// Whether the plane of a, or a plane through one of its edges and its normal, has all of b on the other
-/// side.
+/// Whether the plane of a, or a plane through one of its edges and its normal, has all of b on the other side.
 bool separated_by(const Triangle& a, const Triangle& b, double close) {
     if (range_of(b, a.corner[0], a.normal).beyond(close)) return true;
     for (int i = 0; i < 3; ++i) {
@@ -64,8 +63,7 @@ Meeting meeting(const Triangle& a, const Triangle& b, double close) {
     return most;
 }
 
-// The line in which they cross begins at the common vertex and ends on the edge opposite it, of one or the
-// other.
+// The line in which they cross begins at the common vertex and ends on the edge opposite it, of one or the other.
 Meeting meeting_beyond_vertex(const Triangle& a, int i, const Triangle& b, int j, double close) {
     const Vec3& vertex = a.corner[i];
     const Vec3 &a1 = a.corner[(i + 1) % 3], &a2 = a.corner[(i + 2) % 3];

@@ -16,8 +16,7 @@ namespace magshell {
 namespace {
 
 // Twice the area of a face over its longest edge squared is sqrt(3)/2 when it is equilateral. Below this it
-// is lost in the round-off of the coordinates. The ratio has no unit: a mesh of microns is judged like one of
-// metres.
+// is lost in the round-off of the coordinates. The ratio has no unit: a mesh of microns is judged like one of metres.
 constexpr double degenerate_ratio = 1e-10;
 
 template <class... Parts>

@@ -36,8 +36,7 @@ class TriangleMesh {
     const Rows3& rest_positions() const { return rest_positions_; }  // (n_v, 3), m
     const Rows3i& faces() const { return faces_; }                   // (n_f, 3)
     const Rows2i& edges() const { return edges_; }                   // (n_e, 2), lower vertex first, sorted
-    /// (n_e, 2): the face that runs the edge forward (lower to higher vertex), then the one that runs it
-    /// backward.
+    /// (n_e, 2): the face that runs the edge forward (lower to higher vertex), then the one that runs it backward.
     const Rows2i& edge_faces() const { return edge_faces_; }
     const Rows3i& face_edges() const { return face_edges_; }  // (n_f, 3): the edge opposite each vertex
 

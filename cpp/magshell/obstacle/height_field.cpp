@@ -159,8 +159,7 @@ HeightField::Pair HeightField::scan(const Vec3& point, const Pair& start, double
     return best;
 }
 
-// Newton's iteration for the minimum of D; where its second derivatives are not positive, those of Gauss and
-// Newton.
+// Newton's iteration for the minimum of D; where its second derivatives are not positive, those of Gauss and Newton.
 HeightField::Pair HeightField::nearest(const Vec3& point, Pair at) const {
     const double close = 1e-8 * spacing_.minCoeff();  // the next step is far below rounding
     Ground g = ground(at);

@@ -141,8 +141,7 @@ bool MeshBody::nearest(const Vec3& point, const Level& start, Distance& out) con
         at = level(p);
         if (!(at.gradient.squaredNorm() > flattest * flattest)) return false;
         if (step.squaredNorm() > close * close * cell_ * cell_) continue;
-        // Another point than the nearest would be farther than phi(x), a distance already, by more than its
-        // error.
+        // Another point than the nearest would be farther than phi(x), a distance already, by more than its error.
         const double value = m * at.gradient.norm();
         if (std::abs(value - start.value) > 0.5 * cell_) return false;
         out = parallel_surface(value, at.gradient, at.second);

@@ -2,8 +2,7 @@
 //
 //   F(x) = min_s psi(x, s),      psi = |x - c(s)| - r(s)
 //
-// c and r are cubic splines. In the minimum psi_s = 0, so the gradient of F is psi_x = n = (x - c) / |x - c|,
-// and
+// c and r are cubic splines. In the minimum psi_s = 0, so the gradient of F is psi_x = n = (x - c) / |x - c|, and
 //
 //   H = psi_xx - psi_xs psi_xs^T / psi_ss,      psi_xx = P / d,   psi_xs = - P c' / d,   P = I - n n^T
 //   psi_ss = (|c'|^2 - (n . c')^2) / d - n . c'' - r''

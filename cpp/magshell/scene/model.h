@@ -47,8 +47,7 @@ class Model {
     const VectorXd& metric() const { return metric_; }
     /// The floor under every residual of a state, to be multiplied by the unit of round-off.
     VectorXd cancelling_forces(const VectorXd& q);
-    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or
-    /// without.
+    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or without.
     void add_cancelling_contact_forces(bool in_motion, VectorXd& out) const;
 
     double energy(const VectorXd& q, const Controls& controls) const;
@@ -64,8 +63,7 @@ class Model {
     /// The Hessian at the last evaluated state, in matrix().
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
     void extrapolate(const VectorXd& p);
-    /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in
-    /// them.
+    /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in them.
     VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
 
     /// Forces that no energy has act only within the stages of time steps. A step begins at q; at a stage,
@@ -140,8 +138,7 @@ class Model {
     std::vector<ElasticTerm*> elastic_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
     const ContactTerm* contact_ = nullptr;
-    // By part: the nodes and rotations whose columns it is the first to add to, and so clears. Last:
-    // nobody's.
+    // By part: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
     std::vector<std::vector<Index>> first_nodes_, first_rotations_;
     Values values_;
     Kinematics kinematics_;  // where the forces were evaluated last

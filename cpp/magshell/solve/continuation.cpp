@@ -105,8 +105,7 @@ class Follower {
         return true;
     }
 
-    // From a point along its tangent; the model's last evaluated state must be that point. False: no
-    // convergence.
+    // From a point along its tangent; the model's last evaluated state must be that point. False: no convergence.
     bool correct(const PathPoint& base, const Tangent& along, double step, PathPoint& found,
                  int& iterations) {
         VectorXd q = base.state;
@@ -182,8 +181,7 @@ class Follower {
         return true;
     }
 
-    // The eigenvalue next to zero at the point just factorized, positive on the side of `count` unstable
-    // directions.
+    // The eigenvalue next to zero at the point just factorized, positive on the side of `count` unstable directions.
     double signed_eigenvalue(const PathPoint& point, Index count, VectorXd* mode) {
         const std::vector<Mode> modes = modes_near_zero(newton_, 1);
         if (mode) *mode = modes.front().shape;

@@ -34,8 +34,7 @@ std::size_t bytes_of(const PartRecord& part) {
     return bytes;
 }
 
-// The start with its edge rotations at rest, if none were given, and the Maxwell branch relaxed, if it is
-// new.
+// The start with its edge rotations at rest, if none were given, and the Maxwell branch relaxed, if it is new.
 MotionState beginning(Model& model, const MotionInput& input) {
     MotionState start = input.start;
     model.set_memory(start.memory);

@@ -76,8 +76,7 @@ Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& contr
     std::vector<Mode> modes = modes_near_zero(newton, count);
     if (modes.front().eigenvalue < 0.0 || negative_pivots == 0) return modes.front();
 
-    // Many stable modes lie nearer to zero. Shift until all are stable; the most unstable one is then the
-    // nearest.
+    // Many stable modes lie nearer to zero. Shift until all are stable; the most unstable one is then the nearest.
     double shift = std::max(std::abs(modes.front().eigenvalue), std::abs(modes.back().eigenvalue));
     Eigen::MatrixXd no_moves(q.size(), 0);
     for (FactorReport factor; !factor.succeeded || factor.negative_pivots > 0;) {

@@ -45,8 +45,7 @@ constexpr double nothing = 1e-7, little = 1e-4;
 // Of solves with an unsymmetric matrix for gradients.
 constexpr double exact_solve = 1e-13;
 constexpr int many_vectors = 300;
-// Of those with a factorization from nearby: a soft sheet's solution has up to four digits less than its
-// residual.
+// Of those with a factorization from nearby: a soft sheet's solution has up to four digits less than its residual.
 constexpr double exact_nearby = 1e-14;
 constexpr int few_vectors = 30;
 
@@ -330,8 +329,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             return fail("the iteration diverged");
         const bool in_place = move.isZero(0.0);
         const bool settled = report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent();
-        // Under the floor, small forces that move a thin sheet far are lost in larger ones: a step tells
-        // them.
+        // Under the floor, small forces that move a thin sheet far are lost in larger ones: a step tells them.
         if (in_place && settled &&
             (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;

@@ -1,5 +1,4 @@
-// A stable equilibrium: mixed Newton in adaptive load steps, saddles left, relaxation where it does not
-// converge.
+// A stable equilibrium: mixed Newton in adaptive load steps, saddles left, relaxation where it does not converge.
 #pragma once
 
 #include "magshell/solve/newton.h"

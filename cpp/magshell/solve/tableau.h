@@ -4,8 +4,7 @@
 //   x_i = x + dt sum_j a_ij v_j,   v_i = v + dt sum_j a_ij w_j,   M w_i = f(x_i, v_i, t + c_i dt)     j <= i
 //
 // so that unknowns without mass, edge rotations, are at rest in every stage and at the end. A method that
-// begins explicitly has the rates at the end of the step before as its first column; it needs another one to
-// start.
+// begins explicitly has the rates at the end of the step before as its first column; it needs another one to start.
 #pragma once
 
 namespace magshell {

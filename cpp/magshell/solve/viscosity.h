@@ -3,8 +3,7 @@
 //   sigma = C (d + beta d' + g (d - e)),   e' = (d - e)/tau
 //
 // beta [s]: stiffness-proportional damping (Kelvin-Voigt); for small motions the matrix beta K. g and tau
-// [s]: the modulus of a Maxwell branch beside the elastic one, and its relaxation time. With T = a dt and r =
-// T/tau,
+// [s]: the modulus of a Maxwell branch beside the elastic one, and its relaxation time. With T = a dt and r = T/tau,
 //
 //   d'_i = (d_i - d^_i)/T,   e_i = (e^_i + r d_i)/(1 + r),
 //   sigma_i = C (scale d_i - shift_i),  scale = 1 + beta/T + g/(1 + r),  shift_i = beta/T d^_i + g/(1 + r)

@@ -104,8 +104,7 @@ struct FoldCurvature {
     explicit FoldCurvature(const Fold& fold) {
         const WingCurvature l(fold.left), r(fold.right);
         const Pack p = fold.right_is_point;
-        // x1 enters by e, x2 by r_left, x3 by r_right, and x0 by minus their sum (r_right only where x3 is a
-        // point).
+        // x1 enters by e, x2 by r_left, x3 by r_right, and x0 by minus their sum (r_right only where x3 is a point).
         block[B11] = l.edge_edge - r.edge_edge;
         block[B21] = l.point_edge;
         block[B31] = -r.point_edge;

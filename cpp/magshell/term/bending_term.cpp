@@ -131,8 +131,7 @@ double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const
 }
 
 void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
-    // Faces that share a rotation share an edge and so a node: parts of one colour meet at no rotation
-    // either.
+    // Faces that share a rotation share an edge and so a node: parts of one colour meet at no rotation either.
     parts_.scatter([&](const Part& part) {
         for (Index h = part.first_fold; h < part.last_fold; ++h) {
             const double m = moment(sheet_.folds[h], stresses);

@@ -1,5 +1,4 @@
-// The bending energy of a whole sheet, `hinge` and `midedge` alike: energy/bending.h over
-// strain/fold_angle.h.
+// The bending energy of a whole sheet, `hinge` and `midedge` alike: energy/bending.h over strain/fold_angle.h.
 //
 // Fold angles and their gradients are found once an edge; faces combine three of them. The Hessian is the
 // faces' J^T C J, plus each fold's curvature times the moment of the faces beside it.

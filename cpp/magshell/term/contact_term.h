@@ -1,5 +1,4 @@
-// Contact with obstacles: penalty energies of points of the sheet, its vertices and, if wanted, points on its
-// faces.
+// Contact with obstacles: penalty energies of points of the sheet, its vertices and, if wanted, points on its faces.
 //
 //   E = k_n S(offset - distance(x)),   x = sum w_i x_i                    [J]    energy/contact.h
 #pragma once
@@ -80,8 +79,7 @@ class ContactTerm final : public Term {
     /// Adds a vector to a point's nodes, weighted.
     void spread(const Touch& touch, const Vec3& vector, VectorXd& out) const;
     void spread(const Touch& touch, const Vec3& force, Residual& out) const;
-    /// Adds the magnitude of forces that cancel inside one that depends on the point's place by a stiffness
-    /// [N/m].
+    /// Adds the magnitude of forces that cancel inside one that depends on the point's place by a stiffness [N/m].
     void add_cancelling_force(const Touch& touch, double stiffness, VectorXd& out) const;
     /// Those inside the normal forces at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;

@@ -54,8 +54,7 @@ class ForceTerm {
     virtual void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda,
                      KinematicsGradient& by, Gradient& out) const = 0;
 
-    /// From now on, what makes the force unsymmetric stays as it was at the last evaluated state, or does
-    /// not.
+    /// From now on, what makes the force unsymmetric stays as it was at the last evaluated state, or does not.
     virtual void hold(bool /*held*/) {}
 
     /// Adds the magnitude of forces that cancel inside velocities at the last evaluated state.

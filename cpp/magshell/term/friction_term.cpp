@@ -93,8 +93,7 @@ void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambd
     }
 }
 
-// A velocity is the difference of two places over a stage, and in what sticks a small one makes a large
-// force.
+// A velocity is the difference of two places over a stage, and in what sticks a small one makes a large force.
 void FrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
     for (const Rub& each : rubbing_) {
         const double stiffness = at.rate * each.friction.by_velocity.norm();

@@ -25,8 +25,7 @@ class FrictionTerm final : public ForceTerm {
                   Remainder& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              Gradient& out) const override;
-    /// Normal forces and normals: with held ones, friction is the slope of a convex potential of the
-    /// velocities.
+    /// Normal forces and normals: with held ones, friction is the slope of a convex potential of the velocities.
     void hold(bool held) override;
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 

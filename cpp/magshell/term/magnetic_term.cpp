@@ -39,8 +39,7 @@ bool MagneticTerm::set_values(const Values& values) {
             const Mat3 frame = rest_frame(surface_, f);
             const Vec3 across = frame.col(0).cross(frame.col(1)), m = values.vector(magnetization_, f);
             Vec3 coordinates = frame.inverse() * m;
-            // What the inverse leaves of a tangential magnetization along the normal is round-off, not
-            // magnetization.
+            // What the inverse leaves of a tangential magnetization along the normal is round-off, not magnetization.
             if (std::abs(coordinates[2]) <= 1e-14 * m.norm()) coordinates[2] = 0.0;
             if (coordinates[2] != 0.0) normal_magnetization_ = true;
             elements_[pack].volume.set(lane, 0.5 * across.norm() * thicknesses_[f]);

@@ -48,8 +48,7 @@ class Term {
     /// Adds the share of the Hessian that is not on faces.
     virtual void finish_assembly(const double* /*q*/, const Controls&, SystemMatrix& /*out*/) const {}
 
-    /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J
-    /// p).
+    /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J p).
     virtual void extrapolate(const double* /*p*/) {}
 
     /// Adds the magnitude of forces that cancel inside the strains themselves, as for |a|^2 - |a~|^2 at rest,
