@@ -52,7 +52,7 @@ bool Watch::give_way() {
 }
 
 void Rest::settle(Nanoseconds now, Nanoseconds worked, Nanoseconds put_aside, Nanoseconds waited) {
-    constexpr Nanoseconds of_waiting = 16, shortest = 2'000'000, longest = 1'000'000'000, forgiven = 4;
+    constexpr Nanoseconds of_waiting = 20, shortest = 2'000'000, longest = 250'000'000, forgiven = 4;
     const Nanoseconds cost = std::min(put_aside, waited);
     const bool of_no_use = put_aside > moment && put_aside > worked;
     if (cost <= moment && !of_no_use) {
@@ -60,7 +60,7 @@ void Rest::settle(Nanoseconds now, Nanoseconds worked, Nanoseconds put_aside, Na
         if (worked_ > length_ / forgiven) length_ = 0;
         return;
     }
-    length_ = std::min(longest, std::max({2 * length_, of_waiting * cost, shortest}));
+    length_ = std::max({std::min(2 * length_, longest), of_waiting * cost, shortest});
     end_ = now + length_;
     worked_ = 0;
 }
