@@ -102,9 +102,9 @@ def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict, dict]:
         sheet, supports=[clamp], loads=[load], field=[ms.UniformField(), dipoles], gravity=(0, 0, -1.0)
     )
     inputs = {
+        **{name: np.array(getattr(sheet, name)) for name in sheet._replaceable},
         "remanent_magnetization": np.tile((2e4, 0.0, 5e3), (mesh.n_faces, 1)),
         "applied_flux_density": np.array((0.0, 0.0, 5e-4)),
-        **{name: np.array(getattr(sheet, name)) for name in sheet._replaceable},
         **{f"{name}_factor": np.array(1.0) for name in ("load", "gravity", "field", "motion")},
     }
     values = {
