@@ -217,6 +217,7 @@ def test_paper_without_examples(tmp_path) -> None:
         ["gradients", "--faces", "0"],
         ["dynamics", "--rounds", "0"],
         ["scaling", "--faces", "100", "1"],
+        ["scaling", "--company", "-1"],
         ["terms", "--rounds", "0"],
         ["paper", "--iterations", "0"],
         ["accuracy", "--rounds", "0"],

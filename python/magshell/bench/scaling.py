@@ -53,6 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"sizes of the square sheet (default {' '.join(map(str, FACES))})",
     )
     parser.add_argument("--bending", choices=("midedge", "hinge"), default="midedge")
+    parser.add_argument(
+        "--company",
+        type=int,
+        metavar="ROUNDS",
+        help=f"of the motions beside busy programs, the median counts (default {busy_machine.ROUNDS}; 0: one round of a "
+        "tiny strip, as with --quick)",
+    )
     add_rounds(parser, 3)
 
 
@@ -61,6 +68,9 @@ def run(options: argparse.Namespace) -> dict:
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if min(faces) < 2:
         raise SystemExit("--faces must be at least 2")
+    company = chosen(options.company, options.quick, 0, busy_machine.ROUNDS)
+    if company < 0:
+        raise SystemExit(f"--company must be at least 0, got {company}")
     one, two, ended = _sizes(sorted(faces), options)
     if not one:
         raise SystemExit(f"no size was measured: the process of {ended} faces was ended, {_WHY}")
@@ -72,7 +82,7 @@ def run(options: argparse.Namespace) -> dict:
     if ended is not None:
         print(f"\nThe process of {ended} faces was ended, {_WHY}. It and larger sizes are left out.")
     return {
-        "busy machine": busy_machine.measure(options.quick),
+        "busy machine": busy_machine.measure(company),
         "bending": options.bending,
         "sizes": {str(threads): each for threads, each in zip(THREADS, (one, two), strict=True)},
         "exponents": exponents,
