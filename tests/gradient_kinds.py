@@ -253,6 +253,7 @@ def two_sheets_at_rest() -> Kind:
         ms.PointLoad(mesh.vertices_at(x=0.11), (1e-4, 2e-4, -2e-4), body=other),
         ms.EdgeLoad(MESH.edges_at(x=0.1), (0, 1e-2, -1e-2), body=sheet),
         ms.AreaLoad((0.1, 0, 0.2)),
+        ms.SurfaceTension(RNG.uniform(0.1, 0.2, 3), faces=[1, 4, 7], body=other),
     ]
     floor = ms.Contact(under(ob.Plane, -3e-3, rotation=(0.02, 0.01, 0)), contact_stiffness=5.0, offset=1e-3)
     scene = ms.Scene(
@@ -275,6 +276,7 @@ def two_sheets_in_motion() -> Kind:
     scene = ms.Scene(
         [sheet, other],
         supports=[ms.Clamp(other.mesh.edges_at(x=0.01), rotation=(0, 0.1, 0), body=other)],
+        loads=[ms.SurfaceTension(0.3, body=sheet)],
         contacts=[rubbing],
         field=ms.UniformField(),
         gravity=(0, 0.3, -9.81),

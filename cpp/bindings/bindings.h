@@ -18,6 +18,7 @@ void register_errors(py::module_& module);
 void register_mesh(py::module_& module);
 void register_continuation(py::module_& module);
 void register_dynamics(py::module_& module);
+void register_face_energies(py::module_& module);
 void register_field(py::module_& module);
 void register_force(py::module_& module);
 void register_linalg(py::module_& module);

@@ -76,6 +76,9 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     const IndexArray couples = indices("couples");
     for (py::ssize_t k = 0; k < couples.shape(0); ++k)
         input.couples.push_back({couples.at(k, 0), couples.at(k, 1), couples.at(k, 2)});
+    for (const py::handle each : given["face_energies"])
+        input.face_energies.push_back({each["owner"].cast<std::string>(), each["body"].cast<Index>(),
+                                       each["energy"].cast<std::shared_ptr<FaceEnergy>>()});
     input.gravity = given["gravity"].cast<bool>();
     input.loads = given["loads"].cast<bool>();
     for (const py::handle source : given["field_sources"])

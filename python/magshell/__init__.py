@@ -44,6 +44,7 @@ from .statics.path import CriticalPoint, Path, follow
 from .statics.solve import equilibrium
 from .statics.warm_start import WarmStart
 from .surroundings.contact import Contact
+from .surroundings.face_energies import SurfaceTension
 from .surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .surroundings.supports import Clamp, Pin, SymmetryPlane
 from .surroundings.water import Water
@@ -92,6 +93,7 @@ __all__ = [
     "Scene",
     "Shell",
     "Strains",
+    "SurfaceTension",
     "SymmetryPlane",
     "Trajectory",
     "TriangleMesh",

@@ -91,6 +91,9 @@ void Model::add_terms(const SceneInput& input) {
         if (input.sheets[body].magnetic)
             terms_.push_back(std::make_unique<MagneticTerm>(*bodies_.sheets()[body], body, *loops_[body],
                                                             sources_, registry_));
+    for (const FaceEnergyInput& given : input.face_energies)
+        terms_.push_back(given.energy->term(given.owner, given.body, *bodies_.sheets()[given.body],
+                                            *loops_[given.body], registry_));
     if (input.gravity)
         terms_.push_back(std::make_unique<LoadTerm>("gravity", "gravity_factor", nodes(), registry_));
     if (input.loads) terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));

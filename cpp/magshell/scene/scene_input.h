@@ -10,6 +10,7 @@
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
 #include "magshell/term/contact_term.h"
+#include "magshell/term/face_energy.h"
 
 namespace magshell {
 
@@ -28,6 +29,13 @@ struct SheetInput {
     std::vector<DirectedEdge> directed_edges;  // directions are rows of SceneInput::directions
 };
 
+/// An energy of a body's faces beside its elastic and magnetic ones.
+struct FaceEnergyInput {
+    std::string owner;  // under which its inputs are registered
+    Index body;
+    std::shared_ptr<const FaceEnergy> energy;
+};
+
 /// Held nodes count the scene's vertices first, then directions.
 struct SceneInput {
     Index n_vertices = 0;
@@ -36,6 +44,7 @@ struct SceneInput {
     std::vector<HeldNode> held;
     Index motions = 0;  // that held nodes refer to
     std::vector<EdgeCoupleInput> couples;
+    std::vector<FaceEnergyInput> face_energies;
     bool gravity = false, loads = false;
     std::vector<std::shared_ptr<const AppliedField>> field_sources;
     std::vector<ContactInput> contacts;

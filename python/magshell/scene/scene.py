@@ -20,13 +20,14 @@ from ..mesh.triangle_mesh import TriangleMesh
 from ..surroundings.constraints import Constraints, free_rigid_motions, gather
 from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import contact_inputs, obstacles_of
-from ..surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
+from ..surroundings.face_energies import FaceEnergy
+from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane, continuations
 from ..surroundings.water import Water
 from .layout import Layout
 from .values import Values
 
-_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple)
+_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy)
 _SUPPORTS = (Pin, Clamp, SymmetryPlane)
 
 
@@ -37,7 +38,7 @@ class Scene:
     bodies: a Shell, or several that do not touch each other. Positions and faces of a result are those of one body after
         another, and `result[body]` has those of one; each may have its own `bending`.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
-    loads: PointLoad, EdgeLoad, AreaLoad and EdgeCouple objects; likewise.
+    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple and SurfaceTension objects; likewise.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     gravity: (3,), m/s2; needs the mass density of all bodies.
     contacts: Contact objects, each with the obstacles that it is about.
@@ -143,7 +144,8 @@ class Scene:
                 [*bodies.split(edges), n_directions - n_couples + np.arange(n_couples)], axis=1
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
-            loads=any(not isinstance(load, EdgeCouple) for load in self.loads),
+            face_energies=self._face_energies(),
+            loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
             contacts=contact_inputs(self.contacts, bodies),
             obstacles=[{"shape": each._core, "moves": each.motion is not None} for each in self.obstacles],
@@ -170,6 +172,14 @@ class Scene:
                 "directed_edges": pairs[of == k],
             }
             for k, (shell, part) in enumerate(zip(self.bodies, self._bodies.parts, strict=True))
+        ]
+
+    def _face_energies(self) -> list[dict]:
+        """As the core takes them."""
+        return [
+            {"owner": label, "body": self._bodies.of(load).bodies.start or 0, "energy": load._core}
+            for load, label in self._labels
+            if isinstance(load, FaceEnergy)
         ]
 
     @property

@@ -62,7 +62,7 @@ def free_rigid_motions(bodies: Bodies, constraints: Constraints) -> list[str]:
         vertices = np.flatnonzero(mesh.components == part)
         center = mesh.rest_positions[vertices].mean(axis=0)
         rows = _prevented(bodies, constraints, mesh.components == part, center)
-        _, values, modes = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]))
+        _, values, modes = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]), full_matrices=False)
         for mode in modes[values < 1e-8 * max(values[0], 1e-300)]:
             where = f" of part {part} (with vertex {vertices[0]})" if mesh.n_components > 1 else ""
             found.append(_in_words(mode, center, size) + where)

@@ -1,0 +1,66 @@
+// Surface tension: what it costs a face to have an area.
+//
+//   E_f = gamma A(x),   A = |a_1 x a_2| / 2                                         [J]
+//
+// with a_1 = x_1 - x_0, a_2 = x_2 - x_0 and the unit normal n,
+//
+//   dA = (a_2 x n) . da_1 / 2 + (n x a_1) . da_2 / 2,   dn = (I - n n^T) (da_1 x a_2 + a_1 x da_2) / |a_1 x a_2|.
+//
+// One face a lane.
+#pragma once
+
+#include <string_view>
+
+#include "magshell/core/face_input.h"
+#include "magshell/core/vector3.h"
+#include "magshell/energy/symmetric3.h"
+
+namespace magshell {
+
+struct SurfaceTension {
+    static constexpr std::string_view name = "surface tension";
+    static constexpr FaceInput inputs[] = {{"surface_tension", "N/m"}};
+
+    Pack3 a1, a2, normal;
+    Pack area2;  // |a_1 x a_2|
+
+    explicit SurfaceTension(const Pack3 x[3]) : a1(x[1] - x[0]), a2(x[2] - x[0]) {
+        const Pack3 across = cross(a1, a2);
+        area2 = sqrt(squared_norm(across));
+        normal = (Pack(1.0) / area2) * across;
+    }
+
+    Pack energy(const Pack in[1]) const { return Pack(0.5) * in[0] * area2; }
+
+    void gradient(const Pack in[1], Pack3 g[3]) const {
+        const Pack half = Pack(0.5) * in[0];
+        g[1] = half * cross(a2, normal);
+        g[2] = half * cross(normal, a1);
+        g[0] = -(g[1] + g[2]);
+    }
+
+    /// Lower blocks at lower_index(k, l).
+    void hessian(const Pack in[1], Pack33 h[6]) const {
+        const Pack half = Pack(0.5) * in[0];
+        Pack33 k = Pack(-1.0) * outer(normal, normal);
+        add_to_diagonal(k, Pack(1.0));
+        k = (half / area2) * k;
+        const Pack33 c1 = cross_matrix(a1), c2 = cross_matrix(a2), kc1 = multiply(k, c1);
+        const Pack33 h11 = -multiply(c2, multiply(k, c2)), h22 = -multiply(c1, kc1);
+        const Pack33 h12 = multiply(c2, kc1) - half * cross_matrix(normal), h21 = transpose(h12);
+        h[lower_index(1, 1)] = h11;
+        h[lower_index(2, 1)] = h21;
+        h[lower_index(2, 2)] = h22;
+        h[lower_index(1, 0)] = -(h11 + h12);
+        h[lower_index(2, 0)] = -(h21 + h22);
+        h[lower_index(0, 0)] = h11 + h12 + h21 + h22;
+    }
+
+    /// d(rate . gradient)/d(input) of each input.
+    void rate_by_inputs(const Pack[1], const Pack3 rate[3], Pack out[1]) const {
+        out[0] = Pack(0.5) *
+                 (dot(rate[1] - rate[0], cross(a2, normal)) + dot(rate[2] - rate[0], cross(normal, a1)));
+    }
+};
+
+}  // namespace magshell
