@@ -297,6 +297,57 @@ def two_sheets_in_motion() -> Kind:
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
 
 
+def tied(moves: bool) -> Kind:
+    """A patch on a sheet, of two bendings and magnetizations, in a field; loads and supports on both."""
+    sheet = two_sheets()[0]
+    patch = ms.Shell(
+        sheet.mesh,
+        thickness=3e-4,
+        young_modulus=1e6,
+        poisson_ratio=0.3,
+        mass_density=2e3,
+        bending="hinge",
+        remanent_magnetization=(1e4, -5e3, 2e4),
+    )
+    tail = ms.Shell(
+        sheet.mesh.transformed(translation=(0.1, 0, 0)),
+        thickness=1e-3,
+        young_modulus=4e6,
+        poisson_ratio=0.4,
+        mass_density=1e3,
+        remanent_magnetization=(1e3, 0, 0),
+    )
+    scene = ms.Scene(
+        [patch, sheet, tail],
+        ties=[ms.Tie(sheet, patch), ms.Tie(tail, sheet)],
+        supports=[
+            ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0), body=sheet),
+            ms.Pin(tail.mesh.vertices_at(x=0.2), body=tail),
+        ],
+        loads=[
+            ms.PointLoad(MESH.vertices_at(x=0.1), (1e-4, 2e-4, -2e-4), body=patch),
+            ms.AreaLoad((0.1, 0, 0.2)),
+        ],
+        contacts=[
+            ms.Contact(ob.Plane((-0.01, 0, 1), center=(0.2, 0, -2e-3)), contact_stiffness=5.0, offset=1e-3)
+        ],
+        field=[ms.UniformField(), DIPOLES],
+        gravity=(0.2, 0.1, -9.81),
+    )
+    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "motion_factor": 0.7, "gravity_factor": 0.8}
+    if not moves:
+        return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
+    controls |= {
+        "velocities": (0.01, 0.02, -0.05),
+        "damping": RNG.uniform(1e-3, 2e-3, scene.mesh.n_vertices),
+        "stiffness_damping": 1e-3,
+        "time_step": 2e-3,
+    }
+    reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
+    fixed = {**EXACT, "steps": 4, "integrator": ms.TRBDF2(), "progress": False}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-3, reach=reach)
+
+
 RUBS = {"friction_coefficient": 0.4}
 MAKERS = {
     **{
@@ -332,6 +383,8 @@ MAKERS = {
     "through water onto a Plane": lambda: thrown(ob.Plane, ms.TRBDF2(), True, extra=VISCOUS, **RUBS),
     "in a corner": in_a_corner,
     "two sheets at rest": two_sheets_at_rest,
+    "tied sheets at rest": lambda: tied(False),
+    "tied sheets in motion": lambda: tied(True),
     "two sheets in motion": two_sheets_in_motion,
 }
 

@@ -74,6 +74,10 @@ BAD_INPUT = {
         lambda: ms.SampledField.from_function(zeros, (0, 0, 0), (1, 1, 1), (4, 4, 0)),
         "counts must be three integers of at least 1",
     ),
+    "more samples than there is memory": (
+        lambda: ms.SampledField.from_function(zeros, (0, 0, 0), (1, 1, 1), np.full(3, 2**63 + 1, dtype=np.uint64)),
+        r"are 7\.85e\+56 samples, more than 1e\+09",
+    ),
     "sampled function of the wrong shape": (
         lambda: ms.SampledField.from_function(one_sample_short, (0, 0, 0), (1, 1, 1), (4, 4, 4)),
         r"function\(points\) \[T\] must have shape \(64, 3\), got \(63, 3\)",

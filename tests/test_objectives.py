@@ -161,6 +161,8 @@ def test_printable_measures_to_the_nearest_ray():
 
 def test_parametrisations():
     assert parametrize.from_regions(torch.tensor([1.0, 5.0]), [1, 0, 1]).tolist() == [5, 1, 5]
+    unsigned = np.array([1, 0, 1], dtype=np.uint64)
+    assert parametrize.from_regions(torch.tensor([1.0, 5.0]), unsigned).tolist() == [5, 1, 5]
     assert parametrize.along(torch.tensor([2.0, -1.0]), (0, 0, 9.0)).tolist() == [[0, 0, 2], [0, 0, -1]]
     moduli = parametrize.log_scaled(torch.tensor([0.0, 0.5, 1.0], dtype=torch.float64), 1e4, 1e8)
     np.testing.assert_allclose(moduli, [1e4, 1e6, 1e8])

@@ -92,7 +92,8 @@ MotionInput input_of(Model& model, const py::dict& given) {
 // (n, n_v, 3), of the recorded states.
 template <class Field>
 Array positions_of(const Model& model, const MotionResult& motion, const Field& field) {
-    const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size()), n_v = model.nodes().n_vertices();
+    const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size()),
+                      n_v = model.nodes().n_user_vertices();
     Array rows({n, n_v, py::ssize_t{3}});
     for (py::ssize_t k = 0; k < n; ++k)
         Eigen::Map<Rows3>(rows.mutable_data(k, 0, 0), n_v, 3) =
@@ -147,7 +148,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     const Watch watch(progress);
     std::vector<VectorXd> by_q, by_v;
     const VectorXd no_rotations = VectorXd::Zero(model.bodies().n_edges());
-    const py::ssize_t n_v = model.nodes().n_vertices(), n_e = model.bodies().n_edges();
+    const py::ssize_t n_v = model.nodes().n_user_vertices(), n_e = model.bodies().n_edges();
     for (py::ssize_t k = 0; k < static_cast<py::ssize_t>(motion.recorded.size()); ++k) {
         const auto rows = [&](const Array& of) {
             return Rows3(Eigen::Map<const Rows3>(of.data(k, 0, 0), n_v, 3));
@@ -166,9 +167,9 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     py::dict result;
     result["values"] = values_to_user(model, gradient.values);
     result["controls"] = rows_of(model, gradient.controls);
-    result["positions"] = model.bodies().positions(gradient.positions);
+    result["positions"] = model.bodies().gradient_by_vectors(gradient.positions);
     result["edge_rotations"] = model.bodies().edge_rotations(gradient.positions);
-    result["velocities"] = model.bodies().positions(gradient.velocities);
+    result["velocities"] = model.bodies().gradient_by_vectors(gradient.velocities);
     result["mass"] = VectorXd(model.bodies().positions(gradient.mass).rowwise().sum());
     result["damping"] = VectorXd(model.bodies().positions(gradient.damping).rowwise().sum());
     result["time_step"] = gradient.time_step;

@@ -69,6 +69,7 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     const auto indices = [&](const char* name) { return given[name].cast<IndexArray>(); };
     SceneInput input;
     input.n_vertices = given["n_vertices"].cast<Index>();
+    input.original = given["original"].cast<std::vector<Index>>();
     input.sheets = sheets_of(given["sheets"]);
     input.directions = to_rows3(array("directions"));
     input.held = held_nodes(indices("held_nodes"), array("held_frames"));
@@ -204,9 +205,7 @@ void register_model(py::module_& module) {
                          const Array& r) { return m.bodies().state(to_rows3(x), to_vector(r)); })
         .def(
             "full_vector",
-            [](const Model& m, const Array& rows) {
-                return m.bodies().gradient_by_state(to_rows3(rows), VectorXd::Zero(m.bodies().n_edges()));
-            },
+            [](const Model& m, const Array& rows) { return m.bodies().vectors(to_rows3(rows)); },
             "Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.")
         .def("positions", [](const Model& m, const VectorXd& q) { return m.bodies().positions(q); })
         .def("edge_rotations", [](const Model& m, const VectorXd& q) { return m.bodies().edge_rotations(q); })

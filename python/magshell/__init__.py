@@ -6,6 +6,7 @@ from ._machine.threads import num_threads, set_num_threads, show_config
 from .bodies.body_result import BodyResult
 from .bodies.shell import Shell
 from .bodies.strains import Strains
+from .bodies.ties import Tie
 from .design.minimize import minimize
 from .design.minimum import Minimum
 from .dynamics.simulate import simulate
@@ -95,6 +96,7 @@ __all__ = [
     "Strains",
     "SurfaceTension",
     "SymmetryPlane",
+    "Tie",
     "Trajectory",
     "TriangleMesh",
     "UniformField",

@@ -23,11 +23,12 @@ def from_regions(values, regions):
         raise ValueError(
             f"regions must be integers of shape (n_f,), got {regions.dtype} {tuple(regions.shape)}"
         )
+    regions = regions.long()  # torch has no smallest of unsigned numbers
     if len(regions) and not 0 <= int(regions.min()) <= int(regions.max()) < len(values):
         raise ValueError(
             f"regions must lie in 0 ... {len(values) - 1}, got {int(regions.min())} ... {int(regions.max())}"
         )
-    return values[regions.long()]
+    return values[regions]
 
 
 def along(amplitude, directions):

@@ -18,7 +18,9 @@ struct Nodes {
     std::vector<Vec3> rest;  // per node: rest position of a vertex, rest value of a direction
     Index scalars = 0;
 
+    /// Those that are welded count once.
     Index n_vertices() const { return vertices.size(); }
+    Index n_user_vertices() const { return vertices.user_size(); }
     Index n_nodes() const { return static_cast<Index>(rest.size()); }
     Index n_unknowns() const { return 3 * n_nodes() + scalars; }
     /// Of the vertices: the first so many unknowns.
@@ -37,8 +39,9 @@ class NodeNumbering {
 
     /// Our number of the caller's vertex.
     Index number(Index user, const Vec3& rest_position);
-    /// Once all bodies are numbered; directions (n_d, 3).
-    Nodes finish(const Rows3& directions);
+    /// Once all bodies are numbered; directions (n_d, 3). A vertex without a number is a copy, and
+    /// `original[vertex]` has one.
+    Nodes finish(const Rows3& directions, const std::vector<Index>& original);
 
   private:
     std::vector<Index> core_, user_;

@@ -20,30 +20,38 @@ Slot Parameters::add(const std::string& owner, const std::string& name, const st
     return slot;
 }
 
-// move(place in the caller's order, place in ours, width) for all rows.
+// move(place in the caller's order, place in ours, width, whether an earlier row is there too) for all rows.
 template <class Move>
 void Parameters::each_row(const Move& move) const {
     for (const Entry& entry : entries_) {
         if (!entry.order) {
-            move(entry.slot.first, entry.slot.first, entry.slot.size());
+            move(entry.slot.first, entry.slot.first, entry.slot.size(), false);
             continue;
         }
-        for (Index row = 0; row < entry.slot.rows; ++row)
-            move(entry.slot.at(entry.order->user[row]), entry.slot.at(row), entry.slot.width);
+        const Renumbering& order = *entry.order;
+        for (Index row = 0; row < order.size(); ++row)
+            move(entry.slot.at(order.user[row]), entry.slot.at(row), entry.slot.width, false);
+        if (order.size() == order.user_size()) continue;
+        for (Index row = 0; row < order.user_size(); ++row)
+            if (order.is_copy(row))
+                move(entry.slot.at(row), entry.slot.at(order.core[row]), entry.slot.width, true);
     }
 }
 
 VectorXd Parameters::to_core(const VectorXd& in_user_order) const {
-    VectorXd ours(size_);
-    each_row([&](Index user, Index core, Index width) {
-        ours.segment(core, width) = in_user_order.segment(user, width);
+    VectorXd ours = VectorXd::Zero(size_);
+    each_row([&](Index user, Index core, Index width, bool copy) {
+        if (copy)
+            ours.segment(core, width) += in_user_order.segment(user, width);
+        else
+            ours.segment(core, width) = in_user_order.segment(user, width);
     });
     return ours;
 }
 
 VectorXd Parameters::to_user(const VectorXd& in_core_order) const {
     VectorXd users(size_);
-    each_row([&](Index user, Index core, Index width) {
+    each_row([&](Index user, Index core, Index width, bool) {
         users.segment(user, width) = in_core_order.segment(core, width);
     });
     return users;

@@ -29,7 +29,8 @@ class Parameters {
     };
 
     /// A new place, or the one that this parameter of this owner already has: several may read it. The order
-    /// of its rows has to outlive the list. Throws std::logic_error where the shapes differ.
+    /// of its rows has to outlive the list. Where several rows of the caller are one of ours, that one is their
+    /// sum, and our last rows are empty. Throws std::logic_error where the shapes differ.
     Slot add(const std::string& owner, const std::string& name, const std::string& unit, Index rows,
              Index width, const Renumbering* order = nullptr);
 

@@ -1,4 +1,4 @@
-// Two numberings of the same things: the caller's, and ours.
+// Two numberings of the same things: the caller's, and ours. Several of the caller's may be one of ours.
 #pragma once
 
 #include <utility>
@@ -8,11 +8,14 @@
 
 namespace magshell {
 
-/// user[k] is the caller's index of our k, core[u] ours of the caller's u.
+/// user[k] is the caller's index of our k, core[u] ours of the caller's u. Where several u are one k, user[k] is the
+/// first of them, and the others are its copies.
 struct Renumbering {
     std::vector<Index> user, core;
 
     Index size() const { return static_cast<Index>(user.size()); }
+    Index user_size() const { return static_cast<Index>(core.size()); }
+    bool is_copy(Index u) const { return user[core[u]] != u; }
 
     static Renumbering from_user_order(std::vector<Index> user) {
         Renumbering numbering;

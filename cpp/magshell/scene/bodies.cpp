@@ -8,7 +8,9 @@ Bodies::Bodies(const SceneInput& input) {
     NodeNumbering numbering(input.n_vertices);
     for (const SheetInput& sheet : input.sheets)
         owned_.push_back(std::make_unique<Sheet>(sheet.owner, *sheet.mesh, sheet.vertices, numbering));
-    nodes_ = numbering.finish(input.directions);
+    nodes_ = numbering.finish(input.directions, input.original);
+    for (Index user = 0; user < nodes_.n_user_vertices(); ++user)
+        if (nodes_.vertices.is_copy(user)) copies_.push_back(user);
     for (std::size_t k = 0; k < owned_.size(); ++k) {
         const SheetInput& given = input.sheets[k];
         owned_[k]->add_folds(*given.mesh, given.directed_edges, given.directors, nodes_);
@@ -38,30 +40,49 @@ VectorXd Bodies::rest_state() const {
 }
 
 VectorXd Bodies::state(const Rows3& positions, const VectorXd& edge_rotations) const {
-    VectorXd q = gradient_by_state(positions, edge_rotations);
+    VectorXd q = vectors(positions);
+    add_rotations(edge_rotations, q);
     for (Index node = nodes_.n_vertices(); node < nodes_.n_nodes(); ++node)
         q.segment<3>(3 * node) = nodes_.rest[node];
     return q;
 }
 
-VectorXd Bodies::gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const {
-    VectorXd gradient = VectorXd::Zero(nodes_.n_unknowns());
+VectorXd Bodies::vectors(const Rows3& of_vertices) const {
+    VectorXd q = VectorXd::Zero(nodes_.n_unknowns());
     for (Index v = 0; v < nodes_.n_vertices(); ++v)
-        gradient.segment<3>(3 * v) = by_positions.row(nodes_.user_vertex(v)).transpose();
-    Index first_edge = 0;
-    for (const Sheet* sheet : sheets_) {
-        for (Index r = 0; r < sheet->n_rotations(); ++r)
-            gradient[nodes_.first_scalar() + sheet->first_rotation + r] =
-                by_edge_rotations[first_edge + sheet->edge_of_rotation[r]];
-        first_edge += sheet->n_edges();
-    }
+        q.segment<3>(3 * v) = of_vertices.row(nodes_.user_vertex(v)).transpose();
+    return q;
+}
+
+Rows3 Bodies::gradient_by_vectors(const VectorXd& by_q) const {
+    Rows3 by_vertices = positions(by_q);
+    for (const Index copy : copies_) by_vertices.row(copy).setZero();
+    return by_vertices;
+}
+
+VectorXd Bodies::gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const {
+    VectorXd gradient = vectors(by_positions);
+    for (const Index copy : copies_)
+        gradient.segment<3>(3 * nodes_.vertices.core[copy]) += by_positions.row(copy).transpose();
+    add_rotations(by_edge_rotations, gradient);
     return gradient;
 }
 
+void Bodies::add_rotations(const VectorXd& of_edges, VectorXd& q) const {
+    Index first_edge = 0;
+    for (const Sheet* sheet : sheets_) {
+        for (Index r = 0; r < sheet->n_rotations(); ++r)
+            q[nodes_.first_scalar() + sheet->first_rotation + r] =
+                of_edges[first_edge + sheet->edge_of_rotation[r]];
+        first_edge += sheet->n_edges();
+    }
+}
+
 Rows3 Bodies::positions(const VectorXd& q) const {
-    Rows3 x(nodes_.n_vertices(), 3);
+    Rows3 x(nodes_.n_user_vertices(), 3);
     for (Index v = 0; v < nodes_.n_vertices(); ++v)
         x.row(nodes_.user_vertex(v)) = q.segment<3>(3 * v).transpose();
+    for (const Index copy : copies_) x.row(copy) = q.segment<3>(3 * nodes_.vertices.core[copy]).transpose();
     return x;
 }
 
@@ -81,6 +102,8 @@ VectorXd Bodies::vertex_weights(const VectorXd& by_vertex) const {
     VectorXd weights = VectorXd::Zero(nodes_.n_unknowns());
     for (Index v = 0; v < nodes_.n_vertices(); ++v)
         weights.segment<3>(3 * v).setConstant(by_vertex[nodes_.user_vertex(v)]);
+    for (const Index copy : copies_)
+        weights.segment<3>(3 * nodes_.vertices.core[copy]).array() += by_vertex[copy];
     return weights;
 }
 

@@ -22,11 +22,16 @@ class Bodies {
     VectorXd rest_state() const;
     /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,).
     VectorXd state(const Rows3& positions, const VectorXd& edge_rotations) const;
-    /// A gradient by the caller's positions and edge rotations as one by all unknowns.
+    /// Vectors of the caller's vertices among all unknowns, zero elsewhere; welded ones have one.
+    VectorXd vectors(const Rows3& of_vertices) const;
+    /// A gradient by the caller's positions and edge rotations as one by all unknowns: the transpose of positions().
     VectorXd gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const;
     Rows3 positions(const VectorXd& q) const;
+    /// A gradient by unknowns as one by the caller's positions: the transpose of vectors().
+    Rows3 gradient_by_vectors(const VectorXd& by_q) const;
     VectorXd edge_rotations(const VectorXd& q) const;
-    /// One number a vertex of the caller as one for each unknown, zero for those that are no vertex.
+    /// One number a vertex of the caller as one for each unknown, zero for those that are no vertex; welded ones
+    /// are added up.
     VectorXd vertex_weights(const VectorXd& by_vertex) const;
 
     /// Where each unknown is at rest [m]: its vertex, or the middle of its edge.
@@ -39,9 +44,12 @@ class Bodies {
     VectorXd area_metric() const;
 
   private:
+    void add_rotations(const VectorXd& of_edges, VectorXd& q) const;
+
     std::vector<std::unique_ptr<Sheet>> owned_;
     std::vector<const Sheet*> sheets_;
     Nodes nodes_;
+    std::vector<Index> copies_;  // the caller's vertices that are welded to an earlier one
     Index n_edges_ = 0;
 };
 

@@ -20,7 +20,8 @@ namespace {
 
 std::vector<HeldNode> renumbered(std::vector<HeldNode> held, const Nodes& nodes) {
     for (HeldNode& h : held)
-        if (h.node < nodes.n_vertices()) h.node = nodes.vertices.core[h.node];
+        h.node = h.node < nodes.n_user_vertices() ? nodes.vertices.core[h.node]
+                                                  : nodes.direction_node(h.node - nodes.n_user_vertices());
     return held;
 }
 

@@ -39,6 +39,7 @@ struct FaceEnergyInput {
 /// Held nodes count the scene's vertices first, then directions.
 struct SceneInput {
     Index n_vertices = 0;
+    std::vector<Index> original;  // of each vertex: itself, or the one that it is welded to; empty if none is
     std::vector<SheetInput> sheets;
     Rows3 directions;  // (n_d, 3), of directed edges and of couples
     std::vector<HeldNode> held;

@@ -15,14 +15,14 @@ class LoadTerm final : public Term {
     /// Registers its forces, three a vertex, as those of its own name, and the control that scales them.
     LoadTerm(const std::string& name, const std::string& factor, const Nodes& nodes, Registry& registry)
         : name_(name),
-          slot_(registry.values.add(name, "forces", "N", nodes.n_vertices(), 3, &nodes.vertices)),
+          slot_(registry.values.add(name, "forces", "N", nodes.n_user_vertices(), 3, &nodes.vertices)),
           factor_(registry.controls.add("scene", factor, "1", 1, 1)),
-          forces_(VectorXd::Zero(slot_.size())) {}
+          forces_(VectorXd::Zero(nodes.n_coordinates())) {}
 
     std::string_view name() const override { return name_; }
 
     bool set_values(const Values& values) override {
-        forces_ = Eigen::Map<const VectorXd>(values[slot_], slot_.size());
+        forces_ = Eigen::Map<const VectorXd>(values[slot_], forces_.size());
         return values.changed(slot_);
     }
 
@@ -37,7 +37,7 @@ class LoadTerm final : public Term {
 
     void vjp(const double*, const Controls& controls, const double* lambda, Gradient& out) override {
         const Eigen::Map<const VectorXd> at_vertices(lambda, forces_.size());
-        out.values.segment(slot_.first, slot_.size()) -= controls[factor_.first] * at_vertices;
+        out.values.segment(slot_.first, forces_.size()) -= controls[factor_.first] * at_vertices;
         out.controls[factor_.first] -= forces_.dot(at_vertices);
     }
 

@@ -11,6 +11,7 @@ from .._checks.checked_list import checked_list
 from ..mesh.quality import MeshQuality
 from ..mesh.triangle_mesh import TriangleMesh
 from .shell import Shell
+from .ties import Tie, joined_components, originals
 
 
 class Part(NamedTuple):
@@ -39,9 +40,12 @@ class Part(NamedTuple):
 
 
 class Bodies:
-    """Raises ValueError where one is no Shell, or is there twice."""
+    """Raises ValueError where one is no Shell, or is there twice, or where a tie cannot be.
 
-    def __init__(self, bodies):
+    original: (n_v of all,), the first of the vertices that each is welded to, or itself.
+    """
+
+    def __init__(self, bodies, ties=()):
         self.shells: tuple[Shell, ...] = checked_list("bodies", bodies, (Shell,))
         if not self.shells:
             raise ValueError("bodies must hold at least one Shell")
@@ -56,6 +60,52 @@ class Bodies:
             mesh = shell.mesh
             self.parts.append(Part(mesh, slice(k, k + 1), vertex, edge, face))
             vertex, edge, face = vertex + mesh.n_vertices, edge + mesh.n_edges, face + mesh.n_faces
+        self.ties: tuple[Tie, ...] = checked_list("ties", ties, (Tie,))
+        self._welded = np.concatenate([np.zeros((0, 2), dtype=np.int64), *map(self._pairs, self.ties)])
+        self.original = originals(vertex, self._welded)
+        self._check_welded_once()
+
+    def _pairs(self, tie: Tie) -> np.ndarray:
+        """(k, 2), the scene's vertices."""
+        first = [self.parts[self.number(body)].first_vertex for body in (tie.a, tie.b)]
+        return tie.pairs() + first
+
+    def _check_welded_once(self) -> None:
+        for k, part in enumerate(self.parts):
+            values, counts = np.unique(self.original[part.vertices], return_counts=True)
+            if counts.max() > 1:
+                twice = part.first_vertex + np.flatnonzero(
+                    self.original[part.vertices] == values[np.argmax(counts)]
+                )
+                raise ValueError(
+                    f"ties would make one of vertices {twice[0] - part.first_vertex} and {twice[1] - part.first_vertex} "
+                    f"of body {k}"
+                )
+
+    @property
+    def n_vertices(self) -> int:
+        """Those that are welded count once."""
+        return len(self.original) - int(np.sum(self.copies))
+
+    @property
+    def copies(self) -> np.ndarray:
+        """(n_v of all,), whether it is welded to an earlier one."""
+        return self.original != np.arange(len(self.original))
+
+    @property
+    def components(self) -> np.ndarray:
+        """(n_v of all,), the connected part of each vertex."""
+        return joined_components(self.mesh.components, self._welded) if self.ties else self.mesh.components
+
+    def check_welded(self, name: str, unit: str, rows: np.ndarray) -> None:
+        """Raises ValueError where rows (n_v of all, 3) say two things of one vertex."""
+        apart = np.abs(rows - rows[self.original]).max(axis=1)
+        if apart.max() > 1e-9 * max(np.abs(rows).max(), 1e-300):
+            vertex = int(np.argmax(apart))
+            raise ValueError(
+                f"{name} [{unit}] must be the same where bodies are tied, but those of vertices "
+                f"{self.original[vertex]} and {vertex} differ by {apart[vertex]:.3g}"
+            )
 
     def __len__(self) -> int:
         return len(self.shells)
@@ -112,7 +162,14 @@ class Bodies:
         """Its points with the scene's vertices: (k, 3), -1 where there are fewer, and their weights (k, 3)."""
         part = self.of(contact)
         vertices, weights = contact.points(part.mesh)
-        return np.where(vertices < 0, vertices, vertices + np.int32(part.first_vertex)), weights
+        numbers = np.where(vertices < 0, vertices, vertices + np.int32(part.first_vertex))
+        if not self.ties:
+            return numbers, weights
+        again = (vertices[:, 1] < 0) & np.isin(
+            self.original[numbers[:, 0]], numbers[~self.copies[numbers[:, 0]], 0]
+        )
+        kept = ~(again & self.copies[numbers[:, 0]])
+        return numbers[kept], weights[kept]
 
     def split(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The body of each of the scene's edges, (k,), and its number there, (k,)."""

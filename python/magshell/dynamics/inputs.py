@@ -177,6 +177,7 @@ class MotionInputs:
         if shape not in ((3,), (n_v, 3)):
             raise ValueError(f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {shape}")
         rows = np.broadcast_to(quantity("velocities", "m/s", given, shape), (n_v, 3))
+        inputs.scene._bodies.check_welded("velocities", "m/s", rows)
         velocity = model.full_vector(np.ascontiguousarray(rows))
         return MotionState(
             origin.time,
@@ -209,6 +210,7 @@ class MotionInputs:
             return _checked_state(start, model.size, model.n_strains)
         given = inputs.take("positions", start)
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
+        inputs.scene._bodies.check_welded("start", "m", positions)
         check_faces(mesh, positions)
         check_outside(inputs.scene, inputs.values, positions, 0.0)
         state = model.state(positions, np.zeros(mesh.n_edges))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
@@ -29,6 +30,9 @@ def residual_to_remanent(residual_flux_density):
         )
     remanent = residual / core.vacuum_permeability
     return float(remanent) if remanent.ndim == 0 else remanent
+
+
+_MOST_SAMPLES = 10**9  # 24 GB
 
 
 class AppliedField(Owner):
@@ -169,6 +173,10 @@ class SampledField(AppliedField):
         counts = array_of("counts", counts, "be three integers")
         if counts.shape != (3,) or counts.dtype.kind not in "iu" or counts.min() < 1:
             raise ValueError(f"counts must be three integers of at least 1, got {counts.tolist()}")
+        if math.prod(counts.tolist()) > _MOST_SAMPLES:
+            raise ValueError(
+                f"counts of {counts.tolist()} are {math.prod(counts.tolist()):.3g} samples, more than {_MOST_SAMPLES:.3g}"
+            )
         if (backwards := np.flatnonzero((counts > 1) & (lower >= upper))).size:
             axis = backwards[0]
             raise ValueError(

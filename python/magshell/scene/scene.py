@@ -15,6 +15,7 @@ from .._checks.quantity import quantity
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
 from ..bodies.shell import Shell
+from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
 from ..surroundings.constraints import Constraints, free_rigid_motions, gather
@@ -35,8 +36,9 @@ class Scene:
     """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
     needs and, up to 256 MB, the memory of its last factorization.
 
-    bodies: a Shell, or several that do not touch each other. Positions and faces of a result are those of one body after
-        another, and `result[body]` has those of one; each may have its own `bending`.
+    bodies: a Shell, or several, which do not feel each other but through ties. Positions and faces of a result are those
+        of one body after another, and `result[body]` has those of one; each may have its own `bending`.
+    ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple and SurfaceTension objects; likewise.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
@@ -69,6 +71,7 @@ class Scene:
         self,
         bodies: Shell | Iterable[Shell],
         *,
+        ties=(),
         supports=(),
         loads=(),
         field=None,
@@ -77,7 +80,7 @@ class Scene:
         water: Water | None = None,
         allow_rigid_motions: bool = False,
     ):
-        self._bodies = Bodies(bodies)
+        self._bodies = Bodies(bodies, ties)
         self.supports = checked_list("supports", supports, _SUPPORTS)
         self.loads = checked_list("loads", loads, _LOADS)
         self.fields = () if field is None else checked_list("field", field, (AppliedField,))
@@ -102,6 +105,7 @@ class Scene:
         """What a copy, or another process, makes the scene from again."""
         return {
             "bodies": self.bodies,
+            "ties": self.ties,
             "supports": self.supports,
             "loads": self.loads,
             "field": self.fields,
@@ -135,6 +139,7 @@ class Scene:
         self._warned_of_strain = 0.0
         self._model = _core.Model(
             n_vertices=mesh.n_vertices,
+            original=bodies.original if bodies.ties else [],
             sheets=self._sheets(constraints),
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
@@ -165,7 +170,7 @@ class Scene:
             {
                 "owner": f"body {k}",
                 "mesh": part.mesh._core,
-                "vertices": np.arange(part.vertices.start, part.vertices.stop),
+                "vertices": self._bodies.original[part.vertices],
                 "curvature_scale": shell.curvature_scale,
                 "directors": shell.bending == "midedge",
                 "magnetic": bool(self.fields),
@@ -221,6 +226,10 @@ class Scene:
         return self._bodies.shells
 
     @property
+    def ties(self) -> tuple[Tie, ...]:
+        return self._bodies.ties
+
+    @property
     def shell(self) -> Shell:
         """The one body. Raises ValueError where there are several."""
         if len(self.bodies) > 1:
@@ -267,6 +276,7 @@ class Scene:
         lines = [f"Scene: {len(self.bodies)} bodies" if several else f"Scene: {self.bodies[0]!r}"]
         if several:
             lines += [f"  body {k}: {body!r}" for k, body in enumerate(self.bodies)]
+        lines += [f"  welded by {tie!r}" for tie in self.ties]
         lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
         lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
         lines += [f"  in {field!r}" for field in self.fields]

@@ -38,6 +38,7 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     n_v = scene.mesh.n_vertices
     if len(positions) != n_v:
         raise ValueError(f"start [m] must have shape (n_v, 3) = ({n_v}, 3), got {positions.shape}")
+    scene._bodies.check_welded("start", "m", positions)
     check_faces(scene.mesh, positions)
     check_outside(scene, inputs.values, positions, 0.0)
     return model.state(positions, np.zeros(scene.mesh.n_edges)), [], inputs.controls, False

@@ -27,7 +27,7 @@ def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints
     """All supports of a scene as one. `free_directions` (k, 3) are appended to the directions, held and still."""
     motions: list[RigidMotion] = []
     mesh, places = bodies.mesh, [(s, bodies.of(s)) for s in supports]
-    nodes, frames = _held_vertices(bodies, [h for s, part in places for h in _held(s, part)], motions)
+    nodes, frames = _held_vertices(bodies, [h for s, part in places for h in _held(s, part, bodies)], motions)
     pairs, directions, direction_motions = _directed_edges(
         [d for s, part in places for d in _directed(s, part)], motions
     )
@@ -45,9 +45,12 @@ def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints
     )
 
 
-def _held(support, part: Part) -> list[Held]:
+def _held(support, part: Part, bodies: Bodies) -> list[Held]:
     """With the scene's vertices."""
-    return [held._replace(vertices=held.vertices + part.first_vertex) for held in support.held(part.mesh)]
+    return [
+        held._replace(vertices=bodies.original[held.vertices + part.first_vertex])
+        for held in support.held(part.mesh)
+    ]
 
 
 def _directed(support, part: Part) -> list[DirectedEdges]:
@@ -57,14 +60,14 @@ def _directed(support, part: Part) -> list[DirectedEdges]:
 
 def free_rigid_motions(bodies: Bodies, constraints: Constraints) -> list[str]:
     """The rigid motions that no support prevents, in words; of every connected part."""
-    found, mesh, size = [], bodies.mesh, bodies.size
-    for part in range(mesh.n_components):
-        vertices = np.flatnonzero(mesh.components == part)
+    found, mesh, size, components = [], bodies.mesh, bodies.size, bodies.components
+    for part in range(components.max() + 1):
+        vertices = np.flatnonzero(components == part)
         center = mesh.rest_positions[vertices].mean(axis=0)
-        rows = _prevented(bodies, constraints, mesh.components == part, center)
+        rows = _prevented(bodies, constraints, components == part, center)
         _, values, modes = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]), full_matrices=False)
         for mode in modes[values < 1e-8 * max(values[0], 1e-300)]:
-            where = f" of part {part} (with vertex {vertices[0]})" if mesh.n_components > 1 else ""
+            where = f" of part {part} (with vertex {vertices[0]})" if components.max() > 0 else ""
             found.append(_in_words(mode, center, size) + where)
     return found
 

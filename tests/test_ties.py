@@ -1,0 +1,175 @@
+"""Bodies that are welded: against one body that is the same. Their gradients: test_every_gradient.py."""
+
+import copy
+
+import numpy as np
+import pytest
+
+import magshell as ms
+
+LENGTH, WIDTH = 0.04, 0.01
+FULL = ms.meshes.rectangle(LENGTH, WIDTH, cells=(8, 2))
+PLATE = {"thickness": 5e-4, "poisson_ratio": 0.3, "mass_density": 1e3}
+
+
+def halves(**options):
+    """A strip as two bodies, the second with its seam first."""
+    half = ms.meshes.rectangle(LENGTH / 2, WIDTH, cells=(4, 2))
+    left = ms.Shell(half, young_modulus=1e6, **PLATE)
+    right = ms.Shell(half.transformed(translation=(LENGTH / 2, 0, 0)), young_modulus=1e6, **PLATE)
+    return left, right, ms.Tie(left, right, **options)
+
+
+def coated(young_modulus=3e6):
+    """A strip twice, one on the other."""
+    a, b = (ms.Shell(FULL, young_modulus=y, **PLATE) for y in (1e6, young_modulus - 1e6))
+    return a, b, ms.Tie(a, b)
+
+
+def clamped(mesh, body):
+    return ms.Clamp(mesh.edges_at(x=0.0), body=body)
+
+
+def test_two_halves_stretch_as_one_strip():
+    left, right, tie = halves()
+    pull = ms.EdgeLoad(right.mesh.edges_at(x=LENGTH), (0.5, 0.1, 0), body=right)
+    two = ms.Scene([left, right], ties=[tie], supports=[clamped(left.mesh, left)], loads=[pull])
+    sheet = ms.Shell(FULL, young_modulus=1e6, **PLATE)
+    one = ms.Scene(
+        sheet, supports=[clamped(FULL, None)], loads=[ms.EdgeLoad(FULL.edges_at(x=LENGTH), (0.5, 0.1, 0))]
+    )
+    of_two, of_one = ms.equilibrium(two, require_stable=False), ms.equilibrium(one, require_stable=False)
+    assert two._bodies.n_vertices == FULL.n_vertices
+    for body in (left, right):
+        same = [FULL.nearest_vertex(place) for place in body.mesh.rest_positions]
+        assert np.allclose(of_two[body].positions, of_one.positions[same], rtol=0, atol=1e-12)
+    assert of_two.energies["membrane"] == pytest.approx(of_one.energies["membrane"], rel=1e-12)
+
+
+def test_a_seam_is_a_hinge():
+    """The second half hangs straight down from the seam."""
+    left, right, tie = halves()
+    held = ms.Clamp(left.mesh.edges_at(x=0.0), body=left)
+    scene = ms.Scene(
+        [left, right], ties=[tie], supports=[held], gravity=(0, 0, -2.0), allow_rigid_motions=True
+    )
+    start = scene.mesh.rest_positions.copy()
+    start[right.mesh.n_vertices :, 2] -= 0.3 * (start[right.mesh.n_vertices :, 0] - LENGTH / 2)
+    hanging = ms.equilibrium(scene, start=start)[right].positions
+    seam = hanging[right.mesh.vertices_at(x=LENGTH / 2)].mean(axis=0)
+    end = hanging[right.mesh.vertices_at(x=LENGTH)].mean(axis=0)
+    assert np.allclose(end - seam, (0, 0, -LENGTH / 2), atol=1e-3 * LENGTH)
+
+
+@pytest.mark.parametrize("moves", [False, True], ids=["at rest", "in motion"])
+def test_a_coating_adds_its_stiffness_and_mass(moves):
+    a, b, tie = coated()
+    sheet = ms.Shell(FULL, young_modulus=3e6, **{**PLATE, "mass_density": 2e3})
+    load = ms.PointLoad(FULL.vertices_at(x=LENGTH), (0, 1e-4, 2e-3), body=b)
+    two = ms.Scene(
+        [a, b], ties=[tie], supports=[clamped(FULL, a), clamped(FULL, b)], loads=[load], gravity=(0, 0, 3.0)
+    )
+    load = ms.PointLoad(FULL.vertices_at(x=LENGTH), (0, 1e-4, 2e-3))
+    one = ms.Scene(sheet, supports=[clamped(FULL, None)], loads=[load], gravity=(0, 0, 3.0))
+    of_two, of_one = (
+        ms.simulate(scene, steps=4, time_step=5e-3, velocities=(0, 0, 0.2))
+        if moves
+        else ms.equilibrium(scene)
+        for scene in (two, one)
+    )
+    assert np.array_equal(of_two[a].positions, of_two[b].positions)
+    assert np.allclose(of_two[b].positions, of_one.positions, rtol=0, atol=1e-9 * LENGTH)
+
+
+def test_vibrations_of_a_coated_strip():
+    a, b, tie = coated()
+    two = ms.Scene([a, b], ties=[tie], supports=[clamped(FULL, a), clamped(FULL, b)])
+    one = ms.Scene(
+        ms.Shell(FULL, young_modulus=3e6, **{**PLATE, "mass_density": 2e3}), supports=[clamped(FULL, None)]
+    )
+    frequencies = [ms.vibration_modes(scene, count=3).frequencies for scene in (two, one)]
+    assert np.allclose(*frequencies, rtol=1e-8)
+
+
+def test_what_holds_one_holds_the_other():
+    left, right, tie = halves()
+    right_only = [ms.Clamp(right.mesh.edges_at(x=LENGTH), body=right)]
+    with pytest.raises(ValueError, match="leave the sheet free: rotation about"):
+        ms.Scene(
+            [left, right], supports=[*right_only, ms.Pin(left.mesh.vertices_at(x=LENGTH / 2), body=left)]
+        )
+    pinned = ms.Pin(left.mesh.vertices_at(x=0.0), body=left)
+    assert ms.Scene([left, right], ties=[tie], supports=[*right_only, pinned]).n_unknowns > 0
+
+
+def test_points_that_touch_are_there_once():
+    left, right, tie = halves()
+    floor = ms.Contact(ms.obstacles.Plane((0, 0, 1.0), center=(0, 0, -1e-3)), contact_stiffness=5.0)
+    scene = ms.Scene(
+        [left, right], ties=[tie], contacts=[floor], gravity=(0, 0, -1.0), allow_rigid_motions=True
+    )
+    vertices = scene._bodies.contact_points(floor)[0]
+    assert len(np.unique(scene._bodies.original[vertices[:, 0]])) == len(vertices) == scene._bodies.n_vertices
+    only = ms.Contact(ms.obstacles.Plane((0, 0, 1.0)), contact_stiffness=5.0, body=right)
+    assert len(scene._bodies.contact_points(only)[0]) == right.mesh.n_vertices
+
+
+def test_copies_and_scenes_of_three():
+    a, b, tie = coated()
+    c = ms.Shell(FULL, young_modulus=1e6, **PLATE)
+    scene = ms.Scene([c, a, b], ties=[tie, ms.Tie(b, c)], supports=[clamped(FULL, a)])
+    assert scene._bodies.n_vertices == FULL.n_vertices
+    again = copy.deepcopy(scene)
+    assert again._bodies.n_vertices == FULL.n_vertices
+    assert "welded by Tie(27 vertices)" in repr(again)
+
+
+def test_a_tied_scene_does_not_pass_through_itself():
+    left, right, tie = halves()
+    scene = ms.Scene(
+        [left, right],
+        ties=[tie],
+        supports=[clamped(left.mesh, left)],
+        gravity=(0, 0, -0.5),
+        allow_rigid_motions=True,
+    )
+    assert len(ms.equilibrium(scene, require_stable=False).self_intersections()) == 0
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda a, b: ms.Tie(a, a), "a and b are one: to join a mesh to itself use ms.weld"),
+        (lambda a, b: ms.Tie(a, b.mesh), "Tie b must be a Shell of the scene"),
+        (lambda a, b: ms.Tie(a, b, tolerance=0.0), "tolerance .m. must be positive, got 0"),
+        (lambda a, b: ms.Tie(a, b, vertices=[0]), "vertex 0 of a to one of b within .* the nearest is 0.02 m away"),
+        (lambda a, b: ms.Tie(a, b, vertices=[99]), "Tie vertices must be in"),
+        (lambda a, b: ms.Tie(a, b, tolerance=6e-3), "its tolerance of 0.006 m is too wide"),
+        (lambda a, b: ms.Tie(a, ms.Shell(FULL, thickness=1e-3, young_modulus=1.0)), "a Shell that is not in it"),
+        (lambda a, b: "weld", "ties"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(make, message):
+    left, right, _ = halves()
+    with pytest.raises(ValueError, match=message):
+        ms.Scene([left, right], ties=[make(left, right)], supports=[clamped(left.mesh, left)])
+
+
+def test_bodies_that_do_not_touch_are_not_tied():
+    left, right, _ = halves()
+    far = ms.Shell(FULL.transformed(translation=(0, 0, 1.0)), young_modulus=1e6, **PLATE)
+    with pytest.raises(
+        ValueError, match=r"no vertices of a and b within 4\.12e-08 m of each other: the nearest are 1 m"
+    ):
+        ms.Scene([left, right, far], ties=[ms.Tie(left, far)])
+
+
+@pytest.mark.parametrize("name", ["start", "velocities"])
+def test_vertices_that_are_one_have_one_place_and_velocity(name):
+    a, b, tie = coated()
+    scene = ms.Scene([a, b], ties=[tie], supports=[clamped(FULL, a)])
+    rows = scene.mesh.rest_positions.copy() if name == "start" else np.zeros((scene.mesh.n_vertices, 3))
+    rows[30, 2] += 1e-3
+    message = rf"{name} \[.*\] must be the same where bodies are tied, but those of vertices 3 and 30 differ by 0.001"
+    with pytest.raises(ValueError, match=message):
+        ms.simulate(scene, steps=1, time_step=1e-3, **{name: rows})
