@@ -236,7 +236,7 @@ BAD = [
     ({"load_factor": np.zeros(3)}, "load_factor"),
     ({"damping": -1.0}, "damping .* must not be negative"),
     ({"damping": np.ones(3)}, r"\(n_v,\)"),
-    ({"stiffness_damping": -1.0}, "stiffness_damping must be positive"),
+    ({"stiffness_damping": -1.0}, r"stiffness_damping \[s\] must not be negative, got -1"),
     ({"maxwell_modulus": 1.0}, "maxwell_time"),
     ({"velocities": np.zeros((2, 3))}, r"velocities \[m/s\]"),
     ({"start": np.zeros((2, 3))}, "start"),

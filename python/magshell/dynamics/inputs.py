@@ -7,6 +7,7 @@ import numpy as np
 from .. import _core
 from .._checks.arrays import count
 from .._checks.quantity import quantity, shape_of
+from .._checks.scalars import not_negative, positive
 from .._checks.tensors import detached, is_tensor, wants_gradient
 from .._machine.memory import check_memory
 from ..methods.clock import Clock, clock_of
@@ -53,15 +54,12 @@ class MotionInputs:
         self.inputs, self.integrator = inputs, integrator
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
         check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
-        if not quantity("memory_budget", "bytes", memory_budget, ()) >= 0:
-            raise ValueError(f"memory_budget must not be negative, got {memory_budget}")
+        memory_budget = not_negative("memory_budget", "bytes", memory_budget)
         if keep not in (None, "stages", "checkpoints", "factors"):
             raise ValueError(f'keep must be "stages", "checkpoints", "factors" or None, got {keep!r}')
         self.keep = getattr(_core.Keep, keep or "nothing")
         self._given_time_step = time_step
-        self.time_step = float(quantity("time_step", "s", inputs.take("time_step", time_step), ()))
-        if not self.time_step > 0:
-            raise ValueError(f"time_step [s] must be positive, got {self.time_step}")
+        self.time_step = positive("time_step", "s", inputs.take("time_step", time_step))
         self._mass = inputs.values.vertex_masses
         self._damping = self._checked_damping(inputs.take("damping", damping))
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
@@ -156,12 +154,11 @@ class MotionInputs:
         if maxwell_time is not None:
             given["maxwell_time"] = ("s", maxwell_time)
         law = {
-            name: float(quantity(name, unit, self.inputs.take(name, value), ()))
+            name: (positive if name == "maxwell_time" else not_negative)(
+                name, unit, self.inputs.take(name, value)
+            )
             for name, (unit, value) in given.items()
         }
-        for name, value in law.items():
-            if value < 0 or (name == "maxwell_time" and value == 0):
-                raise ValueError(f"{name} must be positive, got {value:g}")
         if law["maxwell_modulus"] and maxwell_time is None:
             raise ValueError("maxwell_modulus needs the relaxation time of the branch, maxwell_time [s]")
         return {"maxwell_time": 1.0, **law}

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import _core as core
-from .._checks.quantity import quantity, real_numbers
+from .._checks.quantity import real_numbers
+from .._checks.scalars import positive
 from .differences import STEP, FluxSampler, Function, GradientSampler
 from .field import AppliedField
 
@@ -30,7 +31,7 @@ class CustomField(AppliedField):
     """
 
     def __init__(self, function: Function, *, length_scale: float, gradient: Function | None = None) -> None:
-        self.length_scale = _checked_length_scale(length_scale)
+        self.length_scale = positive("length_scale", "m", length_scale)
         self.name = getattr(function, "__name__", type(function).__name__)
         self._made_from = {"function": function, "length_scale": self.length_scale, "gradient": gradient}
         step = STEP * self.length_scale
@@ -63,7 +64,7 @@ class MagpylibField(AppliedField):
 
     def __init__(self, sources, *, length_scale: float) -> None:
         magpylib = _import_magpylib()
-        self.length_scale = _checked_length_scale(length_scale)
+        self.length_scale = positive("length_scale", "m", length_scale)
         listed = list(sources) if isinstance(sources, list | tuple) else [sources]
         try:
             copies = [source.copy() for source in listed]
@@ -86,13 +87,6 @@ class MagpylibField(AppliedField):
 
     def __repr__(self) -> str:
         return f"MagpylibField({', '.join(self.names)}, length_scale={self.length_scale:g} m)"
-
-
-def _checked_length_scale(length_scale: float) -> float:
-    value = float(quantity("length_scale", "m", length_scale, ()))
-    if value <= 0:
-        raise ValueError(f"length_scale [m] must be positive, got {value}")
-    return value
 
 
 def _checked_function(name: str, unit: str, function: Function, tail: tuple[int, ...]) -> Callable:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .._checks.arrays import count, number, positive
+from .._checks.arrays import count, number
+from .._checks.scalars import positive
 from .._machine.entry import solve_entry
 from .._machine.progress import progress_bar
 from ..bodies.caps import warn_of_caps
@@ -166,7 +167,10 @@ def follow(
     solver = MixedNewton() if solver is None else solver
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
-    first_step, largest_step = positive("first_step", first_step), positive("largest_step", largest_step)
+    first_step, largest_step = (
+        positive("first_step", "", first_step),
+        positive("largest_step", "", largest_step),
+    )
     max_points = count("max_points", max_points, least=2)
     lowest_parameter = number("lowest_parameter", lowest_parameter)
     if not lowest_parameter < 0:

@@ -9,6 +9,7 @@ import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity
+from .._checks.scalars import not_negative
 from .._checks.selections import indices, selection
 from ..bodies.bodies import checked_body, on_body
 from ..bodies.shell import Shell
@@ -201,9 +202,7 @@ class SymmetryPlane(Support):
             raise ValueError("normal must not be zero")
         self.normal = normal / length
         self.point = quantity("point", "m", point, (3,))
-        self.tolerance = None if tolerance is None else float(quantity("tolerance", "m", tolerance, ()))
-        if self.tolerance is not None and self.tolerance < 0.0:
-            raise ValueError(f"tolerance [m] must not be negative, got {self.tolerance:g}")
+        self.tolerance = None if tolerance is None else not_negative("tolerance", "m", tolerance)
 
     def _vertices(self, mesh: TriangleMesh) -> np.ndarray:
         height = (mesh.rest_positions - self.point) @ self.normal
