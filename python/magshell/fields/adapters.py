@@ -9,7 +9,7 @@ import numpy as np
 from .. import _core as core
 from .._checks.quantity import real_numbers
 from .._checks.scalars import positive
-from .differences import STEP, FluxSampler, Function, GradientSampler
+from .differences import RELATIVE_STEP, FluxSampler, Function, GradientSampler
 from .field import AppliedField
 
 
@@ -34,7 +34,7 @@ class CustomField(AppliedField):
         self.length_scale = positive("length_scale", "m", length_scale)
         self.name = getattr(function, "__name__", type(function).__name__)
         self._made_from = {"function": function, "length_scale": self.length_scale, "gradient": gradient}
-        step = STEP * self.length_scale
+        step = RELATIVE_STEP * self.length_scale
         flux_density = _checked_function("function", "T", function, (3,))
         if gradient is None:
             self._core = core.PythonField(FluxSampler(flux_density, step))
@@ -83,7 +83,7 @@ class MagpylibField(AppliedField):
 
         self._made_from = {"sources": copies, "length_scale": self.length_scale}
         self.names = [type(source).__name__ for source in listed]
-        self._core = core.PythonField(FluxSampler(flux_density, STEP * self.length_scale))
+        self._core = core.PythonField(FluxSampler(flux_density, RELATIVE_STEP * self.length_scale))
 
     def __repr__(self) -> str:
         return f"MagpylibField({', '.join(self.names)}, length_scale={self.length_scale:g} m)"

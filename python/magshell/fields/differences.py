@@ -24,7 +24,7 @@ DIAGONALS = np.array([AXES[j] + AXES[k] for j, k in PAIRS])
 
 # The step in units of the length scale. For a dipole at that distance, truncation and rounding together are
 # then below 1e-10 of the largest entry, for the first and for the second derivatives.
-STEP = 4e-3
+RELATIVE_STEP = 4e-3
 
 Function = Callable[[np.ndarray], np.ndarray]
 

@@ -39,7 +39,9 @@ def poses(obstacles, times: np.ndarray) -> np.ndarray:
     return rows
 
 
-KINKED = 0.3  # rad, by which normals of smooth bodies do not turn within the smoothing of a contact
+LARGEST_SMOOTH_TURN = (
+    0.3  # rad, by which normals of smooth bodies do not turn within the smoothing of a contact
+)
 
 
 def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: float) -> np.ndarray:
@@ -56,7 +58,7 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
         here = places[touching]
         around = obstacle.normals(here[:, None, :] + reach, time)
         turn = np.einsum("pc,pkc->pk", obstacle.normals(here, time), around).min(axis=1, initial=1.0)
-        found.append(vertices[touching][turn < np.cos(KINKED)].ravel())
+        found.append(vertices[touching][turn < np.cos(LARGEST_SMOOTH_TURN)].ravel())
     every = np.unique(np.concatenate(found))
     return every[every >= 0]
 
