@@ -189,7 +189,7 @@ def test_what_cannot_be_done_hands_back_the_motion_until_then(strip):
 
 
 def test_what_is_not_finite_is_named():
-    """A dipole in the very barycentre of a face."""
+    """A dipole in the very barycenter of a face."""
     mesh = ms.TriangleMesh([(0.0, 0, 0), (3.0, 0, 0), (0, 3.0, 0), (3.0, 3.0, 0)], [(0, 1, 2), (1, 3, 2)])
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     scene = ms.Scene(sheet, field=ms.Dipoles([(1.0, 1.0, 0.0)], [(0, 0, 1.0)]), allow_rigid_motions=True)

@@ -91,7 +91,7 @@ BAD_INPUT = {
     ),
     "tube that widens faster than it goes": (
         lambda: ob.Tube(LINE, [0.1, 1.3, 2.5], closed=True),
-        "changes by 1.2 m a knot while its centre advances by 1 m",
+        "changes by 1.2 m a knot while its center advances by 1 m",
     ),
     "ground with a row too few": (
         lambda: ob.HeightField([0, 1, 2], [0, 1], np.zeros((2, 2))),

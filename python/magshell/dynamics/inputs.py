@@ -71,7 +71,7 @@ class MotionInputs:
             {
                 "state": self.start.state,
                 "velocity": self.start.velocity,
-                "memory": self.start.memory,
+                "turns": self.start.turns,
                 **self._history(law),
                 "rotations_given": self.start.rotations_known,
                 **law,
@@ -179,7 +179,7 @@ class MotionInputs:
             origin.time,
             origin.state,
             velocity,
-            origin.memory,
+            origin.turns,
             maxwell_strains=origin.maxwell_strains,
             clock=origin.clock,
             rotations_known=origin.rotations_known,
@@ -201,7 +201,7 @@ class MotionInputs:
             if wants_gradient(start.positions):
                 inputs.take("positions", start.positions)
                 inputs.take("edge_rotations", start.edge_rotations)
-            return MotionState(0.0, start._state, still, start._memory)
+            return MotionState(0.0, start._state, still, start._turns)
         if isinstance(start, MotionState):
             return _checked_state(start, model.size, model.n_strains)
         given = inputs.take("positions", start)
@@ -223,12 +223,10 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
     for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
         values = getattr(start, name)
         quantity(f"start.{name}", "SI", values, (0 if np.size(values) == 0 else n_strains,))
-    if not isinstance(start.memory, list):
-        raise ValueError(
-            f"start.memory must be a list of lists of numbers, got {type(start.memory).__name__}"
-        )
-    for k, each in enumerate(start.memory):
-        quantity(f"start.memory[{k}]", "SI", each, ("n",))
+    if not isinstance(start.turns, list):
+        raise ValueError(f"start.turns must be a list of lists of numbers, got {type(start.turns).__name__}")
+    for k, each in enumerate(start.turns):
+        quantity(f"start.turns[{k}]", "SI", each, ("n",))
     quantity("start.time", "s", start.time, ())
     if not isinstance(start.clock, Clock | None):
         raise ValueError(f"start.clock must be that of a motion, or None, got {type(start.clock).__name__}")

@@ -66,7 +66,7 @@ class MeshSelection:
         )
 
     def faces_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Faces where predicate((n_f, 3) barycentres [m]) -> (n_f,) bool holds."""
+        """Faces where predicate((n_f, 3) barycenters [m]) -> (n_f,) bool holds."""
         return _where("face", predicate, self.face_barycenters, np.arange(self.n_faces))
 
     def nearest_vertex(self, point) -> int:

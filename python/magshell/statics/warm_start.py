@@ -99,7 +99,7 @@ class WarmStart:
     def state_dict(self) -> dict:
         """What a later WarmStart of an equal scene needs to go on with the same bits: tensors and plain values."""
         torch = require_torch("a state_dict")
-        states = [{"state": torch.tensor(s.found.state), "memory": s.found.memory} for s in self._last]
+        states = [{"state": torch.tensor(s.found.state), "turns": s.found.turns} for s in self._last]
         designs = [packed(self.scene, arguments, torch.from_numpy) for arguments in self._design]
         return {"states": states, "designs": designs, "of_cases": self._of_cases}
 
@@ -108,7 +108,7 @@ class WarmStart:
         designs = [unpacked(self.scene, arguments) for arguments in state["designs"]]
         last = []
         for arguments, kept in zip(designs, state["states"], strict=True):
-            origin = Origin(kept["state"].numpy(), kept["memory"], inputs_of(self.scene, arguments))
+            origin = Origin(kept["state"].numpy(), kept["turns"], inputs_of(self.scene, arguments))
             last.append(find(self.scene, arguments, origin, self._search, keep_factor=True))
         self._last, self._design, self._of_cases = last, designs, state["of_cases"]
 

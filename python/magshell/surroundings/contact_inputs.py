@@ -66,8 +66,8 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
 def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
     """A body that starts deeper in an obstacle than half its thickness would be shot out of it."""
     allowed = np.empty(scene.mesh.n_vertices)
-    for part, sheet in zip(scene._bodies.parts, values.sheets, strict=True):
-        allowed[part.vertices] = 0.5 * np.max(sheet.thickness)
+    for span, sheet in zip(scene._bodies.spans, values.sheets, strict=True):
+        allowed[span.vertices] = 0.5 * np.max(sheet.thickness)
     for contact in scene.contacts:
         vertices, weights = scene._bodies.contact_points(contact)
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])
