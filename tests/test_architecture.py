@@ -61,6 +61,7 @@ ROOMS = [
     "__init__",
     "bench",
 ]
+OFFERED_ROOMS = {"control", "meshes", "objectives", "obstacles", "optim", "parametrize"}  # as ms.control, ...
 # Imports of a higher room, each with its reason.
 UPWARD_IMPORTS = {
     # Only autograd.py may see torch.autograd, which says what transforms a tensor is in. Asked for once torch is loaded.
@@ -346,6 +347,14 @@ def test_rules_let_good_code_through(tmp_path: Path, file: str, text: str) -> No
     path.parent.mkdir(parents=True)
     path.write_text(text)
     assert [complaint for rule in RULES for complaint in rule(tmp_path)] == []
+
+
+def test_users_are_not_led_into_the_bench_or_the_rooms() -> None:
+    code = "import sys, magshell; print(*dir(magshell), *(name for name in sys.modules if '.bench' in name))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    names = run.stdout.split()
+    assert "Scene" in names and "equilibrium" in names
+    assert not [name for name in names if "bench" in name or (name in ROOMS and name not in OFFERED_ROOMS)]
 
 
 def test_import_needs_no_optional_module() -> None:

@@ -42,8 +42,8 @@ class Values:
         if "vertex_loads" in own:
             numbers["loads", "forces"] = own["vertex_loads"]
         if magnetization is not None:
-            for k, part in enumerate(scene._bodies.parts):
-                numbers[f"body {k}", "remanent_magnetization"] = magnetization[part.faces]
+            for k, span in enumerate(scene._bodies.spans):
+                numbers[f"body {k}", "remanent_magnetization"] = magnetization[span.faces]
         self.numbers = scene._value_layout.packed(numbers)
 
     def same_as(self, other: Values) -> bool:
@@ -79,7 +79,7 @@ class Values:
     def part_of(self, sheet):
         """Where one of `sheets` stands among them."""
         return next(
-            part for part, each in zip(self.scene._bodies.parts, self.sheets, strict=True) if each is sheet
+            span for span, each in zip(self.scene._bodies.spans, self.sheets, strict=True) if each is sheet
         )
 
     @property
@@ -108,7 +108,7 @@ class Values:
         return self._now.get(item, item)
 
     def _moved(self) -> Constraints:
-        """The same constraints with other motions."""
+        """The same constraints with other moves."""
         scene = self.scene
         supports = [self.current(support) for support in scene.supports]
         moved = gather(scene._bodies, supports, scene._couple_directions)
@@ -134,7 +134,7 @@ class Gradient:
         return (owner, name) in self._scene._value_layout
 
     def value(self, owner: str, name: str) -> np.ndarray:
-        return self._scene._value_layout.part(self._values, owner, name)
+        return self._scene._value_layout.of(self._values, owner, name)
 
     def own(self, name: str) -> np.ndarray:
         """By what a solve itself was given: a control, or one of the others."""
@@ -142,5 +142,5 @@ class Gradient:
             return self.others[name]
         if name == "remanent_magnetization":
             return joined([self.value(f"body {k}", name) for k in range(len(self._scene.bodies))])
-        by_control = self._scene._control_layout.part(self._controls, "scene", name)
+        by_control = self._scene._control_layout.of(self._controls, "scene", name)
         return by_control[..., 0, :] if name == "applied_flux_density" else by_control[..., 0]

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .._checks.arrays import count, number, positive
+from .._checks.arrays import count, number
+from .._checks.scalars import positive
 from .._machine.entry import solve_entry
 from .._machine.progress import progress_bar
 from ..bodies.caps import warn_of_caps
@@ -77,7 +78,7 @@ class Path:
         options = MixedNewton()._options()
         options.require_stable = False
         point = self._points[index]
-        return solve(self._inputs, point.state, point.memory, controls, controls, options).equilibrium
+        return solve(self._inputs, point.state, point.turns, controls, controls, options).equilibrium
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face at one of the points, by default the last."""
@@ -95,7 +96,7 @@ class Path:
         return (1.0 - along) * self._from + along * self._to
 
     def _control(self, name: str) -> np.ndarray:
-        return self.scene._control_layout.part(self._controls, "scene", name)
+        return self.scene._control_layout.of(self._controls, "scene", name)
 
     @property
     def stable(self) -> np.ndarray:
@@ -166,7 +167,10 @@ def follow(
     solver = MixedNewton() if solver is None else solver
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
-    first_step, largest_step = positive("first_step", first_step), positive("largest_step", largest_step)
+    first_step, largest_step = (
+        positive("first_step", "", first_step),
+        positive("largest_step", "", largest_step),
+    )
     max_points = count("max_points", max_points, least=2)
     lowest_parameter = number("lowest_parameter", lowest_parameter)
     if not lowest_parameter < 0:
@@ -184,7 +188,7 @@ def follow(
         field_factor=field_factor,
         motion_factor=motion_factor,
     )
-    state, memory, from_, at_rest = starting_point(scene, start, inputs)
+    state, turns, from_, at_rest = starting_point(scene, start, inputs)
     if not at_rest:
         raise ValueError(
             "start must have the same remanent_magnetization, and the values of the scene, as the path"
@@ -198,7 +202,7 @@ def follow(
     began = time.perf_counter()
     with inputs.in_core(), progress_bar("path", 1.0, shown=progress, delay=2.0, bar_format=_BAR) as bar:
         found = _core.follow_path(
-            scene._model, state, memory, from_, inputs.controls, options, until, _advance(bar)
+            scene._model, state, turns, from_, inputs.controls, options, until, _advance(bar)
         )
         bending = _bending_energies(scene, found, inputs.controls)
     path = _path(inputs, found, from_, time.perf_counter() - began)

@@ -49,7 +49,7 @@ def equilibrium(
         displacement, rotation and center of supports that move, positions and moments of Dipoles, the sizes,
         magnetization, center and rotation of a magnet, the flux_density of a SampledField, the law of a Contact, the
         center and rotation of an obstacle, the numbers of Water, and {scene: {"gravity": value}}. The scene is
-        not analysed again. `scene.parts` lists the objects.
+        not analysed again. `scene.objects` lists the objects.
     start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
         (n_v, 3) m. By default the rest shape, unloaded. Load cases may have Equilibria, one each.
     require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.
