@@ -88,6 +88,7 @@ OPTIONAL_MODULES = [
     "cloudpickle",
 ]
 LONGEST_FILE = 400
+SPELLINGS = {"cent" + "re": "center"}  # in two halves, as this file is read as well
 
 
 def cpp_files(root: Path) -> list[Path]:
@@ -226,6 +227,14 @@ def length_violations(root: Path) -> Iterator[str]:
             yield f"{path.relative_to(root)} has {length} lines"
 
 
+def spelling_violations(root: Path) -> Iterator[str]:
+    for path in cpp_files(root) + python_files(root, "python", "tests", "examples"):
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            for word, right in SPELLINGS.items():
+                if word in line.lower():
+                    yield f"{path.relative_to(root)}:{number}: {word} is spelled {right} here"
+
+
 RULES = [
     include_violations,
     import_violations,
@@ -233,6 +242,7 @@ RULES = [
     circle_violations,
     hidden_violations,
     length_violations,
+    spelling_violations,
 ]
 
 
@@ -311,6 +321,7 @@ def test_the_rules_look_at_files() -> None:
         (hidden_violations, "python/magshell/__init__.py", "from .mesh import *\n", "imports *"),
         (hidden_violations, "python/magshell/mesh/__init__.py", "from .weld import weld\n", "hides a module"),
         (length_violations, "tests/test_long.py", "\n" * (LONGEST_FILE + 1), "401 lines"),
+        (spelling_violations, "tests/test_a.py", f"x = bary{next(iter(SPELLINGS))}s\n", "spelled center"),
     ],
 )
 def test_rule_sees_a_violation(tmp_path: Path, rule, file: str, text: str, complaint: str) -> None:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from .._checks.quantity import quantity
 
-TIME_STEP = 1e-4  # s, between the times that derivatives are taken from
+STEP = 1e-4  # s, between the times that derivatives are taken from
 # Fourth-order derivatives: from both sides, and from one side near time 0, before which nobody asked for the motion.
 _CENTRAL = {-2: 1 / 12, -1: -2 / 3, 1: 2 / 3, 2: -1 / 12}
 _FORWARD = {0: -25 / 12, 1: 4.0, 2: -3.0, 3: 4 / 3, 4: -1 / 4}
@@ -48,12 +48,12 @@ def rates(motion: Callable | None, time: float) -> tuple[np.ndarray, np.ndarray]
     """Velocity (3,) m/s and spin omega (3,) rad/s in world axes, with dR/dt = [omega] R, at a time [s]."""
     if motion is None:
         return np.zeros(3), np.zeros(3)
-    weights = _FORWARD if 0 <= time < 2 * TIME_STEP else _CENTRAL
+    weights = _FORWARD if 0 <= time < 2 * STEP else _CENTRAL
     velocity, turning = np.zeros(3), np.zeros((3, 3))
     for steps, weight in weights.items():
-        displacement, rotation = pose(motion, time + steps * TIME_STEP)
-        velocity += weight / TIME_STEP * displacement
-        turning += weight / TIME_STEP * matrix(rotation)
+        displacement, rotation = pose(motion, time + steps * STEP)
+        velocity += weight / STEP * displacement
+        turning += weight / STEP * matrix(rotation)
     skew = turning @ matrix(pose(motion, time)[1]).T
     return velocity, 0.5 * np.array(
         [skew[2, 1] - skew[1, 2], skew[0, 2] - skew[2, 0], skew[1, 0] - skew[0, 1]]
