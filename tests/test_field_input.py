@@ -75,7 +75,9 @@ BAD_INPUT = {
         "counts must be three integers of at least 1",
     ),
     "more samples than there is memory": (
-        lambda: ms.SampledField.from_function(zeros, (0, 0, 0), (1, 1, 1), np.full(3, 2**63 + 1, dtype=np.uint64)),
+        lambda: ms.SampledField.from_function(
+            zeros, (0, 0, 0), (1, 1, 1), np.full(3, 2**63 + 1, dtype=np.uint64)
+        ),
         r"are 7\.85e\+56 samples, more than 1e\+09",
     ),
     "sampled function of the wrong shape": (

@@ -1,6 +1,6 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
-from . import control, meshes, objectives, obstacles, optim, parametrize
+from . import control, meshes, objectives, obstacles, optim, parametrize, shapes
 from ._core import __version__
 from ._machine.threads import num_threads, set_num_threads, show_config
 from .bodies.body_result import BodyResult
@@ -29,6 +29,7 @@ from .linear.buckling import Buckling, linear_buckling
 from .linear.response import LinearResponse, linear_response
 from .linear.vibration import VibrationModes, vibration_modes
 from .mesh.io import read_fields, read_mesh, write_mesh
+from .mesh.tet_mesh import TetMesh
 from .mesh.triangle_mesh import TriangleMesh
 from .mesh.welding import Weld, weld
 from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
@@ -96,6 +97,7 @@ __all__ = [
     "Strains",
     "SurfaceTension",
     "SymmetryPlane",
+    "TetMesh",
     "Tie",
     "Trajectory",
     "TriangleMesh",
@@ -125,6 +127,7 @@ __all__ = [
     "read_mesh",
     "residual_to_remanent",
     "set_num_threads",
+    "shapes",
     "show_config",
     "simulate",
     "vibration_modes",

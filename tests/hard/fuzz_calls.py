@@ -129,7 +129,9 @@ def _scenes(s: Sample) -> Iterator[Call]:
     yield Call("Clamp", lambda **a: scene(supports=ms.Clamp(**a)), {"edges": edges, **moved})
     coating = ms.Shell(mesh, thickness=1e-4, young_modulus=1e6)
     tie = {"a": s.shell, "b": coating, "vertices": [0, 1], "tolerance": 1e-9}
-    yield Call("Tie", lambda **a: ms.Scene([s.shell, coating], ties=[ms.Tie(**a)], allow_rigid_motions=True), tie)
+    yield Call(
+        "Tie", lambda **a: ms.Scene([s.shell, coating], ties=[ms.Tie(**a)], allow_rigid_motions=True), tie
+    )
     plane = {"normal": (1, 0, 0), "point": (0, 0, 0), "tolerance": 1e-9}
     yield Call(
         "SymmetryPlane", lambda **a: scene(supports=[ms.SymmetryPlane(**a)], allow_rigid_motions=True), plane

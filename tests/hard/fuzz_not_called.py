@@ -26,6 +26,7 @@ NOT_CALLED = {
     "AppliedField": "abstract",
     "control.Curve": "abstract",
     "obstacles.Obstacle": "abstract",
+    "shapes.Shape": "abstract",
     "SDIRK2": "takes nothing",
     "SDIRK3": "takes nothing",
     "TRBDF2": "takes nothing",

@@ -71,10 +71,10 @@ class FaceEnergyTerm final : public Term {
         });
     }
 
-    void assemble(const Part& part, const double* q, const Controls& controls, bool,
+    void assemble(const Chunk& chunk, const double* q, const Controls& controls, bool,
                   SystemMatrix& out) const override {
         const Pack factor(controls[factor_.first]);
-        FaceLoop::over_packs(part, [&](Index pack) {
+        FaceLoop::over_packs(chunk, [&](Index pack) {
             Pack33 h[6];
             kernel(pack, q).hessian(inputs_[pack].of, h);
             for (Pack33& block : h) block = factor * block;

@@ -18,6 +18,8 @@ from .._machine.files import replacing
 from .obj import read_obj
 from .ply import read_ply, write_ply
 from .selection import RELATIVE_TOLERANCE
+from .tet_io import TetContent, TetFields, cells_and_data, tetrahedra_of
+from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh, checked_mesh
 
 _MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
@@ -33,39 +35,52 @@ class Fields(NamedTuple):
     face: dict[str, np.ndarray]
 
 
-def read_mesh(path, drop_unused: bool = False) -> TriangleMesh:
-    """The triangle mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`).
+def read_mesh(path, drop_unused: bool = False) -> TriangleMesh | TetMesh:
+    """The mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`): a TetMesh where a VTU or
+    MSH file holds tetrahedra, else a TriangleMesh.
 
     Coordinates are taken to be in m: use `.scaled(1e-3)` on a file in mm. Points in the plane get z = 0. An
     STL file stores each triangle apart: its corners within 1e-6 of the mesh's size are one vertex.
 
+    Tetrahedra have 4 points or 10; triangles and lines beside them are left out. gmsh's physical groups of volumes become
+    parts with their names, as does a cell field `part` of integers.
+
     Args:
         path: the ending tells the format.
-        drop_unused: leave out points that no triangle uses, instead of refusing them.
+        drop_unused: leave out points that no triangle, or no tetrahedron, uses, instead of refusing them.
 
     Raises:
         FileNotFoundError: no such file.
         ValueError: unknown ending, a file that cannot be read, that holds other faces than triangles or none,
-            or whose mesh `TriangleMesh` refuses.
+            or whose mesh `TriangleMesh` or `TetMesh` refuses.
         ImportError: without meshio, where it is needed.
     """
     return _read(path, drop_unused)[0]
 
 
-def read_fields(path, drop_unused: bool = False) -> Fields:
-    """The fields in a file, for the vertices and faces of `read_mesh` with the same arguments."""
+def read_fields(path, drop_unused: bool = False) -> Fields | TetFields:
+    """The fields in a file, for the vertices and faces, or tetrahedra, of `read_mesh` with the same arguments."""
     return _read(path, drop_unused)[1]
 
 
-def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, face_fields=None) -> None:
-    """Writes a mesh and fields on it to VTU (needs the extra `io`) or binary PLY.
+def write_mesh(
+    path,
+    mesh: TriangleMesh | TetMesh,
+    positions=None,
+    vertex_fields=None,
+    face_fields=None,
+    tetrahedron_fields=None,
+) -> None:
+    """Writes a mesh and fields on it to VTU (needs the extra `io`) or, of triangles, binary PLY.
 
     Args:
         path: ends in .vtu or .ply.
-        mesh: gives the faces.
+        mesh: gives the faces, or the tetrahedra: their parts are written as the field `part`, without names. Fields on a
+            solid's faces go to a file of its `surface`.
         positions: (n_v, 3), m, instead of the rest positions.
         vertex_fields: name -> (n_v,) or (n_v, k).
         face_fields: name -> (n_f,) or (n_f, k).
+        tetrahedron_fields: name -> (n_t,) or (n_t, k).
 
     Raises:
         ValueError: unknown ending, wrong shapes, or names with spaces or one of " < > &.
@@ -75,22 +90,39 @@ def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, fac
     ending = path.suffix.lower()
     if ending not in _WRITERS:
         raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}")
-    points = checked_mesh(mesh).rest_positions
+    solid = isinstance(mesh, TetMesh)
+    points = mesh.rest_positions if solid else checked_mesh(mesh).rest_positions
     if positions is not None:
         points = quantity("positions", "m", detached(positions), (mesh.n_vertices, 3))
+    _refuse_misplaced(solid, ending, face_fields, tetrahedron_fields)
     on_vertices = _checked_fields("vertex", vertex_fields, mesh.n_vertices)
-    on_faces = _checked_fields("face", face_fields, mesh.n_faces)
+    if solid:
+        on_cells = _checked_fields("tetrahedron", tetrahedron_fields, mesh.n_tetrahedra)
+        cells, cell_data = cells_and_data(mesh, on_cells)
+    else:
+        on_faces = _checked_fields("face", face_fields, mesh.n_faces)
+        cells, cell_data = [("triangle", mesh.faces)], {name: [values] for name, values in on_faces.items()}
     if ending == ".ply":
         write_ply(path, points, mesh.faces, on_vertices, on_faces)
         return
     meshio = _meshio("vtu")
-    cell_data = {name: [values] for name, values in on_faces.items()}
-    content = _meshio().Mesh(points, [("triangle", mesh.faces)], point_data=on_vertices, cell_data=cell_data)
+    content = _meshio().Mesh(points, cells, point_data=on_vertices, cell_data=cell_data)
     with replacing(path) as part:
         meshio.write(part, content)
 
 
-def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields]:
+def _refuse_misplaced(solid: bool, ending: str, face_fields, tetrahedron_fields) -> None:
+    if solid and ending == ".ply":
+        raise ValueError("PLY holds no tetrahedra: write .vtu, or the mesh's `surface`")
+    if solid and face_fields:
+        raise ValueError(
+            "face_fields: a file of tetrahedra has no faces; write those of the mesh's `surface`"
+        )
+    if not solid and tetrahedron_fields:
+        raise ValueError("tetrahedron_fields: a TriangleMesh has no tetrahedra")
+
+
+def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields] | tuple[TetMesh, TetFields]:
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in _READABLE:
@@ -99,12 +131,15 @@ def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields]:
         raise FileNotFoundError(f"no file {str(path)!r}")
     reader = {".obj": read_obj, ".ply": read_ply}.get(ending, _read_with_meshio)
     try:
-        points, faces, vertex_fields, face_fields = reader(path)
+        found = reader(path)
     except ImportError:
         raise
     except Exception as error:  # a reader fed garbage may raise anything
         reason = str(error) or type(error).__name__
         raise ValueError(f"cannot read {str(path)!r} as {ending[1:].upper()}: {reason}") from error
+    if isinstance(found, TetContent):
+        return _solid(path, found, drop_unused)
+    points, faces, vertex_fields, face_fields = found
     if len(faces) == 0:
         raise ValueError(f"{str(path)!r} holds no triangles")
     faces = index_array(f"the faces of {str(path)!r}", faces)
@@ -113,22 +148,39 @@ def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields]:
     if ending == ".stl":
         points, faces = _merge_coincident(points, faces)
 
-    used = np.unique(faces)
-    within = used.size == 0 or (used[0] >= 0 and used[-1] < len(points))
-    if within and len(used) < len(points):
-        if not drop_unused:
-            unused = np.setdiff1d(np.arange(len(points)), used)
-            raise ValueError(
-                f"{str(path)!r} has {len(unused)} points that no triangle uses, the first one {unused[0]}; "
-                "read_mesh(..., drop_unused=True) leaves them out"
-            )
-        points, faces = points[used], np.searchsorted(used, faces)
-        vertex_fields = {name: values[used] for name, values in vertex_fields.items()}
+    points, faces, vertex_fields = _used(path, "triangle", points, faces, vertex_fields, drop_unused)
     try:
         mesh = TriangleMesh(points, faces)
     except ValueError as error:
         raise ValueError(f"{str(path)!r}: {error}") from error
     return mesh, Fields(vertex_fields, face_fields)
+
+
+def _solid(path: Path, found: TetContent, drop_unused: bool) -> tuple[TetMesh, TetFields]:
+    nodes = index_array(f"the tetrahedra of {str(path)!r}", found.tetrahedra)
+    found.points, found.tetrahedra, found.vertex_fields = _used(
+        path, "tetrahedron", found.points, nodes, found.vertex_fields, drop_unused
+    )
+    try:
+        return found.build()
+    except ValueError as error:
+        raise ValueError(f"{str(path)!r}: {error}") from error
+
+
+def _used(path: Path, cell: str, points, cells, vertex_fields, drop_unused: bool):
+    """Points, cells and fields without the points that no cell uses. Raises ValueError where those are not to be dropped."""
+    used = np.unique(cells)
+    within = used.size == 0 or (used[0] >= 0 and used[-1] < len(points))
+    if not within or len(used) == len(points):
+        return points, cells, vertex_fields
+    if not drop_unused:
+        unused = np.setdiff1d(np.arange(len(points)), used)
+        raise ValueError(
+            f"{str(path)!r} has {len(unused)} points that no {cell} uses, the first one {unused[0]}; "
+            "read_mesh(..., drop_unused=True) leaves them out"
+        )
+    fields = {name: values[used] for name, values in vertex_fields.items()}
+    return points[used], np.searchsorted(used, cells), fields
 
 
 def _meshio(module: str | None = None):
@@ -138,10 +190,13 @@ def _meshio(module: str | None = None):
         raise ImportError('this file format needs meshio: pip install "magshell[io]"') from error
 
 
-def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
+def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict] | TetContent:
     # meshio.read ends the interpreter on a file it cannot read; the readers of the formats raise
     with np.errstate(over="ignore"):  # its STL reader multiplies whatever stands where the count should
         content = _meshio(_MESHIO_MODULES[path.suffix.lower()]).read(path)
+    solid = tetrahedra_of(content)
+    if solid is not None:
+        return solid
     others = {
         block.type: len(block.data)
         for block in content.cells

@@ -12,12 +12,13 @@ from .. import _core
 from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
+from .mesh_base import MeshBase, frozen
 from .quality import MeshQuality
-from .selection import MeshSelection
 from .summary import boundary_loops, summary
+from .transforms import moved
 
 
-class TriangleMesh(MeshSelection):
+class TriangleMesh(MeshBase):
     """An oriented manifold triangle mesh, with or without boundary, of one part or several. Immutable.
 
     Args:
@@ -73,55 +74,34 @@ class TriangleMesh(MeshSelection):
         """(n_f, 3): the edge opposite each vertex of the face, int32, read-only."""
         return self._core.face_edges
 
-    @property
-    def n_vertices(self) -> int:
-        return len(self.rest_positions)
-
-    @property
-    def n_faces(self) -> int:
-        return len(self.faces)
-
-    @property
-    def n_edges(self) -> int:
-        return len(self.edges)
-
     @cached_property
     def boundary_edges(self) -> np.ndarray:
         """Indices of the edges with one face, ascending."""
-        return _frozen(np.flatnonzero((self.edge_faces < 0).any(axis=1)))
+        return frozen(np.flatnonzero((self.edge_faces < 0).any(axis=1)))
 
     @cached_property
     def interior_edges(self) -> np.ndarray:
         """Indices of the edges with two faces, ascending."""
-        return _frozen(np.flatnonzero((self.edge_faces >= 0).all(axis=1)))
+        return frozen(np.flatnonzero((self.edge_faces >= 0).all(axis=1)))
 
     @cached_property
     def boundary_vertices(self) -> np.ndarray:
         """Indices of the vertices on boundary edges, ascending."""
-        return _frozen(np.unique(self.edges[self.boundary_edges]))
+        return frozen(np.unique(self.edges[self.boundary_edges]))
 
     @cached_property
     def boundary_loops(self) -> tuple[np.ndarray, ...]:
         """The vertices of each closed boundary curve, in order, the surface to their left."""
-        return tuple(map(_frozen, boundary_loops(self)))
+        return tuple(map(frozen, boundary_loops(self)))
 
     @cached_property
     def components(self) -> np.ndarray:
         """(n_v,): the number of the connected part each vertex belongs to, from 0."""
         shape = (self.n_vertices, self.n_vertices)
         graph = coo_array((np.ones(self.n_edges, dtype=bool), tuple(self.edges.T)), shape=shape)
-        return _frozen(connected_components(graph, directed=False)[1])
-
-    @property
-    def n_components(self) -> int:
-        return int(self.components.max()) + 1
+        return frozen(connected_components(graph, directed=False)[1])
 
     # Geometry at rest
-
-    @cached_property
-    def size(self) -> float:
-        """The diagonal of the bounding box, m: the length that default tolerances are relative to."""
-        return float(np.linalg.norm(np.ptp(self.rest_positions, axis=0)))
 
     @cached_property
     def _area_vectors(self) -> np.ndarray:
@@ -134,33 +114,22 @@ class TriangleMesh(MeshSelection):
     @cached_property
     def face_areas(self) -> np.ndarray:
         """(n_f,), m2."""
-        return _frozen(np.linalg.norm(self._area_vectors, axis=1))
+        return frozen(np.linalg.norm(self._area_vectors, axis=1))
 
     @cached_property
     def face_normals(self) -> np.ndarray:
         """(n_f, 3) unit vectors."""
-        return _frozen(self._area_vectors / self.face_areas[:, None])
+        return frozen(self._area_vectors / self.face_areas[:, None])
 
     @cached_property
     def face_barycenters(self) -> np.ndarray:
         """(n_f, 3), m."""
-        return _frozen(self.rest_positions[self.faces].mean(axis=1))
-
-    @cached_property
-    def edge_lengths(self) -> np.ndarray:
-        """(n_e,), m."""
-        ends = self.rest_positions[self.edges]
-        return _frozen(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
-
-    @cached_property
-    def edge_midpoints(self) -> np.ndarray:
-        """(n_e, 3), m."""
-        return _frozen(self.rest_positions[self.edges].mean(axis=1))
+        return frozen(self.rest_positions[self.faces].mean(axis=1))
 
     @cached_property
     def vertex_normals(self) -> np.ndarray:
         """(n_v, 3) unit vectors: the normals around each vertex, weighted by area. Zero where they cancel."""
-        return _frozen(self.normals_at_vertices(self.rest_positions))
+        return frozen(self.normals_at_vertices(self.rest_positions))
 
     def normals_at_vertices(self, positions: np.ndarray) -> np.ndarray:
         """The same (n_v, 3) where the vertices are at other positions, (n_v, 3) m."""
@@ -212,16 +181,7 @@ class TriangleMesh(MeshSelection):
                 surface.
             translation: (3,), m.
         """
-        positions = self.rest_positions
-        if rotation is not None:
-            as_matrix = getattr(rotation, "as_matrix", None)
-            matrix = quantity("rotation", "1", as_matrix() if as_matrix else rotation, (3, 3))
-            if abs(np.linalg.det(matrix)) <= 1e-12 * np.linalg.norm(matrix) ** 3:
-                raise ValueError("rotation is singular: it would flatten the mesh")
-            positions = positions @ matrix.T
-        if translation is not None:
-            positions = positions + quantity("translation", "m", translation, (3,))
-        return TriangleMesh(positions, self.faces)
+        return TriangleMesh(moved(self.rest_positions, rotation, translation), self.faces)
 
     def scaled(self, factor: float) -> TriangleMesh:
         """The mesh with all coordinates multiplied by a positive factor."""
@@ -233,8 +193,3 @@ def checked_mesh(value, name: str = "mesh") -> TriangleMesh:
     if not isinstance(value, TriangleMesh):
         raise ValueError(f"{name} must be a TriangleMesh, got {type(value).__name__}")
     return value
-
-
-def _frozen(array: np.ndarray) -> np.ndarray:
-    array.setflags(write=False)
-    return array

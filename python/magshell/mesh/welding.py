@@ -9,9 +9,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .._checks.quantity import quantity
-from .selection import RELATIVE_TOLERANCE
+from .tet_mesh import TetMesh
+from .tet_weld import TetWeld, weld_solids
 from .triangle_mesh import TriangleMesh
+from .weld_tolerance import weld_tolerance
 
 
 class Weld(NamedTuple):
@@ -22,11 +23,14 @@ class Weld(NamedTuple):
     face_maps: tuple[np.ndarray, ...]
 
 
-def weld(*meshes: TriangleMesh, tolerance: float | None = None) -> Weld:
+def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Weld | TetWeld:
     """Joins meshes along boundaries that they share vertex by vertex.
 
     Boundary vertices of different parts within `tolerance` become one, at the position of the first part.
     Vertices of one part are never joined, so its slits stay open.
+
+    Meshes of tetrahedra are joined alike, by the vertices of their surfaces, where they share faces; they keep their
+    `parts`, and `tetrahedron_maps` come instead of `face_maps`.
 
     Args:
         meshes: two or more, their normals on the same side along the seams.
@@ -44,10 +48,12 @@ def weld(*meshes: TriangleMesh, tolerance: float | None = None) -> Weld:
     """
     if len(meshes) < 2:
         raise ValueError(f"weld needs at least two meshes, got {len(meshes)}")
+    if isinstance(meshes[0], TetMesh):
+        return weld_solids(meshes, tolerance)
     for part, mesh in enumerate(meshes):
         if not isinstance(mesh, TriangleMesh):
             raise ValueError(f"mesh {part} must be a TriangleMesh, got {type(mesh).__name__}")
-    tolerance = _checked_tolerance(meshes, tolerance)
+    tolerance = weld_tolerance(meshes, tolerance)
 
     maps = _vertex_maps(meshes, tolerance)
     _check_seams(meshes, maps, tolerance)
@@ -60,19 +66,6 @@ def weld(*meshes: TriangleMesh, tolerance: float | None = None) -> Weld:
     ends = np.cumsum([mesh.n_faces for mesh in meshes])
     face_maps = tuple(np.arange(end - mesh.n_faces, end) for mesh, end in zip(meshes, ends, strict=True))
     return Weld(TriangleMesh(positions, faces), tuple(maps), face_maps)
-
-
-def _checked_tolerance(meshes, tolerance: float | None) -> float:
-    if tolerance is None:
-        tolerance = RELATIVE_TOLERANCE * max(mesh.size for mesh in meshes)
-    shortest = min(float(mesh.edge_lengths.min()) for mesh in meshes)
-    tolerance = float(quantity("tolerance", "m", tolerance, ()))
-    if not 0 <= tolerance < 0.5 * shortest:
-        raise ValueError(
-            f"tolerance [m] must be at least 0 and below half of the shortest edge ({shortest:.4g} m), "
-            f"got {tolerance}"
-        )
-    return tolerance
 
 
 def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:

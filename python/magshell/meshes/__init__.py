@@ -1,11 +1,33 @@
-"""Generators of meshes: sheets, rings, shells of revolution, and any planar outline."""
+"""Generators of meshes: sheets, rings, shells of revolution, any planar outline; and solids of tetrahedra."""
 
 from .annuli import annulus, sector
+from .balls import ball
+from .boxes import box
 from .cuts import cut
 from .cylinders import cylinder
 from .disks import disk
+from .extrusions import extruded, solid_cylinder
+from .filled import tetrahedralize
 from .outlines import outline
 from .rectangles import rectangle
 from .spherical_caps import spherical_cap
+from .stuffed import from_distance
+from .tubes import tube
 
-__all__ = ["annulus", "cut", "cylinder", "disk", "outline", "rectangle", "sector", "spherical_cap"]
+__all__ = [
+    "annulus",
+    "ball",
+    "box",
+    "cut",
+    "cylinder",
+    "disk",
+    "extruded",
+    "from_distance",
+    "outline",
+    "rectangle",
+    "sector",
+    "solid_cylinder",
+    "spherical_cap",
+    "tetrahedralize",
+    "tube",
+]

@@ -33,7 +33,7 @@ def gmsh_session(mesh_size: float) -> Iterator:
     try:
         import gmsh
     except (ImportError, OSError) as error:  # OSError: gmsh is there, a system library that it needs is not
-        raise ImportError(f'outlines are meshed by gmsh: pip install "magshell[gmsh]" ({error})') from error
+        raise ImportError(f'this is meshed by gmsh: pip install "magshell[gmsh]" ({error})') from error
 
     started_here = not gmsh.isInitialized()
     if started_here:

@@ -1,0 +1,50 @@
+"""What meshes of triangles and of tetrahedra have in common."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from .selection import MeshSelection
+
+
+class MeshBase(MeshSelection):
+    """Counts and lengths that follow from rest_positions, edges, faces and components."""
+
+    @property
+    def n_vertices(self) -> int:
+        return len(self.rest_positions)
+
+    @property
+    def n_faces(self) -> int:
+        return len(self.faces)
+
+    @property
+    def n_edges(self) -> int:
+        return len(self.edges)
+
+    @property
+    def n_components(self) -> int:
+        return int(self.components.max()) + 1
+
+    @cached_property
+    def size(self) -> float:
+        """The diagonal of the bounding box, m: the length that default tolerances are relative to."""
+        return float(np.linalg.norm(np.ptp(self.rest_positions, axis=0)))
+
+    @cached_property
+    def edge_lengths(self) -> np.ndarray:
+        """(n_e,), m, straight from end to end."""
+        ends = self.rest_positions[self.edges]
+        return frozen(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
+    @cached_property
+    def edge_midpoints(self) -> np.ndarray:
+        """(n_e, 3), m, halfway between the ends; of ten-node tetrahedra the nodes on the edges may lie elsewhere."""
+        return frozen(self.rest_positions[self.edges].mean(axis=1))
+
+
+def frozen(array: np.ndarray) -> np.ndarray:
+    array.setflags(write=False)
+    return array

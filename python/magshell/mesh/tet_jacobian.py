@@ -1,0 +1,111 @@
+"""Volumes of tetrahedra, and of ten-node ones the Jacobian: how their map from a straight one stretches volume.
+
+The map of ten nodes is quadratic, so its Jacobian determinant is a cubic polynomial, held by its 20 coefficients in the
+basis of Bernstein. It lies between the smallest and the largest of them, and its mean is theirs.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from math import factorial
+
+import numpy as np
+
+from .tet_topology import EDGES
+
+_POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])  # (20, 4)
+_POINTS = _POWERS / 3.0
+_LEVELS = 4  # halvings that decide whether a polynomial with coefficients of both signs is positive
+
+
+def _basis(points: np.ndarray) -> np.ndarray:
+    """(n, 20): the polynomials of Bernstein at barycentric coordinates (n, 4)."""
+    weights = [6 / np.prod([factorial(p) for p in powers]) for powers in _POWERS.tolist()]
+    return np.prod(points[:, None, :] ** _POWERS, axis=2) * weights
+
+
+_FROM_VALUES = np.linalg.inv(_basis(_POINTS))
+
+
+def _gradients(points: np.ndarray) -> np.ndarray:
+    """(n, 10, 3): derivatives of the ten shape functions by the last three of four barycentric coordinates (n, 4)."""
+    corner = np.zeros((len(points), 10, 4))
+    for i in range(4):
+        corner[:, i, i] = 4 * points[:, i] - 1
+    for k, (i, j) in enumerate(EDGES):
+        corner[:, 4 + k, i] = 4 * points[:, j]
+        corner[:, 4 + k, j] = 4 * points[:, i]
+    return corner[:, :, 1:] - corner[:, :, :1]
+
+
+def _halves() -> np.ndarray:
+    """(8, 20, 20): the coefficients on each of eight parts of a tetrahedron from those on the whole."""
+    corners = np.eye(4)
+    middle = {(i, j): 0.5 * (corners[i] + corners[j]) for i in range(4) for j in range(4)}
+    parts = [[middle[i, j] for j in range(4)] for i in range(4)]
+    ring = [middle[0, 1], middle[1, 2], middle[2, 3], middle[0, 3]]
+    parts += [[middle[0, 2], middle[1, 3], ring[k], ring[(k + 1) % 4]] for k in range(4)]
+    return np.array([_FROM_VALUES @ _basis(_POINTS @ np.array(part)) for part in parts])
+
+
+_PARTS = _halves()
+_AT_POINTS = _gradients(_POINTS)
+
+
+def straight_volumes(corner_positions: np.ndarray) -> np.ndarray:
+    """(n_t,), m3, signed, of corners (n_t, 4, 3)."""
+    a, b, c = np.moveaxis(corner_positions[:, 1:] - corner_positions[:, :1], 1, 0)
+    return np.einsum("ti,ti->t", np.cross(a, b), c) / 6
+
+
+def jacobians(node_positions: np.ndarray) -> np.ndarray:
+    """(n_t, 20), m3: the coefficients of the Jacobian determinant of ten-node tetrahedra (n_t, 10, 3)."""
+    values = np.linalg.det(np.einsum("pna,tni->tpia", _AT_POINTS, node_positions))
+    return values @ _FROM_VALUES.T
+
+
+def bent(node_positions: np.ndarray) -> np.ndarray:
+    """(n_t,) bool: whether a node of (n_t, 10, 3) is not in the middle of its edge, by more than round-off. Others have
+    the Jacobian of their corners everywhere."""
+    ends = node_positions[:, EDGES]
+    off = node_positions[:, 4:] - ends.mean(axis=2)
+    lengths2 = np.square(ends[:, :, 1] - ends[:, :, 0]).sum(axis=2)
+    return (np.square(off).sum(axis=2) > 1e-28 * lengths2).any(axis=1)
+
+
+def quadratic_volumes(node_positions: np.ndarray) -> np.ndarray:
+    """(n_t,), m3, signed, of ten-node tetrahedra (n_t, 10, 3)."""
+    volumes = straight_volumes(node_positions[:, :4])
+    curved = bent(node_positions)
+    volumes[curved] = jacobians(node_positions[curved]).mean(axis=1) / 6
+    return volumes
+
+
+def least_jacobians(coefficients: np.ndarray) -> np.ndarray:
+    """(n_t,), m3: the least value on each of the 20 points that decide a cubic polynomial."""
+    return (coefficients @ _basis(_POINTS).T).min(axis=1)
+
+
+def not_positive(coefficients: np.ndarray, floor: np.ndarray) -> np.ndarray:
+    """(n_t,) bool: whether the polynomial falls to its floor (n_t,) or below. What five halvings leave open counts."""
+    bad = np.zeros(len(coefficients), dtype=bool)
+    open_ones, owner = coefficients, np.arange(len(coefficients))
+    for level in range(_LEVELS + 1):
+        undecided = open_ones.min(axis=1) <= floor[owner]
+        open_ones, owner = open_ones[undecided], owner[undecided]
+        if len(owner) == 0:
+            return bad
+        bad[owner[least_jacobians(open_ones) <= floor[owner]]] = True
+        going_on = ~bad[owner]
+        open_ones, owner = open_ones[going_on], owner[going_on]
+        if level < _LEVELS:
+            open_ones = np.einsum("pij,tj->tpi", _PARTS, open_ones).reshape(-1, 20)
+            owner = np.repeat(owner, 8)
+    bad[owner] = True
+    return bad
+
+
+def shape_values(points: np.ndarray) -> np.ndarray:
+    """(n, 10): the ten shape functions at barycentric coordinates (n, 4)."""
+    at_corners = points * (2 * points - 1)
+    return np.concatenate([at_corners, 4 * points[:, EDGES[:, 0]] * points[:, EDGES[:, 1]]], axis=1)

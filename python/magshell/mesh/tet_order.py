@@ -1,0 +1,65 @@
+"""From four nodes to ten, on curved boundaries where there are such, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+
+import numpy as np
+
+from .signed_distance import Distance, checked_distance, onto_surface
+from .tet_jacobian import jacobians, not_positive, straight_volumes
+
+Projection = Distance
+_ON_SURFACE = 1e-3  # of an edge: both its ends lie this near to the surface that its node moves onto
+_LEAST_JACOBIAN = 0.1  # of the straight tetrahedron's
+
+
+def quadratic(mesh, surface: Projection | None):
+    nodes = ten_nodes(mesh)
+    positions = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
+    if surface is None:
+        return type(mesh)(positions, nodes, mesh.parts, mesh.part_names)
+    distance = checked_distance("surface", surface)
+    edges = mesh.boundary_edges
+    lengths = mesh.edge_lengths[edges]
+    at_ends = np.abs(distance(mesh.rest_positions))[mesh.edges[edges]]
+    on_it = (at_ends <= _ON_SURFACE * lengths[:, None]).all(axis=1)
+    edges, lengths = edges[on_it], lengths[on_it]
+    target = positions.copy()
+    target[mesh.n_vertices + edges] = onto_surface(distance, mesh.edge_midpoints[edges], lengths)
+    return type(mesh)(held_back(positions, target, nodes), nodes, mesh.parts, mesh.part_names)
+
+
+def curved(mesh, place: Callable[[np.ndarray, np.ndarray], np.ndarray]):
+    """The mesh with ten nodes, those on edges at place(midpoints, edges (n_e, 2)), or as far towards it as tetrahedra
+    keep a tenth of their Jacobian."""
+    nodes = ten_nodes(mesh)
+    straight = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
+    target = np.concatenate([mesh.rest_positions, place(mesh.edge_midpoints, mesh.edges)])
+    return type(mesh)(held_back(straight, target, nodes), nodes, mesh.parts, mesh.part_names)
+
+
+def ten_nodes(mesh) -> np.ndarray:
+    return np.concatenate([mesh.tetrahedra, mesh.n_vertices + mesh.tetrahedron_edges], axis=1)
+
+
+def held_back(straight: np.ndarray, target: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Positions on the way from straight (n_v, 3) to target: all the way, or half of it and half again where a
+    tetrahedron (n_t, 10) would keep less than a tenth of its Jacobian."""
+    share = np.ones(len(straight))
+    floor = _LEAST_JACOBIAN * 6 * straight_volumes(straight[nodes[:, :4]])
+    checked = np.flatnonzero((straight != target).any(axis=1)[nodes].any(axis=1))
+    for halving in count():  # ends: nodes that no longer move at all make no tetrahedron bad
+        positions = straight + share[:, None] * (target - straight)
+        bad = checked[not_positive(jacobians(positions[nodes[checked]]), floor[checked])]
+        if len(bad) == 0:
+            return positions
+        share[np.unique(nodes[bad])] *= 0.5 if halving < 4 else 0.0
+
+
+def linear(mesh):
+    used = np.unique(mesh.corners)
+    return type(mesh)(
+        mesh.rest_positions[used], np.searchsorted(used, mesh.corners), mesh.parts, mesh.part_names
+    )

@@ -1,0 +1,25 @@
+"""Points moved as a whole."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.quantity import quantity
+
+
+def moved(positions: np.ndarray, rotation=None, translation=None) -> np.ndarray:
+    """rotation x + translation. rotation: an invertible (3, 3) matrix or a scipy Rotation. translation: (3,), m."""
+    if rotation is not None:
+        positions = positions @ matrix_of(rotation).T
+    if translation is not None:
+        positions = positions + quantity("translation", "m", translation, (3,))
+    return positions
+
+
+def matrix_of(rotation) -> np.ndarray:
+    """(3, 3), invertible, of a matrix or a scipy Rotation."""
+    as_matrix = getattr(rotation, "as_matrix", None)
+    matrix = quantity("rotation", "1", as_matrix() if as_matrix else rotation, (3, 3))
+    if abs(np.linalg.det(matrix)) <= 1e-12 * np.linalg.norm(matrix) ** 3:
+        raise ValueError("rotation is singular: it would flatten the mesh")
+    return matrix

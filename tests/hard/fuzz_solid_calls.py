@@ -1,0 +1,116 @@
+"""Meshes of tetrahedra, their generators and shapes with arguments that work, for the fuzzing to spoil."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from fuzz_calls import Call, Sample
+
+import magshell as ms
+from magshell import meshes, shapes
+
+POINT = (0.1, 0.0, 0.0)
+
+
+def solid_calls(s: Sample) -> Iterator[Call]:
+    yield from _generators(s)
+    yield from _shapes()
+    block = meshes.box((1.0, 1.0, 1.0), cells=(2, 1, 1))
+    parts = np.arange(block.n_tetrahedra) % 2
+    given = {"rest_positions": block.rest_positions, "tetrahedra": block.tetrahedra, "parts": parts}
+    given["part_names"] = {"odd": 1}
+    yield Call("TetMesh", ms.TetMesh, given)
+    ten = block.second_order()
+    yield Call(
+        "TetMesh of ten", ms.TetMesh, {"rest_positions": ten.rest_positions, "tetrahedra": ten.tetrahedra}
+    )
+    yield Call("TetMesh.mended", ms.TetMesh.mended, {**given, "merge_tolerance": 1e-6})
+    yield Call("TetMesh.with_parts", block.with_parts, {"parts": parts, "names": {"odd": 1}})
+    yield Call("TetMesh.transformed", block.transformed, {"rotation": np.eye(3), "translation": (1, 0, 0)})
+    yield Call("TetMesh.scaled", block.scaled, {"factor": 2.0})
+    yield Call("TetMesh.second_order", block.second_order, {"surface": shapes.ball(1.0)})
+    yield Call("TetMesh.refined", block.refined, {"surface": shapes.ball(1.0)})
+    yield Call("TetMesh.tetrahedra_at", block.tetrahedra_at, {"x": 0.0, "tolerance": 1e-6})
+    left = {"predicate": lambda points: points[:, 0] < 0.5}
+    yield Call("TetMesh.tetrahedra_where", block.tetrahedra_where, left)
+    named = block.with_parts(parts, names={"odd": 1})
+    for select in (named.tetrahedra_in, named.vertices_in, named.faces_in):
+        yield Call(f"TetMesh.{select.__name__}", select, {"part": "odd"})
+    yield Call("TetQuality.worst", block.quality.worst, {"count": 2})
+    apart = block.transformed(translation=(1.0, 0, 0))
+    yield Call(
+        "weld of solids",
+        lambda meshes, tolerance: ms.weld(*meshes, tolerance=tolerance),
+        {"meshes": [block, apart], "tolerance": 1e-6},
+    )
+    fields = {
+        "vertex_fields": {"u": np.zeros(block.n_vertices)},
+        "tetrahedron_fields": {"J": np.zeros((block.n_tetrahedra, 3))},
+    }
+    path = s.folder / "solid.vtu"
+    yield Call(
+        "write_mesh",
+        ms.write_mesh,
+        {"path": path, "mesh": block, "positions": block.rest_positions, **fields},
+    )
+
+
+def _generators(s: Sample) -> Iterator[Call]:
+    box = {"size": (1.0, 1.0, 1.0), "cells": (2, 1, 1), "diagonals": "alternating", "order": 1}
+    yield Call("meshes.box", meshes.box, box)
+    yield Call("meshes.ball", meshes.ball, {"radius": 1.0, "cells": 2, "order": 2}, cost=2)
+    bar = {"radius": 1.0, "length": 1.0, "cells": (2, 1), "order": 1}
+    yield Call("meshes.solid_cylinder", meshes.solid_cylinder, bar)
+    tube = {"inner_radius": 1.0, "outer_radius": 2.0, "length": 1.0, "angle": 1.0, "cells": (1, 2, 1)}
+    yield Call("meshes.tube", meshes.tube, {**tube, "diagonals": "crossed", "order": 2})
+    plate = {"sheet": s.mesh, "height": 0.1, "layers": 1, "order": 1}
+    yield Call("meshes.extruded", meshes.extruded, plate)
+    stuffed = {"shape": shapes.ball(1.0), "spacing": 0.5, "bounds": [(-1.0, -1, -1), (1.0, 1, 1)], "order": 1}
+    yield Call("meshes.from_distance", meshes.from_distance, stuffed, cost=4)
+    wanted = {"shape": shapes.ball(1.0), "n_tetrahedra": 300}
+    yield Call("meshes.from_distance of a number", meshes.from_distance, wanted, cost=10)
+    closed = {"surface": meshes.box((1.0, 1.0, 1.0), cells=(2, 2, 2)).surface, "size": 0.5, "order": 1}
+    yield Call("meshes.tetrahedralize", meshes.tetrahedralize, closed, cost=20)
+
+
+def _shapes() -> Iterator[Call]:
+    points = np.random.default_rng(0).normal(size=(5, 3))
+    ball, other = shapes.ball(1.0).named("a"), shapes.box((1.0, 1.0, 1.0))
+
+    def probed(kind):
+        def probe(**arguments):
+            shape = kind(**arguments)
+            shape(points)
+            shape.nearest(points)
+            return repr(shape), shape.bounds
+
+        return probe
+
+    makers = {
+        "ball": {"radius": 1.0, "center": POINT},
+        "capsule": {"start": POINT, "end": (1.0, 0, 0), "radius": 0.2, "end_radius": 0.1},
+        "box": {"size": (1.0, 1.0, 1.0), "center": POINT, "rounding": 0.1},
+        "cylinder": {"start": POINT, "end": (1.0, 0, 0), "radius": 0.2},
+        "half_space": {"normal": (0.0, 0, 1.0), "point": POINT},
+        "ellipsoid": {"radii": (1.0, 0.5, 0.2), "center": POINT},
+    }
+    for name, arguments in makers.items():
+        yield Call(f"shapes.{name}", probed(getattr(shapes, name)), arguments)
+
+    def of_several(kind):
+        return lambda several, **more: probed(lambda: kind(*several, **more))()
+
+    for name in ("union", "intersection", "difference"):
+        yield Call(f"shapes.{name}", of_several(getattr(shapes, name)), {"several": [ball, other]})
+    yield Call(
+        "shapes.smooth_union", of_several(shapes.smooth_union), {"several": [ball, other], "radius": 0.1}
+    )
+    yield Call("Shape.smooth_union", of_several(ball.smooth_union), {"several": [other], "radius": 0.1})
+    yield Call("Shape", ball, {"points": points})
+    yield Call("Shape.named", ball.named, {"name": "b"})
+    yield Call("Shape.translated", probed(ball.translated), {"translation": POINT})
+    yield Call("Shape.rotated", probed(ball.rotated), {"rotation": np.eye(3), "center": POINT})
+    yield Call("Shape.scaled", probed(ball.scaled), {"factor": 2.0})
+    yield Call("Shape.offset", probed(ball.offset), {"distance": 0.1})
+    yield Call("Shape.hollow", probed(ball.hollow), {"thickness": 0.1})
