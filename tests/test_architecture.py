@@ -43,6 +43,7 @@ ROOMS = [
     "mesh",
     "fields",
     "methods",
+    "shapes",
     "meshes",
     "bodies",
     "obstacles",
@@ -61,7 +62,15 @@ ROOMS = [
     "__init__",
     "bench",
 ]
-OFFERED_ROOMS = {"control", "meshes", "objectives", "obstacles", "optim", "parametrize"}  # as ms.control, ...
+OFFERED_ROOMS = {
+    "control",
+    "meshes",
+    "objectives",
+    "obstacles",
+    "optim",
+    "parametrize",
+    "shapes",
+}  # as ms.control, ...
 # Imports of a higher room, each with its reason.
 UPWARD_IMPORTS = {
     # Only autograd.py may see torch.autograd, which says what transforms a tensor is in. Asked for once torch is loaded.

@@ -18,6 +18,7 @@ __all__: list[str] = [
     "CuboidMagnet",
     "CylinderMagnet",
     "Dipoles",
+    "FaceEnergy",
     "Factor",
     "FactorReport",
     "FailedAttempt",
@@ -35,6 +36,7 @@ __all__: list[str] = [
     "SampledField",
     "StaticsOptions",
     "StaticsResult",
+    "SurfaceTension",
     "TriangleMesh",
     "Water",
     "analyze",
@@ -281,6 +283,12 @@ class Water:
         thrust_curve: AttackCurve,
     ) -> None: ...
 
+class FaceEnergy:
+    pass
+
+class SurfaceTension(FaceEnergy):
+    def __init__(self) -> None: ...
+
 class Model:
     def __init__(self, **kwargs) -> None: ...
     def assemble(
@@ -491,8 +499,6 @@ class StaticsResult:
     @property
     def load_steps(self) -> int: ...
     @property
-    def turns(self) -> list[list[float]]: ...
-    @property
     def outcome(self) -> Outcome: ...
     @property
     def progress(self) -> float: ...
@@ -508,6 +514,8 @@ class StaticsResult:
     def stable(self) -> bool: ...
     @property
     def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def turns(self) -> list[list[float]]: ...
     @property
     def unstable_directions(self) -> int: ...
 
@@ -538,11 +546,11 @@ class PathOptions:
 
 class PathPoint:
     @property
-    def turns(self) -> list[list[float]]: ...
-    @property
     def parameter(self) -> float: ...
     @property
     def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def turns(self) -> list[list[float]]: ...
     @property
     def unstable_directions(self) -> int: ...
 
@@ -683,9 +691,9 @@ class MotionResult:
     @property
     def last_acceleration(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
-    def last_turns(self) -> list[list[float]]: ...
-    @property
     def last_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def last_turns(self) -> list[list[float]]: ...
     @property
     def last_velocity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property

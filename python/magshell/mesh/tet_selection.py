@@ -26,7 +26,7 @@ class TetSelection(MeshBase):
         return found
 
     def tetrahedra_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Tetrahedra where predicate((n_t, 3) barycentres [m]) -> (n_t,) bool holds."""
+        """Tetrahedra where predicate((n_t, 3) barycenters [m]) -> (n_t,) bool holds."""
         return _where("tetrahedron", predicate, self.tetrahedron_barycenters, np.arange(self.n_tetrahedra))
 
     def tetrahedra_in(self, part) -> np.ndarray:

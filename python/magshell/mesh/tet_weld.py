@@ -107,11 +107,11 @@ def _check_hanging(meshes, joined: TetMesh, maps, tolerance: float) -> None:
     loose = np.setdiff1d(joined.surface_vertices, np.flatnonzero(shared))
     at_seam = np.flatnonzero(shared[faces].any(axis=1))
     corners = joined.rest_positions[faces[at_seam]]
-    centre = corners.mean(axis=1)
-    reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    center = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
     if len(loose) == 0:
         return
-    near = cKDTree(joined.rest_positions[loose]).query_ball_point(centre, reach)
+    near = cKDTree(joined.rest_positions[loose]).query_ball_point(center, reach)
     for face, (a, b, c), candidates in zip(at_seam, corners, near, strict=True):
         vertices = loose[np.array(candidates, dtype=int)]
         vertices = vertices[from_mesh[vertices] != owner[face]]

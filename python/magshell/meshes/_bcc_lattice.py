@@ -1,7 +1,7 @@
-"""The body-centred cubic lattice of tetrahedra, all alike.
+"""The body-centerd cubic lattice of tetrahedra, all alike.
 
-Its points are the corners of cubic cells and their centres; each centre and its neighbour along an axis make four
-tetrahedra with the four edges of the square between them. Nodes 0 and 2 of a tetrahedron are the centres, 1 and 3 the
+Its points are the corners of cubic cells and their centers; each center and its neighbour along an axis make four
+tetrahedra with the four edges of the square between them. Nodes 0 and 2 of a tetrahedron are the centers, 1 and 3 the
 corners: both pairs are a cell apart, the *long* edges; the other four are the *short* ones, sqrt(3)/2 of that.
 """
 
@@ -28,16 +28,16 @@ class Lattice:
 
 def lattice_inside(distance: Distance, low: np.ndarray, counts: np.ndarray, spacing: float) -> Lattice:
     """The lattice on counts (3,) cells from `low` (3,) on, with those tetrahedra that reach inside."""
-    corner, centre = _integers(counts + 1), _integers(counts)
-    points = low + spacing * np.concatenate([corner, centre + 0.5])
+    corner, center = _integers(counts + 1), _integers(counts)
+    points = low + spacing * np.concatenate([corner, center + 0.5])
     values = distance(points)
     values[values == 0] = np.finfo(float).tiny  # outside, and so near that the point moves to where it is
-    parity = np.concatenate([corner.sum(axis=1), centre.sum(axis=1)]) % 2
-    colour = parity + np.repeat([0, 2], [len(corner), len(centre)])
+    parity = np.concatenate([corner.sum(axis=1), center.sum(axis=1)]) % 2
+    colour = parity + np.repeat([0, 2], [len(corner), len(center)])
     inside = values < 0
     tetrahedra = []
     for axis in range(3):
-        pairs = centre[centre[:, axis] < counts[axis] - 1]
+        pairs = center[center[:, axis] < counts[axis] - 1]
         step = np.eye(3, dtype=int)
         u, v = step[(axis + 1) % 3], step[(axis + 2) % 3]
         first = len(corner) + _number(pairs, counts)

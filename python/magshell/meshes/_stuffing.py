@@ -1,6 +1,6 @@
 """Isosurface stuffing (Labelle and Shewchuk 2007), with tetrahedra of one size.
 
-A body-centred cubic lattice of tetrahedra, all alike, covers the shape. Lattice points that the surface passes nearby
+A body-centerd cubic lattice of tetrahedra, all alike, covers the shape. Lattice points that the surface passes nearby
 move onto it; the tetrahedra that the surface still cuts are cut there. Nothing comes out with dihedral angles beyond
 those of its authors' proof, 10.7 and 164.8 degrees, and what lies inside is the lattice.
 

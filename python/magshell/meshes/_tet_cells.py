@@ -93,11 +93,11 @@ def twenty_four_each(
     rings = corners[:, sides].reshape(-1, 4)
     _, first, which = np.unique(np.sort(rings, axis=1), axis=0, return_index=True, return_inverse=True)
     middles = corner_points[:, sides].reshape(-1, 4, 3)[first].mean(axis=1)
-    centres = corner_points.mean(axis=1)
+    centers = corner_points.mean(axis=1)
     side = len(points) + which.ravel()
-    centre = len(points) + len(middles) + np.repeat(np.arange(len(corners)), 6)
-    fans = [np.stack([rings[:, (k + 1) % 4], rings[:, k], side, centre], axis=1) for k in range(4)]
-    return np.concatenate([points, middles, centres]), np.stack(fans, axis=1).reshape(-1, 4)
+    center = len(points) + len(middles) + np.repeat(np.arange(len(corners)), 6)
+    fans = [np.stack([rings[:, (k + 1) % 4], rings[:, k], side, center], axis=1) for k in range(4)]
+    return np.concatenate([points, middles, centers]), np.stack(fans, axis=1).reshape(-1, 4)
 
 
 def prisms(faces: np.ndarray, n_points: int, layers: int) -> np.ndarray:

@@ -17,11 +17,11 @@ def ball(radius: float, cells: int, order: int = 1) -> TetMesh:
     """The ball of the given radius [m] around the origin: 20 cells^3 tetrahedra, dihedral angles near those of regular
     ones.
 
-    An icosahedron's twenty corners at the centre, each divided evenly and bent so that layer k of `cells` lies on a sphere.
+    An icosahedron's twenty corners at the center, each divided evenly and bent so that layer k of `cells` lies on a sphere.
 
     Args:
         radius: m.
-        cells: from the centre to the surface.
+        cells: from the center to the surface.
         order: 1 for four nodes, 2 for ten, those on the surface on it.
 
     >>> ball(0.01, cells=4).n_tetrahedra

@@ -41,7 +41,7 @@ def from_distance(
         order: 1 for four nodes, 2 for ten, with the nodes on the surface's edges on it.
 
     Parts named by `Shape.named` become parts of the mesh, 1, 2, ... in their order, by which is nearest to a tetrahedron's
-    barycentre; 0 is what none has named. The same arguments give the same mesh.
+    barycenter; 0 is what none has named. The same arguments give the same mesh.
 
     Raises:
         ValueError: also for a shape that reaches beyond its bounds, and where nothing is found inside.
