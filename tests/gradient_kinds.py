@@ -198,6 +198,51 @@ def in_a_corner() -> Kind:
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)
 
 
+CORNER = np.flatnonzero(MESH.rest_positions[:, 0] > 0.05)[[1, 3, 4]]  # a triangle: one inside, two at the end
+
+
+def with_rigid_parts(free: bool, **own):
+    """A clamped sheet that carries a magnet, and a magnetized top beside it. own: of the magnet."""
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    carried = {
+        "mass": 3e-3,
+        "inertia": np.array([1.2e-6, 0.9e-6, 1.5e-6]),
+        "center": MESH.rest_positions[CORNER].mean(axis=0) + np.array([1e-3, 2e-3, 4e-3]),
+        "magnetic_moment": (4e-3, 2e-3, 1e-2),
+    }
+    parts = [ms.Rigid(CORNER, **{**carried, **own})]
+    if free:
+        spin = {"velocity": (0.01, -0.02, 0.1), "angular_velocity": (3.0, 40.0, -5.0)}
+        place = {"center": (0.05, 0.03, 0.04), "magnetic_moment": (2e-3, 1e-3, -1e-3)}
+        parts.append(ms.Rigid(mass=2e-3, inertia=(0.7e-6, 1.0e-6, 1.4e-6), **place, **spin))
+    return ms.Scene(
+        [sheet, *parts],
+        supports=[ms.Clamp(MESH.edges_at(x=0.0))],
+        loads=[ms.PointLoad(MESH.vertices_at(x=0.1), (0.0, 1e-3, 2e-3))],
+        field=[ms.UniformField(), DIPOLES],
+        gravity=(0.1, 0.2, -2.0),
+        allow_rigid_motions=free,
+    )
+
+
+def rigid_at_rest() -> Kind:
+    scene = with_rigid_parts(False)
+    return Kind(scene, {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=REACH)
+
+
+def rigid_in_motion(integrator, own=None, **options) -> Kind:
+    scene = with_rigid_parts(True, **(own or {}))
+    turning = np.cross([2.0, 5.0, -1.0], MESH.rest_positions - MIDDLE)
+    moves = np.array([0.02, 0.01, -0.1]) + turning + 0.05 * RNG.standard_normal((N_V, 3))
+    moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
+    begin = MESH.rest_positions + 1e-4 * RNG.standard_normal((N_V, 3))
+    begin[CORNER] = MESH.rest_positions[CORNER] + (1e-4, 2e-4, 1e-4)
+    controls = {**IN_TIME, "start": begin, "velocities": moves, "time_step": 3e-3}
+    fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
+    reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+
+
 def swaying(t):
     return np.array([0.02 * t, 0.04 * t, 2e-4 * np.sin(40 * t)]), np.array([0.3 * t, 0.2 * t, 0.5 * t])
 
@@ -372,6 +417,11 @@ MAKERS = {
     "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),
     "in motion, sdirk3": lambda: moving(ms.SDIRK3(), "hinge", keep="checkpoints", memory_budget=2e4),
     "from an equilibrium": let_go,
+    "at rest, with a rigid part": rigid_at_rest,
+    "in motion, with rigid parts, euler": lambda: rigid_in_motion(ms.ImplicitEuler(), {"inertia": 1.1e-6}),
+    "in motion, with rigid parts, tr_bdf2": lambda: rigid_in_motion(
+        ms.TRBDF2(), keep="checkpoints", memory_budget=2e4, stiffness_damping=1e-3
+    ),
     "onto a Plane": lambda: thrown(ob.Plane),
     "onto a Plane, rubbing": lambda: thrown(ob.Plane, **RUBS),
     "onto a Plane, rubbing late": lambda: thrown(ob.Plane, lagged_friction=True, face_samples=1, **RUBS),

@@ -86,7 +86,10 @@ class Kind:
         """All inputs, each once and a little off what it was made with, so that nothing is left to a default."""
         once = {key: value for key, value in self.entries.items() if self._once(key)}
         rng = np.random.default_rng(23)
-        return {key: value * (1.0 + 0.02 * rng.uniform(-1, 1, value.shape)) for key, value in once.items()}
+        off = {key: value * (1.0 + 0.02 * rng.uniform(-1, 1, value.shape)) for key, value in once.items()}
+        if self.scene.rigid_parts:  # which a start must not bend
+            off |= {key: value for key, value in once.items() if key[1] in ("start", "velocities")}
+        return off
 
     def _once(self, key: tuple) -> bool:
         owner, name = key
@@ -141,6 +144,7 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
     if owner is scene:
         layout, key = scene._value_layout, ("loads", "forces")
         loads = layout.of(scene._values.numbers, *key) if key in layout else np.zeros(0)
+        loads = loads[: scene.mesh.n_vertices]
         values = {"gravity": scene.gravity, "vertex_loads": loads}
         absent = {name for name, value in values.items() if not np.any(value)}
     elif isinstance(owner, ms.Contact):
@@ -155,6 +159,8 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
     else:
         values = {name: getattr(owner, name) for name in names}
         absent = set()
+        if isinstance(owner, ms.Rigid):
+            absent = {name for name in names if values[name] is None}
         if isinstance(owner, ms.Shell):
             weightless = not (moving or scene.gravity.any())
             absent = {"mass_density"} if weightless else set()

@@ -33,6 +33,10 @@ def loss_of(found):
             continue
         values = size * torch.as_tensor(getattr(found, name))
         total = total + (weights_of(name, values.shape) * values).sum() + 0.01 * (values[..., ::2] ** 2).sum()
+    for part in found.scene.rigid_parts if hasattr(found, "scene") else ():
+        turned, center = torch.as_tensor(found[part].rotation), torch.as_tensor(found[part].center)
+        total = total + (weights_of("turned", turned.shape) * turned).sum()
+        total = total + (weights_of("center", center.shape) * center / LARGE).sum()
     return total
 
 

@@ -89,7 +89,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     return input;
 }
 
-// (n, n_v, 3), of the recorded states.
+// (n, n_v, 3), of the recorded states, the own points of rigid parts among them.
 template <class Field>
 Array positions_of(const Model& model, const MotionResult& motion, const Field& field) {
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size()),
@@ -97,7 +97,7 @@ Array positions_of(const Model& model, const MotionResult& motion, const Field& 
     Array rows({n, n_v, py::ssize_t{3}});
     for (py::ssize_t k = 0; k < n; ++k)
         Eigen::Map<Rows3>(rows.mutable_data(k, 0, 0), n_v, 3) =
-            model.bodies().positions(field(motion.recorded[k]));
+            model.bodies().points(field(motion.recorded[k]));
     return rows;
 }
 
@@ -105,7 +105,7 @@ Array rotations_of(const Model& model, const MotionResult& motion) {
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size()), n_e = model.bodies().n_edges();
     Array rows({n, n_e});
     for (py::ssize_t k = 0; k < n; ++k)
-        Eigen::Map<VectorXd>(rows.mutable_data(k, 0), n_e) =
+        Eigen::Map<VectorXd>(rows.mutable_data() + k * n_e, n_e) =
             model.bodies().edge_rotations(motion.recorded[k].q);
     return rows;
 }
@@ -153,7 +153,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
         const auto rows = [&](const Array& of) {
             return Rows3(Eigen::Map<const Rows3>(of.data(k, 0, 0), n_v, 3));
         };
-        const VectorXd rotations = Eigen::Map<const VectorXd>(by_edge_rotations.data(k, 0), n_e);
+        const VectorXd rotations = Eigen::Map<const VectorXd>(by_edge_rotations.data() + k * n_e, n_e);
         by_q.push_back(model.bodies().gradient_by_state(rows(by_positions), rotations));
         by_v.push_back(model.bodies().gradient_by_state(rows(by_velocities), no_rotations));
     }
@@ -170,7 +170,8 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     result["positions"] = model.bodies().gradient_by_vectors(gradient.positions);
     result["edge_rotations"] = model.bodies().edge_rotations(gradient.positions);
     result["velocities"] = model.bodies().gradient_by_vectors(gradient.velocities);
-    result["mass"] = VectorXd(model.bodies().positions(gradient.mass).rowwise().sum());
+    result["own_velocities"] = model.bodies().points(gradient.velocities);
+    result["mass"] = VectorXd(model.bodies().points(gradient.mass).rowwise().sum());
     result["damping"] = VectorXd(model.bodies().positions(gradient.damping).rowwise().sum());
     result["time_step"] = gradient.time_step;
     result["stiffness_damping"] = gradient.viscosity.stiffness_damping;

@@ -64,6 +64,14 @@ std::vector<SheetInput> sheets_of(const py::list& given) {
     return sheets;
 }
 
+std::vector<RigidInput> rigid_of(const py::list& given) {
+    std::vector<RigidInput> rigid;
+    for (const py::handle each : given)
+        rigid.push_back({each["owner"].cast<std::string>(), to_rows3(each["points"].cast<Array>()),
+                         each["vertices"].cast<std::vector<Index>>(), each["magnetic"].cast<bool>()});
+    return rigid;
+}
+
 std::unique_ptr<Model> make_model(const py::kwargs& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     const auto indices = [&](const char* name) { return given[name].cast<IndexArray>(); };
@@ -71,6 +79,7 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     input.n_vertices = given["n_vertices"].cast<Index>();
     input.original = given["original"].cast<std::vector<Index>>();
     input.sheets = sheets_of(given["sheets"]);
+    input.rigid = rigid_of(given["rigid"]);
     input.directions = to_rows3(array("directions"));
     input.held = held_nodes(indices("held_nodes"), array("held_frames"));
     input.moves = given["moves"].cast<Index>();
@@ -122,9 +131,10 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
         const std::lock_guard lock(model.in_use());
         model.evaluate(q, controls);
         model.assemble(q, controls, false);
-        if (reduced)
+        if (reduced) {
             model.reduction().matrix(model.matrix(), values);
-        else
+            model.reduction().add_curvature(model.residual().gradient, values);
+        } else
             values = model.matrix().values();
     }
     const SparsePattern& pattern = *model.reduction().pattern();
@@ -201,8 +211,23 @@ void register_model(py::module_& module) {
         .def_property_readonly("bytes", &Model::bytes)
         .def_property_readonly("n_strains", &Model::n_strains)
         .def("rest_state", [](const Model& m) { return m.bodies().rest_state(); })
-        .def("state", [](const Model& m, const Array& x,
-                         const Array& r) { return m.bodies().state(to_rows3(x), to_vector(r)); })
+        .def("state",
+             [](const Model& m, const Array& x, const Array& r) {
+                 VectorXd q = m.bodies().state(to_rows3(x), to_vector(r));
+                 m.reduction().settle(q, nullptr);
+                 return q;
+             })
+        .def(
+            "settled_velocity",
+            [](const Model& m, const VectorXd& q, VectorXd v) {
+                VectorXd at = q;
+                m.reduction().settle(at, &v);
+                return v;
+            },
+            "Velocities of all unknowns, with those of rigid parts as their vertices say.")
+        .def(
+            "points", [](const Model& m, const VectorXd& q) { return m.bodies().points(q); },
+            "Positions, then the own points of rigid parts (10 each).")
         .def(
             "full_vector",
             [](const Model& m, const Array& rows) { return m.bodies().vectors(to_rows3(rows)); },
@@ -219,6 +244,16 @@ void register_model(py::module_& module) {
                 return m.reduction().weights(m.bodies().vertex_weights(to_vector(of_vertices)));
             },
             "Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.")
+        .def(
+            "free_weight_values",
+            [](const Model& m, const Array& of_points) {
+                LargeVector<double> values(m.reduction().pattern()->rows.size(), 0.0);
+                m.reduction().add_weights(m.bodies().vertex_weights(to_vector(of_points)), values);
+                return py::array_t<double>(values.size(), values.data());
+            },
+            "The same as a matrix, in the places of hessian(): with rigid parts it is no diagonal. At the "
+            "state that was "
+            "evaluated last.")
         .def(
             "prescribed_rate",
             [](const Model& m, const Controls& controls) { return m.reduction().prescribed_rate(controls); },

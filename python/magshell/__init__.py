@@ -4,6 +4,8 @@ from . import control, meshes, objectives, obstacles, optim, parametrize, shapes
 from ._core import __version__
 from ._machine.threads import num_threads, set_num_threads, show_config
 from .bodies.body_result import BodyResult
+from .bodies.rigid import Rigid
+from .bodies.rigid_result import RigidResult
 from .bodies.shell import Shell
 from .bodies.strains import Strains
 from .bodies.ties import Tie
@@ -91,6 +93,8 @@ __all__ = [
     "Picture",
     "Pin",
     "PointLoad",
+    "Rigid",
+    "RigidResult",
     "SampledField",
     "Scene",
     "Shell",

@@ -321,6 +321,12 @@ class Model:
         """
         Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.
         """
+    def free_weight_values(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same as a matrix, in the places of hessian(): with rigid parts it is no diagonal. At the state that was evaluated last.
+        """
     def full_vector(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -343,6 +349,12 @@ class Model:
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> tuple: ...
+    def points(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        Positions, then the own points of rigid parts (10 each).
+        """
     def positions(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
@@ -364,6 +376,14 @@ class Model:
     def set_values(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
         All of them, rows in the caller's order.
+        """
+    def settled_velocity(
+        self,
+        arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Velocities of all unknowns, with those of rigid parts as their vertices say.
         """
     def state(
         self,

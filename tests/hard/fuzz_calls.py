@@ -137,6 +137,22 @@ def _scenes(s: Sample) -> Iterator[Call]:
         "SymmetryPlane", lambda **a: scene(supports=[ms.SymmetryPlane(**a)], allow_rigid_motions=True), plane
     )
 
+    rigid = {
+        "mass": 1e-3,
+        "inertia": (1e-8, 1e-8, 2e-8),
+        "center": (0.09, 0, 0),
+        "magnetic_moment": (1e-3, 0, 0),
+    }
+    yield Call(
+        "Rigid",
+        lambda **a: ms.Scene([s.shell, ms.Rigid(**a)], allow_rigid_motions=True),
+        {"vertices": mesh.vertices_where(lambda x: x[:, 0] > 0.05), "body": s.shell, **rigid},
+    )
+    spin = {"velocity": (0, 0, 1.0), "angular_velocity": (1.0, 0, 0)}
+    yield Call(
+        "Rigid, free", lambda **a: ms.Scene(ms.Rigid(**a), allow_rigid_motions=True), {**rigid, **spin}
+    )
+
     def loaded(kind):
         return lambda **a: scene(supports=s.clamp, loads=kind(**a))
 

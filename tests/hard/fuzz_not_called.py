@@ -8,6 +8,7 @@ NOT_CALLED = {
     "Equilibrium": "a result",
     "Interrupted": "an error",
     "BodyResult": "a result",
+    "RigidResult": "a result",
     "LinearResponse": "a result",
     "Minimum": "a result",
     "Multistart": "a result",

@@ -51,6 +51,7 @@ class Backward {
             end = std::min(end, at->first);
         }
         back_to_start();
+        model_.reduction().settle_vjp(motion_.start.q, motion_.start.v, g_.positions, g_.velocities);
         g_.values = std::move(scene_.values);
         g_.factorizations = newton_.factorizations();
         return std::move(g_);

@@ -11,12 +11,11 @@ Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorX
     const Controls& controls = equilibrium.controls;
     const Reduction& reduction = model.reduction();
 
+    model.set_turns(equilibrium.turns);
+    model.evaluate(q, controls);
     VectorXd reduced = -reduction.vector(by_state);
     equilibrium.factor->solve(reduced);
     const VectorXd lambda = reduction.expand(reduced);
-
-    model.set_turns(equilibrium.turns);
-    model.evaluate(q, controls);
     Gradient gradient(model.registry());
     model.vjp(q, controls, lambda, gradient);
     if (reduction.moves()) {

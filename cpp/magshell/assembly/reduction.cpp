@@ -6,7 +6,7 @@
 namespace magshell {
 
 Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const Nodes& nodes, Index moves,
-                     Registry& registry)
+                     Registry& registry, Carriers carriers)
     : held_(std::move(held)), nodes_(nodes), moves_(moves), full_size_(matrix.size()) {
     progress_ = registry.controls.add("scene", "motion_factor", "1", 1, 1);
     for (Index k = 0; k < moves; ++k) {
@@ -31,14 +31,17 @@ Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, con
         for (int axis = 0; axis < h.held; ++axis) is_held[3 * h.node + axis] = 1;
     }
 
+    if (!carriers.empty()) carried_ = std::make_unique<Carried>(std::move(carriers), matrix);
     std::vector<Index> reduced(matrix.size(), -1);
     for (Index u = 0; u < matrix.size(); ++u)
-        if (!is_held[u]) {
+        if (!is_held[u] && !(carried_ && carried_->carries(u))) {
             reduced[u] = static_cast<Index>(free_unknowns_.size());
             free_unknowns_.push_back(u);
         }
     SparsePattern pattern;
-    pattern.size = static_cast<Index>(free_unknowns_.size());
+    const Index free = static_cast<Index>(free_unknowns_.size());
+    pattern.size = free + (carried_ ? carried_->coordinates() : 0);
+    if (carried_) carried_->couple(matrix, reduced, free);
     pattern.column_starts.reserve(free_unknowns_.size() + 1);
     pattern.rows.reserve(matrix.rows().size());
     pattern.column_starts.push_back(0);
@@ -47,12 +50,31 @@ Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, con
             const Index row = reduced[matrix.rows()[k]];
             if (row < 0) continue;
             pattern.rows.push_back(row);
-            if (pieces_.empty() || pieces_.back().from + pieces_.back().count != k) pieces_.push_back({k, 0});
+            const bool gap =
+                carried_ && pieces_.size() > 0 &&
+                piece_to_.back() + pieces_.back().count + 1 != static_cast<Index>(pattern.rows.size());
+            if (pieces_.empty() || gap || pieces_.back().from + pieces_.back().count != k) {
+                pieces_.push_back({k, 0});
+                if (carried_) piece_to_.push_back(static_cast<Index>(pattern.rows.size()) - 1);
+            }
             ++pieces_.back().count;
         }
+        if (carried_) carried_->append_rows(reduced[u], pattern.rows);
         pattern.column_starts.push_back(static_cast<Index>(pattern.rows.size()));
     }
+    if (carried_) {
+        carried_->append_columns(pattern);
+        carried_->find_places(matrix, reduced, pattern);
+        carried_->linearize(rest_state(nodes));
+    }
     pattern_ = std::make_shared<const SparsePattern>(std::move(pattern));
+}
+
+// What carriers are linearized at before anything was evaluated.
+VectorXd Reduction::rest_state(const Nodes& nodes) {
+    VectorXd q = VectorXd::Zero(nodes.n_unknowns());
+    for (Index node = 0; node < nodes.n_nodes(); ++node) q.segment<3>(3 * node) = nodes.rest[node];
+    return q;
 }
 
 bool Reduction::axis_aligned(const HeldNode& h) const {
@@ -173,23 +195,61 @@ void Reduction::turn_blocks(SystemMatrix& full) const {
 void Reduction::matrix(SystemMatrix& full, LargeVector<double>& values) const {
     if (!frame_of_.empty()) turn_blocks(full);
     values.resize(pattern_->rows.size());
+    if (carried_) {
+        std::fill(values.begin(), values.end(), 0.0);
+        for (std::size_t k = 0; k < pieces_.size(); ++k)
+            std::copy_n(full.values().data() + pieces_[k].from, pieces_[k].count,
+                        values.data() + piece_to_[k]);
+        carried_->add_matrix(full, values.data());
+        return;
+    }
     double* to = values.data();
     for (const Piece& piece : pieces_) to = std::copy_n(full.values().data() + piece.from, piece.count, to);
 }
 
+void Reduction::add_weights(const VectorXd& full, LargeVector<double>& values) const {
+    for (std::size_t k = 0; k < free_unknowns_.size(); ++k)
+        values[pattern_->column_starts[k]] += full[free_unknowns_[k]];
+    if (carried_) carried_->add_weights(full, values.data());
+}
+
 VectorXd Reduction::vector(const VectorXd& full) const {
-    if (frame_of_.empty()) return weights(full);
+    if (frame_of_.empty()) return gathered(full);
     VectorXd turned = full;
     for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
         if (frame_of_[node] >= 0)
             turned.segment<3>(3 * node) =
                 held_[frame_of_[node]].frame.transpose() * full.segment<3>(3 * node);
-    return weights(turned);
+    return gathered(turned);
+}
+
+VectorXd Reduction::gathered(const VectorXd& full) const {
+    VectorXd reduced(size());
+    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) reduced[k] = full[free_unknowns_[k]];
+    if (carried_) carried_->pull_back(full, reduced);
+    return reduced;
+}
+
+VectorXd Reduction::project(const VectorXd& full) const {
+    VectorXd own = expand(vector(full));
+    if (!carried_) return own;
+    VectorXd carried = full;
+    carried_->project(carried);
+    carried_->replace(carried, own);
+    return own;
+}
+
+void Reduction::advance(VectorXd& q, const VectorXd& p) const {
+    if (carried_)
+        carried_->advance(q, p);
+    else
+        q += p;
 }
 
 VectorXd Reduction::weights(const VectorXd& full) const {
     VectorXd reduced(size());
-    for (Index k = 0; k < size(); ++k) reduced[k] = full[free_unknowns_[k]];
+    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) reduced[k] = full[free_unknowns_[k]];
+    if (carried_) carried_->diagonal(full, reduced);
     return reduced;
 }
 
@@ -197,12 +257,14 @@ std::vector<Vec3> Reduction::free(const std::vector<Vec3>& full) const {
     std::vector<Vec3> points;
     points.reserve(free_unknowns_.size());
     for (const Index unknown : free_unknowns_) points.push_back(full[unknown]);
+    if (carried_) carried_->append_points(full, points);
     return points;
 }
 
 VectorXd Reduction::expand(const VectorXd& reduced) const {
     VectorXd full = VectorXd::Zero(full_size_);
-    for (Index k = 0; k < size(); ++k) full[free_unknowns_[k]] = reduced[k];
+    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) full[free_unknowns_[k]] = reduced[k];
+    if (carried_) carried_->push_forward(reduced, full);
     for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
         if (frame_of_[node] >= 0) {
             const Vec3 local = full.segment<3>(3 * node);
@@ -215,7 +277,8 @@ std::size_t Reduction::bytes() const {
     return pieces_.capacity() * sizeof(Piece) +
            (frame_of_.capacity() + free_unknowns_.capacity() + pattern_->rows.capacity() +
             pattern_->column_starts.capacity()) *
-               sizeof(Index);
+               sizeof(Index) +
+           (carried_ ? carried_->bytes() : 0);
 }
 
 }  // namespace magshell

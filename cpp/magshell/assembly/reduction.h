@@ -1,4 +1,5 @@
-// From all unknowns to the free ones: supports hold nodes along some directions and may move them as rigid bodies.
+// From all unknowns to the free ones: supports hold nodes along some directions and may move them as rigid bodies, and
+// carriers make the places of nodes functions of a few coordinates, which are the last of the free unknowns.
 //
 // A node held along directions that are not the world's axes is turned into a frame of its own, in which it
 // is held along the first one or two axes. Nodes without supports cost nothing here.
@@ -7,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "magshell/assembly/carried.h"
 #include "magshell/assembly/support_move.h"
 #include "magshell/assembly/system_matrix.h"
 #include "magshell/body/nodes.h"
@@ -25,9 +27,9 @@ struct HeldNode {
 
 class Reduction {
   public:
-    /// `moves`: how many the held nodes refer to. The nodes have to outlive it.
+    /// `moves`: how many the held nodes refer to. The nodes have to outlive it. No node is both held and carried.
     Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const Nodes& nodes, Index moves,
-              Registry& registry);
+              Registry& registry, Carriers carriers = {});
 
     void set_values(const Values& values);
     bool moves() const { return !moves_.empty(); }
@@ -50,14 +52,40 @@ class Reduction {
     /// The largest angle [rad] by which a support turns in all.
     double largest_turn() const;
 
+    /// Whether there are nodes that a carrier moves. All of the following is linear at the state linearized last.
+    bool carries() const { return carried_ != nullptr; }
+    void linearize(const VectorXd& q) {
+        if (carried_) carried_->linearize(q);
+    }
+
     /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first.
     void matrix(SystemMatrix& full, LargeVector<double>& values) const;
+    /// Adds a diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses, areas.
+    void add_weights(const VectorXd& full, LargeVector<double>& values) const;
+    /// Adds what a gradient of all unknowns says of the coordinates of carriers, as nodes move along curves.
+    void add_curvature(const VectorXd& gradient, LargeVector<double>& values) const {
+        if (carried_) carried_->add_curvature(gradient, values.data());
+    }
+    void add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const {
+        if (carried_) carried_->add_curvature_product(gradient, reduced, out);
+    }
     VectorXd vector(const VectorXd& full) const;
-    /// A diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses, areas.
+    /// The diagonal of what add_weights adds; without carriers there is nothing else.
     VectorXd weights(const VectorXd& full) const;
+    /// What of a vector of all unknowns lies along motions of the free ones.
+    VectorXd project(const VectorXd& full) const;
+    /// Moves a state along p, a vector of all unknowns: by p itself where nothing carries.
+    void advance(VectorXd& q, const VectorXd& p) const;
+    /// See Carrier: a start, and the way back from it.
+    void settle(VectorXd& q, VectorXd* v) const {
+        if (carried_) carried_->settle(q, v);
+    }
+    void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const {
+        if (carried_) carried_->settle_vjp(q, v, by_q, by_v);
+    }
     /// Of points of all unknowns, the same for the three of a node, those of the free ones.
     std::vector<Vec3> free(const std::vector<Vec3>& full) const;
-    /// A free vector back among all unknowns, zero where they are held.
+    /// A free vector back among all unknowns, zero where they are held; B z where they are carried.
     VectorXd expand(const VectorXd& reduced) const;
 
     std::size_t bytes() const;
@@ -69,6 +97,8 @@ class Reduction {
     Vec3 rate_of(const HeldNode& h, double progress) const;
     bool axis_aligned(const HeldNode& h) const;
     void turn_blocks(SystemMatrix& full) const;
+    VectorXd gathered(const VectorXd& full) const;
+    static VectorXd rest_state(const Nodes& nodes);
 
     std::vector<HeldNode> held_;
     const Nodes& nodes_;
@@ -87,6 +117,8 @@ class Reduction {
         Index from, count;
     };
     std::vector<Piece> pieces_;
+    std::unique_ptr<Carried> carried_;  // nullptr: nothing is
+    std::vector<Index> piece_to_;       // with carriers, whose rows stand between: where each piece goes
 };
 
 }  // namespace magshell

@@ -1,13 +1,17 @@
 #include "magshell/scene/bodies.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace magshell {
 
 Bodies::Bodies(const SceneInput& input) {
-    NodeNumbering numbering(input.n_vertices);
+    n_sheet_vertices_ = input.n_vertices;
+    NodeNumbering numbering(input.n_vertices + RigidInput::own * static_cast<Index>(input.rigid.size()));
     for (const SheetInput& sheet : input.sheets)
         owned_.push_back(std::make_unique<Sheet>(sheet.owner, *sheet.mesh, sheet.vertices, numbering));
+    add_rigid(input.rigid, numbering);
     nodes_ = numbering.finish(input.directions, input.original);
     for (Index user = 0; user < nodes_.n_user_vertices(); ++user)
         if (nodes_.vertices.is_copy(user)) copies_.push_back(user);
@@ -16,6 +20,17 @@ Bodies::Bodies(const SceneInput& input) {
         owned_[k]->add_folds(*given.mesh, given.directed_edges, given.directors, nodes_);
         n_edges_ += owned_[k]->n_edges();
         sheets_.push_back(owned_[k].get());
+    }
+}
+
+void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering) {
+    Index user = n_sheet_vertices_;
+    for (const RigidInput& part : rigid) {
+        std::vector<Index>& nodes = rigid_nodes_.emplace_back();
+        for (Index k = 0; k < RigidInput::own; ++k)
+            nodes.push_back(numbering.number(user++, part.points.row(k).transpose()));
+        for (const Index vertex : part.vertices) nodes.push_back(numbering.number(vertex, Vec3::Zero()));
+        rigid_points_.push_back(part.points);
     }
 }
 
@@ -30,6 +45,9 @@ std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
         s.nodes[3] = nodes_.direction_node(couple.direction);
         all.push_back(s);
     }
+    for (std::size_t k = 0; k < input.rigid.size(); ++k)
+        if (input.rigid[k].magnetic)
+            std::copy_n(rigid_nodes_[k].begin(), 4, all.emplace_back().nodes.begin());
     return all;
 }
 
@@ -44,13 +62,16 @@ VectorXd Bodies::state(const Rows3& positions, const VectorXd& edge_rotations) c
     add_rotations(edge_rotations, q);
     for (Index node = nodes_.n_vertices(); node < nodes_.n_nodes(); ++node)
         q.segment<3>(3 * node) = nodes_.rest[node];
+    for (const std::vector<Index>& part : rigid_nodes_)
+        for (Index k = 0; k < RigidInput::own; ++k) q.segment<3>(3 * part[k]) = nodes_.rest[part[k]];
     return q;
 }
 
 VectorXd Bodies::vectors(const Rows3& of_vertices) const {
     VectorXd q = VectorXd::Zero(nodes_.n_unknowns());
     for (Index v = 0; v < nodes_.n_vertices(); ++v)
-        q.segment<3>(3 * v) = of_vertices.row(nodes_.user_vertex(v)).transpose();
+        if (nodes_.user_vertex(v) < of_vertices.rows())
+            q.segment<3>(3 * v) = of_vertices.row(nodes_.user_vertex(v)).transpose();
     return q;
 }
 
@@ -78,10 +99,10 @@ void Bodies::add_rotations(const VectorXd& of_edges, VectorXd& q) const {
     }
 }
 
-Rows3 Bodies::positions(const VectorXd& q) const {
-    Rows3 x(nodes_.n_user_vertices(), 3);
+Rows3 Bodies::rows(const VectorXd& q, Index count) const {
+    Rows3 x(count, 3);
     for (Index v = 0; v < nodes_.n_vertices(); ++v)
-        x.row(nodes_.user_vertex(v)) = q.segment<3>(3 * v).transpose();
+        if (nodes_.user_vertex(v) < count) x.row(nodes_.user_vertex(v)) = q.segment<3>(3 * v).transpose();
     for (const Index copy : copies_) x.row(copy) = q.segment<3>(3 * nodes_.vertices.core[copy]).transpose();
     return x;
 }
@@ -118,7 +139,16 @@ std::vector<Vec3> Bodies::unknown_points() const {
 double Bodies::extent() const {
     double largest = 0.0;
     for (const Sheet* sheet : sheets_) largest = std::max(largest, sheet->extent());
+    for (const Rows3& points : rigid_points_)
+        largest = std::max(largest, (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm());
     return largest;
+}
+
+double Bodies::rigid_length() const {
+    double smallest = std::numeric_limits<double>::infinity();
+    for (const Rows3& points : rigid_points_)
+        smallest = std::min(smallest, 0.5 * (points.row(0) - points.row(1)).norm() / std::sqrt(2.0));
+    return smallest;
 }
 
 double Bodies::reach() const {
@@ -136,6 +166,11 @@ VectorXd Bodies::area_metric() const {
             for (const Index node : sheet->corners[f])
                 metric.segment<3>(3 * node).array() += (b - a).cross(c - a).norm() / 6.0;
         }
+    // As large as the faces of its tetrahedron: what moves a rigid part by itself needs a measure too.
+    for (const std::vector<Index>& part : rigid_nodes_)
+        for (Index k = 0; k < 4; ++k)
+            metric.segment<3>(3 * part[k]).array() +=
+                0.25 * (nodes_.rest[part[0]] - nodes_.rest[part[1]]).squaredNorm();
     return metric;
 }
 

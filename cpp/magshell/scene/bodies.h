@@ -14,24 +14,34 @@ class Bodies {
 
     const Nodes& nodes() const { return nodes_; }
     const std::vector<const Sheet*>& sheets() const { return sheets_; }
+    /// The nodes of each rigid part, its own first.
+    const std::vector<std::vector<Index>>& rigid_nodes() const { return rigid_nodes_; }
+    /// Of the smallest rigid part, half the edge of the cube around its tetrahedron [m]; infinite without.
+    double rigid_length() const;
+    /// How many vertices the caller's sheets have; those of rigid parts follow.
+    Index n_sheet_vertices() const { return n_sheet_vertices_; }
     /// Of all sheets, one after another, in the caller's numbers.
     Index n_edges() const { return n_edges_; }
     /// What each element couples, and each couple.
     std::vector<Stencil> stencils(const SceneInput& input) const;
 
     VectorXd rest_state() const;
-    /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,).
+    /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,); a rigid part's own points at rest.
     VectorXd state(const Rows3& positions, const VectorXd& edge_rotations) const;
-    /// Vectors of the caller's vertices among all unknowns, zero elsewhere; welded ones have one.
+    /// Vectors of the caller's vertices among all unknowns, zero elsewhere; welded ones have one. Rows of the
+    /// sheets' vertices, or of points() too.
     VectorXd vectors(const Rows3& of_vertices) const;
-    /// A gradient by the caller's positions and edge rotations as one by all unknowns: the transpose of positions().
+    /// A gradient by the caller's positions and edge rotations as one by all unknowns: the transpose of positions(),
+    /// or of points().
     VectorXd gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const;
-    Rows3 positions(const VectorXd& q) const;
+    /// Of the sheets' vertices; and of the points of rigid parts too.
+    Rows3 positions(const VectorXd& q) const { return rows(q, n_sheet_vertices_); }
+    Rows3 points(const VectorXd& q) const { return rows(q, nodes_.n_user_vertices()); }
     /// A gradient by unknowns as one by the caller's positions: the transpose of vectors().
     Rows3 gradient_by_vectors(const VectorXd& by_q) const;
     VectorXd edge_rotations(const VectorXd& q) const;
-    /// One number a vertex of the caller as one for each unknown, zero for those that are no vertex; welded ones
-    /// are added up.
+    /// One number a vertex of the caller, points of rigid parts too, as one for each unknown; zero for all others.
+    /// Those of welded vertices are added up.
     VectorXd vertex_weights(const VectorXd& by_vertex) const;
 
     /// Where each unknown is at rest [m]: its vertex, or the middle of its edge.
@@ -45,12 +55,16 @@ class Bodies {
 
   private:
     void add_rotations(const VectorXd& of_edges, VectorXd& q) const;
+    Rows3 rows(const VectorXd& q, Index count) const;
+    void add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering);
 
     std::vector<std::unique_ptr<Sheet>> owned_;
     std::vector<const Sheet*> sheets_;
     Nodes nodes_;
     std::vector<Index> copies_;  // the caller's vertices that are welded to an earlier one
-    Index n_edges_ = 0;
+    Index n_edges_ = 0, n_sheet_vertices_ = 0;
+    std::vector<std::vector<Index>> rigid_nodes_;
+    std::vector<Rows3> rigid_points_;
 };
 
 }  // namespace magshell

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
+#include "magshell/assembly/rigid_carrier.h"
 #include "magshell/core/errors.h"
 #include "magshell/strain/fold_angle.h"
 #include "magshell/term/bending_term.h"
@@ -13,16 +13,27 @@
 #include "magshell/term/load_term.h"
 #include "magshell/term/magnetic_term.h"
 #include "magshell/term/membrane_term.h"
+#include "magshell/term/moment_term.h"
 #include "magshell/term/water_term.h"
 
 namespace magshell {
 namespace {
 
-std::vector<HeldNode> renumbered(std::vector<HeldNode> held, const Nodes& nodes) {
+// Held nodes count the vertices of sheets first, then directions.
+std::vector<HeldNode> renumbered(std::vector<HeldNode> held, const Bodies& bodies) {
+    const Nodes& nodes = bodies.nodes();
     for (HeldNode& h : held)
-        h.node = h.node < nodes.n_user_vertices() ? nodes.vertices.core[h.node]
-                                                  : nodes.direction_node(h.node - nodes.n_user_vertices());
+        h.node = h.node < bodies.n_sheet_vertices()
+                     ? nodes.vertices.core[h.node]
+                     : nodes.direction_node(h.node - bodies.n_sheet_vertices());
     return held;
+}
+
+Carriers carriers_of(const Bodies& bodies) {
+    Carriers carriers;
+    for (const std::vector<Index>& nodes : bodies.rigid_nodes())
+        carriers.push_back(std::make_unique<RigidCarrier>(nodes, RigidInput::own, bodies.nodes().rest));
+    return carriers;
 }
 
 CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& mesh, const Sheet& sheet,
@@ -44,7 +55,8 @@ CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& m
 Model::Model(const SceneInput& input)
     : bodies_(input),
       matrix_(nodes().n_nodes(), nodes().scalars, bodies_.stencils(input)),
-      reduction_(matrix_, renumbered(input.held, nodes()), nodes(), input.moves, registry_),
+      reduction_(matrix_, renumbered(input.held, bodies_), nodes(), input.moves, registry_,
+                 carriers_of(bodies_)),
       schedule_(nodes().n_nodes(), bodies_.sheets()),
       sources_(input.field_sources, registry_),
       of_body_(bodies_.sheets().size()),
@@ -95,6 +107,7 @@ void Model::add_terms(const SceneInput& input) {
     for (const FaceEnergyInput& given : input.face_energies)
         terms_.push_back(given.energy->term(given.owner, given.body, *bodies_.sheets()[given.body],
                                             *loops_[given.body], registry_));
+    add_moments(input);
     if (input.gravity)
         terms_.push_back(std::make_unique<LoadTerm>("gravity", "gravity_factor", nodes(), registry_));
     if (input.loads) terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));
@@ -104,6 +117,16 @@ void Model::add_terms(const SceneInput& input) {
         for (Index body = 0; body < count; ++body)
             forces_.push_back(
                 std::make_unique<WaterTerm>(*bodies_.sheets()[body], *loops_[body], *input.water, registry_));
+}
+
+void Model::add_moments(const SceneInput& input) {
+    std::vector<MomentTerm::Magnet> magnets;
+    for (std::size_t k = 0; k < input.rigid.size(); ++k)
+        if (input.rigid[k].magnetic)
+            std::copy_n(bodies_.rigid_nodes()[k].begin(), 4,
+                        magnets.emplace_back(MomentTerm::Magnet{input.rigid[k].owner, {}}).corners.begin());
+    if (!magnets.empty())
+        terms_.push_back(std::make_unique<MomentTerm>(magnets, nodes(), sources_, matrix_, registry_));
 }
 
 void Model::add_couples(const SceneInput& input) {
@@ -133,7 +156,7 @@ void Model::set_values(const VectorXd& in_user_order) {
     reduction_.set_values(values_);
     sources_.set_values(values_);
     bool cancels_otherwise = false;
-    length_scale_ = std::numeric_limits<double>::infinity();
+    length_scale_ = bodies_.rigid_length();
     for (const std::unique_ptr<Term>& term : terms_) {
         cancels_otherwise |= term->set_values(values_);
         length_scale_ = std::min(length_scale_, term->length_scale());
@@ -231,6 +254,7 @@ std::vector<std::pair<std::string_view, double>> Model::energies(const VectorXd&
 }
 
 void Model::evaluate(const VectorXd& q, const Controls& controls) {
+    reduction_.linearize(q);
     residual_.reset(size());
     for (const std::unique_ptr<Term>& term : terms_) term->evaluate(q.data(), controls, residual_);
 }

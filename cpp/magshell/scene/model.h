@@ -120,6 +120,7 @@ class Model {
   private:
     void add_loops(Index body, const VectorXd& curvature_scale);
     void add_terms(const SceneInput& input);
+    void add_moments(const SceneInput& input);
     void add_couples(const SceneInput& input);
     void add_contacts(const SceneInput& input);
     void share_out_columns();

@@ -36,11 +36,23 @@ struct FaceEnergyInput {
     std::shared_ptr<const FaceEnergy> energy;
 };
 
+/// Vertices of bodies that move as one, with ten points of its own: the four corners of a regular tetrahedron, and the
+/// middles of its edges.
+struct RigidInput {
+    std::string owner;
+    Rows3 points;                 // (10, 3) at rest; the scene's vertices after all others
+    std::vector<Index> vertices;  // the scene's
+    bool magnetic = false;
+
+    static constexpr Index own = 10;
+};
+
 /// Held nodes count the scene's vertices first, then directions.
 struct SceneInput {
-    Index n_vertices = 0;
+    Index n_vertices = 0;         // of the sheets
     std::vector<Index> original;  // of each vertex: itself, or the one that it is welded to; empty if none is
     std::vector<SheetInput> sheets;
+    std::vector<RigidInput> rigid;
     Rows3 directions;  // (n_d, 3), of directed edges and of couples
     std::vector<HeldNode> held;
     Index moves = 0;  // that held nodes refer to

@@ -114,7 +114,7 @@ class Follower {
         VectorXd increment = step * along.state;
         for (iterations = 0;; ++iterations, newton_.count_iteration()) {
             if (newton_.options().mixed) model_.extrapolate(increment);
-            q += increment;
+            model_.reduction().advance(q, increment);
             const Controls at = controls(parameter);
             model_.evaluate(q, at);
             const double residual = newton_.relative_residual(q, {});

@@ -112,13 +112,27 @@ class Run {
         aim(step);
     }
 
+    // A step without the rates of one before is of first order where nodes are carried (SDIRK2's first stage is): a short
+    // one hardly counts. From there on each substep is as long as all before it.
+    bool begins_gently(const MotionState& state) const {
+        return input_.tableau.begins_explicitly && state.rates.empty() && model_.reduction().carries();
+    }
+
+    // The last substep first.
+    static Substeps gentle_beginning() {
+        Substeps ahead;
+        for (double end = 1.0; end > smallest_part; end *= 0.5) ahead.push_back({0.5 * end, end});
+        ahead.push_back({0.0, smallest_part});
+        return ahead;
+    }
+
     // In substeps where the whole fails.
     bool take(Index step, MotionState& state) {
         const bool last = step >= input_.steps - result_.leaf;
         const bool keep = result_.keep == Keep::stages || result_.keep == Keep::factors ||
                           (result_.keep == Keep::checkpoints && last);
         std::vector<SubstepRecord> records;
-        Substeps done, ahead = {{0.0, 1.0}};
+        Substeps done, ahead = begins_gently(state) ? gentle_beginning() : Substeps{{0.0, 1.0}};
         while (!ahead.empty()) {
             const std::pair<double, double> substep = ahead.back();
             ahead.pop_back();

@@ -27,19 +27,34 @@ MatrixXd generic_start(Index rows, int columns) {
 
 std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     const Model& model = newton.model();
-    const VectorXd metric = model.reduction().weights(model.metric());
+    const Reduction& reduction = model.reduction();
+    const VectorXd metric = reduction.weights(model.metric());
+    // With carriers it is no diagonal.
+    const auto weighed = [&](const MatrixXd& x) -> MatrixXd {
+        if (!reduction.carries()) return metric.asDiagonal() * x;
+        MatrixXd product(x.rows(), x.cols());
+        for (Index c = 0; c < x.cols(); ++c)
+            product.col(c) = reduction.vector(model.metric().cwiseProduct(reduction.expand(x.col(c))));
+        return product;
+    };
     const Index massive = static_cast<Index>((metric.array() > 0.0).count());
     const int columns = std::min(count + 3, massive);
 
     // With X = K^-1 M Y: X^T K X = X^T M Y, so K itself is not needed. X = Q R is made orthonormal in M
     // first: next to a critical point all its columns are almost the same.
-    const VectorXd root = metric.cwiseSqrt();
-    MatrixXd y = generic_start(model.reduction().size(), columns);
+    const VectorXd root = (reduction.carries() ? model.metric() : metric).cwiseSqrt();
+    const auto scaled = [&](const MatrixXd& x) -> MatrixXd {
+        if (!reduction.carries()) return root.asDiagonal() * x;
+        MatrixXd product(root.size(), x.cols());
+        for (Index c = 0; c < x.cols(); ++c) product.col(c) = root.cwiseProduct(reduction.expand(x.col(c)));
+        return product;
+    };
+    MatrixXd y = generic_start(reduction.size(), columns);
     VectorXd eigenvalues = VectorXd::Zero(columns);
     for (int round = 0; round < 40; ++round) {
-        MatrixXd my = metric.asDiagonal() * y, x = my;
+        MatrixXd my = weighed(y), x = my;
         newton.factor()->solve(x);
-        const Eigen::HouseholderQR<MatrixXd> qr(root.asDiagonal() * x);
+        const Eigen::HouseholderQR<MatrixXd> qr(scaled(x));
         const MatrixXd r = qr.matrixQR().topRows(columns);
         r.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(x);
         r.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(my);
@@ -62,7 +77,7 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     std::sort(order.begin(), order.end());  // Ritz values ascend
     std::vector<Mode> modes;
     for (const int c : order) {
-        VectorXd shape = model.reduction().expand(y.col(c));
+        VectorXd shape = reduction.expand(y.col(c));
         Index largest;
         shape.head(model.n_coordinates()).cwiseAbs().maxCoeff(&largest);
         modes.push_back({eigenvalues[c], shape / shape[largest]});

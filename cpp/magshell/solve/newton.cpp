@@ -91,13 +91,13 @@ VectorXd Newton::gradient(const VectorXd& q, const Anchor& anchor) const {
 double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool with_floor) const {
     const Reduction& reduction = model_.reduction();
     // Held components have no residual of their own; those of framed nodes are told apart in their frames.
-    const VectorXd free = reduction.expand(reduction.vector(gradient(q, anchor)));
+    const VectorXd free = reduction.project(gradient(q, anchor));
     const Index nodes = model_.nodes().first_scalar(), rotations = model_.nodes().scalars;
     VectorXd magnitude = model_.residual().magnitude;
     if (anchor.weights) magnitude += anchor.weights->cwiseProduct(q - *anchor.target).cwiseAbs();
     VectorXd cancelling = model_.cancelling_forces(q);
     // In the inertia of a short step, positions cancel.
-    if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q.cwiseAbs());
+    if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q).cwiseAbs();
     model_.add_cancelling_contact_forces(anchor.motion != nullptr, cancelling);
     if (!with_floor) cancelling.setZero();
     return std::max(
@@ -106,15 +106,12 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
                  options_.tolerance));
 }
 
-FactorReport Newton::factorize_assembled(const Anchor& anchor) {
+FactorReport Newton::factorize_assembled(const VectorXd& q, const Anchor& anchor) {
     if (!factor_) factor_ = model_.new_factor([this] { watch(watched_); });
     LargeVector<double>& values = factor_->values();
     model_.reduction().matrix(model_.matrix(), values);
-    if (anchor.weights) {
-        const std::vector<Index>& column_starts = model_.reduction().pattern()->column_starts;
-        const VectorXd weights = model_.reduction().weights(*anchor.weights);
-        for (Index k = 0; k < weights.size(); ++k) values[column_starts[k]] += weights[k];
-    }
+    if (anchor.weights) model_.reduction().add_weights(*anchor.weights, values);
+    if (model_.reduction().carries()) model_.reduction().add_curvature(gradient(q, anchor), values);
     ++factorizations_;
     const Stopwatch running(linear_time_);
     FactorReport report;
@@ -143,7 +140,7 @@ void Newton::assemble(const VectorXd& q, const Controls& controls, bool extrapol
 FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
     evaluate(q, controls, anchor);
     assemble(q, controls, false, anchor);
-    return factorize_assembled(anchor);
+    return factorize_assembled(q, anchor);
 }
 
 FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
@@ -157,7 +154,7 @@ FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool
         if (unsymmetric_) model_.remainder().add_product(move, false, pull);
         moves.col(k) = pull;
     }
-    return factorize_assembled(anchor);
+    return factorize_assembled(q, anchor);
 }
 
 GmresReport Newton::solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
@@ -172,12 +169,15 @@ GmresReport Newton::solve_nearby(const VectorXd& q, const Controls& controls, co
     // Forces of different kinds count alike, whatever their units.
     const VectorXd scale = reduction.weights(stiffness).unaryExpr(
         [](double each) { return each != 0.0 ? 1.0 / std::sqrt(std::abs(each)) : 1.0; });
+    const VectorXd forces = reduction.carries() ? gradient(q, anchor) : VectorXd();
     const auto assembled = [&](const VectorXd& x) {
         const VectorXd full = reduction.expand(x);
         matrix.multiply(full.data(), whole.data());
         if (anchor.weights) whole += anchor.weights->cwiseProduct(full);
         if (unsymmetric_) model_.remainder().add_product(full, true, whole);
-        return VectorXd(scale.cwiseProduct(reduction.vector(whole)));
+        VectorXd image = reduction.vector(whole);
+        reduction.add_curvature_product(forces, x, image);
+        return VectorXd(scale.cwiseProduct(image));
     };
     const auto precondition = [&](VectorXd& x) {
         x = x.cwiseQuotient(scale);
@@ -293,7 +293,8 @@ bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor
         };
         const double whole = length(step);
         for (double share = 1.0;; share *= 0.5) {
-            q = from + share * step;
+            q = from;
+            model_.reduction().advance(q, share * step);
             evaluate(q, controls, anchor);
             if (share <= shortest || relative_residual(q, anchor) <= enough) break;
             if (length(solve_with_factor(-gradient(q, anchor))) <= (1.0 - 0.25 * share) * whole) break;
@@ -364,7 +365,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         extrapolated = true;
         last_step = length;
         moved += length;
-        q += step;
+        model_.reduction().advance(q, step);
         evaluate(q, controls, anchor);
     }
 }

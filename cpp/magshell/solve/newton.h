@@ -37,7 +37,8 @@ struct NewtonReport {
 };
 
 /// A quadratic pull, 1/2 sum w_i (q_i - target_i)^2: the inertia of a time step, or one implicit Euler step
-/// of a gradient flow. Among all unknowns; weights are the same along the three axes of a node.
+/// of a gradient flow. Among all unknowns; weights are the same along the three axes of a node. Those of nodes that a
+/// carrier moves may be negative, as long as the sum over them is not.
 struct Anchor {
     const VectorXd* weights = nullptr;
     const VectorXd* target = nullptr;
@@ -120,7 +121,7 @@ class Newton {
     bool factor_serves(double contraction, double residual, double last_step) const;
     /// As solve_with_factor with an unsymmetric K, or K^T, free unknowns.
     GmresReport solve_unsymmetric(bool transposed, const GmresOptions& options, VectorXd& reduced) const;
-    FactorReport factorize_assembled(const Anchor& anchor);
+    FactorReport factorize_assembled(const VectorXd& q, const Anchor& anchor);
     VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
 
     Model& model_;

@@ -90,7 +90,8 @@ class Relaxation {
         const VectorXd saddle = q_;
         ++report_.saddles_left;
         for (double amplitude = settled * model_.extent(); amplitude < model_.extent(); amplitude *= 2.0) {
-            const VectorXd trial = saddle + amplitude * mode.shape;
+            VectorXd trial = saddle;
+            model_.reduction().advance(trial, amplitude * mode.shape);
             const double energy = model_.energy(trial, controls_);
             // The first push may be too small for the energy to tell, but must be made.
             if (amplitude > settled * model_.extent() && !(energy < energy_)) break;

@@ -9,7 +9,7 @@ StepAlgebra::StepAlgebra(const Tableau& tableau, const Inertia& inertia, double 
     const VectorXd by_acceleration = inertia.mass / (stage_time_ * stage_time_);
     weights_ = by_acceleration + inertia.damping / stage_time_;
     velocity_share_ =
-        (weights_.array() > 0.0).select(stage_time_ * by_acceleration.array() / weights_.array(), 0.0);
+        (weights_.array() != 0.0).select(stage_time_ * by_acceleration.array() / weights_.array(), 0.0);
 }
 
 void StepAlgebra::start_of_stage(int i, const MotionState& begin, const std::vector<StageRates>& rates,
@@ -72,6 +72,14 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         // As fast as until now; what has no velocity begins where it was.
         q.head(coordinates) = x_hat.head(coordinates) +
                               step.stage_time() * (i == 0 ? state.v : rates.back().v).head(coordinates);
+        if (model.reduction().carries()) {
+            VectorXd ahead = q - state.q;
+            ahead.tail(q.size() - coordinates).setZero();
+            const VectorXd others = q.tail(q.size() - coordinates);
+            q = state.q;
+            model.reduction().advance(q, ahead);
+            q.tail(others.size()) = others;
+        }
         ViscousStage viscous;
         if (viscosity_.any()) {
             viscous = ViscousStage(viscosity_, step.stage_time(), dt, tableau.a[i], rates, at_begin, state.e);

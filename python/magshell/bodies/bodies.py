@@ -10,6 +10,8 @@ import numpy as np
 from .._checks.checked_list import checked_list
 from ..mesh.quality import MeshQuality
 from ..mesh.triangle_mesh import TriangleMesh
+from .no_mesh import NoMesh
+from .rigid import Rigid
 from .shell import Shell
 from .ties import Tie, joined_components, originals
 
@@ -40,15 +42,23 @@ class Span(NamedTuple):
 
 
 class Bodies:
-    """Raises ValueError where one is no Shell, or is there twice, or where a tie cannot be.
+    """Raises ValueError where one is no Shell and no Rigid, or is there twice, or where a tie cannot be.
 
+    shells, rigid: those of a kind. The points of rigid parts come after all vertices.
     original: (n_v of all,), the first of the vertices that each is welded to, or itself.
     """
 
     def __init__(self, bodies, ties=()):
-        self.shells: tuple[Shell, ...] = checked_list("bodies", bodies, (Shell,))
-        if not self.shells:
-            raise ValueError("bodies must hold at least one Shell")
+        listed = checked_list("bodies", bodies, (Shell, Rigid))
+        self.shells: tuple[Shell, ...] = tuple(body for body in listed if isinstance(body, Shell))
+        self.rigid: tuple[Rigid, ...] = tuple(body for body in listed if isinstance(body, Rigid))
+        if not listed:
+            raise ValueError("bodies must hold at least one Shell or Rigid")
+        for k, part in enumerate(self.rigid):
+            if self.rigid_number(part) < k:
+                raise ValueError(
+                    f"bodies must differ, but rigid parts {self.rigid_number(part)} and {k} are one Rigid"
+                )
         for k, shell in enumerate(self.shells):
             if (before := self.number(shell)) < k:
                 raise ValueError(
@@ -100,7 +110,7 @@ class Bodies:
     def check_welded(self, name: str, unit: str, rows: np.ndarray) -> None:
         """Raises ValueError where rows (n_v of all, 3) say two things of one vertex."""
         apart = np.abs(rows - rows[self.original]).max(axis=1)
-        if apart.max() > 1e-9 * max(np.abs(rows).max(), 1e-300):
+        if apart.max(initial=0.0) > 1e-9 * max(np.abs(rows).max(initial=0.0), 1e-300):
             vertex = int(np.argmax(apart))
             raise ValueError(
                 f"{name} [{unit}] must be the same where bodies are tied, but those of vertices "
@@ -119,6 +129,8 @@ class Bodies:
         """Of all: as edges are sorted by their lower vertex, they too are those of one body after another."""
         if len(self) == 1:
             return self.shells[0].mesh
+        if not self.shells:
+            return NoMesh()
         faces = [span.mesh.faces + span.first_vertex for span in self.spans]
         return TriangleMesh(
             np.concatenate([mesh.rest_positions for mesh in self.meshes]), np.concatenate(faces)
@@ -127,12 +139,12 @@ class Bodies:
     @property
     def size(self) -> float:
         """Of the largest body: the diagonal of its bounding box [m]."""
-        return max(mesh.size for mesh in self.meshes)
+        return max((mesh.size for mesh in self.meshes), default=0.0)
 
     @property
     def extent(self) -> float:
         """Of the largest body: the longest side of its bounding box [m]."""
-        return max(float(np.ptp(mesh.rest_positions, axis=0).max()) for mesh in self.meshes)
+        return max((float(np.ptp(mesh.rest_positions, axis=0).max()) for mesh in self.meshes), default=0.0)
 
     def number(self, shell) -> int:
         """Which of the bodies it is. Raises ValueError where it is none of them."""
@@ -141,6 +153,20 @@ class Bodies:
                 return k
         what = "a Shell that is not in it" if isinstance(shell, Shell) else f"{shell!r:.60}"
         raise ValueError(f"a body of the scene is one of scene.bodies, got {what}")
+
+    def rigid_number(self, part) -> int:
+        """Which of the rigid parts it is. Raises ValueError where it is none of them."""
+        for k, each in enumerate(self.rigid):
+            if each is part:
+                return k
+        raise ValueError(
+            "a rigid part of the scene is one of scene.rigid_parts, got a Rigid that is not in it"
+        )
+
+    @property
+    def n_points(self) -> int:
+        """Vertices, and points of rigid parts."""
+        return self.mesh.n_vertices + 10 * len(self.rigid)
 
     def of(self, item) -> Span:
         """What a support, a load or a contact is about. Raises ValueError where it does not say so, and has to."""
@@ -205,4 +231,6 @@ def on_body(body: Shell | None) -> str:
 
 def joined(arrays: list[np.ndarray]) -> np.ndarray:
     """Rows of all bodies; of one body, its own."""
+    if not arrays:
+        return np.zeros(0)
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)

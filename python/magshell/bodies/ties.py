@@ -86,6 +86,8 @@ class Tie:
 
 def originals(count: int, welded: np.ndarray) -> np.ndarray:
     """(count,): the first of the vertices that each is welded to, itself where it is not. welded: (k, 2)."""
+    if not len(welded):
+        return np.arange(count)
     groups = _groups(count, welded)
     first = np.full(groups.max(initial=-1) + 1, count)
     np.minimum.at(first, groups, np.arange(count))

@@ -10,6 +10,7 @@ from .._checks.quantity import quantity, shape_of
 from .._checks.scalars import not_negative, positive
 from .._checks.tensors import detached, is_tensor, wants_gradient
 from .._machine.memory import check_memory
+from ..bodies.rigid_place import check_rigid, own_velocities
 from ..methods.clock import Clock, clock_of
 from ..methods.integrators import Integrator
 from ..methods.solvers import Newton
@@ -60,7 +61,7 @@ class MotionInputs:
         self.keep = getattr(_core.Keep, keep or "nothing")
         self._given_time_step = time_step
         self.time_step = positive("time_step", "s", inputs.take("time_step", time_step))
-        self._mass = inputs.values.vertex_masses
+        self._mass = inputs.values.masses
         self._damping = self._checked_damping(inputs.take("damping", damping))
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
         self.start = self._begin(start, velocities)
@@ -133,7 +134,10 @@ class MotionInputs:
         damping = quantity("damping", "N s/m", given, shape)
         if (np.asarray(damping) < 0).any():
             raise ValueError(f"damping [N s/m] must not be negative, but the smallest is {np.min(damping):g}")
-        return np.broadcast_to(damping, (n_v,))
+        on_vertices = np.broadcast_to(damping, (n_v,))
+        if not self.inputs.scene.rigid_parts:
+            return on_vertices
+        return np.concatenate([on_vertices, np.zeros(len(self._mass) - n_v)])
 
     def _history(self, law: dict[str, float]) -> dict[str, np.ndarray]:
         """What the start remembers of the motion that led to it, as far as this one can use it."""
@@ -166,16 +170,24 @@ class MotionInputs:
     def _begin(self, start, velocities) -> MotionState:
         inputs, model = self.inputs, self.inputs.scene._model
         origin = self._origin(start)
-        if velocities is None:
+        goes_on = isinstance(start, Trajectory | MotionState)
+        own = own_velocities(inputs, start, goes_on)
+        if goes_on and inputs.scene.rigid_parts:  # free bodies go on as they did, whatever the vertices do
+            own = model.points(origin.velocity)[inputs.scene.mesh.n_vertices :]
+        if velocities is None and (goes_on or not own.any()):
             return origin
         n_v = inputs.scene.mesh.n_vertices
-        given = inputs.take("velocities", velocities)
+        given = inputs.take("velocities", np.zeros((n_v, 3)) if velocities is None else velocities)
         shape = shape_of("velocities [m/s]", given)
         if shape not in ((3,), (n_v, 3)):
             raise ValueError(f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {shape}")
         rows = np.broadcast_to(quantity("velocities", "m/s", given, shape), (n_v, 3))
         inputs.scene._bodies.check_welded("velocities", "m/s", rows)
-        velocity = model.full_vector(np.ascontiguousarray(rows))
+        velocity = model.full_vector(np.concatenate([rows, own]))
+        if inputs.scene.rigid_parts:
+            velocity = model.settled_velocity(origin.state, velocity)
+            fastest = np.abs(rows).max(initial=0.0)
+            check_rigid(inputs.scene, rows, model.positions(velocity), "velocities [m/s]", fastest)
         return MotionState(
             origin.time,
             origin.state,
@@ -211,6 +223,7 @@ class MotionInputs:
         check_faces(mesh, positions)
         check_outside(inputs.scene, inputs.values, positions, 0.0)
         state = model.state(positions, np.zeros(mesh.n_edges))
+        check_rigid(inputs.scene, positions, model.positions(state), "start [m]", mesh.size)
         return MotionState(0.0, state, still, rotations_known=False)
 
 

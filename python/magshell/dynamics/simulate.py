@@ -14,7 +14,7 @@ from ..adjoint.dynamic import MotionAdjoint
 from ..bodies.caps import warn_of_caps
 from ..bodies.strains import StrainHistory, warn_if_large
 from ..errors import Interrupted, NotConverged
-from ..methods.integrators import TRBDF2, ImplicitEuler, Integrator
+from ..methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler, Integrator
 from ..methods.solvers import MixedNewton, Newton
 from ..scene.inputs import Inputs
 from ..scene.replacements import requested
@@ -126,6 +126,11 @@ def simulate(
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if integrator is None:
         integrator = ImplicitEuler() if scene.contacts else TRBDF2()
+    if scene.rigid_parts and isinstance(integrator, SDIRK2 | SDIRK3):
+        raise ValueError(
+            f"{type(integrator).__name__} falls to first order where rigid parts turn, as its first stage is of first order "
+            "only: take TRBDF2(), which keeps the second, or ImplicitEuler()"
+        )
     inputs = Inputs(
         scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True, moving=True
     )
@@ -164,7 +169,7 @@ def simulate(
             f"{found.reason}. Take shorter steps. The motion until there is in `error.last_good`.",
             result,
         )
-    bending = result.energies["bending"]
+    bending = result.energies.get("bending", np.zeros(len(result)))
     most = int(np.argmax(bending))
     positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
     where = f"the motion, at {result.times[most]:.4g} s,"
@@ -183,7 +188,8 @@ def _warn(result: Trajectory) -> None:
 
 def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     scene, model, values = asked.inputs.scene, asked.inputs.scene._model, asked.inputs.values
-    positions, edge_rotations, velocities = _outputs(asked, found)
+    points, edge_rotations, velocities = _outputs(asked, found)
+    rigid, n_v = bool(scene.rigid_parts), scene.mesh.n_vertices
     recorded = len(found.kinetic_energy)
     ended = asked.clock.after(found.steps_done)
     thickness = values.whole.thickness
@@ -193,8 +199,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         scene=scene,
         integrator=asked.integrator,
         times=asked.clock.at(asked.record_every * np.arange(recorded)),
-        positions=positions,
-        velocities=velocities,
+        positions=points[:, :n_v] if rigid else points,
+        velocities=velocities[:, :n_v] if rigid else velocities,
         edge_rotations=edge_rotations,
         remanent_magnetization=asked.inputs.given_magnetization,
         applied_flux_density=asked.recorded("applied_flux_density", recorded),
@@ -235,6 +241,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
             )
             for contact in scene.contacts
         ],
+        _own_points=points[:, n_v:] if rigid else None,
+        _own_velocities=velocities[:, n_v:] if rigid else None,
     )
 
 
@@ -247,6 +255,7 @@ def _by_name(names: list[str], by_term: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _outputs(asked: MotionInputs, found):
+    """Positions, edge rotations, velocities; with the points of rigid parts."""
     inputs, model = asked.inputs, asked.inputs.scene._model
     arrays = found.positions(model), found.edge_rotations(model), found.velocities(model)
     if not inputs.leaves:

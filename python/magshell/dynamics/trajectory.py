@@ -13,6 +13,8 @@ from .._checks.quantity import quantity
 from .._checks.tensors import detached
 from .._machine.files import replace_file
 from ..bodies.body_result import BodyResult
+from ..bodies.rigid import Rigid
+from ..bodies.rigid_result import RigidResult
 from ..bodies.shell import Shell
 from ..bodies.strains import StrainHistory, Strains, strains_of
 from ..mesh.crossings import told
@@ -125,10 +127,12 @@ class Trajectory:
     _placed: list = field(
         repr=False, default_factory=list
     )  # the first arguments of near_kinks, of each contact
+    _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
+    _own_velocities: Any = field(repr=False, default=None)
 
-    def __getitem__(self, body: Shell) -> BodyResult:
+    def __getitem__(self, body: Shell | Rigid) -> BodyResult | RigidResult:
         """What it says of one body of the scene."""
-        return BodyResult(self, body)
+        return RigidResult(self, body) if isinstance(body, Rigid) else BodyResult(self, body)
 
     @property
     def displacements(self):
@@ -172,7 +176,7 @@ class Trajectory:
         positions, rotations = (detached(each)[index] for each in (self.positions, self.edge_rotations))
         model = self.scene._model
         state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
-        before = 3 * self.scene.mesh.n_vertices
+        before = 3 * self.scene._bodies.n_points
         state[before : before + self._directions.shape[1]] = self._directions[index]
         return strains_of(self.scene, state, self._thickness)
 

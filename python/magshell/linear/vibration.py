@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.sparse import diags_array
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from .. import _core
@@ -16,6 +17,7 @@ from ..scene.inputs import Inputs
 from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
 from .mode_shapes import mode_shapes
+from .rest import symmetric
 
 _ROUND_OFF_SHARE = (
     64.0 * np.finfo(float).eps
@@ -96,7 +98,7 @@ def vibration_modes(
         raise ValueError(f"count must be an integer of at least 1, got {count!r}")
     began = time.perf_counter()
     model = scene._model
-    masses = model.free_weights(inputs.values.vertex_masses)
+    masses = model.free_weights(inputs.values.masses)
     if count >= np.count_nonzero(masses):
         raise ValueError(
             f"count must be below the {np.count_nonzero(masses)} unknowns with mass, got {count}"
@@ -106,8 +108,12 @@ def vibration_modes(
             stiffness = model.hessian(model.rest_state(), scene._control_layout.zeros())
         else:
             stiffness = model.hessian(equilibrium._state, equilibrium._controls)
-    slow = min(map(_slow_square, inputs.values.sheets))
-    pencil = _Pencil(stiffness, model.free_points, masses, slow)
+        inertia = None
+        if scene.rigid_parts:
+            masses = model.free_weights(inputs.values.masses)  # as the parts are turned there
+            inertia = model.free_weight_values(inputs.values.masses)
+    slow = min(map(_slow_square, inputs.values.sheets), default=1.0)
+    pencil = _Pencil(stiffness, model.free_points, masses, slow, inertia)
     squares, vectors = pencil.lowest(int(count))
     modes, edge_rotations = mode_shapes(model, vectors)
     return VibrationModes(
@@ -125,15 +131,24 @@ class _Pencil:
     """K and M, and a factorization of K - shift M with the shift below every square of a frequency.
 
     stiffness: (n, column starts, rows, values), the lower triangle of K. points: (n, 3), where the unknowns are.
-    masses: (n,), zero for edge rotations.
+    masses: (n,), the diagonal of M, zero for edge rotations. inertia: all of M, in the places of K, if that is more.
     slow_square: 1/s2, about as large as the lowest of a sheet that is held.
     """
 
-    def __init__(self, stiffness: tuple, points: np.ndarray, masses: np.ndarray, slow_square: float):
+    def __init__(
+        self,
+        stiffness: tuple,
+        points: np.ndarray,
+        masses: np.ndarray,
+        slow_square: float,
+        inertia: np.ndarray | None = None,
+    ):
         *pattern, self._values = stiffness
         self._diagonal = pattern[1][:-1]
         self._masses = masses
         self._moving = np.flatnonzero(masses)
+        self._inertia = inertia
+        self._root = _root(masses) if inertia is None else _root_of(symmetric(*pattern, inertia), masses)
         self._factor = _core.analyze(*pattern, points=points)
         self.factorizations = 0
         stiffest = self._values[self._diagonal][self._moving] / masses[self._moving]
@@ -164,18 +179,18 @@ class _Pencil:
         raise NotConverged(f"some of the {count} slowest modes were not found. Ask for more, or for fewer.")
 
     def _search(self, count: int, seed: int, space: int) -> tuple[np.ndarray, np.ndarray]:
-        # With y = M^1/2 x and the edge rotations at rest: M^1/2 (K - shift M)^-1 M^1/2 y = y / (w^2 - shift).
+        # With M = L L^T, y = L^T x and the edge rotations at rest: L^T (K - shift M)^-1 L y = y / (w^2 - shift).
         self._factorize(self._shift)
-        roots = np.sqrt(self._masses)
+        times_root, times_transposed = self._root
 
         def moved_by(y: np.ndarray) -> np.ndarray:
-            forces = np.zeros(len(roots))
-            forces[self._moving] = roots[self._moving] * y.ravel()
-            return self._factor.solve(forces)
+            forces = np.zeros(len(self._masses))
+            forces[self._moving] = y.ravel()
+            return self._factor.solve(times_root(forces))
 
         size = len(self._moving)
         inverse = LinearOperator(
-            (size, size), matvec=lambda y: (roots * moved_by(y))[self._moving], dtype=np.float64
+            (size, size), matvec=lambda y: times_transposed(moved_by(y))[self._moving], dtype=np.float64
         )
         start = np.random.default_rng(seed).standard_normal(size)  # one that no symmetry is orthogonal to
         try:
@@ -191,12 +206,34 @@ class _Pencil:
 
     def _factorize(self, shift: float) -> _core.FactorReport:
         values = self._values.copy()
-        values[self._diagonal] -= shift * self._masses
+        if self._inertia is None:
+            values[self._diagonal] -= shift * self._masses
+        else:
+            values -= shift * self._inertia
         self.factorizations += 1
         report = self._factor.factorize(values)
         if not report.succeeded:
             raise NotConverged(f"the vibration modes: {report.reason}")
         return report
+
+
+def _root(masses: np.ndarray) -> tuple:
+    """Products with L and with L^T, M = L L^T a diagonal."""
+    roots = np.sqrt(masses)
+    return (lambda x: roots * x), (lambda x: roots * x)
+
+
+def _root_of(inertia, masses: np.ndarray) -> tuple:
+    """The same of a matrix whose last rows, of rigid parts, are coupled."""
+    coupled = inertia.copy()
+    coupled.setdiag(0.0)
+    coupled.eliminate_zeros()
+    first = coupled.indices.min(initial=len(masses))
+    root = diags_array(np.sqrt(masses)).tolil()
+    if first < len(masses):
+        root[first:, first:] = np.linalg.cholesky(inertia[first:, first:].toarray())
+    root = root.tocsc()
+    return (lambda x: root @ x), (lambda x: root.T @ x)
 
 
 def _inputs(scene: Scene, equilibrium: Equilibrium | None) -> Inputs:

@@ -32,7 +32,7 @@ def of_all_bodies(scene, replaced: dict[object, dict]):
 
     For what has been checked.
     """
-    if not scene.fields:
+    if not scene.fields or not scene.bodies:
         return None
     given = [replaced.get(body, {}).get(_NAME, body.remanent_magnetization) for body in scene.bodies]
     counts = [body.mesh.n_faces for body in scene.bodies]

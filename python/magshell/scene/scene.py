@@ -14,6 +14,8 @@ from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
+from ..bodies.rigid import Rigid
+from ..bodies.rigid_place import places
 from ..bodies.shell import Shell
 from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
@@ -36,8 +38,8 @@ class Scene:
     """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
     needs and, up to 256 MB, the memory of its last factorization.
 
-    bodies: a Shell, or several, which do not feel each other but through ties. Positions and faces of a result are those
-        of one body after another, and `result[body]` has those of one; each may have its own `bending`.
+    bodies: a Shell, or several, which do not feel each other but through ties, and Rigid parts. Positions and faces of a
+        result are those of one Shell after another, and `result[body]` has those of one; each may have its own `bending`.
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple and SurfaceTension objects; likewise.
@@ -69,7 +71,7 @@ class Scene:
 
     def __init__(
         self,
-        bodies: Shell | Iterable[Shell],
+        bodies: Shell | Rigid | Iterable[Shell | Rigid],
         *,
         ties=(),
         supports=(),
@@ -104,7 +106,7 @@ class Scene:
     def __getstate__(self) -> dict:
         """What a copy, or another process, makes the scene from again."""
         return {
-            "bodies": self.bodies,
+            "bodies": (*self.bodies, *self.rigid_parts),
             "ties": self.ties,
             "supports": self.supports,
             "loads": self.loads,
@@ -123,10 +125,23 @@ class Scene:
         edges = _couple_edges(bodies, self.loads)
         self._couple_directions = _couple_directions(mesh, edges)
         constraints = gather(bodies, self.supports, self._couple_directions)
+        self._rigid = places(bodies)
+        for k, part in enumerate(self.rigid_parts):
+            if part.magnetic_moment is not None and not self.fields:
+                raise ValueError(
+                    f"rigid part {k} has a magnetic_moment, but the scene has no field: Scene(..., field=...)"
+                )
+        _refuse_support(self._rigid, constraints.held_nodes[:, 0])
         held = np.intersect1d(edges, constraints.directed_edges[:, 0])
         if held.size:
             raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
         free = [] if allow_rigid_motions else free_rigid_motions(bodies, constraints)
+        if not allow_rigid_motions:
+            free += [
+                f"rigid part {k}, which is free"
+                for k, each in enumerate(self.rigid_parts)
+                if each.vertices is None
+            ]
         if free:
             raise ValueError(
                 f"the supports leave the sheet free: {'; '.join(free)}. Hold it, or say allow_rigid_motions=True if a "
@@ -141,6 +156,10 @@ class Scene:
             n_vertices=mesh.n_vertices,
             original=bodies.original if bodies.ties else [],
             sheets=self._sheets(constraints),
+            rigid=[
+                place.as_input(f"rigid {k}", bool(self.fields) and part.magnetic_moment is not None)
+                for k, (part, place) in enumerate(zip(self.rigid_parts, self._rigid, strict=True))
+            ],
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
             held_frames=constraints.held_frames,
@@ -196,6 +215,7 @@ class Scene:
         """Every object of it with the name that the core has for its values."""
         kinds = (
             ("body", self.bodies),
+            ("rigid", self.rigid_parts),
             ("support", self.supports),
             ("load", self.loads),
             ("field", self._sources),
@@ -230,9 +250,13 @@ class Scene:
         return self._bodies.ties
 
     @property
+    def rigid_parts(self) -> tuple[Rigid, ...]:
+        return self._bodies.rigid
+
+    @property
     def shell(self) -> Shell:
         """The one body. Raises ValueError where there are several."""
-        if len(self.bodies) > 1:
+        if len(self.bodies) != 1:
             raise ValueError(f"the scene has {len(self.bodies)} bodies: say which, scene.bodies[k]")
         return self.bodies[0]
 
@@ -247,6 +271,7 @@ class Scene:
         water = () if self.water is None else (self.water,)
         return (
             *self.bodies,
+            *self.rigid_parts,
             *self.supports,
             *self.loads,
             *self.fields,
@@ -273,10 +298,13 @@ class Scene:
 
     def __repr__(self) -> str:
         several = len(self.bodies) > 1
-        lines = [f"Scene: {len(self.bodies)} bodies" if several else f"Scene: {self.bodies[0]!r}"]
+        lines = [
+            f"Scene: {self.bodies[0]!r}" if len(self.bodies) == 1 else f"Scene: {len(self.bodies)} bodies"
+        ]
         if several:
             lines += [f"  body {k}: {body!r}" for k, body in enumerate(self.bodies)]
         lines += [f"  welded by {tie!r}" for tie in self.ties]
+        lines += [f"  with {part!r}{self._whose(part)}" for part in self.rigid_parts]
         lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
         lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
         lines += [f"  in {field!r}" for field in self.fields]
@@ -290,9 +318,20 @@ class Scene:
 
     def _whose(self, item) -> str:
         """For the repr of a scene with several bodies."""
-        if len(self.bodies) == 1 or item.body is None:
+        if len(self.bodies) < 2 or item.body is None:
             return ""
         return f" (body {self._bodies.number(item.body)})"
+
+
+def _refuse_support(parts, held: np.ndarray) -> None:
+    """Raises ValueError where a support holds a vertex of a rigid part."""
+    for k, place in enumerate(parts):
+        both = np.intersect1d(place.vertices, held)
+        if both.size:
+            raise ValueError(
+                f"a support holds vertex {both[0]}, which rigid part {k} carries: leave it out of the part's vertices; what "
+                "is to stand still altogether needs no Rigid"
+            )
 
 
 def _couple_edges(bodies: Bodies, loads) -> np.ndarray:

@@ -29,6 +29,7 @@ class Values:
             item: item.replaced(**values) for item, values in (replaced or {}).items() if item is not scene
         }
         self.sheets = tuple(self.current(body) for body in scene.bodies)
+        self.rigid = tuple(self.current(span) for span in scene.rigid_parts)
         self.constraints = scene._constraints
         if any(support in self._now for support in scene.supports):
             self.constraints = self._moved()
@@ -38,9 +39,12 @@ class Values:
         for owner, label in scene._labels:
             self.current(owner).add_numbers(label, self, numbers)
         if ("gravity", "forces") in scene._value_layout:
-            numbers["gravity", "forces"] = self.vertex_masses[:, None] * self.gravity
+            numbers["gravity", "forces"] = self.masses[:, None] * self.gravity
         if "vertex_loads" in own:
             numbers["loads", "forces"] = own["vertex_loads"]
+        if ("loads", "forces") in numbers:
+            own_points = [np.zeros((10, 3)) for _ in self.rigid]
+            numbers["loads", "forces"] = joined([numbers["loads", "forces"], *own_points])
         if magnetization is not None:
             for k, span in enumerate(scene._bodies.spans):
                 numbers[f"body {k}", "remanent_magnetization"] = magnetization[span.faces]
@@ -56,9 +60,9 @@ class Values:
             return self.current(owner).gradients(labels[0], self, gradient)
         found = {}
         if ("loads", "forces") in self.scene._value_layout:
-            found["vertex_loads"] = gradient.value("loads", "forces")
+            found["vertex_loads"] = gradient.value("loads", "forces")[: self.scene.mesh.n_vertices]
         if (by_weights := self.by_weights(gradient)) is not None:
-            found["gravity"] = self.vertex_masses @ by_weights
+            found["gravity"] = self.masses @ by_weights
         return found
 
     @property
@@ -90,15 +94,27 @@ class Values:
                 raise ValueError(f"body {k} of the scene has no mass_density [kg/m3]")
         return joined([sheet.vertex_masses for sheet in self.sheets])
 
+    @property
+    def masses(self) -> np.ndarray:
+        """Of all vertices and of the points of rigid parts, kg."""
+        if not self.rigid:
+            return self.vertex_masses
+        places = zip(self.scene._rigid, self.rigid, strict=True)
+        return np.concatenate([self.vertex_masses, *(place.masses(span) for place, span in places)])
+
+    def rigid_place(self, span):
+        """Where one of `rigid` is."""
+        return next(place for place, each in zip(self.scene._rigid, self.rigid, strict=True) if each is span)
+
     def by_masses(self, gradient: Gradient) -> np.ndarray | None:
-        """By the masses of the vertices (n_v,), of gravity and of inertia; None where they have no part."""
+        """By `masses`, of gravity and of inertia; None where they have no part."""
         by_masses, by_weights = gradient.others.get("mass"), self.by_weights(gradient)
         if by_weights is None:
             return by_masses
         return by_weights @ self.gravity + (0.0 if by_masses is None else by_masses)
 
     def by_weights(self, gradient: Gradient) -> np.ndarray | None:
-        """By the vertices' weights, (n_v, 3); None where nothing is heavy."""
+        """By the weights of `masses`, (n, 3); None where nothing is heavy."""
         if ("gravity", "forces") not in self.scene._value_layout:
             return None
         return gradient.value("gravity", "forces")

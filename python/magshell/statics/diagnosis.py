@@ -83,6 +83,14 @@ def _places(inputs, found) -> tuple[list[str], np.ndarray]:
 
 def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
     scene, shell = inputs.scene, inputs.values.whole
+    free = [f"rigid part {k}" for k, part in enumerate(scene.rigid_parts) if part.vertices is None]
+    if free and "singular" in found.reason:
+        return (
+            f"The scene has free bodies ({', '.join(free)}), and what acts on them holds them nowhere: an equilibrium of a "
+            "free body needs a field or a contact that does, or look at its motion by ms.simulate."
+        )
+    if not scene.bodies:
+        return "Start from a nearby equilibrium."
     mesh, quality = scene.mesh, shell.quality
     tiny = np.flatnonzero(quality.heights < SHORTEST_HEIGHT * np.median(mesh.edge_lengths))
     if tiny.size:

@@ -9,6 +9,8 @@ import numpy as np
 
 from .._checks.tensors import detached
 from ..bodies.body_result import BodyResult
+from ..bodies.rigid import Rigid
+from ..bodies.rigid_result import RigidResult
 from ..bodies.shell import Shell
 from ..bodies.strains import Largest, Strains, strains_of
 from ..mesh.crossings import told
@@ -54,6 +56,7 @@ class Equilibrium:
     _turns: list = field(repr=False)
     _controls: Any = field(repr=False)
     _values: Any = field(repr=False)
+    _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
 
     def __getstate__(self):
         raise TypeError(
@@ -61,9 +64,9 @@ class Equilibrium:
             "edge_rotations and energies"
         )
 
-    def __getitem__(self, body: Shell) -> BodyResult:
+    def __getitem__(self, body: Shell | Rigid) -> BodyResult | RigidResult:
         """What it says of one body of the scene."""
-        return BodyResult(self, body)
+        return RigidResult(self, body) if isinstance(body, Rigid) else BodyResult(self, body)
 
     @property
     def displacements(self):
@@ -96,7 +99,7 @@ class Equilibrium:
         return self.scene.mesh.self_intersections(detached(self.positions))
 
     def __repr__(self) -> str:
-        moved = float(np.linalg.norm(np.asarray(detached(self.displacements)), axis=1).max())
+        moved = float(np.linalg.norm(np.asarray(detached(self.displacements)), axis=1).max(initial=0.0))
         kind = "stable" if self.stable else f"unstable in {self.unstable_directions} directions"
         if not self.stable and self.unstable_directions == 0:
             kind = "not known to be stable"

@@ -97,7 +97,9 @@ def solve(inputs: Inputs, state: np.ndarray, turns: list, from_, to, options, pr
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
     positions = scene._model.positions(found.state)
-    warn_of_caps(scene, positions, inputs.values.whole, result.energies["bending"], "this equilibrium")
+    warn_of_caps(
+        scene, positions, inputs.values.whole, result.energies.get("bending", 0.0), "this equilibrium"
+    )
     warn_if_large(
         result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
     )
@@ -113,11 +115,12 @@ def _energies(scene: Scene, found) -> dict[str, float] | None:
 
 
 def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_time: float) -> Equilibrium:
-    positions, edge_rotations = _outputs(inputs, found)
+    points, edge_rotations = _outputs(inputs, found)
+    n_v = scene.mesh.n_vertices
     strain = largest_of(scene, found.state, inputs.values.whole.thickness)
     return Equilibrium(
         scene=scene,
-        positions=positions,
+        positions=points[:n_v] if scene.rigid_parts else points,
         edge_rotations=edge_rotations,
         remanent_magnetization=inputs.given_magnetization,
         applied_flux_density=_flux_density(inputs, found),
@@ -142,13 +145,14 @@ def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_tim
         _turns=found.turns,
         _controls=found.controls,
         _values=inputs.values,
+        _own_points=points[n_v:] if scene.rigid_parts else None,
     )
 
 
 def _outputs(inputs: Inputs, found):
-    """Positions and edge rotations, as tensors in a graph where an input asks for a gradient."""
+    """Positions, points of rigid parts among them, and edge rotations; tensors where an input asks for a gradient."""
     model = inputs.scene._model
-    arrays = np.ascontiguousarray(model.positions(found.state)), model.edge_rotations(found.state)
+    arrays = np.ascontiguousarray(model.points(found.state)), model.edge_rotations(found.state)
     if not inputs.leaves:
         return tuple(like(array, *inputs.given) for array in arrays)
     from ..adjoint.autograd import solved

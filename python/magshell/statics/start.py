@@ -8,6 +8,7 @@ import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.tensors import to_array
+from ..bodies.rigid_place import check_rigid
 from ..scene.inputs import Inputs
 from ..scene.scene import Scene
 from ..surroundings.contact_inputs import check_outside
@@ -41,7 +42,9 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     scene._bodies.check_welded("start", "m", positions)
     check_faces(scene.mesh, positions)
     check_outside(scene, inputs.values, positions, 0.0)
-    return model.state(positions, np.zeros(scene.mesh.n_edges)), [], inputs.controls, False
+    state = model.state(positions, np.zeros(scene.mesh.n_edges))
+    check_rigid(scene, positions, model.positions(state), "start [m]", scene.mesh.size)
+    return state, [], inputs.controls, False
 
 
 def check_faces(mesh, positions: np.ndarray) -> None:

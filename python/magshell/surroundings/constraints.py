@@ -61,7 +61,7 @@ def _directed(support, span: Span) -> list[DirectedEdges]:
 def free_rigid_motions(bodies: Bodies, constraints: Constraints) -> list[str]:
     """The rigid motions that no support prevents, in words; of every connected part."""
     found, mesh, size, components = [], bodies.mesh, bodies.size, bodies.components
-    for part in range(components.max() + 1):
+    for part in range(components.max(initial=-1) + 1):
         vertices = np.flatnonzero(components == part)
         center = mesh.rest_positions[vertices].mean(axis=0)
         rows = _prevented(bodies, constraints, components == part, center)

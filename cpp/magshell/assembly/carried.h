@@ -1,0 +1,92 @@
+// What carriers make of the reduced matrix and of vectors: B^T H B with its curvature. Their coordinates are the last
+// unknowns, those of one carrier after another. Scenes without carriers have none of this.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <map>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "magshell/assembly/carrier.h"
+#include "magshell/assembly/system_matrix.h"
+#include "magshell/linalg/factor.h"
+
+namespace magshell {
+
+using Carriers = std::vector<std::unique_ptr<Carrier>>;
+
+class Carried {
+  public:
+    Carried(Carriers carriers, const SystemMatrix& matrix);
+
+    Index coordinates() const { return coordinates_; }
+    bool carries(Index unknown) const { return carrier_of_[unknown] >= 0; }
+
+    /// While the reduced pattern is built, in this order. `reduced`: of each unknown, negative where it is held or
+    /// carried; of the free ones there are so many.
+    void couple(const SystemMatrix& matrix, const std::vector<Index>& reduced, Index free);
+    void append_rows(Index free, std::vector<Index>& rows) const;
+    void append_columns(SparsePattern& pattern) const;
+    void find_places(const SystemMatrix& matrix, const std::vector<Index>& reduced,
+                     const SparsePattern& pattern);
+
+    /// From now on B is that at q.
+    void linearize(const VectorXd& q);
+
+    /// Adds B^T H B; the same of a diagonal; and the curvature under a gradient.
+    void add_matrix(const SystemMatrix& full, double* values) const;
+    void add_weights(const VectorXd& weights, double* values) const;
+    void add_curvature(const VectorXd& gradient, double* values) const;
+    void add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const;
+
+    /// The last numbers of a reduced vector: B^T f, and the diagonal of B^T w B.
+    void pull_back(const VectorXd& full, VectorXd& reduced) const;
+    void diagonal(const VectorXd& weights, VectorXd& reduced) const;
+    /// B z on the nodes carried.
+    void push_forward(const VectorXd& reduced, VectorXd& full) const;
+    /// What of a full vector is a motion that the carriers allow, and nothing else of it on their nodes.
+    void project(VectorXd& full) const;
+    /// The rows of the nodes carried, from another vector of all unknowns.
+    void replace(const VectorXd& from, VectorXd& to) const;
+
+    /// Moves q, the nodes carried along what of p they can follow.
+    void advance(VectorXd& q, const VectorXd& p) const;
+    void settle(VectorXd& q, VectorXd* v) const;
+    void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const;
+
+    /// Where each coordinate is: the mean of the nodes that it moves.
+    void append_points(const std::vector<Vec3>& full, std::vector<Vec3>& points) const;
+
+    std::size_t bytes() const;
+
+  private:
+    // An entry of the full matrix and the rows of B that its row and its column stand for.
+    struct Mixed {  // the other one is free: to is where the carrier's rows begin in that column
+        Index from, row, to;
+    };
+    struct Inner {
+        Index from, row, column;
+    };
+    struct Chunk {
+        std::unique_ptr<Carrier> carrier;
+        Index first = 0;  // among the carriers' coordinates
+        Eigen::MatrixXd jacobian;
+        Eigen::LDLT<Eigen::MatrixXd> normal;
+        std::vector<Mixed> mixed;
+        std::vector<Inner> inner;
+        std::map<Index, std::vector<Inner>> across;  // rows of a later carrier
+        std::vector<Index> own;                      // where each column's rows of this carrier begin
+        std::map<Index, std::vector<Index>> beside;  // and those of a later one
+    };
+
+    void add_lower(const Chunk& chunk, const Eigen::MatrixXd& block, double* values) const;
+
+    std::vector<Chunk> chunks_;
+    Index coordinates_ = 0, free_ = 0;
+    VectorXd at_;                               // q of the linearization
+    std::vector<Index> carrier_of_, row_of_;    // by unknown: its carrier, its row of B there
+    std::map<Index, std::set<Index>> coupled_;  // by free unknown: carriers
+};
+
+}  // namespace magshell

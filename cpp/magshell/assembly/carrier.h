@@ -1,0 +1,57 @@
+// Nodes whose places are functions of a few coordinates of their own: a rigid part's, a skeleton's.
+//
+//   x = P(z),  B = dx/dz        gradient B^T g,  Hessian B^T H B + sum_i g_i d2x_i/dz2,  lambda of the nodes = B
+//   lambda_z
+//
+// The coordinates count from where the nodes are: each iterate is a new origin, so that derivatives are needed at
+// z = 0 only. What the nodes are at is the only state; all coordinates are lengths [m].
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "magshell/core/types.h"
+
+namespace magshell {
+
+class Carrier {
+  public:
+    explicit Carrier(std::vector<Index> nodes) : nodes_(std::move(nodes)) {}
+    virtual ~Carrier() = default;
+
+    const std::vector<Index>& nodes() const { return nodes_; }
+    virtual Index coordinates() const = 0;
+
+    /// B at q: a row for each component of its nodes, a column a coordinate.
+    virtual Eigen::MatrixXd jacobian(const VectorXd& q) const = 0;
+
+    /// sum_i g_i d2x_i/dz2 at q, for a gradient of all unknowns; symmetric.
+    virtual Eigen::MatrixXd curvature(const VectorXd& q, const VectorXd& gradient) const = 0;
+
+    /// Moves its nodes in q along z.
+    virtual void advance(VectorXd& q, const VectorXd& z) const = 0;
+
+    /// A start, where the caller says where the vertices are: nodes of its own join them, and what rounding left of
+    /// the vertices' order is mended. With the velocities v of the vertices those of all its nodes.
+    virtual void settle(VectorXd& q, VectorXd* v) const = 0;
+
+    /// From gradients by what settle makes, at a settled q, to those by what it is given; v and by_v may be empty.
+    virtual void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const = 0;
+
+    /// Its nodes' rows of a vector of all unknowns, and back.
+    VectorXd gather(const VectorXd& full) const {
+        VectorXd own(3 * nodes_.size());
+        for (std::size_t k = 0; k < nodes_.size(); ++k)
+            own.segment<3>(3 * k) = full.segment<3>(3 * nodes_[k]);
+        return own;
+    }
+    void scatter(const VectorXd& own, VectorXd& full) const {
+        for (std::size_t k = 0; k < nodes_.size(); ++k)
+            full.segment<3>(3 * nodes_[k]) = own.segment<3>(3 * k);
+    }
+
+  private:
+    std::vector<Index> nodes_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,169 @@
+"""Rigid parts: vertices that move as one body, or a free body without a mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.owner import Owner
+from .._checks.quantity import quantity, real_numbers
+from .._checks.selections import selection
+from .shell import Shell
+
+_ROUNDING = 1e-9
+
+
+class Rigid(Owner):
+    """Vertices of a body that move as one rigid body: a payload, a stiff frame, a magnet glued on. Or a free body without
+    a mesh. One of the bodies of a scene.
+
+    vertices: (k,), three at least and not all on a line; or None for a free body.
+    mass: kg, its own, beside that of the sheet it is part of; None where it has none: a frame.
+    inertia: kg m2, about `center`, in the world's axes at rest: (3, 3), or (3,) where those are its principal axes, or one
+        number for all three. By default that of a point mass, none.
+    center: (3,) m, of its own mass and of its moment, at rest; by default the mean of the vertices, or the origin.
+    magnetic_moment: (3,) A m2 at rest, in a scene with a field; it turns with the part.
+    velocity, angular_velocity: (3,) m/s of the center, (3,) rad/s in the world's axes: of a free body, where a motion
+        starts at rest positions. Vertices have theirs from the `velocities` of ms.simulate.
+    body: the Shell whose vertices they are, in a scene of several.
+
+    Supports hold none of its vertices. `result[part]` has its center and rotation, and how fast it moves. ms.simulate
+    takes it by TRBDF2, the first step in seven parts, or by ImplicitEuler; viscous damping acts on vertices only. Faces
+    between its vertices still bend at its border: where that half of a face matters, give them a larger modulus too.
+
+    >>> import numpy as np
+    >>> import magshell as ms
+    >>> top = ms.Rigid(mass=1.0, inertia=(1.0, 2.0, 3.0), angular_velocity=(0, 0, 2.0))
+    >>> scene = ms.Scene(top, allow_rigid_motions=True)
+    >>> move = ms.simulate(scene, steps=50, time_step=np.pi / 100)
+    >>> bool(np.abs(move[top].rotation[-1] - np.diag([-1.0, -1.0, 1.0])).max() < 1e-2)  # half a turn
+    True
+    """
+
+    for_all = False
+    _replaceable = ("mass", "inertia", "center", "magnetic_moment", "velocity", "angular_velocity")
+
+    def __init__(
+        self,
+        vertices=None,
+        *,
+        mass=None,
+        inertia=None,
+        center=None,
+        magnetic_moment=None,
+        velocity=None,
+        angular_velocity=None,
+        body: Shell | None = None,
+    ):
+        if body is not None and not isinstance(body, Shell):
+            raise ValueError(f"body must be a Shell of the scene, got {body!r:.60}")
+        if vertices is None and body is not None:
+            raise ValueError("a Rigid of a body needs its vertices: Rigid(vertices=..., body=...)")
+        self.vertices = None if vertices is None else selection("Rigid vertices", vertices)
+        self.body = body
+        self.mass = None if mass is None else float(quantity("mass", "kg", mass, ()))
+        if self.mass is not None and not self.mass > 0:
+            raise ValueError(f"mass [kg] must be positive, got {self.mass:g}")
+        self.inertia = None if inertia is None else _checked_inertia(inertia)
+        if self.mass is None and self.inertia is not None:
+            raise ValueError("inertia [kg m2] was given without a mass [kg]")
+        self.center = _vector("center", "m", center)
+        self.magnetic_moment = _vector("magnetic_moment", "A m2", magnetic_moment)
+        self.velocity = _vector("velocity", "m/s", velocity)
+        self.angular_velocity = _vector("angular_velocity", "rad/s", angular_velocity)
+        if vertices is None:
+            self._check_free()
+        elif velocity is not None or angular_velocity is not None:
+            raise ValueError(
+                "velocity and angular_velocity are those of a free body: vertices have theirs from ms.simulate's velocities"
+            )
+
+    def _check_free(self) -> None:
+        if self.mass is None:
+            raise ValueError(
+                "a free Rigid needs a mass [kg], and an inertia [kg m2]: Rigid(mass=..., inertia=...)"
+            )
+        least = 0.0 if self.inertia is None else np.linalg.eigvalsh(self.inertia_tensor)[0]
+        if not least > 0:
+            raise ValueError(
+                f"a free Rigid needs an inertia [kg m2] about every axis, but the smallest is {least:g}: it could spin "
+                "without a force"
+            )
+
+    @property
+    def inertia_tensor(self) -> np.ndarray:
+        """(3, 3), kg m2, about the center; zero where there is none."""
+        given = np.zeros(()) if self.inertia is None else self.inertia
+        return given if given.ndim == 2 else given * np.eye(3)
+
+    def replaced(self, **values) -> Rigid:
+        """The same part with other values."""
+        own = {name: getattr(self, name) for name in self._replaceable}
+        for name in values:
+            if own[name] is None and not (name in ("velocity", "angular_velocity") and self.vertices is None):
+                raise ValueError(f"the Rigid was made without {name}: give it one in the scene, zero will do")
+        return Rigid(self.vertices, body=self.body, **{**own, **values})
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        if self.magnetic_moment is not None:
+            numbers[label, "magnetic_moment"] = self.magnetic_moment
+            numbers[label, "center"] = values.rigid_place(self).center_of(self)
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        place, found = values.rigid_place(self), {}
+        by_center = np.zeros(3)
+        if gradient.has(label, "magnetic_moment"):
+            found["magnetic_moment"] = gradient.value(label, "magnetic_moment")[0]
+            by_center += gradient.value(label, "center")[0]
+        elif self.magnetic_moment is not None:
+            found["magnetic_moment"] = np.zeros(3)
+        by_masses = values.by_masses(gradient)
+        if self.mass is not None and by_masses is not None:
+            found["mass"], found["inertia"], by_place = place.masses_vjp(self, by_masses[place.points])
+            by_center += by_place
+        by_mass_points = gradient.others.get("own_velocities")
+        if by_mass_points is not None:
+            rows, at = by_mass_points[place.points], place.rest - place.center_of(self)
+            found["velocity"], found["angular_velocity"] = rows.sum(axis=0), np.cross(at, rows).sum(axis=0)
+            if self.vertices is None:  # points start at velocity + angular_velocity x (point - center)
+                by_center -= np.cross(rows.sum(axis=0), or_zero(self.angular_velocity))
+        found["center"] = by_center
+        none = {"mass": np.zeros(()), "inertia": np.zeros(np.shape(self.inertia)), "velocity": np.zeros(3)}
+        return {**none, "angular_velocity": np.zeros(3), **found}
+
+    def __repr__(self) -> str:
+        what = "free" if self.vertices is None else f"{np.size(self.vertices)} vertices"
+        mass = "" if self.mass is None else f", mass {self.mass:g} kg"
+        magnet = (
+            ""
+            if self.magnetic_moment is None
+            else f", magnetic_moment {tuple(self.magnetic_moment.tolist())} A m2"
+        )
+        return f"Rigid({what}{mass}{magnet})"
+
+
+def _checked_inertia(given) -> np.ndarray:
+    given = real_numbers("inertia [kg m2]", given)
+    if given.shape not in ((), (3,), (3, 3)):
+        raise ValueError(f"inertia [kg m2] must be a number or have shape (3,) or (3, 3), got {given.shape}")
+    given = np.array(quantity("inertia", "kg m2", given, given.shape))
+    tensor = given if given.ndim == 2 else given * np.eye(3)
+    size = np.abs(tensor).max()
+    if np.abs(tensor - tensor.T).max() > _ROUNDING * size:
+        raise ValueError("inertia [kg m2] must be symmetric")
+    low, middle, high = np.linalg.eigvalsh(tensor)
+    if low < -_ROUNDING * size:
+        raise ValueError(f"inertia [kg m2] must not be negative about any axis, but the smallest is {low:g}")
+    if high > low + middle + _ROUNDING * size:
+        raise ValueError(
+            f"no body has the inertia [kg m2]: its largest principal moment {high:g} is more than the sum of the other "
+            f"two, {low:g} and {middle:g}"
+        )
+    return 0.5 * (tensor + tensor.T) if given.ndim == 2 else given
+
+
+def _vector(name: str, unit: str, given) -> np.ndarray | None:
+    return None if given is None else np.array(quantity(name, unit, given, (3,)))
+
+
+def or_zero(vector: np.ndarray | None) -> np.ndarray:
+    return np.zeros(3) if vector is None else vector

@@ -1,0 +1,167 @@
+"""Where a rigid part is in its scene: vertices, points of its own, and their masses."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .._checks.selections import indices
+from .._checks.tensors import is_tensor
+from .rigid import Rigid, or_zero
+
+# The ten points of a part in units of its length: the corners of a tetrahedron, the middles of its edges. Any body has
+# the masses, center and inertia of ten point masses there, and of only one choice of them.
+_CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
+_POINTS = np.concatenate([_CORNERS, np.eye(3), -np.eye(3)])
+_PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+_MOMENTS = np.concatenate(  # (10, 10): of unit masses there: mass, first and second moments
+    [np.ones((1, 10)), _POINTS.T, [_POINTS[:, i] * _POINTS[:, j] for i, j in _PAIRS]]
+)
+
+
+class Place(NamedTuple):
+    """A rigid part in its scene: what its values do not change.
+
+    vertices: (k,), the scene's. points: its rows among all points. rest: (10, 3) m, where they are at rest.
+    center: (3,) m, about which the points stand: that of the scene's own part; axes: (3, 3), columns; length: m.
+    """
+
+    vertices: np.ndarray
+    points: slice
+    rest: np.ndarray
+    center: np.ndarray
+    axes: np.ndarray
+    length: float
+
+    def center_of(self, part: Rigid) -> np.ndarray:
+        """(3,) m, of its own mass, at rest."""
+        return self.center if part.center is None else part.center
+
+    def masses(self, part: Rigid) -> np.ndarray:
+        """(10,) kg: of its points. Some may be negative; they add up to the body."""
+        if part.mass is None:
+            return np.zeros(10)
+        return np.linalg.solve(_MOMENTS, self._moments(part))
+
+    def _local(self, part: Rigid) -> tuple[np.ndarray, np.ndarray]:
+        """The center and the second moments about it, in lengths along the axes."""
+        inertia = part.inertia_tensor
+        spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+        center = self.axes.T @ (self.center_of(part) - self.center) / self.length
+        return center, self.axes.T @ spread @ self.axes / self.length**2
+
+    def _moments(self, part: Rigid) -> np.ndarray:
+        center, spread = self._local(part)
+        second = spread + part.mass * np.outer(center, center)
+        return np.concatenate([[part.mass], part.mass * center, [second[i, j] for i, j in _PAIRS]])
+
+    def masses_vjp(self, part: Rigid, by_masses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """By mass (), by inertia as it was given, and by center (3,)."""
+        by = np.linalg.solve(_MOMENTS.T, by_masses)
+        center, _ = self._local(part)
+        by_second = np.zeros((3, 3))
+        for value, (i, j) in zip(by[4:], _PAIRS, strict=True):
+            by_second[i, j] += 0.5 * value
+            by_second[j, i] += 0.5 * value
+        by_mass = by[0] + by[1:4] @ center + center @ by_second @ center
+        by_center = self.axes @ (part.mass * (by[1:4] + 2.0 * by_second @ center)) / self.length
+        by_spread = self.axes @ by_second @ self.axes.T / self.length**2
+        by_tensor = 0.5 * np.trace(by_spread) * np.eye(3) - by_spread
+        shape = np.shape(part.inertia)
+        by_inertia = {2: by_tensor, 1: np.diag(by_tensor)}.get(len(shape), np.trace(by_tensor))
+        return np.asarray(by_mass), np.asarray(by_inertia), by_center
+
+    def start_velocities(self, part: Rigid) -> np.ndarray:
+        """(10, 3) m/s of the points of a free body that starts at rest positions."""
+        turning = np.cross(or_zero(part.angular_velocity), self.rest - self.center_of(part))
+        return or_zero(part.velocity) + turning
+
+    def as_input(self, owner: str, magnetic: bool) -> dict:
+        """As the core takes it."""
+        return {"owner": owner, "points": self.rest, "vertices": self.vertices.tolist(), "magnetic": magnetic}
+
+
+def places(bodies) -> list[Place]:
+    """Where each rigid part of a scene is. Raises ValueError on vertices that do not make one."""
+    found: list[Place] = []
+    of_part: dict[int, int] = {}
+    n_v = bodies.mesh.n_vertices
+    for k, part in enumerate(bodies.rigid):
+        vertices = _vertices(part, bodies)
+        for vertex in vertices.tolist():
+            if vertex in of_part:
+                raise ValueError(
+                    f"rigid parts {of_part[vertex]} and {k} share vertex {vertex}: make one part of the two, or leave "
+                    "the vertex to one of them"
+                )
+            of_part[vertex] = k
+        found.append(_place(part, bodies.mesh.rest_positions[vertices], vertices, n_v + 10 * k))
+    return found
+
+
+def _vertices(part: Rigid, bodies) -> np.ndarray:
+    """The scene's."""
+    if part.vertices is None:
+        return np.zeros(0, dtype=np.int64)
+    if not bodies.shells:
+        raise ValueError("a Rigid with vertices needs the Shell whose vertices they are among the bodies")
+    of = bodies.of(part)
+    chosen = np.asarray(indices("Rigid vertices", part.vertices, of.mesh.n_vertices))
+    if len(chosen) < 3:
+        raise ValueError(f"a Rigid needs 3 vertices at least, to tell how it is turned, got {len(chosen)}")
+    rest = of.mesh.rest_positions[chosen]
+    spread = np.linalg.svd(rest - rest.mean(axis=0), compute_uv=False)
+    if spread[1] <= 1e-6 * spread[0]:
+        raise ValueError(
+            "the vertices of a Rigid lie on a line, about which it could turn: add one beside it"
+        )
+    return bodies.original[chosen + of.first_vertex]
+
+
+def _place(part: Rigid, rest: np.ndarray, vertices: np.ndarray, first: int) -> Place:
+    middle = rest.mean(axis=0) if len(rest) else np.zeros(3)
+    center = middle if part.center is None else part.center
+    tensor, axes, length = part.inertia_tensor, np.eye(3), 0.0
+    if tensor.any():
+        _, axes = np.linalg.eigh(tensor)
+        axes = axes * np.linalg.det(axes)
+        length = np.sqrt(0.5 * np.trace(tensor) / part.mass)
+    if len(rest):  # neither much smaller than what it carries, which it turns
+        length = max(length, 0.5 * np.sqrt(((rest - center) ** 2).sum(axis=1).mean()))
+    points = center + length * _POINTS @ axes.T
+    return Place(vertices, slice(first, first + 10), points, center, axes, length)
+
+
+def check_rigid(scene, given: np.ndarray, settled: np.ndarray, name: str, size: float) -> None:
+    """Raises ValueError where rows of the vertices (n_v, 3) bend a rigid part. size: what counts as all of it."""
+    for k, place in enumerate(scene._rigid):
+        off = np.linalg.norm(given[place.vertices] - settled[place.vertices], axis=1)
+        if len(off) and off.max() > _BENT * size:
+            worst = place.vertices[np.argmax(off)]
+            raise ValueError(
+                f"{name} would bend rigid part {k}: vertex {worst} is off by {off.max():.3g} from how the part moves"
+            )
+
+
+_BENT = 1e-3
+
+
+def own_velocities(inputs, start, goes_on: bool) -> np.ndarray:
+    """(10 a part, 3) m/s: how the points of free rigid parts start. goes_on: start is a motion, which knows it.
+
+    Raises ValueError where a start does not fit their velocities.
+    """
+    scene, values = inputs.scene, inputs.values
+    rows = np.zeros((10 * len(scene.rigid_parts), 3))
+    for k, (place, part) in enumerate(zip(scene._rigid, values.rigid, strict=True)):
+        if part.vertices is not None or (part.velocity is None and part.angular_velocity is None):
+            continue
+        if start is None or is_tensor(start) or isinstance(start, np.ndarray | list | tuple):
+            rows[10 * k : 10 * k + 10] = place.start_velocities(part)
+        elif not goes_on or part is not scene.rigid_parts[k]:
+            raise ValueError(
+                "the velocity of a free Rigid is that of a motion that starts at rest positions; this one goes on from "
+                f"{type(start).__name__}"
+            )
+    return rows
