@@ -32,6 +32,7 @@ from .mesh import TriangleMesh
 from .minimum import Minimum
 from .multistart import multistart
 from .path import CriticalPoint, Path, follow
+from .placed_field import PlacedField
 from .plotting import Picture, animate, plot, write_page
 from .sampling import random_starts
 from .scene import Scene
@@ -87,6 +88,7 @@ __all__ = [
     "Path",
     "Picture",
     "Pin",
+    "PlacedField",
     "PointLoad",
     "SampledField",
     "Scene",

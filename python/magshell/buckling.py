@@ -12,6 +12,7 @@ from ._arrays import count
 from ._entry import solve_entry
 from ._inputs import Inputs
 from ._mode_shapes import mode_shapes
+from ._replacements import requested
 from ._rest import RestStiffness
 from .errors import NotConverged
 from .scene import Scene
@@ -52,6 +53,7 @@ def linear_buckling(
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
+    values: dict | None = None,
     modes: int = 1,
 ) -> Buckling:
     """The smallest positive multiples of the controls at which a scene buckles, by linear theory.
@@ -84,6 +86,7 @@ def linear_buckling(
         scene,
         remanent_magnetization,
         applied_flux_density,
+        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,

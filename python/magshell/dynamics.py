@@ -8,6 +8,7 @@ import numpy as np
 
 from . import _core
 from ._caps import warn_of_caps
+from ._courses import over_time
 from ._entry import solve_entry
 from ._inputs import Inputs
 from ._motion_adjoint import MotionAdjoint
@@ -117,12 +118,14 @@ def simulate(
         vertex_loads,
         values,
         moving=True,
+        in_time=True,
         thickness=thickness,
         young_modulus=young_modulus,
         poisson_ratio=poisson_ratio,
         mass_density=mass_density,
         curvature_scale=curvature_scale,
     )
+    replaced, courses = over_time(scene, replaced)
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if integrator is None:
         integrator = ImplicitEuler() if scene.contacts else TRBDF2()
@@ -144,6 +147,7 @@ def simulate(
         maxwell_time=maxwell_time,
         integrator=integrator,
         solver=solver,
+        courses=courses,
         applied_flux_density=applied_flux_density,
         load_factor=load_factor,
         gravity_factor=gravity_factor,

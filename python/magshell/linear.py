@@ -10,6 +10,7 @@ import numpy as np
 
 from ._entry import solve_entry
 from ._inputs import Inputs
+from ._replacements import requested
 from ._rest import RestStiffness
 from ._tensors import like
 from .scene import Scene
@@ -52,6 +53,7 @@ def linear_response(
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
+    values: dict | None = None,
 ) -> LinearResponse:
     """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
 
@@ -74,6 +76,7 @@ def linear_response(
         scene,
         remanent_magnetization,
         applied_flux_density,
+        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,

@@ -16,6 +16,7 @@ from ._crossings import told
 from ._entry import solve_entry
 from ._inputs import Inputs
 from ._progress import progress_bar
+from ._replacements import requested
 from ._solve import solve
 from ._start import starting_point
 from .equilibrium import Equilibrium
@@ -132,6 +133,7 @@ def follow(
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
+    values: dict | None = None,
     start: Equilibrium | None = None,
     until: Callable[[float, np.ndarray], bool] | None = None,
     first_step: float = 0.05,
@@ -179,6 +181,7 @@ def follow(
         scene,
         remanent_magnetization,
         applied_flux_density,
+        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,

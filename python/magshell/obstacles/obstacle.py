@@ -33,7 +33,7 @@ class Obstacle(Owner, ABC):
     """
 
     _core: core.Obstacle
-    _replaceable = ("center", "rotation")
+    _replaceable = _in_time = ("center", "rotation")
     _made_from: dict[str, Any]
 
     def __init__(
@@ -70,6 +70,12 @@ class Obstacle(Owner, ABC):
         Obstacle.__init__(
             other, **{"center": self.center, "rotation": self.rotation, **values}, motion=self.motion
         )
+        return other
+
+    def _on(self, path: Callable) -> Obstacle:
+        """The same body as its path has it: at a time, its center and its rotation."""
+        other = self.replaced(center=np.zeros(3), rotation=np.zeros(3))
+        other.motion = path
         return other
 
     def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
