@@ -64,7 +64,7 @@ def linear_buckling(
 
     so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact
     in the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells.
-    A shallow arch that softens on its way needs ms.follow. Controls as in ms.equilibrium; a field's own
+    A shallow arch that softens on its way needs ms.follow. Controls and values as in ms.equilibrium; a field's own
     stiffness counts.
 
     modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where

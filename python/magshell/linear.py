@@ -58,7 +58,7 @@ def linear_response(
     """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
 
     The stiffness is that of the unloaded sheet: loads and fields act as the forces they are at rest, without
-    the stiffness they add; supports that move do so at the rate they start with. Controls as in
+    the stiffness they add; supports that move do so at the rate they start with. Controls and values as in
     ms.equilibrium.
 
     Raises ValueError on bad input, and where the supports leave the sheet a motion without stiffness; Interrupted.

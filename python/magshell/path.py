@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
+from ._along_path import AlongPath
 from ._arrays import count, number, positive
 from ._caps import warn_of_caps
 from ._crossings import told
@@ -68,6 +70,7 @@ class Path:
     reason: str
     _points: list = field(repr=False)
     _inputs: Inputs = field(repr=False)
+    _moving: AlongPath = field(repr=False)
     _from: Any = field(repr=False)
     _to: Any = field(repr=False)
 
@@ -78,7 +81,9 @@ class Path:
         options = MixedNewton()._options()
         options.require_stable = False
         point = self._points[index]
-        return solve(self._inputs, point.state, point.memory, controls, controls, options).equilibrium
+        inputs = copy.copy(self._inputs)
+        inputs.values = self._moving.values(self.parameters[index])
+        return solve(inputs, point.state, point.memory, controls, controls, options).equilibrium
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face at one of the points, by default the last."""
@@ -150,6 +155,9 @@ def follow(
     unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
     parameter passes 1 or `lowest_parameter`, or where until(parameter, positions) says so. Controls as in ms.equilibrium.
 
+    values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, those
+        move along the path, on straight lines from the start's to these; everything else has to be the same.
+
     first_step: of the parameter. largest_step: root mean square displacement between points, over the mesh's size.
     locate_critical: find limit points and bifurcations between points whose numbers of unstable directions differ.
     progress: show a bar once a path has taken two seconds.
@@ -187,11 +195,8 @@ def follow(
         field_factor=field_factor,
         motion_factor=motion_factor,
     )
-    state, memory, from_, at_rest = starting_point(scene, start, inputs)
-    if not at_rest:
-        raise ValueError(
-            "start must have the same remanent_magnetization, and the values of the scene, as the path"
-        )
+    state, memory, from_, _ = starting_point(scene, start, inputs)
+    moving = AlongPath(inputs, start)
     options = _core.PathOptions()
     options.newton = solver._newton_options()
     options.first_step, options.largest_step = first_step, largest_step
@@ -201,10 +206,18 @@ def follow(
     began = time.perf_counter()
     with inputs.in_core(), progress_bar("path", 1.0, shown=progress, delay=2.0, bar_format=_BAR) as bar:
         found = _core.follow_path(
-            scene._model, state, memory, from_, inputs.controls, options, until, _advance(bar)
+            scene._model,
+            state,
+            memory,
+            np.concatenate([from_, moving.before]),
+            np.concatenate([inputs.controls, moving.after]),
+            options,
+            moving.entries,
+            until,
+            _advance(bar),
         )
         bending = _bending_energies(scene, found, inputs.controls)
-    path = _path(inputs, found, from_, time.perf_counter() - began)
+    path = _path(inputs, moving, found, from_, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {len(path)} points of the path", path)
     if found.outcome == _core.Outcome.failed:
@@ -241,7 +254,7 @@ def _advance(bar):
     return advance
 
 
-def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
+def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> Path:
     scene = inputs.scene
     model = scene._model
     points = found.points
@@ -265,6 +278,7 @@ def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
         reason=found.reason,
         _points=points,
         _inputs=inputs,
+        _moving=moving,
         _from=from_,
         _to=inputs.controls,
     )

@@ -76,6 +76,7 @@ def vibration_modes(
 
     equilibrium: of this scene, with the controls and values it was found for; one that is not stable has modes that
         grow. By default the rest shape without loads and fields.
+    values: as in ms.equilibrium, where there is no equilibrium, which has its own.
     count: how many modes.
 
     Raises ValueError on bad input, NotConverged where the search for the modes does not come to its end, Interrupted.

@@ -304,14 +304,6 @@ void Model::extrapolate(const VectorXd& p) {
     for (const std::unique_ptr<Term>& term : terms_) term->extrapolate(p.data());
 }
 
-VectorXd Model::gradient_rate(const VectorXd& q, const Controls& rate) {
-    Residual change;
-    change.reset(size());
-    for (const std::unique_ptr<Term>& term : terms_)
-        if (term->driven()) term->evaluate(q.data(), rate, change);
-    return change.gradient;
-}
-
 Model::Memory Model::memory() const {
     Memory memory;
     for (const std::unique_ptr<Term>& term : terms_) memory.push_back(term->memory());

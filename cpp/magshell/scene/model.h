@@ -70,8 +70,11 @@ class Model {
     /// The Hessian at the last evaluated state, in matrix().
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
     void extrapolate(const VectorXd& p);
-    /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in them.
-    VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
+    /// How fast the gradient at q changes while the controls, now `at`, change at this rate: exact for those that it is
+    /// linear in, by differences of fourth order for what varies. Leaves the model as evaluated elsewhere.
+    VectorXd gradient_rate(const VectorXd& q, const Controls& at, const Controls& rate);
+    /// Likewise how fast supports carry what they hold; zero elsewhere.
+    VectorXd prescribed_rate(const VectorXd& q, const Controls& at, const Controls& rate);
 
     /// Forces that no energy has act only within the stages of time steps. A step begins at q; at a stage,
     /// after evaluate and after assemble at the same q, they add to the residual and to matrix(), and leave
@@ -131,6 +134,8 @@ class Model {
     void add_contacts(const SceneInput& input);
     void share_out_columns();
     void hand_out_values();
+    template <class Function>
+    VectorXd rate_by_varying(const Controls& at, const Controls& rate, const Function& function);
 
     Registry registry_;
     Bodies bodies_;
