@@ -23,6 +23,7 @@ from _letters.designs import VARIANTS, designed
 from _letters.relief import draw_relief
 from _letters.task import FLUX_DENSITY, RELIEF, Task
 from _letters.tiles import cut_out, one_sheet
+from _run import run
 
 import magshell as ms
 
@@ -97,17 +98,15 @@ def picture(result: dict) -> ms.Picture:
     )
 
 
+def write(outcome: dict, out: Path) -> None:
+    ms.Picture(plot(outcome)).save(out / "banner.png", dpi=250)
+    picture(outcome).save(out / "banner_in_space.png")
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--word", default="MAGSHELL")
     parser.add_argument("--cells", type=int, default=64, help="along a letter's side (default 64)")
     parser.add_argument("--iterations", type=int, default=60, help="of each letter's design (default 60)")
     options = parser.parse_args()
-    began = time.perf_counter()
-    outcome = main(options.word, options.cells, options.iterations, progress=True)
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
-    ms.Picture(plot(outcome)).save(out / "banner.png", dpi=250)
-    picture(outcome).save(out / "banner_in_space.png")
-    print(f"\nPictures in {out}/; {time.perf_counter() - began:.0f} s in all.")
+    run(lambda: main(options.word, options.cells, options.iterations, progress=True), summary, write)

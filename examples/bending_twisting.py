@@ -29,12 +29,12 @@ Run it: prints a summary and writes pictures and a movie into out/.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
 from _bending.report import draw_alignment, draw_balance, draw_turning, draw_undamped, summary
 from _bending.strip import CELLS, TIME_STEP, Strip, balance, strip
+from _run import run
 
 import magshell as ms
 
@@ -179,14 +179,12 @@ def movie(result: dict, path, every=4, fps=25) -> Path:
     )
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main()
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "bending_twisting.png", dpi=200)
     bent_picture(outcome).save(out / "bending.png")
     twisted_picture(outcome).save(out / "twisting.png")
     movie(outcome, out / "twisting.gif")
-    print(f"\nPictures and the movie in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(main, summary, write)

@@ -31,7 +31,6 @@ Run it: prints a summary and writes pictures into out/.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +38,7 @@ from _bistable.measurements import measured_ramp
 from _bistable.model import HIGHEST_FIELD, Beam, beam, buckled
 from _bistable.report import draw_convergence, draw_path, summary
 from _bistable.studies import MESHES, convergence, differences
+from _run import run
 
 import magshell as ms
 
@@ -127,12 +127,10 @@ def picture(result: dict) -> ms.Picture:
     )
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main()
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "bistable_beam.png", dpi=200)
     picture(outcome).save(out / "bistable_beam_states.png")
-    print(f"\nPictures in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(main, summary, write)

@@ -34,7 +34,6 @@ Run it: prints a summary and writes pictures and a movie into out/.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +53,7 @@ from _bistable.motion import (
     step,
     variations,
 )
+from _run import run
 
 import magshell as ms
 
@@ -201,13 +201,11 @@ def movie(result: dict, path, before=0.15, after=0.3, fps=25) -> Path:
     )
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main()
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "bistable_in_time.png", dpi=200)
     picture(outcome).save(out / "bistable_in_time_states.png")
     movie(outcome, out / "bistable_in_time.gif")
-    print(f"\nPictures and the movie in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(main, summary, write)

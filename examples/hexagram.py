@@ -38,6 +38,7 @@ import torch
 from _hexagram.design import BOUND, FIELDS, FLUX_DENSITY, ROLL, Design, design, from_beam_theory
 from _hexagram.report import draw_objective, draw_profile, summary
 from _hexagram.sheet import ARM_LENGTH, arm_coordinates, tips
+from _run import run
 
 import magshell as ms
 
@@ -192,13 +193,11 @@ def pictures(result: dict) -> dict[str, ms.Picture]:
     }
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main()
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "hexagram.png", dpi=200)
     for name, picture in pictures(outcome).items():
         picture.save(out / f"hexagram_{name}.png")
-    print(f"\nPictures in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(main, summary, write)

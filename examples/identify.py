@@ -29,7 +29,6 @@ Run it: prints a summary and writes pictures into out/.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +37,7 @@ from _identify.inverse import Problem, lbfgs, mma, optimized
 from _identify.limits import deviations, of_finer_magnetizations, scaled_together
 from _identify.model import NOISE, measured, sheet, true_magnetization
 from _identify.report import draw_history, draw_magnetization, draw_modulus, summary
+from _run import run
 
 import magshell as ms
 
@@ -112,11 +112,9 @@ def plot(result: dict):
     return figure
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main()
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "identify.png", dpi=200)
-    print(f"\nPicture in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(main, summary, write)

@@ -34,6 +34,7 @@ import numpy as np
 import torch
 from _kirigami.reaching import TIME_STEP, Reaching, Tower, drawn_targets
 from _kirigami.reaching_report import draw_angles, draw_distances, draw_field, draw_towers, movie, summary
+from _run import run
 
 import magshell as ms
 
@@ -119,12 +120,10 @@ def plot(result: dict):
     return figure
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main(progress=True)
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "kirigami_reaching.png", dpi=160)
     movie(outcome, out / "kirigami_reaching.gif")
-    print(f"\nPicture and movie in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(lambda: main(progress=True), summary, write)

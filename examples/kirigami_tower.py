@@ -24,7 +24,6 @@ Run it: prints a summary and writes a picture into out/.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -33,6 +32,7 @@ from _kirigami.checks import checks, solve, switched_on
 from _kirigami.design import SEARCHES, Search
 from _kirigami.model import kirigami
 from _kirigami.report import draw_convergence, draw_design, draw_switching, draw_tower, summary
+from _run import run
 
 import magshell as ms
 
@@ -71,11 +71,9 @@ def plot(result: dict):
     return figure
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main()
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "kirigami_tower.png", dpi=200)
-    print(f"\nPicture in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(main, summary, write)

@@ -27,7 +27,6 @@ Run it: prints a summary and writes pictures into out/.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +34,7 @@ from _letters.designs import VARIANTS, Design, designed
 from _letters.pictures import NAMES, draw_convergence, draw_designs
 from _letters.report import summary
 from _letters.task import Task
+from _run import run
 
 import magshell as ms
 
@@ -111,13 +111,11 @@ def picture(result: dict) -> ms.Picture:
     )
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main(progress=True)
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "letters_convergence.png", dpi=200)
     ms.Picture(sheets(outcome)).save(out / "letters.png", dpi=200)
     picture(outcome).save(out / "letters_in_space.png")
-    print(f"\nPictures in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(lambda: main(progress=True), summary, write)

@@ -54,6 +54,7 @@ import torch
 from _octopus.channels import CHANNELS
 from _octopus.report import draw_convergence, draw_field, draw_path, draw_snapshot, movie, summary
 from _octopus.task import Swim, Variables
+from _run import run
 
 import magshell as ms
 
@@ -148,6 +149,12 @@ def plot(results: dict[str, dict]):
     return figure
 
 
+def write(outcome: dict, out: Path) -> None:
+    ms.Picture(plot(outcome)).save(out / "octopus.png", dpi=130)
+    for channel, result in outcome.items():
+        movie(result, out / f"octopus_{channel.replace(' ', '_')}.gif")
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -155,11 +162,4 @@ if __name__ == "__main__":
     parser.add_argument("--channels", nargs="+", choices=list(CHANNELS), default=list(CHANNELS))
     parser.add_argument("--iterations", type=int, default=ITERATIONS)
     asked = parser.parse_args()
-    outcome = main(asked.channels, iterations=asked.iterations, progress=True)
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
-    ms.Picture(plot(outcome)).save(out / "octopus.png", dpi=130)
-    for channel, result in outcome.items():
-        movie(result, out / f"octopus_{channel.replace(' ', '_')}.gif")
-    print(f"\nPictures and movies in {out}/.")
+    run(lambda: main(asked.channels, iterations=asked.iterations, progress=True), summary, write)

@@ -42,12 +42,12 @@ well.
 from __future__ import annotations
 
 import sys
-import time
 from pathlib import Path
 
 from _reptile.model import GROUNDS, TIME_STEP, Crawler, crawler
 from _reptile.report import draw_paths, draw_progress, draw_side, movie, picture, summary
 from _reptile.study import study
+from _run import run
 
 import magshell as ms
 
@@ -97,14 +97,12 @@ def animation(result: dict, name: str, path: Path, **options) -> Path:
     return movie(*result["walks"][name], path, name, **options)
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main(with_study="--study" in sys.argv[1:])
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "reptile.png", dpi=160)
     for ground, crawled in outcome["walks"].items():
         picture(*crawled).save(out / f"reptile_{ground}.png")
         animation(outcome, ground, out / f"reptile_{ground}.gif")
-    print(f"\nPictures and movies in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(lambda: main(with_study="--study" in sys.argv[1:]), summary, write)

@@ -36,9 +36,9 @@ Run it: prints a summary and writes pictures and movies into out/.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
+from _run import run
 from _tracks.fits import METHODS, cost, fitted
 from _tracks.model import CELLS, TASKS, strip
 from _tracks.report import draw_convergence, draw_field, draw_track, movie, states, summary
@@ -91,14 +91,12 @@ def animation(result: dict, name: str, path: Path) -> Path:
     return movie(result["strip"], list(result["fits"][name].values())[-1], path)
 
 
-if __name__ == "__main__":
-    began = time.perf_counter()
-    outcome = main(progress=True)
-    print(summary(outcome))
-    out = Path("out")
-    out.mkdir(exist_ok=True)
+def write(outcome: dict, out: Path) -> None:
     ms.Picture(plot(outcome)).save(out / "track_fitting.png", dpi=200)
     for curve in outcome["fits"]:
         picture(outcome, curve).save(out / f"track_fitting_{curve}.png")
         animation(outcome, curve, out / f"track_fitting_{curve}.gif")
-    print(f"\nPictures and movies in {out}/; {time.perf_counter() - began:.0f} s in all.")
+
+
+if __name__ == "__main__":
+    run(lambda: main(progress=True), summary, write)

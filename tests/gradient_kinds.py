@@ -9,6 +9,7 @@ from test_adjoint import BENDINGS, DEFAULTS, DIPOLES, MAGNETIZATION, MESH, N_V, 
 
 import magshell as ms
 from magshell import obstacles as ob
+from magshell.surroundings.supports import rotation_matrix
 
 torch = pytest.importorskip("torch")
 
@@ -180,7 +181,7 @@ def thrown(shape, integrator=None, swims=False, motion=None, extra=None, options
 
 def in_a_corner() -> Kind:
     """Nodes with frames of their own: an oblique symmetry plane, on an oblique slope and in water."""
-    turn = ms.supports.rotation_matrix(np.array([0.5, -0.4, 0.8]))
+    turn = rotation_matrix(np.array([0.5, -0.4, 0.8]))
     mesh = ms.TriangleMesh(MESH.rest_positions @ turn.T, MESH.faces)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     slope = ob.Plane(turn @ [0.02, 0, 1], center=turn @ [0.05, 0.03, -1.5e-3])

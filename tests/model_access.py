@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 import magshell as ms
-from magshell._values import Values
+from magshell.scene.values import Values
 
 
 @dataclass(frozen=True)

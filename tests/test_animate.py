@@ -10,8 +10,8 @@ from motions import lifted_strip
 import magshell as ms
 from magshell.plotting import films
 from magshell.plotting.colors import FIELD, rgb
-from magshell.plotting.playing import moments, speed_of, spoken, state_at, with_times
-from magshell.plotting.states import states_of
+from magshell.plotting.playing import moments, speed_of, spoken, state_at
+from magshell.states.state import states_of, with_times
 
 image = pytest.importorskip("PIL.Image")
 

@@ -1,6 +1,8 @@
-"""The shape of the code: floors of the C++ core, who may see which library, file lengths, light imports."""
+"""The shape of the code: floors of the C++ core, rooms of the Python package, who may see which library, file lengths,
+light imports."""
 
 import ast
+import graphlib
 import re
 import subprocess
 import sys
@@ -29,13 +31,48 @@ FLOORS = {
     "magshell/adjoint": 8,
     "bindings": 9,
 }
+# Rooms of the Python package from the lowest up, with the modules that stand beside them: a file imports its own room
+# and lower ones, within functions too. `__init__` is the package as users see it; the bench uses it as they do.
+ROOMS = [
+    "_core",
+    "errors",
+    "_machine",
+    "_checks",
+    "objectives",
+    "parametrize",
+    "mesh",
+    "fields",
+    "methods",
+    "meshes",
+    "bodies",
+    "obstacles",
+    "surroundings",
+    "scene",
+    "adjoint",
+    "statics",
+    "dynamics",
+    "linear",
+    "control",
+    "optim",
+    "design",
+    "starts",
+    "states",
+    "plotting",
+    "__init__",
+    "bench",
+]
+# Imports of a higher room, each with its reason.
+UPWARD_IMPORTS = {
+    # Only autograd.py may see torch.autograd, which says what transforms a tensor is in. Asked for once torch is loaded.
+    ("_checks/tensor_kinds.py", "adjoint.autograd"),
+}
 # Libraries that one folder hides from the others: a pattern of the include, and the folder.
 HIDDEN_HEADERS = {r"pybind11/|Python\.h": "bindings", r"(?i)cholmod": "magshell/linalg"}
-# Modules that some Python modules hide from the others, by their names within the package.
+# Modules that some rooms or files of the package hide from the others.
 HIDDEN_MODULES = {
-    "torch.autograd": ("autograd",),
-    "matplotlib": ("plotting", "bench"),  # the bench draws curves, never a sheet
-    "pyvista": ("plotting",),
+    "torch.autograd": ("adjoint/autograd.py",),
+    "matplotlib": ("plotting/", "bench/"),  # the bench draws curves, never a sheet
+    "pyvista": ("plotting/",),
 }
 OPTIONAL_MODULES = [
     "torch",
@@ -100,11 +137,85 @@ def imported_names(path: Path) -> Iterator[str]:
 def import_violations(root: Path) -> Iterator[str]:
     package = root / "python" / "magshell"
     for path in python_files(root, "python/magshell"):
-        owner = path.relative_to(package).parts[0].removesuffix(".py")
+        file = path.relative_to(package).as_posix()
         for name in imported_names(path):
             for module, only in HIDDEN_MODULES.items():
-                if (name == module or name.startswith(f"{module}.")) and owner not in only:
-                    yield f"{path.relative_to(package)} imports {name}, which only {' and '.join(only)} may"
+                if (name == module or name.startswith(f"{module}.")) and not file.startswith(only):
+                    yield f"{file} imports {name}, which only {' and '.join(only)} may"
+
+
+def own_imports(path: Path, package: Path) -> Iterator[str]:
+    """What a file imports of the package, anywhere in it: "mesh.io" or "errors"; "__init__" is the whole package."""
+    here = path.relative_to(package).parent.parts
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            dotted = [alias.name.split(".") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            above = ["magshell", *here[: len(here) + 1 - node.level]] if node.level else []
+            base = above + (node.module or "").split(".") if node.module else above
+            dotted = [[*base, alias.name] for alias in node.names]
+        else:
+            continue
+        for parts in dotted:
+            if parts[0] == "magshell":
+                yield module_of(parts[1:], package)
+
+
+def module_of(parts: list[str], package: Path) -> str:
+    """The file that a dotted name stands in or is, as far as there is one; its room at least."""
+    if not parts or parts[0] not in ROOMS:
+        return "__init__"
+    found = next(
+        (n for n in range(len(parts), 0, -1) if package.joinpath(*parts[:n]).with_suffix(".py").is_file()), 1
+    )
+    return ".".join(parts[:found])
+
+
+def room_violations(root: Path) -> Iterator[str]:
+    package = root / "python" / "magshell"
+    for path in python_files(root, "python/magshell"):
+        file = path.relative_to(package).as_posix()
+        room = file.split("/")[0].removesuffix(".py")
+        if room not in ROOMS:
+            yield f"{file}: its room has no place in the order"
+            continue
+        for name in own_imports(path, package):
+            if (file, name) in UPWARD_IMPORTS:
+                continue
+            if name.split(".")[0] not in ROOMS[: ROOMS.index(room) + 1]:
+                yield f"{file} imports {name}, of a higher room"
+
+
+def circle_violations(root: Path) -> Iterator[str]:
+    """Files that need each other, in whatever order they are loaded."""
+    package = root / "python" / "magshell"
+    needed = {}
+    for path in python_files(root, "python/magshell"):
+        file = path.relative_to(package).as_posix()
+        if path.name not in ("__init__.py", "__main__.py"):
+            upward = {name for each, name in UPWARD_IMPORTS if each == file}
+            needed[file.removesuffix(".py").replace("/", ".")] = set(own_imports(path, package)) - upward
+    try:
+        graphlib.TopologicalSorter(needed).prepare()
+    except graphlib.CycleError as error:
+        yield f"imports in a circle: {' -> '.join(error.args[1])}"
+
+
+def hidden_violations(root: Path) -> Iterator[str]:
+    """A function that a package offers under the name of a module of its own hides that module."""
+    package = root / "python" / "magshell"
+    for path in package.rglob("__init__.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            for alias in node.names if isinstance(node, ast.ImportFrom) and node.module else ():
+                name = alias.asname or alias.name
+                if name == "*":
+                    yield f"{path.relative_to(package)} imports * from {node.module}"
+                elif (
+                    name == node.module
+                    or path.with_name(f"{name}.py").exists()
+                    or path.with_name(name).is_dir()
+                ):
+                    yield f"{path.relative_to(package)}: {name} hides a module"
 
 
 def length_violations(root: Path) -> Iterator[str]:
@@ -114,7 +225,14 @@ def length_violations(root: Path) -> Iterator[str]:
             yield f"{path.relative_to(root)} has {length} lines"
 
 
-RULES = [include_violations, import_violations, length_violations]
+RULES = [
+    include_violations,
+    import_violations,
+    room_violations,
+    circle_violations,
+    hidden_violations,
+    length_violations,
+]
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -147,22 +265,50 @@ def test_the_rules_look_at_files() -> None:
         ),
         (
             import_violations,
-            "python/magshell/statics.py",
+            "python/magshell/statics/solve.py",
             "from torch import autograd\n",
-            "only autograd may",
+            "only adjoint/autograd.py may",
         ),
         (
             import_violations,
-            "python/magshell/statics.py",
+            "python/magshell/adjoint/static.py",
             "class A(torch.autograd.Function): ...\n",
-            "only autograd may",
+            "only adjoint/autograd.py may",
         ),
         (
             import_violations,
-            "python/magshell/io/vtu.py",
+            "python/magshell/mesh/vtu.py",
             "def f():\n    import pyvista as pv\n",
-            "only plotting may",
+            "only plotting/ may",
         ),
+        (room_violations, "python/magshell/attic/a.py", "", "no place"),
+        (
+            room_violations,
+            "python/magshell/mesh/a.py",
+            "from .._core import scene\nfrom ..scene import b\n",
+            "higher room",
+        ),
+        (
+            room_violations,
+            "python/magshell/mesh/a.py",
+            "def f():\n    from .. import statics\n",
+            "higher room",
+        ),
+        (
+            room_violations,
+            "python/magshell/mesh/a.py",
+            "def f():\n    import magshell as ms\n",
+            "higher room",
+        ),
+        (room_violations, "python/magshell/errors.py", "from magshell import mesh\n", "higher room"),
+        (
+            circle_violations,
+            "python/magshell/mesh/a.py",
+            "def f():\n    from .a import g\n",
+            "mesh.a -> mesh.a",
+        ),
+        (hidden_violations, "python/magshell/__init__.py", "from .mesh import *\n", "imports *"),
+        (hidden_violations, "python/magshell/mesh/__init__.py", "from .weld import weld\n", "hides a module"),
         (length_violations, "tests/test_long.py", "\n" * (LONGEST_FILE + 1), "401 lines"),
     ],
 )
@@ -184,7 +330,15 @@ def test_rule_sees_a_violation(tmp_path: Path, rule, file: str, text: str, compl
         ("cpp/magshell/linalg/cholmod.cpp", '#include <cholmod.h>\n#include "magshell/linalg/cholmod.h"\n'),
         ("cpp/bindings/solve.cpp", '#include <pybind11/stl.h>\n#include "magshell/linalg/cholmod.h"\n'),
         ("python/magshell/plotting/html.py", "import pyvista\nfrom matplotlib import pyplot\n"),
-        ("python/magshell/autograd.py", "from torch.autograd.function import once_differentiable\n"),
+        ("python/magshell/adjoint/autograd.py", "from torch.autograd.function import once_differentiable\n"),
+        (
+            "python/magshell/states/a.py",
+            "from .. import _core, errors\nfrom ..mesh import io\nfrom . import b\n",
+        ),
+        (
+            "python/magshell/bench/cases/a.py",
+            "import magshell as ms\nfrom magshell import _core\nfrom ..b import c\n",
+        ),
     ],
 )
 def test_rules_let_good_code_through(tmp_path: Path, file: str, text: str) -> None:

@@ -68,7 +68,8 @@ def test_dynamics(tmp_path, capsys) -> None:
     pytest.importorskip("torch")
     results = run("dynamics", tmp_path, "--quick", "--long", "200")
     printed = capsys.readouterr().out
-    assert "for comparison" in printed and "A long run of 24 faces" in printed
+    assert "Energy kept over 2 periods" in printed and "A long run of 24 faces" in printed
+    assert results["energies"].keys() == results["errors"].keys()
     assert results["energies"]["TR-BDF2"]["kept"]["0.001"] > 0.999
     assert 0 < results["memory"]["checkpoints, 100"]["bytes"] < 1e6
     assert results["long run"]["TRBDF2"]["steps"] == 200

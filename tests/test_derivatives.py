@@ -9,6 +9,7 @@ import pytest
 from model_access import Controls, Problem
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 FIELD = (0.03, -0.05, 0.08)  # T
 MAGNETIZATION = {"tangential": (4e4, 3e4, 0.0), "normal": (0.0, 0.0, 6e4), "mixed": (3e4, -2e4, 5e4)}
@@ -148,7 +149,7 @@ def clamped(size):
 def turned(mesh):
     """By 0.9 rad about an axis that is none of the world's."""
     axis = np.array([1.0, 2.0, -1.0]) / np.sqrt(6.0)
-    return ms.supports.rotation_matrix(0.9 * axis)
+    return rotation_matrix(0.9 * axis)
 
 
 def oblique_symmetry(size):
@@ -234,7 +235,7 @@ def folded(degrees):
         on_right = (flat - start) @ across < 0.0
         assert on_right[tips[0]] != on_right[tips[1]]
         on_right[mesh.edges[crease]] = False
-        rotation = ms.supports.rotation_matrix(np.radians(degrees) * along)
+        rotation = rotation_matrix(np.radians(degrees) * along)
         positions = np.where(on_right[:, None], (flat - start) @ rotation.T + start, flat)
         left_open = np.pi - abs(np.radians(degrees))
         positions = positions + 0.05 * left_open * mesh.edge_lengths.min() * rng.normal(size=positions.shape)

@@ -90,3 +90,20 @@ def test_bistable_beam_pictures(bistable, tmp_path) -> None:
     assert (tmp_path / "path.png").stat().st_size > 20_000
     assert (tmp_path / "states.png").stat().st_size > 20_000
     assert "limit point" in example.summary(bistable)
+
+
+def test_as_a_script_it_tells_its_numbers_and_leaves_pictures(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    load("_run").run(
+        lambda: {"height": 3}, "{height} mm high".format_map, lambda found, out: (out / "a.png").touch()
+    )
+    told = capsys.readouterr().out
+    assert told.startswith("3 mm high\n") and "Pictures in out/" in told
+    assert (tmp_path / "out" / "a.png").is_file()
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("[!_]*.py")), ids=lambda path: path.stem)
+def test_every_example_is_a_script_of_this_kind(path) -> None:
+    example = load(path.stem)
+    assert callable(example.main) and callable(example.summary) and callable(example.write)
+    assert path.read_text().rstrip().endswith("summary, write)")

@@ -259,7 +259,7 @@ def test_an_interrupted_motion_leaves_nothing_behind(monkeypatch, call):
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr("magshell.dynamics._advance", lambda bar: interrupt)
+        patched.setattr("magshell.dynamics.simulate._advance", lambda bar: interrupt)
         with pytest.raises(ms.Interrupted):
             slide(scene, solver=ms.Newton(max_iterations=1))
     np.testing.assert_array_equal(slide(scene), slide(slides_into_the_floor()))

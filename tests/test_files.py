@@ -14,7 +14,7 @@ import pytest
 from motions import lifted_strip
 
 import magshell as ms
-from magshell._files import check_replaceable, replace_file, replacing
+from magshell._machine.files import check_replaceable, replace_file, replacing
 from magshell.bench.report import writable_path, write_json
 
 MESH = ms.meshes.rectangle(0.05, 0.01, cells=(40, 8))

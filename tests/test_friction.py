@@ -5,6 +5,7 @@ import pytest
 from blocks import GRAVITY, STICKING, block_on, block_sheet, resting_on_plane, simulated
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 # F1 of the validation's reference.json; ipc-sim/IPC and rigid-ipc, "slopeTest_highSchoolPhysics".
 TANGENT = 0.5  # of the slope
@@ -30,7 +31,7 @@ def on_slope(friction, **contact):
     """Gravity is vertical; the slope falls along x, and the sheet is laid on it."""
     sheet = block_sheet()
     flat = resting_on_plane(sheet, GRAVITY * np.cos(ANGLE))
-    turn = ms.supports.rotation_matrix(np.array([0.0, ANGLE, 0.0]))
+    turn = rotation_matrix(np.array([0.0, ANGLE, 0.0]))
     mesh = ms.TriangleMesh(sheet.mesh.rest_positions @ turn.T, sheet.mesh.faces)
     turned = ms.Shell(mesh, thickness=2e-3, young_modulus=1e9, mass_density=1e3)
     scene = block_on(ms.obstacles.slope(-ANGLE), friction, sheet=turned, **contact)

@@ -52,7 +52,7 @@ SOLVES = {
     "equilibrium": (ms.Equilibrium, still),
     "progress": (ms.Equilibrium, lambda c: still(c, progress=lambda *_: c.answer())),
     "positions": (ms.Equilibrium, lambda c: still(c, start=MESH.rest_positions)),
-    "cases": (ms.equilibria.Equilibria, lambda c: still(c, load_factor=[0.5, 1.0])),
+    "cases": (ms.Equilibria, lambda c: still(c, load_factor=[0.5, 1.0])),
     "path": (
         ms.Path,
         lambda c: still(c, ms.follow, until=lambda t, _: c.answer(t > 0.1), progress=False),

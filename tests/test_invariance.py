@@ -7,15 +7,16 @@ from hypothesis import strategies as st
 from model_access import Controls, Problem
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 BENDINGS = ["midedge", "hinge"]
 MAGNETIZATION = np.array([3e4, 1e4, -2e4])  # A/m
 FLUX_DENSITY = np.array([0.4e-3, -0.3e-3, 1.5e-3])  # T
 LINE_LOAD = np.array([0.01, 0.004, 0.02])  # N/m
-OBLIQUE = ms.supports.rotation_matrix(np.array([0.7, -1.1, 0.4]))
+OBLIQUE = rotation_matrix(np.array([0.7, -1.1, 0.4]))
 
 rotations = st.builds(
-    lambda *vector: ms.supports.rotation_matrix(np.array(vector)), *[st.floats(-3, 3) for _ in range(3)]
+    lambda *vector: rotation_matrix(np.array(vector)), *[st.floats(-3, 3) for _ in range(3)]
 )
 
 
@@ -313,7 +314,7 @@ def test_turning_a_clamp_turns_a_sheet_for_nothing(bending, angle):
     clamp = ms.Clamp(edges, rotation=rotation, center=center, displacement=(0.3, 0.0, -0.1))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, bending=bending)
     found = ms.equilibrium(ms.Scene(sheet, supports=[clamp]))
-    matrix = ms.supports.rotation_matrix(rotation)
+    matrix = rotation_matrix(rotation)
     expected = (mesh.rest_positions - center) @ matrix.T + center + (0.3, 0.0, -0.1)
     assert np.abs(found.positions - expected).max() < 1e-8 * mesh.size
     assert found.stable and found.energy < 1e-12 * 1e6 * 1e-3 * mesh.face_areas.sum()

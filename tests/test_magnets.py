@@ -5,11 +5,12 @@ import pytest
 
 import magshell as ms
 from magshell import _core
+from magshell.surroundings.supports import rotation_matrix
 
 MAGNETIZATION = np.array([3e5, -7e5, 9e5])
 CENTER, ROTATION = np.array([0.01, -0.02, 0.005]), np.array([0.3, -0.5, 0.9])
 PLACE = {"remanent_magnetization": MAGNETIZATION, "center": CENTER, "rotation": ROTATION}
-TURN = ms.supports.rotation_matrix(ROTATION)
+TURN = rotation_matrix(ROTATION)
 MAGNETS = {
     "cube": ms.CuboidMagnet((0.02, 0.02, 0.02), **PLACE),
     "brick": ms.CuboidMagnet((0.02, 0.03, 0.01), **PLACE),

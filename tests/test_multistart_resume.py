@@ -13,8 +13,8 @@ import torch
 from multistart_runs import STARTS, bits, quiet
 
 import magshell as ms
-from magshell._digest import digest
-from magshell.minimum import Record
+from magshell.design.digest import digest
+from magshell.design.minimum import Record
 
 
 def logged(folder, start):

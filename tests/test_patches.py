@@ -6,9 +6,10 @@ from directors import directors
 from model_access import Controls, Problem
 
 import magshell as ms
+from magshell.surroundings.supports import continuations, rotation_matrix
 
 YOUNG, THICKNESS = 2e6, 2e-3  # Pa, m
-OBLIQUE = ms.supports.rotation_matrix(np.array([0.7, -1.1, 0.4]))
+OBLIQUE = rotation_matrix(np.array([0.7, -1.1, 0.4]))
 
 
 def sheet(cells=(6, 4), length=0.3, width=0.2, **options):
@@ -119,7 +120,7 @@ FLUX_DENSITY = np.array([2e-3, -1e-3, 3e-3])  # T
 def edge_traction(mesh, rotation):
     """The boundary edges and h (M . outward conormal) B on each [N/m]."""
     edges = mesh.boundary_edges
-    conormals = ms.supports.continuations(mesh, edges)
+    conormals = continuations(mesh, edges)
     return edges, THICKNESS * (conormals @ rotation @ TANGENTIAL)[:, None] * (rotation @ FLUX_DENSITY)
 
 

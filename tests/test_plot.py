@@ -12,9 +12,9 @@ from magshell.plotting import backend as backends
 from magshell.plotting import colors, glyphs
 from magshell.plotting.colors import rgb, scalar_of
 from magshell.plotting.panels import outline
-from magshell.plotting.states import State, states_of
-from magshell.plotting.units import length_unit, prefixed, round_below, with_unit
 from magshell.plotting.view import view_of
+from magshell.states.state import State, states_of
+from magshell.states.units import length_unit, prefixed, round_below, with_unit
 
 MAGNETIZATION = (4e4, 0.0, 0.0)
 

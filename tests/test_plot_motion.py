@@ -8,9 +8,9 @@ import magshell as ms
 from magshell.plotting import colors
 from magshell.plotting.colors import rgb
 from magshell.plotting.panels import Options, draw
-from magshell.plotting.states import states_of
-from magshell.plotting.units import length_unit
 from magshell.plotting.view import view_of
+from magshell.states.state import states_of
+from magshell.states.units import length_unit
 
 MESH = ms.meshes.rectangle(0.1, 0.02, cells=(10, 4))
 

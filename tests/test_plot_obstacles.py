@@ -9,8 +9,8 @@ pytest.importorskip("matplotlib")
 
 import magshell as ms
 from magshell import obstacles as ob
-from magshell.plotting.states import states_of
 from magshell.plotting.surroundings import REACH, obstacle_solids
+from magshell.states.state import states_of
 
 MESH = ms.meshes.rectangle(0.1, 0.04, cells=(10, 4))
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import magshell as ms
-from magshell import _crossings
-from magshell.plotting.plot import noted_crossings
-from magshell.plotting.states import states_of
+from magshell.mesh import crossings
+from magshell.plotting.drawing import noted_crossings
+from magshell.states.state import states_of
+from magshell.surroundings.supports import rotation_matrix
 
-OBLIQUE = ms.supports.rotation_matrix(np.array([0.7, -1.1, 0.4]))
+OBLIQUE = rotation_matrix(np.array([0.7, -1.1, 0.4]))
 
 
 def pairs(positions, faces=None):
@@ -246,11 +247,11 @@ def test_a_motion_tells_and_prints():
 def test_what_costs_much_is_not_done_unasked(monkeypatch):
     mesh = square()
     states = np.stack([mesh.rest_positions] * 3)
-    assert _crossings.told(mesh, states) == "does not pass through itself in any state"
-    monkeypatch.setattr(_crossings, "AFFORDABLE", 2 * mesh.n_faces)
-    assert _crossings.told(mesh, states) == "does not pass through itself in the last state"
-    monkeypatch.setattr(_crossings, "AFFORDABLE", mesh.n_faces - 1)
-    assert "ask self_intersections()" in _crossings.told(mesh, states)
+    assert crossings.told(mesh, states) == "does not pass through itself in any state"
+    monkeypatch.setattr(crossings, "AFFORDABLE", 2 * mesh.n_faces)
+    assert crossings.told(mesh, states) == "does not pass through itself in the last state"
+    monkeypatch.setattr(crossings, "AFFORDABLE", mesh.n_faces - 1)
+    assert "ask self_intersections()" in crossings.told(mesh, states)
 
 
 def test_a_picture_says_so():

@@ -8,7 +8,7 @@ import pytest
 from motions import lifted_strip
 
 import magshell as ms
-from magshell import series
+from magshell.states import series
 
 meshio = pytest.importorskip("meshio")
 

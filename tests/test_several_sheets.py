@@ -11,7 +11,7 @@ import magshell as ms
 from magshell import obstacles as ob
 from magshell.bench.cases import magnetic_strip
 from magshell.bench.cases.magnetic_strip import LENGTH, WIDTH
-from magshell.plotting.states import states_of
+from magshell.states.state import states_of
 
 FAR = 0.5  # m, between sheets of 0.1 m
 STRONG = np.array([0.0, 0.0, 2e-3])

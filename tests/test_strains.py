@@ -8,9 +8,10 @@ from directors import directors, turn_about
 from model_access import Controls, Problem
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 YOUNG, THICKNESS = 2e6, 2e-3  # Pa, m
-OBLIQUE = ms.supports.rotation_matrix(np.array([0.7, -1.1, 0.4]))
+OBLIQUE = rotation_matrix(np.array([0.7, -1.1, 0.4]))
 MAGNETIZATION = (4e4, 0.0, 0.0)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 torch = pytest.importorskip("torch")
 
@@ -284,7 +285,7 @@ def test_by_a_support_that_presses_the_sheet_onto_the_ground(integrator, name):
 
 def sliding_into_a_corner():
     """Held by an oblique symmetry plane, in nodes with frames of their own, on an oblique slope and in water."""
-    turn = ms.supports.rotation_matrix(np.array([0.5, -0.4, 0.8]))
+    turn = rotation_matrix(np.array([0.5, -0.4, 0.8]))
     mesh = ms.TriangleMesh(MESH.rest_positions @ turn.T, MESH.faces)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     slope = ms.obstacles.Plane(turn @ [0.1, 0, 1], center=turn @ [0, 0, -1e-4])

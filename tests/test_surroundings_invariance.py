@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 MESH = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2), irregular=0.2, seed=3)
 MAGNETIZATION, FLUX_DENSITY = np.array([2e4, 3e3, 5e3]), np.array([1e-3, 2e-3, 4e-3])  # A/m, T
 VELOCITY, FLOW = np.array([0.05, -0.03, -0.1]), np.array([0.02, 0.03, 0.01])  # m/s
 GRAVITY = np.array([0.5, 0.3, -9.81])
-TURN = ms.supports.rotation_matrix(np.array([0.7, -1.1, 0.4]))
+TURN = rotation_matrix(np.array([0.7, -1.1, 0.4]))
 MIRROR = np.diag([1.0, -1.0, 1.0])
 SHIFT = np.array([0.3, -0.2, 0.1])  # m
 TIME_STEP = 2.0**-10  # s, so that times add up without rounding

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from magshell._processors import first_threads, processors, quotas_of
+from magshell._machine.processors import first_threads, processors, quotas_of
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="affinity and /proc are Linux's")
 SANITIZED = "san.so" in os.environ.get("LD_PRELOAD", "")

@@ -5,11 +5,12 @@ import pytest
 from blocks import block_sheet, simulated
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 GRAVITY = 9.81  # m/s2
 INTEGRATORS = [ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()]
 SECOND_ORDER = INTEGRATORS[1:]
-TILT = ms.supports.rotation_matrix(np.array([0.4, -0.7, 0.2]))
+TILT = rotation_matrix(np.array([0.4, -0.7, 0.2]))
 # Of drag and thrust. C = 2 sin^2 is 2 head on; reference.json: "drag rho A v^2 + thrust rho A v^2 = 2 rho A v^2".
 COEFFICIENTS = [(1.0, 1.0), (0.6, 0.0), (0.3, 1.7)]
 

@@ -38,7 +38,7 @@ class Design:
     young_modulus: np.ndarray
     curvature_scale: np.ndarray
     positions: np.ndarray
-    history: list[ms.design.Record]
+    history: list  # records, as in ms.Minimum
 
     @property
     def errors(self) -> np.ndarray:
@@ -111,7 +111,7 @@ class Search:
             price = price + SCALE_PRICE * ((2 * self.scale - 1) ** 2).mean()
         return mismatch + price, {"mismatch": mismatch.detach()}
 
-    def design(self, history: list[ms.design.Record]) -> Design:
+    def design(self, history: list) -> Design:
         """The variables as they stand; where they are not designed, what the sheet has."""
         properties = {name: values.detach() for name, values in self.properties().items()}
         with self.at_rest.accept_jumps():

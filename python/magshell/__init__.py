@@ -1,15 +1,15 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
 from . import control, meshes, objectives, obstacles, optim, parametrize
-from ._body_result import BodyResult
-from ._config import num_threads, set_num_threads, show_config
 from ._core import __version__
-from .buckling import Buckling, linear_buckling
-from .contact import Contact
-from .design import minimize
-from .dynamics import simulate
-from .equilibria import Equilibria
-from .equilibrium import Equilibrium
+from ._machine.threads import num_threads, set_num_threads, show_config
+from .bodies.body_result import BodyResult
+from .bodies.shell import Shell
+from .bodies.strains import Strains
+from .design.minimize import minimize
+from .design.minimum import Minimum
+from .dynamics.simulate import simulate
+from .dynamics.trajectory import MotionState, Trajectory
 from .errors import (
     DesignRejected,
     EquilibriumJumped,
@@ -21,33 +21,33 @@ from .errors import (
     NotConverged,
     ObjectiveFailed,
 )
-from .field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
-from .field_adapters import CustomField, MagpylibField
-from .integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
-from .io import read_fields, read_mesh, write_mesh
-from .linear import LinearResponse, linear_response
-from .loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
-from .magnets import CuboidMagnet, CylinderMagnet
-from .mesh import TriangleMesh
-from .minimum import Minimum
-from .multistart import multistart
-from .path import CriticalPoint, Path, follow
-from .placed_field import PlacedField
+from .fields.adapters import CustomField, MagpylibField
+from .fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
+from .fields.magnets import CuboidMagnet, CylinderMagnet
+from .fields.placed import PlacedField
+from .linear.buckling import Buckling, linear_buckling
+from .linear.response import LinearResponse, linear_response
+from .linear.vibration import VibrationModes, vibration_modes
+from .mesh.io import read_fields, read_mesh, write_mesh
+from .mesh.triangle_mesh import TriangleMesh
+from .mesh.welding import Weld, weld
+from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
+from .methods.solvers import MixedNewton, Newton
 from .plotting import Picture, animate, plot, write_page
-from .sampling import random_starts
-from .scene import Scene
-from .series import write_series
-from .shell import Shell
-from .solvers import MixedNewton, Newton
-from .starts import Multistart
-from .statics import equilibrium
-from .strains import Strains
-from .supports import Clamp, Pin, SymmetryPlane
-from .trajectory import MotionState, Trajectory
-from .vibration import VibrationModes, vibration_modes
-from .warm_start import WarmStart
-from .water import Water
-from .weld import Weld, weld
+from .scene.scene import Scene
+from .starts.multistart import multistart
+from .starts.sampling import random_starts
+from .starts.starts import Multistart
+from .states.series import write_series
+from .statics.equilibria import Equilibria
+from .statics.equilibrium import Equilibrium
+from .statics.path import CriticalPoint, Path, follow
+from .statics.solve import equilibrium
+from .statics.warm_start import WarmStart
+from .surroundings.contact import Contact
+from .surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
+from .surroundings.supports import Clamp, Pin, SymmetryPlane
+from .surroundings.water import Water
 
 __all__ = [
     "SDIRK2",

@@ -6,8 +6,8 @@ A/m. Positions may be those of one equilibrium, (n_v, 3), or of several load cas
 
 from __future__ import annotations
 
-from ._quantity import quantity
-from ._tensors import detached, positive_number, real_tensor, require_torch, tensor_of
+from ._checks.quantity import quantity
+from ._checks.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
 
 
 def shape_matching(positions, target, vertices=None, weights=None):

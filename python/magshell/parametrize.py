@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ._quantity import quantity
-from ._tensors import detached, positive_number, real_tensor, require_torch, tensor_of
+from ._checks.quantity import quantity
+from ._checks.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
 
 
 def from_regions(values, regions):

@@ -7,6 +7,7 @@ from answers import Answer, above, below, both, holds, near
 from registry import case
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 GRAVITY, SIDE, THICKNESS, DENSITY = 9.81, 0.05, 2e-3, 1e3
 SMOOTHING = 1e-2 * THICKNESS
@@ -16,7 +17,7 @@ WEIGHT = DENSITY * THICKNESS * SIDE**2 * GRAVITY  # N, of the plate
 def plate(contacts, cells=(4, 4), at=(0.0, 0.0, 0.0), turned=(0.0, 0.0, 0.0), **options) -> ms.Scene:
     """A free square sheet around `at`, turned by a rotation vector."""
     flat = ms.meshes.rectangle(SIDE, SIDE, cells=cells).transformed(translation=(-SIDE / 2, -SIDE / 2, 0))
-    mesh = flat.transformed(ms.supports.rotation_matrix(np.array(turned)), at)
+    mesh = flat.transformed(rotation_matrix(np.array(turned)), at)
     sheet = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e7, poisson_ratio=0.3, mass_density=DENSITY)
     given = {"gravity": (0, 0, -GRAVITY), "allow_rigid_motions": True, **options}
     return ms.Scene(sheet, contacts=contacts, **given)

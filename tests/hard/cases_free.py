@@ -8,6 +8,7 @@ from registry import case
 from sheets import LENGTH, MAGNETIZATION, shell, strip
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 GRAVITY = 9.81
 INTEGRATORS = (ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3())
@@ -63,7 +64,7 @@ def compass():
     strength = 2e-4
     moment = MAGNETIZATION * scene.shell.face_volumes.sum()
     period = 2.0 * np.pi * np.sqrt(inertia / (moment * strength))
-    tilt = ms.supports.rotation_matrix(np.array([0.0, 0.02, 0.0]))
+    tilt = rotation_matrix(np.array([0.0, 0.02, 0.0]))
     start = x @ tilt.T
     motion = ms.simulate(
         scene,

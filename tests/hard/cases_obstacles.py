@@ -7,6 +7,7 @@ from answers import Answer, below, both, holds, near
 from registry import case
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 GRAVITY, SIDE, THICKNESS = 9.81, 0.02, 1e-3
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * 0.01
@@ -134,7 +135,7 @@ def struck_by_a_ball(speed):
 def askew(friction):
     """It crumples."""
     scene = plate(ms.obstacles.Plane(center=(0, 0, -0.011)), friction)
-    start = scene.mesh.rest_positions @ ms.supports.rotation_matrix(np.array([0.8, 0.3, 0.0])).T
+    start = scene.mesh.rest_positions @ rotation_matrix(np.array([0.8, 0.3, 0.0])).T
     return valid(moved(scene, 20, 1e-3, start=start, velocities=(0, 0, -4.43)), 1e-3)
 
 

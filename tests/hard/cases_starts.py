@@ -8,6 +8,7 @@ from registry import case
 from sheets import LENGTH, WIDTH, cantilever, shell, strip
 
 import magshell as ms
+from magshell.surroundings.supports import rotation_matrix
 
 
 def idle_strip() -> ms.Scene:
@@ -47,7 +48,7 @@ def inverted():
 
 @case("turned about its own axis by {} degrees, away from its clamp", over=(60, 120))
 def turned(degrees):
-    rotation = ms.supports.rotation_matrix(np.array([np.radians(degrees), 0, 0]))
+    rotation = rotation_matrix(np.array([np.radians(degrees), 0, 0]))
     return found_again(lambda x: (x - (0, WIDTH / 2, 0)) @ rotation.T + (0, WIDTH / 2, 0))
 
 

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from .._files import replacing
+from .._machine.files import replacing
 from .report import (
     add_common_arguments,
     as_json,

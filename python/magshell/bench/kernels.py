@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 import magshell as ms
-from magshell._values import Values
+from magshell.scene.values import Values
 
 from .ratios import note
 from .report import add_rounds, chosen, print_table

@@ -15,8 +15,8 @@ import scipy
 
 import magshell as ms
 from magshell import _core
-from magshell._files import check_replaceable, replace_file
-from magshell._progress import progress_bar
+from magshell._machine.files import check_replaceable, replace_file
+from magshell._machine.progress import progress_bar
 
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:

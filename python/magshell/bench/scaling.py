@@ -12,7 +12,7 @@ import numpy as np
 
 import magshell as ms
 from magshell import _core
-from magshell._inputs import Inputs
+from magshell.scene.inputs import Inputs
 
 from . import busy_machine
 from .ratios import note

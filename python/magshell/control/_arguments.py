@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._quantity import array_of, quantity
-from .._tensors import detached, is_tensor, require_torch
+from .._checks.quantity import array_of, quantity
+from .._checks.tensors import detached, is_tensor, require_torch
 
 
 def tensor(name: str, unit: str, value, shape: tuple[int | str, ...]):

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._quantity import quantity
-from .._tensors import require_torch
+from .._checks.quantity import quantity
+from .._checks.tensors import require_torch
 from ._arguments import tensor
 
 _TURN = 2 * np.pi

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._quantity import quantity, shape_of
-from .._tensors import detached, positive_number
+from .._checks.quantity import quantity, shape_of
+from .._checks.tensors import detached, positive_number
 from ._arguments import indices, tensor
 from .curves import Curve
 

@@ -3,7 +3,7 @@ depend on its number of steps."""
 
 from __future__ import annotations
 
-from .._tensors import positive_number
+from .._checks.tensors import positive_number
 from ..objectives import cap
 from ._arguments import tensor
 from .signals import oscillation

@@ -11,11 +11,11 @@ import math
 
 import numpy as np
 
-from .._arrays import count
-from .._clock import Clock, clock_of
-from .._quantity import quantity, shape_of
-from .._tensors import detached, positive_number, require_torch
-from ..trajectory import MotionState, Trajectory
+from .._checks.arrays import count
+from .._checks.quantity import quantity, shape_of
+from .._checks.tensors import detached, positive_number, require_torch
+from ..dynamics.trajectory import MotionState, Trajectory
+from ..methods.clock import Clock, clock_of
 from ._arguments import tensor
 
 

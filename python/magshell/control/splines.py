@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from .._arrays import count
-from .._quantity import quantity
-from .._tensors import detached, positive_number, require_torch
+from .._checks.arrays import count
+from .._checks.quantity import quantity
+from .._checks.tensors import detached, positive_number, require_torch
 from ._arguments import tensor
 from .signals import at_times
 

@@ -1,11 +1,11 @@
 """Generators of meshes: sheets, rings, shells of revolution, and any planar outline."""
 
-from .annulus import annulus, sector
-from .cut import cut
-from .cylinder import cylinder
-from .disk import disk
-from .outline import outline
-from .rectangle import rectangle
-from .spherical_cap import spherical_cap
+from .annuli import annulus, sector
+from .cuts import cut
+from .cylinders import cylinder
+from .disks import disk
+from .outlines import outline
+from .rectangles import rectangle
+from .spherical_caps import spherical_cap
 
 __all__ = ["annulus", "cut", "cylinder", "disk", "outline", "rectangle", "sector", "spherical_cap"]

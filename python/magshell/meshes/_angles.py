@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._quantity import real_numbers
+from .._checks.quantity import real_numbers
 
 TURN = 2 * np.pi
 _ROUND_OFF = 1e-12

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import number
-from .._quantity import array_of
+from .._checks.arrays import number
+from .._checks.quantity import array_of
 
 DIAGONALS = ("alternating", "aligned", "crossed")
 

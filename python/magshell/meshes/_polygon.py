@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._quantity import quantity
+from .._checks.quantity import quantity
 
 
 def checked_polyline(name: str, points, least: int) -> np.ndarray:

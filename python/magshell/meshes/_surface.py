@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..mesh import TriangleMesh
+from ..mesh.triangle_mesh import TriangleMesh
 
 
 def surface(points: np.ndarray, faces: np.ndarray, outwards: Callable) -> TriangleMesh:

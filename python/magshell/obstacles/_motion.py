@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .._quantity import quantity
+from .._checks.quantity import quantity
 
 STEP = 1e-4  # s, between the times that derivatives are taken from
 # Fourth-order derivatives: from both sides, and from one side near time 0, before which nobody asked for the motion.

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import _core as core
-from .._quantity import quantity, shape_of
-from ._checks import flag, positive
+from .._checks.flags import flag, positive
+from .._checks.quantity import quantity, shape_of
 from ._surfaces import box_surface, sphere_surface, swept_surface
 from .obstacle import Obstacle, Surface
 

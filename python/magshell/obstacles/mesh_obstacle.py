@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .. import _core as core
-from ..io import read_mesh
-from ..mesh import TriangleMesh
+from ..mesh.io import read_mesh
+from ..mesh.triangle_mesh import TriangleMesh
 from .obstacle import Obstacle, Surface
 
 FINEST = 256  # cells; 140 MB of samples

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core as core
-from .._owner import Owner
-from .._quantity import quantity
+from .._checks.owner import Owner
+from .._checks.quantity import quantity
 from . import _motion
 
 Surface = tuple[np.ndarray, np.ndarray]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import _core as core
-from .._quantity import quantity
+from .._checks.quantity import quantity
 from ._surfaces import grid_faces
 from .obstacle import Obstacle, Surface
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from .._tensors import require_torch
+from .._checks.tensors import require_torch
 
 _HOMES = {"GCMMA": ".gcmma", "LBFGS": ".lbfgs", "MMA": ".mma"}
 

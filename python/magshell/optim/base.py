@@ -8,11 +8,11 @@ from collections.abc import Callable
 import numpy as np
 import torch
 
-from ..minimum import STANDSTILL
 from . import box as boxes
 from .box import Box
 from .iterate import Iterate, Restoring, as_array, as_tensor
 from .sample import Sample
+from .standstill import STANDSTILL
 
 
 class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):

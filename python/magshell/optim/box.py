@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from .._quantity import real_numbers
-from .._tensors import detached
+from .._checks.quantity import real_numbers
+from .._checks.tensors import detached
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import DesignRejected
-from ..minimum import STANDSTILL
 from .base import BoxOptimizer
 from .box import Box
 from .cauchy import cauchy_step, subspace_step
 from .curvature import Curvature, shows_curvature, updated_diagonal
 from .line_search import Probe, strong_wolfe
 from .sample import Sample
+from .standstill import STANDSTILL
 
 _ROUNDING = 4 * np.finfo(float).eps  # of the objective: a smaller decrease cannot be seen
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .._arrays import positive
+from .._checks.arrays import positive
 from ..errors import DesignRejected
 from .approximation import Asymptotes, Surroundings
 from .base import BoxOptimizer, require_range

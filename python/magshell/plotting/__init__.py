@@ -1,8 +1,8 @@
 """Pictures and pages of sheets. Nothing outside this package sees a plotting library."""
 
-from .animate import animate
+from .animation import animate
+from .drawing import plot
 from .page import write_page
 from .picture import Picture
-from .plot import plot
 
 __all__ = ["Picture", "animate", "plot", "write_page"]

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._quantity import quantity, shape_of
-from .._tensors import detached
-from .states import State
-from .units import LengthUnit, prefixed
+from .._checks.quantity import quantity, shape_of
+from .._checks.tensors import detached
+from ..states.state import State
+from ..states.units import LengthUnit, prefixed
 
 
 def rgb(code: str) -> np.ndarray:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .._files import replacing
+from .._machine.files import replacing
 
 _NO_PILLOW = 'a GIF needs pillow: pip install "magshell[plot]"'
 _NO_FFMPEG = (

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..states.state import State
+from ..states.units import LengthUnit, prefixed
 from . import colors, glyphs
 from .colors import Scalar, rgb
 from .panels import (
@@ -22,9 +24,7 @@ from .panels import (
 from .picture import paint, paint_panel, screen_of
 from .playing import SAMPLES, spread
 from .solids import arrows
-from .states import State
 from .surroundings import obstacle_solids, reach
-from .units import LengthUnit, prefixed
 from .view import View
 
 DPI = 140

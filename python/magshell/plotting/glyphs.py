@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh import TriangleMesh
-from .states import State
+from ..mesh.triangle_mesh import TriangleMesh
+from ..states.state import State
 
 ARROWS = 60  # on a sheet, about
 LENGTH = 0.85  # of the longest arrow, in spacings

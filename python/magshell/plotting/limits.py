@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._quantity import quantity
+from .._checks.quantity import quantity
 from .glyphs import ARROWS
 
 NARROWEST, WIDEST = 400, 8000  # pixels

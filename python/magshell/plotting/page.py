@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from .._files import replace_file
-from .._quantity import quantity
+from .._checks.quantity import quantity
+from .._machine.files import replace_file
+from ..states.state import State, states_of, with_times
+from ..states.units import LengthUnit, length_unit, prefixed, with_unit
 from . import colors, glyphs
 from .colors import Scalar, scalar_of
+from .drawing import checked_titles
 from .limits import arrow_count
 from .panels import outline, size_of
-from .playing import SAMPLES, same_faces, speed_of, spread, with_times
-from .plot import checked_titles
-from .states import State, states_of
-from .units import LengthUnit, length_unit, prefixed, with_unit
+from .playing import SAMPLES, same_faces, speed_of, spread
 from .view import view_of
 
 

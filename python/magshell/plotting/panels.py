@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh import TriangleMesh
+from ..mesh.triangle_mesh import TriangleMesh
+from ..states.state import State
+from ..states.units import LengthUnit, with_unit
 from . import colors, glyphs
 from .colors import Scalar, rgb
 from .solids import Solid, arrows, ribbons, sheet
-from .states import State
 from .surroundings import obstacle_solids
-from .units import LengthUnit, with_unit
 from .view import View
 
 CREASE = np.cos(np.radians(40.0))  # rest edges that turn by more are drawn as lines

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .._arrays import positive
-from .._files import replace_file
+from .._checks.arrays import positive
+from .._machine.files import replace_file
+from ..states.units import round_below
 from . import colors, polygons, vtk
 from .colors import Scalar, scale_colors
 from .limits import check_pixels
 from .panels import Drawing, Label, Panel
-from .units import round_below
 
 DPI = 200
 LEGEND, TITLE, MARGIN = 0.72, 0.26, 0.08  # inches

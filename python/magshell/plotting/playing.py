@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._quantity import quantity
+from .._checks.quantity import quantity
+from ..states.state import State
+from ..states.units import clock
 from .limits import check_frames
-from .states import State, timed
-from .units import clock
 
 BEARABLE = (3.0, 20.0)  # s: a motion that takes this long is played as it was
 HANDY = 8.0  # s: about this long is any other, by default
@@ -23,14 +23,6 @@ class Moment:
     before: int
     share: float
     time: float | None
-
-
-def with_times(states: list[State], times) -> list[State]:
-    """The states at the times given; else at their own, which must not fall where a motion follows another."""
-    own = [state.time for state in states]
-    if times is None and None in own:
-        return [replace(state, time=None) for state in states]
-    return timed(states, own if times is None else times)
 
 
 def duration_of(states: list[State]) -> float:

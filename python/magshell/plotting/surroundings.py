@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..states.state import State
 from . import colors
 from .solids import Solid, sheet
-from .states import State
 
 OPACITY = 0.35
 REACH = 1.6  # the side of the square that stands for a plane, in sizes of the drawing

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._quantity import quantity
-from .states import State
+from .._checks.quantity import quantity
+from ..states.state import State
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from .style import COLOURS, INK, machine, new_figure, note, panel_title, tidy
 
-_MARKERS = "osD^vP"
+_MARKERS = "osD^"
 
 
 def draw(results: dict, setting: dict) -> Figure:
@@ -16,7 +16,7 @@ def draw(results: dict, setting: dict) -> Figure:
     errors, energies = results["errors"], results["energies"]
     looks = {
         name: {"color": colour, "marker": marker, "markersize": 4.5, "linewidth": 1.6}
-        for name, colour, marker in zip(dict.fromkeys([*errors, *energies]), COLOURS, _MARKERS, strict=True)
+        for name, colour, marker in zip(errors, COLOURS, _MARKERS, strict=False)
     }
     for name, rows in errors.items():
         by_steps.loglog(rows["steps"], rows["error"], **looks[name])
@@ -37,7 +37,7 @@ def draw(results: dict, setting: dict) -> Figure:
         tidy(axes)
     orders = {name: f"{name}, order {rows['order']:.1f}" for name, rows in errors.items()}
     handles, names = lost.get_legend_handles_labels()
-    labels = [orders.get(name, f"{name}, for comparison") for name in names]
+    labels = [orders[name] for name in names]
     figure.legend(
         handles,
         labels,

@@ -1,0 +1,18 @@
+"""What every example does as a script: compute, tell the numbers, and leave pictures and movies in out/."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+
+def run(
+    compute: Callable[[], dict], summary: Callable[[dict], str], write: Callable[[dict, Path], None]
+) -> None:
+    """write: puts pictures of what was computed into a folder, which is there."""
+    began = time.perf_counter()
+    outcome = compute()
+    print(summary(outcome))
+    out = Path("out")
+    out.mkdir(exist_ok=True)
+    write(outcome, out)
+    print(f"\nPictures in {out}/; {time.perf_counter() - began:.0f} s in all.")

@@ -1,0 +1,1 @@
+"""What callers hand in, checked and converted in one place: numbers with units, indices, tensors."""

@@ -1,0 +1,74 @@
+"""Physical quantities that a caller hands in: checked once, naming the unit and the offending entry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .tensor_kinds import is_tensor, numbers_of, why_not
+
+
+def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.ndarray:
+    """A read-only float64 copy of finite numbers.
+
+    Letters in the shape stand for any size, "..." in front for any leading axes.
+
+    >>> quantity("positions", "m", [[0, 0, 1]], ("n", 3)).shape
+    (1, 3)
+    """
+    label = f"{name} [{unit}]"
+    array = real_numbers(label, values)
+    if not fits(array.shape, shape):
+        if shape == ():
+            raise ValueError(f"{label} must be a number, got shape {array.shape}")
+        wanted = ", ".join(str(size) for size in shape) + ("," if len(shape) == 1 else "")
+        raise ValueError(f"{label} must have shape ({wanted}), got {array.shape}")
+    if not np.isfinite(array).all():
+        index = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
+        entry = f"{name}[{', '.join(map(str, index))}]" if index else name
+        raise ValueError(f"{label} must be finite, but {entry} is {array[index]}")
+    array.flags.writeable = False
+    return array
+
+
+def real_numbers(label: str, values) -> np.ndarray:
+    """A float64 copy of any shape. Truth values, masked entries and strings are no numbers."""
+    array = array_of(label, values, "be an array of real numbers")
+    if array.dtype == bool or not np.can_cast(array.dtype, np.float64, casting="same_kind"):
+        what = f"{values!r:.60}" if array.ndim == 0 else f"dtype {array.dtype}"
+        raise ValueError(f"{label} must be an array of real numbers, got {what}")
+    return array.astype(np.float64)
+
+
+def shape_of(label: str, values) -> tuple[int, ...]:
+    """The shape of what a caller handed in, which may be a list. Raises ValueError where it has none."""
+    if why := why_not(values):
+        raise ValueError(f"{label} {why}")
+    try:
+        return np.shape(values)
+    except ValueError as error:  # a ragged list
+        raise ValueError(f"{label} must be an array of real numbers: {error}") from None
+
+
+def array_of(label: str, values, wanted: str) -> np.ndarray:
+    """Whatever a caller handed in as an array, perhaps the caller's own. Raises ValueError where it is none, which is
+    then told that it must be what is `wanted`."""
+    if why := why_not(values):
+        raise ValueError(f"{label} {why}")
+    if getattr(values, "requires_grad", False):
+        raise ValueError(f"{label} requires a gradient, and nothing passes one back to it: detach it first")
+    if np.ma.is_masked(values):
+        raise ValueError(f"{label} has masked entries: fill them first")
+    try:
+        return numbers_of(values) if is_tensor(values) else np.asarray(values)
+    except (TypeError, ValueError, RuntimeError) as error:  # ragged lists, tensors of kinds that nobody knows
+        raise ValueError(f"{label} must {wanted}: {error}") from None
+
+
+def fits(actual: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+    """Whether a shape is the wanted one: letters stand for any size, "..." in front for any leading axes."""
+    if wanted[:1] == ("...",):
+        wanted = wanted[1:]
+        actual = actual[max(len(actual) - len(wanted), 0) :]
+    return len(actual) == len(wanted) and all(
+        isinstance(w, str) or a == w for a, w in zip(actual, wanted, strict=True)
+    )

@@ -1,0 +1,1 @@
+"""Sheets with thickness and material, and what results say of each."""

@@ -1,0 +1,53 @@
+"""What a result says of one body of its scene."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..mesh.triangle_mesh import TriangleMesh
+from .shell import Shell
+
+
+class BodyResult:
+    """One body of a result: its share of each array, of a tensor in its graph, with the body's own numbers.
+
+    body: Shell, as it is in the scene. mesh: its own.
+    """
+
+    def __init__(self, result, body: Shell):
+        bodies = result.scene._bodies
+        self._result, self._part = result, bodies.parts[bodies.number(body)]
+        self.body = body
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        return self.body.mesh
+
+    @property
+    def positions(self):
+        """(..., n_v, 3) m."""
+        return self._result.positions[..., self._part.vertices, :]
+
+    @property
+    def displacements(self):
+        """(..., n_v, 3) m, from the rest shape."""
+        return self._result.displacements[..., self._part.vertices, :]
+
+    @property
+    def edge_rotations(self):
+        """(..., n_e) rad, zero where an edge has none."""
+        return self._result.edge_rotations[..., self._part.edges]
+
+    @property
+    def velocities(self):
+        """(n, n_v, 3) m/s, of a motion."""
+        return self._result.velocities[..., self._part.vertices, :]
+
+    @property
+    def remanent_magnetization(self):
+        """(n_f, 3) or (3,) A/m, or None."""
+        given = self._result.remanent_magnetization
+        return given if np.ndim(given) < 2 else given[self._part.faces]
+
+    def __repr__(self) -> str:
+        return f"{type(self._result).__name__} of {self.body!r}"

@@ -1,0 +1,187 @@
+"""The loop that improves a design: when it ends, what it saves, and the best design whatever happens."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from .._checks.tensors import require_torch
+from .._machine.progress import progress_bar
+from ..errors import DesignRejected, EquilibriumJumped, Interrupted, ObjectiveFailed
+from .checkpoint import load, save
+from .minimum import Minimum, Record
+from .run import PARTS, Run
+
+_READING = 0.2  # s
+
+
+def minimize(
+    objective: Callable,
+    parameters: Sequence,
+    optimizer,
+    *,
+    max_iterations: int = 100,
+    tolerance: float = 0.0,
+    patience: int = 3,
+    feasibility: float = 1e-6,
+    on_jump: str = "cross",
+    stateful: Sequence = (),
+    callback: Callable[[Record], bool | None] | None = None,
+    progress: bool = True,
+    checkpoint: str | Path | None = None,
+    checkpoint_every: int = 1,
+    resume: bool = False,
+) -> Minimum:
+    """Minimizes objective(*parameters) and leaves the parameters at the best design.
+
+    objective: returns a scalar tensor, or a dict of named terms whose sum it is, or a tuple of one of these with a
+    dict of terms to record, with a tensor of constraints (m,) <= 0, or with both.
+    parameters: tensors with requires_grad, the ones the optimizer was made with.
+    optimizer: one of `ms.optim` or of `torch.optim`, or a function that makes one from the list of parameters.
+    Those of torch know no bounds and no constraints.
+    tolerance: stops once the objective changed by no more than this share of itself, `patience` times in a row.
+    feasibility: how far a constraint may be broken by a design that counts as feasible when the best is chosen.
+    stateful: objects with state_dict() and load_state_dict(), such as `ms.WarmStart`, that checkpoints take along.
+    callback: called with each Record; returning True stops.
+    progress: show a bar. checkpoint: a file that is replaced, whole or not at all, every `checkpoint_every`
+    iterations and at the end. resume: continue from it if it exists, with the same bits as without the stop. A checkpoint
+    of another optimizer, of other bounds or options, or of another objective is refused (ValueError says what differs):
+    its best design is evaluated once and compared. max_iterations, tolerance, patience and on_jump may be others.
+    The bar, each Record and the printed result say how many designs were evaluated and rejected, and why.
+
+    An objective may raise `ms.DesignRejected` where a design cannot be evaluated; the step then goes less far. Where
+    every shorter one is rejected too, because the equilibrium jumps, the whole step is taken with jumps accepted if
+    the objective or one of `stateful` has accept_jumps(), a context manager, and its Record says so; on_jump="stop",
+    or no such object, ends the minimization there.
+
+    Ctrl-C raises `ms.Interrupted`, an error in the objective or the callback `ms.ObjectiveFailed`, once a design is
+    known; both hold the best one, a Minimum, in `last_good`. Before that the error itself comes through.
+
+    >>> import torch, magshell as ms
+    >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
+    >>> optimizer = ms.optim.LBFGS([x], upper=0.5)
+    >>> ms.minimize(lambda x: ((x - 1) ** 2).sum(), [x], optimizer, progress=False).objective
+    0.75
+    """
+    require_torch("minimize")
+    if checkpoint_every < 1:
+        raise ValueError(f"checkpoint_every must be positive, got {checkpoint_every}")
+    if resume and checkpoint is None:
+        raise ValueError("resume needs the checkpoint to continue from")
+    if on_jump not in ("cross", "stop"):
+        raise ValueError(f'on_jump must be "cross" or "stop", got {on_jump!r}')
+    ends = _Ends(max_iterations, tolerance, patience, callback)
+    run = Run(
+        objective, parameters, optimizer, feasibility, stateful, on_jump == "cross", checkpoint is not None
+    )
+    if resume and Path(checkpoint).exists():
+        run.restore(load(checkpoint, PARTS))
+    bar = progress_bar("minimize", max_iterations, shown=progress, initial=run.iteration)
+    run.watch = _Watch(bar, run)
+    try:
+        with bar:
+            return run.minimum(_loop(run, ends, bar, _Checkpoints(checkpoint, checkpoint_every)))
+    except KeyboardInterrupt as error:
+        raise Interrupted(
+            f"interrupted after {run.iteration} iterations", run.minimum("interrupted")
+        ) from error
+    except Exception as error:
+        if run.best is None:
+            raise
+        tried = f", with {run.rejected} designs rejected" if isinstance(error, DesignRejected) else ""
+        raise ObjectiveFailed(
+            f"iteration {run.iteration + 1} failed{tried}: {error}\n"
+            "The best design so far is in `error.last_good`, and in the parameters.",
+            run.minimum("failed"),
+        ) from error
+
+
+def _loop(run: Run, ends: _Ends, bar, checkpoints: _Checkpoints) -> str:
+    """Iterates; returns the reason of the end."""
+    if not run.history:
+        run.begin()
+        reason = ends.reason(run.history)
+    else:
+        reason = ends.spent(run.history)
+    while reason is None:
+        try:
+            moved = run.advance()
+        except EquilibriumJumped as error:
+            reason = f"the equilibrium jumps, however short the step: {error} ({run.rejected} designs were rejected)"
+        else:
+            checkpoints.save(run)
+            bar.update()
+            bar.set_postfix_str(run.summary())
+            reason = ends.reason(run.history, None if moved else run.standstill)
+    checkpoints.save(run, last=True)
+    return reason
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """What ends a minimization; arguments as in `minimize`."""
+
+    max_iterations: int
+    tolerance: float
+    patience: int
+    callback: Callable[[Record], bool | None] | None
+
+    def __post_init__(self):
+        if self.max_iterations < 0:
+            raise ValueError(f"max_iterations must not be negative, got {self.max_iterations}")
+        if not self.tolerance >= 0:
+            raise ValueError(f"tolerance must not be negative, got {self.tolerance}")
+        if self.patience < 1:
+            raise ValueError(f"patience must be positive, got {self.patience}")
+
+    def reason(self, history: list[Record], standstill: str | None = None) -> str | None:
+        """Why to end after the last iteration, if there is a reason; one may be that its step moved nothing."""
+        if self.callback is not None and self.callback(history[-1]) is True:
+            return "stopped by the callback"
+        if standstill is not None:
+            return standstill
+        if self._settled(history):
+            return "the objective has settled"
+        return self.spent(history)
+
+    def spent(self, history: list[Record]) -> str | None:
+        return "max_iterations reached" if history[-1].iteration >= self.max_iterations else None
+
+    def _settled(self, history: list[Record]) -> bool:
+        values = [record.objective for record in history[-self.patience - 1 :]]
+        changes = [abs(b - a) <= self.tolerance * abs(b) for a, b in pairwise(values)]
+        return self.tolerance > 0 and len(changes) == self.patience and all(changes)
+
+
+@dataclass
+class _Watch:
+    """Shows after an evaluation what a run is at, since an iteration may need many; not more often than one can read."""
+
+    bar: Any
+    run: Run
+    shown: float = -math.inf
+
+    def __call__(self) -> None:
+        if time.monotonic() - self.shown > _READING:
+            self.bar.set_postfix_str(self.run.summary())
+            self.shown = time.monotonic()
+
+
+@dataclass
+class _Checkpoints:
+    """Saves a run every few iterations, to a path or, without one, not at all."""
+
+    path: str | Path | None
+    every: int
+    saved: int = 0
+
+    def save(self, run: Run, last: bool = False) -> None:
+        due = run.iteration > self.saved and (last or run.iteration % self.every == 0)
+        if self.path is not None and due:
+            save(self.path, run.snapshot())
+            self.saved = run.iteration

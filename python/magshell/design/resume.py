@@ -1,0 +1,75 @@
+"""Whether a minimization goes on with the problem that its checkpoint is of."""
+
+from __future__ import annotations
+
+from .answer import Answer
+from .configuration import changes
+
+_RELATIVE = 1e-6  # of the objective: another thread count or release may round otherwise
+_ROUNDING = 1e-12  # of the largest objective so far: one that has all but vanished is round-off
+
+
+def check_same(run, snapshot: dict) -> None:
+    """Raises ValueError where parameters, method or options are others than the snapshot's."""
+    shapes, now = ([tuple(each.shape) for each in of] for of in (snapshot["parameters"], run.parameters))
+    if shapes != now:
+        raise ValueError(f"the checkpoint holds parameters of shapes {shapes}, not those of this problem")
+    dtypes, now = ([str(each.dtype) for each in of] for of in (snapshot["parameters"], run.parameters))
+    if dtypes != now:
+        raise ValueError(f"the checkpoint holds parameters of {dtypes}, and this problem has {now}")
+    if snapshot["method"] != run.method:
+        raise ValueError(
+            f"the checkpoint is of {snapshot['method']}, and cannot be resumed with {run.method}"
+        )
+    if len(snapshot["stateful"]) != len(run.stateful):
+        raise ValueError(
+            f"the checkpoint holds the state of {len(snapshot['stateful'])} objects, "
+            f"but `stateful` has {len(run.stateful)}"
+        )
+    if changed := changes(snapshot["configuration"], run.configuration):
+        raise ValueError(
+            f"the checkpoint is of a run with other options: {'; '.join(changed)}. Resume with those of the "
+            "checkpoint, or begin anew with another file"
+        )
+
+
+def check_objective(run, snapshot: dict) -> None:
+    """Evaluates the best design as it was evaluated then, from the same states. Raises ValueError where the objective
+    says something else of it now, with parameters and states as they were before."""
+    best = snapshot["best"]
+    values, states = run.values(), run.states()
+    try:
+        found, violation = _evaluated(run, best)
+        largest = max(abs(record["objective"]) for record in snapshot["history"])
+        for what, was, is_ in (
+            ("objective", best["objective"], found),
+            ("violation", best["violation"], violation),
+        ):
+            if not abs(is_ - was) <= _RELATIVE * abs(was) + _ROUNDING * largest:
+                raise ValueError(
+                    f"the best design of the checkpoint has the {what} {was:.9g} there and {is_:.9g} now: `objective`, "
+                    "or something that it uses, is another one. Resume with that of the checkpoint, or begin anew with "
+                    "another file"
+                )
+    except BaseException:
+        run.set(values)
+        run.load_states(states)
+        raise
+
+
+def _evaluated(run, best: dict) -> tuple[float, float]:
+    """Objective and violation of the best design."""
+    from ..optim.sample import Trial
+
+    def closure():
+        answer = Answer.of(run.objective(*run.parameters))
+        return answer.objective, answer.constraints
+
+    run.set(best["parameters"])
+    run.load_states(best["stateful"])
+    try:
+        with run.accepting_jumps(best["jumped"]):
+            trial = Trial(closure, run.parameters)
+    except Exception as error:
+        raise ValueError(f"the best design of the checkpoint cannot be evaluated: {error}") from error
+    return trial.objective, float(trial.constraints.max(initial=0.0))

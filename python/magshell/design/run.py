@@ -1,0 +1,281 @@
+"""The state of one minimization: where its optimizer stands, the history, the best design."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+
+from .._checks.arrays import number
+from .._checks.tensors import is_tensor, require_torch
+from ..errors import DesignRejected, EquilibriumJumped
+from ..optim.standstill import STANDSTILL
+from .answer import Answer
+from .checkpoint import decoded, encoded
+from .configuration import kept
+from .minimum import Minimum, Record
+from .rejections import conflict, in_words, reason_of, total
+from .resume import check_objective, check_same
+
+PARTS = (
+    "method",
+    "parameters",
+    "optimizer",
+    "history",
+    "best",
+    "terms",
+    "stateful",
+    "configuration",
+)  # of a snapshot
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A design that was evaluated, its terms, and the states from which: None where no checkpoint needs them."""
+
+    design: list
+    terms: dict[str, float]
+    states: list | None = None
+
+
+class Run:
+    """One minimization, an iteration at a time. Arguments as in `ms.minimize`; cross: whether jumps are crossed;
+    checkpointed: whether snapshots will be asked for."""
+
+    def __init__(
+        self,
+        objective: Callable,
+        parameters: Sequence,
+        optimizer,
+        feasibility: float,
+        stateful: Sequence,
+        cross: bool,
+        checkpointed: bool,
+    ):
+        if not callable(objective):
+            raise ValueError(f"objective must be a function of the parameters, got {objective!r:.60}")
+        self.parameters = _checked_parameters(parameters)
+        self.optimizer = _driven(optimizer(self.parameters) if callable(optimizer) else optimizer)
+        if {id(p) for p in self.parameters} != {id(p) for p in self.optimizer.parameters}:
+            raise ValueError("the optimizer must have been made with the same tensors as `parameters`")
+        self.stateful = _checked_stateful(stateful)
+        self.objective, self.feasibility = objective, number("feasibility", feasibility)
+        if not self.feasibility >= 0:
+            raise ValueError(f"feasibility must not be negative, got {feasibility}")
+        self.history: list[Record] = []
+        self.best: dict | None = None
+        offering = {id(each): each for each in (objective, *self.stateful) if hasattr(each, "accept_jumps")}
+        self._offering, self._cross, self._checkpointed = list(offering.values()), cross, checkpointed
+        self.configuration = kept({"feasibility": feasibility, **self.optimizer.configuration()})
+        self._evaluations = 0
+        self.rejections: Counter[str] = Counter()  # of the iteration under way
+        self.watch: Callable[[], None] = lambda: None  # called after every evaluation
+        self._answers: list[_Seen] = []  # of one step
+        self._at = _Seen([], {})  # the design of the last record
+        self._recorded = False  # whether the iteration under way is in the history
+        self._stuck = False  # at a jump that no step avoids
+        self._started = time.perf_counter()
+
+    @property
+    def method(self) -> str:
+        return _name(getattr(self.optimizer, "optimizer", self.optimizer))  # what AnyTorch drives
+
+    @property
+    def rejected(self) -> int:
+        """Trial designs of the iteration under way."""
+        return sum(self.rejections.values())
+
+    @property
+    def iteration(self) -> int:
+        return self.history[-1].iteration if self.history else 0
+
+    def closure(self):
+        self._evaluations += 1
+        before = self.states() if self._checkpointed else None
+        try:
+            answer = Answer.of(self.objective(*self.parameters))
+        except DesignRejected as error:
+            self.rejections[reason_of(error)] += 1
+            raise
+        finally:
+            self.watch()
+        self._answers.append(_Seen(self.values(), answer.terms, before))
+        return answer.objective, answer.constraints
+
+    def begin(self) -> None:
+        self._record(0, self.optimizer.evaluate(self.closure), jumped=False)
+
+    def advance(self) -> bool:
+        """One step; whether it moved anything. Raises the last rejection if no step was short enough."""
+        before = self.values()
+        self._answers, self.rejections, self._recorded = [], Counter(), False
+        try:
+            self.optimizer.step(self.closure)
+            jumped = False
+        except EquilibriumJumped:
+            if not (self._cross and self._offering):
+                self._stuck = True
+                raise
+            with self.accepting_jumps():
+                self.optimizer.leap(self.closure)
+            jumped = True
+        moved = any(not a.equal(b) for a, b in zip(before, self.values(), strict=True))
+        self._record(self.iteration + 1, self.optimizer.evaluate(self.closure), jumped)
+        return moved
+
+    @property
+    def standstill(self) -> str:
+        """What it means that a step moved nothing."""
+        return getattr(self.optimizer, "standstill", STANDSTILL)
+
+    def minimum(self, reason: str) -> Minimum | None:
+        """The best design, which the parameters are set to. None before there is any."""
+        if self.best is None:
+            return None
+        self.set(self.best["parameters"])
+        best = [value.clone() for value in self.best["parameters"]]
+        told = self._all_rejections, conflict(self.history, self._lost, self._stuck)
+        return Minimum(best, self.best["objective"], self.best["violation"], self.history, reason, *told)
+
+    def snapshot(self) -> dict:
+        return {
+            "method": self.method,
+            "parameters": self.values(),
+            "optimizer": self.optimizer.state_dict(),
+            "history": [asdict(record) for record in self.history],
+            "best": self.best,
+            "terms": self._at.terms,
+            "stateful": self.states(),
+            "configuration": self.configuration,
+        }
+
+    def restore(self, snapshot: dict) -> None:
+        """Goes on from a snapshot. Raises ValueError where it is of something else, and changes nothing then."""
+        check_same(self, snapshot)
+        check_objective(self, snapshot)
+        self.set(snapshot["parameters"])
+        self.optimizer.load_state_dict(snapshot["optimizer"])
+        self.load_states(snapshot["stateful"])
+        self.history = [Record(**record) for record in snapshot["history"]]
+        self.best, self._at = snapshot["best"], _Seen(self.values(), snapshot["terms"])
+        self._evaluations = self.history[-1].evaluations
+        self._started -= self.history[-1].seconds
+
+    def summary(self) -> str:
+        """The objective, and how many designs were evaluated and rejected so far."""
+        parts = [f"objective {self.history[-1].objective:.6g}"] if self.history else []
+        return ", ".join(
+            filter(None, (*parts, f"{self._evaluations} evaluations", in_words(self._all_rejections)))
+        )
+
+    @property
+    def _lost(self) -> dict[str, int]:
+        """Rejections of an iteration that is under way, or did not come to its end."""
+        return {} if self._recorded else dict(self.rejections)
+
+    @property
+    def _all_rejections(self) -> dict[str, int]:
+        return dict(total([*(record.rejections for record in self.history), self._lost]))
+
+    def _record(self, iteration: int, sample, jumped: bool) -> None:
+        values = self.values()
+        for seen in self._answers:
+            if all(a.equal(b) for a, b in zip(seen.design, values, strict=True)):
+                self._at = seen
+        record = Record(
+            iteration,
+            sample.objective,
+            self._at.terms,
+            sample.violation,
+            math.sqrt(float(sample.gradient @ sample.gradient)),
+            time.perf_counter() - self._started,
+            self._evaluations,
+            self.rejected,
+            jumped,
+            dict(self.rejections),
+        )
+        self.history.append(record)
+        self._recorded = True
+        if self.best is None or self._order(record.objective, record.violation) < self._order(
+            self.best["objective"], self.best["violation"]
+        ):
+            self.best = {
+                "parameters": values,
+                "objective": record.objective,
+                "violation": record.violation,
+                "stateful": self._at.states,
+                "jumped": jumped,
+            }
+
+    def _order(self, objective: float, violation: float) -> tuple[float, float]:
+        """Feasible designs by their objective, before all others by how far they are from it."""
+        return (0.0, objective) if violation <= self.feasibility else (violation, objective)
+
+    def values(self) -> list:
+        return [parameter.detach().clone() for parameter in self.parameters]
+
+    def states(self) -> list:
+        """Of the stateful objects, as a checkpoint holds them."""
+        return [encoded(each.state_dict(), f"state of {_name(each)}") for each in self.stateful]
+
+    def load_states(self, states: list) -> None:
+        for each, state in zip(self.stateful, states, strict=True):
+            each.load_state_dict(decoded(state))
+
+    @contextmanager
+    def accepting_jumps(self, accepted: bool = True) -> Iterator[None]:
+        """Inside, the equilibrium may jump, where something offers that."""
+        with ExitStack() as stack:
+            for each in self._offering if accepted else ():
+                stack.enter_context(each.accept_jumps())
+            yield
+
+    def set(self, values: list) -> None:
+        with require_torch("minimize").no_grad():
+            for parameter, value in zip(self.parameters, values, strict=True):
+                parameter.copy_(value)
+
+
+def _driven(optimizer):
+    """The optimizer as one that can be asked what is known where it stands."""
+    from ..optim.any_torch import AnyTorch
+    from ..optim.base import BoxOptimizer
+
+    if isinstance(optimizer, BoxOptimizer):
+        return optimizer
+    if isinstance(optimizer, require_torch("minimize").optim.Optimizer):
+        return AnyTorch(optimizer)
+    raise ValueError(
+        "optimizer must be one of ms.optim or torch.optim, or a function that makes one from the parameters, "
+        f"got {optimizer!r:.60}"
+    )
+
+
+def _checked_parameters(parameters) -> list:
+    parameters = [parameters] if is_tensor(parameters) else list(parameters)
+    if not parameters:
+        raise ValueError("there are no parameters to optimize")
+    for position, parameter in enumerate(parameters):
+        if not is_tensor(parameter):
+            raise ValueError(f"parameter {position} must be a torch tensor, got {parameter!r:.60}")
+        if not (parameter.requires_grad and parameter.is_leaf):
+            raise ValueError(
+                f"parameter {position} of shape {tuple(parameter.shape)} must be a tensor of its own that requires a "
+                "gradient: x = x.detach().clone().requires_grad_()"
+            )
+    return parameters
+
+
+def _checked_stateful(stateful) -> list:
+    for each in stateful:
+        for method in ("state_dict", "load_state_dict"):
+            if not callable(getattr(each, method, None)):
+                raise ValueError(f"every object in `stateful` needs {method}(), and {_name(each)} has none")
+    return list(stateful)
+
+
+def _name(each) -> str:
+    return type(each).__name__

@@ -1,0 +1,199 @@
+"""What a simulation computed."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._checks.arrays import index_array
+from .._checks.quantity import quantity
+from .._checks.tensors import detached
+from .._machine.files import replace_file
+from ..bodies.body_result import BodyResult
+from ..bodies.shell import Shell
+from ..bodies.strains import StrainHistory, Strains, strains_of
+from ..mesh.crossings import told
+from ..methods.clock import Clock, clock_of
+from ..methods.integrators import Integrator
+from ..scene.scene import Scene
+from ..surroundings.contact_inputs import near_kinks
+
+
+@dataclass(frozen=True)
+class MotionState:
+    """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits,
+    in steps of the same length.
+
+    time: s, since the start of the motion that led here; clock: how it was counted, in steps. Everything else is in the
+    core's order of unknowns and faces; what the motion had no need of is empty: accelerations and strain rates (TRBDF2),
+    strains of a Maxwell branch. rotations_known: False where the edge rotations are still to be put to rest.
+    """
+
+    time: float
+    state: np.ndarray = field(repr=False)
+    velocity: np.ndarray = field(repr=False)
+    memory: list = field(repr=False, default_factory=list)
+    acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    maxwell_strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    clock: Clock | None = field(repr=False, default=None)
+    rotations_known: bool = field(repr=False, default=True)
+
+    def save(self, path: str | Path) -> None:
+        """Writes an .npz file."""
+        lengths = np.array([len(each) for each in self.memory], dtype=np.int64)
+        remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.memory)])
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        arrays |= {
+            "time": self.time,
+            "clock": astuple(clock_of(self)),
+            "rotations_known": self.rotations_known,
+            "memory": remembered,
+            "memory_lengths": lengths,
+        }
+        replace_file(path, lambda file: np.savez(file, **arrays))
+
+    @classmethod
+    def load(cls, path: str | Path) -> MotionState:
+        """Reads what `save` wrote. Raises ValueError if it is something else."""
+        try:
+            with np.load(Path(path), allow_pickle=False) as file:
+                time = float(quantity("time", "s", file["time"], ()))
+                origin, time_step, steps = quantity("clock", "SI", file["clock"], (3,)).tolist()
+                remembered = quantity("memory", "SI", file["memory"], ("n",))
+                lengths = index_array("memory_lengths", file["memory_lengths"])
+                known = bool(file["rotations_known"])
+                arrays = {name: file[name] for name in _ARRAYS}
+            clock = Clock(origin, time_step, int(steps))
+            parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
+        except (KeyError, ValueError, TypeError, EOFError) as error:
+            raise ValueError(f"{path} is not a saved MotionState: {error}") from error
+        return cls(
+            time,
+            memory=[part.tolist() for part in parts],
+            clock=clock,
+            rotations_known=known,
+            **arrays,
+        )
+
+
+_ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
+
+
+@dataclass(frozen=True, repr=False)
+class Trajectory:
+    """A motion. With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
+
+    times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
+    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C came meanwhile.
+    remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
+    largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
+        leaves the model, of which ms.LargeStrainWarning warns.
+    steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
+    taken}. end: the last state, from which another simulation goes on. bytes: kept for gradients.
+    """
+
+    scene: Scene
+    integrator: Integrator
+    times: np.ndarray
+    positions: Any
+    velocities: Any
+    edge_rotations: Any
+    remanent_magnetization: Any
+    applied_flux_density: np.ndarray
+    kinetic_energy: np.ndarray
+    energies: dict[str, np.ndarray]
+    largest_membrane_strain: np.ndarray
+    largest_bending_strain: np.ndarray
+    steps: int
+    steps_done: int
+    halved: dict[int, int]
+    end: MotionState
+    iterations: int
+    factorizations: int
+    keep: str
+    bytes: int
+    wall_time: float
+    linear_time: float
+    _field_factors: np.ndarray = field(repr=False)
+    _thickness: np.ndarray = field(repr=False)
+    _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
+    _placed: list = field(
+        repr=False, default_factory=list
+    )  # the first arguments of near_kinks, of each contact
+
+    def __getitem__(self, body: Shell) -> BodyResult:
+        """What it says of one body of the scene."""
+        return BodyResult(self, body)
+
+    @property
+    def displacements(self):
+        """(n, n_v, 3) m, from the rest shape."""
+        rest = self.scene.mesh.rest_positions
+        if isinstance(self.positions, np.ndarray):
+            return self.positions - rest
+        return self.positions - self.positions.new_tensor(np.array(rest))
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Kinetic and potential, (n,) J."""
+        return self.kinetic_energy + sum(self.energies.values())
+
+    @property
+    def kinks(self) -> dict[int, np.ndarray]:
+        """{recorded state: vertices} that touch an obstacle where the motion is not differentiable, or within the
+        smoothing of there: by the sharp edge of a box or a mesh, in the middle of a body.
+
+        A small change may bring such a point to another side. A gradient is that of the side on which it is. Looked up
+        when asked for, in the recorded states only.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+        >>> ridge = ms.obstacles.Box((0.1, 0.1, 0.1), rotation=(0, np.pi / 4, 0), center=(0.01, 0.01, -0.0707105))
+        >>> scene = ms.Scene(sheet, contacts=[ms.Contact(ridge)], allow_rigid_motions=True)
+        >>> ms.simulate(scene, steps=1, time_step=1e-3, velocities=(0, 0, -1e-4)).kinks
+        {0: array([3, 4, 5], dtype=int32), 1: array([3, 4, 5], dtype=int32)}
+        """
+        positions = detached(self.positions)
+        found = {}
+        for k, time in enumerate(self.times):
+            near = [near_kinks(*each, positions[k], time) for each in self._placed]
+            if near and (every := np.unique(np.concatenate(near))).size:
+                found[k] = every
+        return found
+
+    def strains(self, index: int = -1) -> Strains:
+        """The principal strains of every face in a recorded state, by default the last."""
+        positions, rotations = (detached(each)[index] for each in (self.positions, self.edge_rotations))
+        model = self.scene._model
+        state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
+        before = 3 * self.scene.mesh.n_vertices
+        state[before : before + self._directions.shape[1]] = self._directions[index]
+        return strains_of(self.scene, state, self._thickness)
+
+    def self_intersections(self, index: int = -1) -> np.ndarray:
+        """The faces that pass through each other in a recorded state, as in TriangleMesh.self_intersections, (k, 2)."""
+        return self.scene.mesh.self_intersections(detached(self.positions)[index])
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        stopped = "" if self.steps_done == self.steps else f" of {self.steps}"
+        halved = f", {len(self.halved)} of them in parts" if self.halved else ""
+        strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
+        crossings = told(self.scene.mesh, detached(self.positions))
+        a_step = 1e3 * self.wall_time / max(self.steps_done, 1)
+        return (
+            f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
+            f"{type(self.integrator).__name__}\n"
+            f"  {strain}\n"
+            f"  {crossings}\n"
+            f"  {self.iterations} iterations, {self.factorizations} factorizations\n"
+            f"  {self.wall_time:.3g} s, {a_step:.3g} ms a step; for gradients: {self.keep}, {self.bytes / 1e6:.3g} MB"
+        )

@@ -1,0 +1,210 @@
+"""Applied magnetic fields: uniform, of dipoles, sampled on a grid. As functions: adapters.py."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from .. import _core as core
+from .._checks.owner import Owner
+from .._checks.quantity import array_of, quantity
+from .._checks.tensors import detached, is_tensor, real_tensor
+
+
+def residual_to_remanent(residual_flux_density):
+    """The remanent magnetization M_r = B_r / mu_0 [A/m] of the residual flux density B_r [T] of a data sheet.
+
+    Numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph. Raises ValueError on
+    what is not real and finite.
+
+    >>> round(residual_to_remanent(0.1))
+    79577
+    """
+    residual = quantity("residual_flux_density", "T", detached(residual_flux_density), ("...",))
+    if is_tensor(residual_flux_density):
+        return (
+            real_tensor("residual_flux_density", residual_flux_density, ("...",)) / core.vacuum_permeability
+        )
+    remanent = residual / core.vacuum_permeability
+    return float(remanent) if remanent.ndim == 0 else remanent
+
+
+class AppliedField(Owner):
+    """A flux density B(x) [T] that does not depend on the sheet.
+
+    `_core` is the field of the C++ core, or None where a solve supplies the value. `_made_from` are the arguments that
+    a copy, or another process, makes the field from again.
+    """
+
+    _core: core.AppliedField | None = None
+    _replaceable: tuple[str, ...] = ()
+    _made_from: Mapping[str, object] = MappingProxyType({})
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        for name in self._replaceable:
+            numbers[label, name] = self._made_from[name]
+
+    def __getstate__(self) -> dict:
+        return dict(self._made_from)
+
+    def __setstate__(self, arguments: dict) -> None:
+        self.__init__(**arguments)
+
+    def flux_density(self, points) -> np.ndarray:
+        """B [T], (..., 3), at points [m], (..., 3); NaN where the field has no value."""
+        return self._samples(points, order=0)[0]
+
+    def gradient(self, points) -> np.ndarray:
+        """dB_i/dx_j [T/m], (..., 3, 3) as [..., i, j], at points [m], (..., 3); NaN as above."""
+        return self._samples(points, order=1)[1]
+
+    def _samples(self, points, order: int) -> tuple[np.ndarray, ...]:
+        if self._core is None:
+            raise ValueError(
+                f"{self!r} has no value of its own: a solve gives it one, as applied_flux_density [T]"
+            )
+        points = quantity("points", "m", points, ("...", 3))
+        rows = points.reshape(-1, 3)
+        samples = core.sample_fields([self._core], [1.0], rows, np.zeros_like(rows), order)
+        return tuple(values.reshape(*points.shape[:-1], *values.shape[1:]) for values in samples[: order + 1])
+
+
+class UniformField(AppliedField):
+    """A field that is the same everywhere; each solve gives its value, `applied_flux_density` [T], (3,).
+
+    >>> UniformField()
+    UniformField()
+    """
+
+    _is_uniform = True
+
+    def __repr__(self) -> str:
+        return "UniformField()"
+
+
+class Dipoles(AppliedField):
+    """Point dipoles in vacuum, B = mu_0/(4 pi) sum (3 (m . r) r / |r|^5 - m / |r|^3).
+
+    A sphere magnetised uniformly is exactly one of them, seen from outside; other magnets are, from afar. The
+    field is NaN on a dipole itself.
+
+    Args:
+        positions: (n, 3) [m]
+        moments: (n, 3) [A m^2]
+
+    >>> Dipoles(positions=[[0, 0, 0]], moments=[[0, 0, 1]]).flux_density([0, 0, 0.1]).round(6)
+    array([0.    , 0.    , 0.0002])
+    """
+
+    _replaceable = _in_time = ("positions", "moments")
+
+    def __init__(self, positions, moments) -> None:
+        self.positions = quantity("positions", "m", positions, ("n", 3))
+        self.moments = quantity("moments", "A m^2", moments, (len(self.positions), 3))
+        self._made_from = {"positions": self.positions, "moments": self.moments}
+        self._core = core.Dipoles(**self._made_from)
+
+    def replaced(self, **values) -> Dipoles:
+        """As many dipoles with other positions or moments."""
+        changed = Dipoles(**{"positions": self.positions, "moments": self.moments, **values})
+        if len(changed.positions) != len(self.positions):
+            raise ValueError(f"there must be {len(self.positions)} dipoles, got {len(changed.positions)}")
+        return changed
+
+    def __repr__(self) -> str:
+        count = len(self.positions)
+        return f"Dipoles({count} dipole{'' if count == 1 else 's'})"
+
+
+class SampledField(AppliedField):
+    """A field given by samples on a regular grid, interpolated by cubic splines.
+
+    The interpolant is twice continuously differentiable and reproduces cubics up to the border. Its error
+    falls with the fourth power of the spacing, that of its gradient with the third. Outside the grid the
+    field is NaN, and a solve that gets there fails.
+
+    Along an axis with one sample the field does not change: (nx, 1, nz, 3) is a field in a plane, and that
+    axis' entries in origin and spacing do not matter. Two samples are joined by a straight line, three by a
+    parabola.
+
+    Args:
+        origin: (3,) [m], the position of flux_density[0, 0, 0]
+        spacing: (3,) [m], between neighbouring samples
+        flux_density: (nx, ny, nz, 3) [T], sample [i, j, k] at origin + (i, j, k) * spacing
+
+    >>> SampledField.from_function(lambda x: 0.1 * x, lower=(0, 0, 0), upper=(1, 1, 1), counts=(4, 4, 4))
+    SampledField(4 x 4 x 4 samples, from (0, 0, 0) to (1, 1, 1) m)
+    """
+
+    _core: core.SampledField
+    _replaceable = ("flux_density",)
+
+    def __init__(self, origin, spacing, flux_density) -> None:
+        self.origin = quantity("origin", "m", origin, (3,))
+        self.spacing = quantity("spacing", "m", spacing, (3,))
+        flux_density = quantity("flux_density", "T", flux_density, ("nx", "ny", "nz", 3))
+        self.counts: tuple[int, ...] = flux_density.shape[:3]
+        if 0 in self.counts:
+            raise ValueError(f"flux_density [T] must have samples along every axis, got {flux_density.shape}")
+        for axis, (count, step) in enumerate(zip(self.counts, self.spacing.tolist(), strict=True)):
+            if count > 1 and step <= 0:
+                raise ValueError(
+                    "spacing [m] must be positive along an axis with several samples,"
+                    f" but spacing[{axis}] is {step}"
+                )
+        self._made_from = {"origin": self.origin, "spacing": self.spacing, "flux_density": flux_density}
+        self._core = core.SampledField(**self._made_from)
+
+    @classmethod
+    def from_function(
+        cls, function: Callable[[np.ndarray], np.ndarray], lower, upper, counts
+    ) -> SampledField:
+        """Samples a function of points (n, 3) [m] that returns B (n, 3) [T]: a slow field is worth it.
+
+        `counts` (3,) samples lie along the axes between the corners lower and upper (3,) [m], both
+        included; a single one lies in the middle.
+        """
+        lower = quantity("lower", "m", lower, (3,))
+        upper = quantity("upper", "m", upper, (3,))
+        counts = array_of("counts", counts, "be three integers")
+        if counts.shape != (3,) or counts.dtype.kind not in "iu" or counts.min() < 1:
+            raise ValueError(f"counts must be three integers of at least 1, got {counts.tolist()}")
+        if (backwards := np.flatnonzero((counts > 1) & (lower >= upper))).size:
+            axis = backwards[0]
+            raise ValueError(
+                "lower [m] must lie below upper [m] along an axis with several samples,"
+                f" but lower[{axis}] is {lower[axis]} and upper[{axis}] is {upper[axis]}"
+            )
+        axes = [
+            np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2])
+            for low, high, count in zip(lower, upper, counts.tolist(), strict=True)
+        ]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        values = quantity(
+            "function(points)", "T", function(points.reshape(-1, 3)), (np.prod(counts).item(), 3)
+        )
+        spacing = [(line[-1] - line[0]) / max(len(line) - 1, 1) for line in axes]
+        return cls([line[0] for line in axes], spacing, values.reshape(points.shape))
+
+    def replaced(self, *, flux_density) -> SampledField:
+        """Other values on the same grid."""
+        return SampledField(
+            self.origin, self.spacing, quantity("flux_density", "T", flux_density, (*self.counts, 3))
+        )
+
+    def contains(self, points) -> np.ndarray:
+        """Whether points [m], (..., 3), lie in the grid: bool, (...)."""
+        points = quantity("points", "m", points, ("...", 3))
+        return np.asarray(self._core.contains(points), dtype=np.bool_).reshape(points.shape[:-1])
+
+    def __repr__(self) -> str:
+        def corner(x: np.ndarray) -> str:
+            return ", ".join(
+                f"{value:g}" if n > 1 else "any" for value, n in zip(x, self.counts, strict=True)
+            )
+
+        last = self.origin + self.spacing * (np.array(self.counts) - 1)
+        samples = " x ".join(map(str, self.counts))
+        return f"SampledField({samples} samples, from ({corner(self.origin)}) to ({corner(last)}) m)"

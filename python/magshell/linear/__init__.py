@@ -1,0 +1,1 @@
+"""Linear theory: small deflections, buckling, vibrations."""

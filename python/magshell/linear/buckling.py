@@ -1,0 +1,166 @@
+"""Buckling loads from the Hessian: ms.linear_buckling."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+from .._checks.arrays import count
+from .._machine.entry import solve_entry
+from ..errors import NotConverged
+from ..scene.inputs import Inputs
+from ..scene.replacements import requested
+from ..scene.scene import Scene
+from .mode_shapes import mode_shapes
+from .rest import RestStiffness
+
+_LARGEST_CHANGE = 1e100  # over the stiffness itself: its square still is a number
+_PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured, over the mean edge length
+_LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
+
+
+@dataclass(frozen=True, repr=False)
+class Buckling:
+    """The lowest buckling modes of a scene.
+
+    factors: (k,), ascending: what to multiply the controls by so that the sheet buckles in mode k.
+    modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
+    edge_rotations: (k, n_e), rad, that go with them.
+    """
+
+    scene: Scene
+    factors: np.ndarray
+    modes: np.ndarray = field(repr=False)
+    edge_rotations: np.ndarray = field(repr=False)
+    factorizations: int
+    wall_time: float
+
+    def __repr__(self) -> str:
+        factors = ", ".join(f"{factor:.6g}" for factor in self.factors)
+        return f"Buckling: at {factors} times the controls; {self.wall_time:.3g} s"
+
+
+@solve_entry
+def linear_buckling(
+    scene: Scene,
+    *,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    motion_factor: float = 1.0,
+    values: dict | None = None,
+    modes: int = 1,
+) -> Buckling:
+    """The smallest positive multiples of the controls at which a scene buckles, by linear theory.
+
+    With K(q, c) the Hessian, c the controls and u the linear response to them,
+
+        (K + lambda dK) v = 0,     dK = d/dt K(rest + t u, t c) at t = 0, by a central difference     [Pa m]
+
+    so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact
+    in the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells.
+    A shallow arch that softens on its way needs ms.follow. Controls and values as in ms.equilibrium; a field's own
+    stiffness counts.
+
+    modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
+        the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
+
+    Raises ValueError on bad input, where the supports leave the sheet a motion without stiffness, where the
+    controls do nothing, and where the sheet does not buckle under them (a column that is pulled); Interrupted.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (-1.0, 0, 0))
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+    >>> round(float(ms.linear_buckling(scene).factors[0]), 3)  # pi^2 E h^3 / (48 L^2) = 0.0206 N/m
+    0.021
+    """
+    modes = count("modes", modes)
+    inputs = Inputs(
+        scene,
+        remanent_magnetization,
+        applied_flux_density,
+        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    began = time.perf_counter()
+    model = scene._model
+    if modes >= model.free_size:
+        raise ValueError(f"modes must be below the {model.free_size} unknowns of the scene, got {modes}")
+    with inputs.in_core():
+        stiffness = RestStiffness(scene)
+        response = stiffness.response(inputs)
+        displacement = float(np.abs(model.positions(response)).max())
+        change = _stiffness_change(scene, stiffness, response, displacement, inputs)
+    factors, vectors = _lowest(
+        stiffness, change, modes, _LARGEST_DISPLACEMENT * scene._bodies.size, displacement
+    )
+    shapes, edge_rotations = mode_shapes(model, vectors)
+    return Buckling(
+        scene=scene,
+        factors=factors,
+        modes=shapes,
+        edge_rotations=edge_rotations,
+        factorizations=2,
+        wall_time=time.perf_counter() - began,
+    )
+
+
+def _stiffness_change(
+    scene: Scene, stiffness: RestStiffness, response: np.ndarray, displacement: float, inputs: Inputs
+) -> np.ndarray:
+    """The values of dK, in the pattern of K, for the controls as they are."""
+    # Where nothing moves before buckling, K is linear in the controls and any step is exact.
+    step = _PRE_LOAD * float(scene.mesh.edge_lengths.mean()) / displacement if displacement > 0.0 else 1.0
+
+    def values(t: float) -> np.ndarray:
+        return scene._model.hessian(stiffness.rest + t * response, t * inputs.controls)[3]
+
+    change = (values(step) - values(-step)) / (2.0 * step)
+    if not change.any():
+        raise ValueError("the controls neither load the sheet nor change its stiffness: nothing buckles it")
+    largest = np.abs(change).max()
+    if not largest < _LARGEST_CHANGE * abs(stiffness.matrix).max():  # NaN too
+        raise ValueError(
+            f"the controls change the stiffness by {largest:g} N/m, beyond what numbers hold: are their units right?"
+        )
+    return change
+
+
+def _lowest(
+    stiffness: RestStiffness, change: np.ndarray, count: int, reach: float, displacement: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positive factors (k,), ascending, and their modes (n, k), k <= count. It moves by `reach` at most."""
+    # -dK v = (1/lambda) K v, with K positive definite: the smallest positive lambda are the largest
+    # eigenvalues.
+    negative_change = -stiffness.with_values(change)
+    size = negative_change.shape[0]
+    inverse = LinearOperator((size, size), matvec=stiffness.solve, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(size)  # one that no symmetry is orthogonal to
+    pencil = {"A": negative_change, "M": stiffness.matrix, "Minv": inverse, "v0": start}
+    try:
+        extreme = abs(eigsh(k=1, which="LM", return_eigenvectors=False, **pencil)[0])
+        # By Sylvester's law, K + lambda dK has as many negative directions as there are factors between 0 and
+        # lambda. Looked for no further than theory reaches: beyond are strains of order one, closely spaced
+        # and meaningless.
+        largest = min(1e3 / extreme, reach / displacement if displacement > 0.0 else np.inf)
+        available = stiffness.negative_directions(largest * change)
+        if available == 0:
+            raise ValueError(
+                "the sheet does not buckle under these controls, as far as linear theory reaches; "
+                "under reversed ones it may"
+            )
+        inverses, vectors = eigsh(k=min(count, available), which="LA", **pencil)
+    except ArpackError as error:
+        raise NotConverged(f"the buckling modes did not converge: {error}. Ask for fewer modes.") from error
+    order = np.argsort(-inverses)
+    return 1.0 / inverses[order], vectors[:, order]

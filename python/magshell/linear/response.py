@@ -1,0 +1,95 @@
+"""Small deflections: ms.linear_response."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._checks.tensors import like
+from .._machine.entry import solve_entry
+from ..scene.inputs import Inputs
+from ..scene.replacements import requested
+from ..scene.scene import Scene
+from .rest import RestStiffness
+
+
+@dataclass(frozen=True, repr=False)
+class LinearResponse:
+    """What linear theory says of a scene: the deflection in proportion to the controls. Not an equilibrium.
+
+    displacements: (n_v, 3) m, from the rest shape; edge_rotations: (n_e,) rad, zero where an edge has none.
+    factorizations: one.
+    """
+
+    scene: Scene
+    displacements: Any
+    edge_rotations: Any
+    factorizations: int
+    wall_time: float
+
+    @property
+    def positions(self):
+        """(n_v, 3) m. They mean something as long as the displacements are small."""
+        rest = self.scene.mesh.rest_positions
+        if isinstance(self.displacements, np.ndarray):
+            return rest + self.displacements
+        return self.displacements + self.displacements.new_tensor(np.array(rest))
+
+    def __repr__(self) -> str:
+        moved = float(np.linalg.norm(np.asarray(self.displacements), axis=1).max())
+        return f"LinearResponse: largest displacement {moved:.4g} m, {self.wall_time:.3g} s"
+
+
+@solve_entry
+def linear_response(
+    scene: Scene,
+    *,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    motion_factor: float = 1.0,
+    values: dict | None = None,
+) -> LinearResponse:
+    """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
+
+    The stiffness is that of the unloaded sheet: loads and fields act as the forces they are at rest, without
+    the stiffness they add; supports that move do so at the rate they start with. Controls and values as in
+    ms.equilibrium.
+
+    Raises ValueError on bad input, and where the supports leave the sheet a motion without stiffness; Interrupted.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, 0.01))
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+    >>> tip = ms.linear_response(scene).displacements[mesh.vertices_at(x=0.1), 2].mean()
+    >>> round(float(tip), 3)  # p L^3 / (3 E I) = 0.04
+    0.04
+    """
+    inputs = Inputs(
+        scene,
+        remanent_magnetization,
+        applied_flux_density,
+        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    began = time.perf_counter()
+    model = scene._model
+    with inputs.in_core():
+        change = RestStiffness(scene).response(inputs)
+    return LinearResponse(
+        scene=scene,
+        displacements=like(model.positions(change), *inputs.given),
+        edge_rotations=like(model.edge_rotations(change), *inputs.given),
+        factorizations=1,
+        wall_time=time.perf_counter() - began,
+    )

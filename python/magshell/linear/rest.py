@@ -1,0 +1,73 @@
+"""A scene's stiffness at its rest shape, unloaded: what linear theory works with."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from .. import _core
+from ..scene.inputs import Inputs
+from ..scene.scene import Scene
+
+
+class RestStiffness:
+    """The Hessian K at the rest shape without controls, factorized once. Works on the free unknowns, (n,).
+
+    Raises ValueError where K is not positive definite: the scene is not held, or not stable at rest.
+    """
+
+    def __init__(self, scene: Scene):
+        self._model = scene._model
+        self.rest = self._model.rest_state()
+        *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())
+        self._factor = _core.analyze(*self._pattern, points=self._model.free_points)
+        report = self._factor.factorize(self._values)
+        if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
+            raise ValueError(
+                f"the stiffness at rest is not positive definite ({report.negative_pivots} negative and "
+                f"{report.perturbed_pivots} zero pivots of {self._pattern[0]}), "
+                "and linear theory needs that: hold the sheet by supports"
+            )
+
+    @property
+    def matrix(self) -> csc_array:
+        """K, (n, n)."""
+        return self.with_values(self._values)
+
+    def with_values(self, values: np.ndarray) -> csc_array:
+        """The symmetric matrix (n, n) whose lower triangle has K's pattern and these values."""
+        return symmetric(*self._pattern, values)
+
+    def negative_directions(self, change: np.ndarray) -> int:
+        """How many negative eigenvalues K plus a change of its values has, by another factorization."""
+        return (
+            _core.analyze(*self._pattern, points=self._model.free_points)
+            .factorize(self._values + change)
+            .negative_pivots
+        )
+
+    def solve(self, forces: np.ndarray) -> np.ndarray:
+        """u (n,) of K u = forces (n,), refined once with a residual of more digits: where stiffnesses differ by 1e6, the
+        order of elimination would decide what is left of the soft ones' digits."""
+        solution = self._factor.solve(forces)
+        residual = forces - self.matrix.astype(np.longdouble) @ solution.astype(np.longdouble)
+        return solution + self._factor.solve(residual.astype(np.float64))
+
+    def response(self, inputs: Inputs) -> np.ndarray:
+        """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports move."""
+        model, layout = self._model, inputs.scene._control_layout
+        unloaded = layout.zeros()
+        moved = model.prescribed_rate(unloaded) * layout.part(inputs.controls, "scene", "motion_factor")
+        forces = model.gradient(self.rest, unloaded) - model.gradient(self.rest, inputs.controls)
+        if moved.any():
+            forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved
+        return moved + model.expand(self.solve(model.reduce(forces)))
+
+
+def symmetric(size: int, starts: np.ndarray, rows: np.ndarray, values: np.ndarray) -> csc_array:
+    """Both triangles of a matrix (n, n) whose lower one is given by columns."""
+    lower = csc_array((values, rows, starts), shape=(size, size))
+    diagonal = lower.diagonal()
+    both = lower + lower.T
+    both.setdiag(diagonal)
+    return csc_array(both)

@@ -1,0 +1,226 @@
+"""Small vibrations about an equilibrium: ms.vibration_modes."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+from .. import _core
+from .._machine.entry import solve_entry
+from ..bodies.shell import Shell
+from ..errors import NotConverged
+from ..scene.inputs import Inputs
+from ..scene.replacements import requested
+from ..scene.scene import Scene
+from ..statics.equilibrium import Equilibrium
+from .mode_shapes import mode_shapes
+
+_LOST = 64.0 * np.finfo(float).eps  # of the fastest vibration's square: below, a square is round-off
+_SHIFT_GROWTH = 8.0
+_ATTEMPTS = 3  # each searches a larger space
+_SAME = 1e-6  # squares that differ by less, relative to their distance from the shift, are not told apart
+
+
+@dataclass(frozen=True, repr=False)
+class VibrationModes:
+    """The slowest small vibrations of a scene about an equilibrium.
+
+    squares: (k,) 1/s2, ascending: of the angular frequencies. Zero for a motion that nothing resists, negative for one
+        that grows: the equilibrium is not stable.
+    modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
+    edge_rotations: (k, n_e), rad, that go with them.
+    unstable: how many modes grow, also where k is less.
+    """
+
+    scene: Scene
+    squares: np.ndarray
+    modes: np.ndarray = field(repr=False)
+    edge_rotations: np.ndarray = field(repr=False)
+    unstable: int
+    factorizations: int
+    wall_time: float
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """(k,) Hz. NaN where the mode does not vibrate but grows."""
+        vibrating = np.where(self.squares < 0.0, np.nan, self.squares)
+        return np.sqrt(vibrating) / (2.0 * np.pi)
+
+    @property
+    def growth_rates(self) -> np.ndarray:
+        """(k,) 1/s: r of the modes that grow as exp(r t), zero for those that vibrate."""
+        return np.sqrt(np.maximum(-self.squares, 0.0))
+
+    def __repr__(self) -> str:
+        frequencies = ", ".join(f"{each:.5g}" for each in self.frequencies[self.unstable :])
+        text = f"VibrationModes: {frequencies} Hz; {self.wall_time:.3g} s"
+        if self.unstable:
+            rates = ", ".join(f"{each:.4g}" for each in self.growth_rates[: self.unstable])
+            text += f"\n  unstable: {self.unstable} mode(s) grow, at rates of {rates} 1/s"
+        return text
+
+
+@solve_entry
+def vibration_modes(
+    scene: Scene, equilibrium: Equilibrium | None = None, *, values: dict | None = None, count: int = 6
+) -> VibrationModes:
+    """The slowest small vibrations of a scene about an equilibrium, loaded, magnetised or buckled.
+
+        K x = w^2 M x
+
+    with K the Hessian there, M the lumped masses and the edge rotations without mass; what supports hold stands still.
+    Damping does not count.
+
+    equilibrium: of this scene, with the controls and values it was found for; one that is not stable has modes that
+        grow. By default the rest shape without loads and fields.
+    values: as in ms.equilibrium, where there is no equilibrium, which has its own.
+    count: how many modes.
+
+    Raises ValueError on bad input, NotConverged where the search for the modes does not come to its end, Interrupted.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))])
+    >>> modes = ms.vibration_modes(scene, count=2)
+    >>> modes.frequencies.round(1)  # 3.516 and 22.03 sqrt(E h^2 / 12 rho) / (2 pi L^2)
+    array([0.5, 3.2])
+    """
+    inputs = _inputs(scene, equilibrium, values)
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
+        raise ValueError(f"count must be an integer of at least 1, got {count!r}")
+    began = time.perf_counter()
+    model = scene._model
+    masses = model.free_weights(inputs.values.vertex_masses)
+    if count >= np.count_nonzero(masses):
+        raise ValueError(
+            f"count must be below the {np.count_nonzero(masses)} unknowns with mass, got {count}"
+        )
+    with inputs.in_core():
+        if equilibrium is None:
+            stiffness = model.hessian(model.rest_state(), scene._control_layout.zeros())
+        else:
+            stiffness = model.hessian(equilibrium._state, equilibrium._controls)
+    slow = min(map(_slow_square, inputs.values.sheets))
+    pencil = _Pencil(stiffness, model.free_points, masses, slow)
+    squares, vectors = pencil.lowest(int(count))
+    modes, edge_rotations = mode_shapes(model, vectors)
+    return VibrationModes(
+        scene=scene,
+        squares=squares,
+        modes=modes,
+        edge_rotations=edge_rotations,
+        unstable=pencil.growing(),
+        factorizations=pencil.factorizations,
+        wall_time=time.perf_counter() - began,
+    )
+
+
+class _Pencil:
+    """K and M, and a factorization of K - shift M with the shift below every square of a frequency.
+
+    stiffness: (n, column starts, rows, values), the lower triangle of K. points: (n, 3), where the unknowns are.
+    masses: (n,), zero for edge rotations.
+    slow_square: 1/s2, about as large as the lowest of a sheet that is held.
+    """
+
+    def __init__(self, stiffness: tuple, points: np.ndarray, masses: np.ndarray, slow_square: float):
+        *pattern, self._values = stiffness
+        self._diagonal = pattern[1][:-1]
+        self._masses = masses
+        self._moving = np.flatnonzero(masses)
+        self._factor = _core.analyze(*pattern, points=points)
+        self.factorizations = 0
+        stiffest = self._values[self._diagonal][self._moving] / masses[self._moving]
+        self._lost = _LOST * stiffest.max()
+        # Below zero, because nothing may resist a rigid motion; and further, the faster something grows.
+        self._shift = -max(slow_square, 16.0 * self._lost)
+        while self._squares_below(self._shift):
+            self._shift *= _SHIFT_GROWTH
+            if self._shift < -16.0 * stiffest.max():
+                raise NotConverged(
+                    "the edge rotations are not stable by themselves, so there are no frequencies"
+                )
+
+    def growing(self) -> int:
+        """How many squares are negative."""
+        return self._squares_below(-self._lost)
+
+    def lowest(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The lowest squares (k,), ascending, and their modes of all free unknowns (n, k)."""
+        for attempt in range(_ATTEMPTS):
+            squares, modes = self._search(count, seed=attempt, space=(2 * count + 20) << attempt)
+            # A search may miss one of several equal ones. By Sylvester's law K - s M has as many negative pivots as
+            # there are squares below s.
+            below = squares[-1] - max(_SAME * (squares[-1] - self._shift), 2.0 * self._lost)
+            if self._squares_below(below) == np.count_nonzero(squares < below):
+                squares[np.abs(squares) <= self._lost] = 0.0
+                return squares, modes
+        raise NotConverged(f"some of the {count} slowest modes were not found. Ask for more, or for fewer.")
+
+    def _search(self, count: int, seed: int, space: int) -> tuple[np.ndarray, np.ndarray]:
+        # With y = M^1/2 x and the edge rotations at rest: M^1/2 (K - shift M)^-1 M^1/2 y = y / (w^2 - shift).
+        self._factorize(self._shift)
+        roots = np.sqrt(self._masses)
+
+        def moved_by(y: np.ndarray) -> np.ndarray:
+            forces = np.zeros(len(roots))
+            forces[self._moving] = roots[self._moving] * y.ravel()
+            return self._factor.solve(forces)
+
+        size = len(self._moving)
+        inverse = LinearOperator(
+            (size, size), matvec=lambda y: (roots * moved_by(y))[self._moving], dtype=np.float64
+        )
+        start = np.random.default_rng(seed).standard_normal(size)  # one that no symmetry is orthogonal to
+        try:
+            inverses, vectors = eigsh(inverse, count, which="LA", v0=start, ncv=min(space, size))
+        except ArpackError as error:
+            raise NotConverged(f"the vibration modes did not converge: {error}. Ask for fewer.") from error
+        order = np.argsort(-inverses)
+        modes = np.stack([moved_by(vectors[:, k]) for k in order], axis=1)
+        return 1.0 / inverses[order] + self._shift, modes
+
+    def _squares_below(self, square: float) -> int:
+        return self._factorize(square).negative_pivots
+
+    def _factorize(self, shift: float) -> _core.FactorReport:
+        values = self._values.copy()
+        values[self._diagonal] -= shift * self._masses
+        self.factorizations += 1
+        report = self._factor.factorize(values)
+        if not report.succeeded:
+            raise NotConverged(f"the vibration modes: {report.reason}")
+        return report
+
+
+def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict | None) -> Inputs:
+    """Magnetization and values of the equilibrium; the scene's own, without a field, at rest."""
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    uniform = np.zeros(3) if scene.has_uniform_field else None
+    if equilibrium is None:
+        replaced = requested(scene, None, values, moving=True)
+        magnetized = any("remanent_magnetization" in replaced.get(body, {}) for body in scene.bodies)
+        idle = np.zeros(3) if scene.fields and not magnetized else None
+        return Inputs(scene, idle, uniform, replaced=replaced)
+    if values is not None:
+        raise ValueError(
+            "values are those of the equilibrium: give them to ms.equilibrium, or give no equilibrium"
+        )
+    if not isinstance(equilibrium, Equilibrium):
+        raise ValueError(f"equilibrium must be an Equilibrium, got {type(equilibrium).__name__}")
+    if equilibrium.scene is not scene:
+        raise ValueError("the equilibrium is of another scene")
+    inputs = Inputs(scene, np.zeros(3) if scene.fields else None, uniform)
+    inputs.values = equilibrium._values
+    return inputs
+
+
+def _slow_square(shell: Shell) -> float:
+    """D / (rho h size^4), 1/s2: the square of the slowest angular frequency of a held sheet, but for a factor."""
+    per_face = shell.young_modulus * shell.thickness**2 / shell.mass_density
+    return float(per_face.mean()) / (12.0 * shell.mesh.size**4)

@@ -1,0 +1,1 @@
+"""The triangle mesh: selections, quality, joining, files."""

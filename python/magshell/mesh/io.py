@@ -1,0 +1,196 @@
+"""Meshes and fields from files and to files."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from .._checks.arrays import index_array, named_values
+from .._checks.quantity import quantity, shape_of
+from .._checks.tensors import detached
+from .._machine.files import replacing
+from .obj import read_obj
+from .ply import read_ply, write_ply
+from .selection import RELATIVE_TOLERANCE
+from .triangle_mesh import TriangleMesh, checked_mesh
+
+_MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
+_READABLE = (".obj", ".ply", *_MESHIO_MODULES)
+_WRITERS = (".vtu", ".ply")
+_LOWER_CELLS = ("vertex", "line", "line3")  # gmsh writes them beside the surface
+
+
+class Fields(NamedTuple):
+    """What a file holds beside the mesh: name -> (n_v,) or (n_v, k), and name -> (n_f,) or (n_f, k)."""
+
+    vertex: dict[str, np.ndarray]
+    face: dict[str, np.ndarray]
+
+
+def read_mesh(path, drop_unused: bool = False) -> TriangleMesh:
+    """The triangle mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`).
+
+    Coordinates are taken to be in m: use `.scaled(1e-3)` on a file in mm. Points in the plane get z = 0. An
+    STL file stores each triangle apart: its corners within 1e-6 of the mesh's size are one vertex.
+
+    Args:
+        path: the ending tells the format.
+        drop_unused: leave out points that no triangle uses, instead of refusing them.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: unknown ending, a file that cannot be read, that holds other faces than triangles or none,
+            or whose mesh `TriangleMesh` refuses.
+        ImportError: without meshio, where it is needed.
+    """
+    return _read(path, drop_unused)[0]
+
+
+def read_fields(path, drop_unused: bool = False) -> Fields:
+    """The fields in a file, for the vertices and faces of `read_mesh` with the same arguments."""
+    return _read(path, drop_unused)[1]
+
+
+def write_mesh(path, mesh: TriangleMesh, positions=None, vertex_fields=None, face_fields=None) -> None:
+    """Writes a mesh and fields on it to VTU (needs the extra `io`) or binary PLY.
+
+    Args:
+        path: ends in .vtu or .ply.
+        mesh: gives the faces.
+        positions: (n_v, 3), m, instead of the rest positions.
+        vertex_fields: name -> (n_v,) or (n_v, k).
+        face_fields: name -> (n_f,) or (n_f, k).
+
+    Raises:
+        ValueError: unknown ending, wrong shapes, or names with spaces or one of " < > &.
+        OSError: it cannot be written; an older file is as it was.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in _WRITERS:
+        raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}")
+    points = checked_mesh(mesh).rest_positions
+    if positions is not None:
+        points = quantity("positions", "m", detached(positions), (mesh.n_vertices, 3))
+    on_vertices = _checked_fields("vertex", vertex_fields, mesh.n_vertices)
+    on_faces = _checked_fields("face", face_fields, mesh.n_faces)
+    if ending == ".ply":
+        write_ply(path, points, mesh.faces, on_vertices, on_faces)
+        return
+    meshio = _meshio("vtu")
+    cell_data = {name: [values] for name, values in on_faces.items()}
+    content = _meshio().Mesh(points, [("triangle", mesh.faces)], point_data=on_vertices, cell_data=cell_data)
+    with replacing(path) as part:
+        meshio.write(part, content)
+
+
+def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields]:
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in _READABLE:
+        raise ValueError(f"cannot read {path.name!r}: the ending must be one of {', '.join(_READABLE)}")
+    if not path.is_file():
+        raise FileNotFoundError(f"no file {str(path)!r}")
+    reader = {".obj": read_obj, ".ply": read_ply}.get(ending, _read_with_meshio)
+    try:
+        points, faces, vertex_fields, face_fields = reader(path)
+    except ImportError:
+        raise
+    except Exception as error:  # a reader fed garbage may raise anything
+        reason = str(error) or type(error).__name__
+        raise ValueError(f"cannot read {str(path)!r} as {ending[1:].upper()}: {reason}") from error
+    if len(faces) == 0:
+        raise ValueError(f"{str(path)!r} holds no triangles")
+    faces = index_array(f"the faces of {str(path)!r}", faces)
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    if ending == ".stl":
+        points, faces = _merge_coincident(points, faces)
+
+    used = np.unique(faces)
+    within = used.size == 0 or (used[0] >= 0 and used[-1] < len(points))
+    if within and len(used) < len(points):
+        if not drop_unused:
+            unused = np.setdiff1d(np.arange(len(points)), used)
+            raise ValueError(
+                f"{str(path)!r} has {len(unused)} points that no triangle uses, the first one {unused[0]}; "
+                "read_mesh(..., drop_unused=True) leaves them out"
+            )
+        points, faces = points[used], np.searchsorted(used, faces)
+        vertex_fields = {name: values[used] for name, values in vertex_fields.items()}
+    try:
+        mesh = TriangleMesh(points, faces)
+    except ValueError as error:
+        raise ValueError(f"{str(path)!r}: {error}") from error
+    return mesh, Fields(vertex_fields, face_fields)
+
+
+def _meshio(module: str | None = None):
+    try:
+        return importlib.import_module(f"meshio.{module}" if module else "meshio")
+    except ImportError as error:
+        raise ImportError('this file format needs meshio: pip install "magshell[io]"') from error
+
+
+def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
+    # meshio.read ends the interpreter on a file it cannot read; the readers of the formats raise
+    with np.errstate(over="ignore"):  # its STL reader multiplies whatever stands where the count should
+        content = _meshio(_MESHIO_MODULES[path.suffix.lower()]).read(path)
+    others = {
+        block.type: len(block.data)
+        for block in content.cells
+        if block.type not in ("triangle", *_LOWER_CELLS)
+    }
+    if others:
+        kind, count = next(iter(others.items()))
+        raise ValueError(
+            f"it holds {count} cells of type {kind!r}; only triangles (of 3 points) are supported"
+        )
+    triangles = [k for k, block in enumerate(content.cells) if block.type == "triangle"]
+    if not triangles:
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), {}, {}
+    faces = np.concatenate([content.cells[k].data for k in triangles])
+    face_fields = {
+        name: np.concatenate([blocks[k] for k in triangles]) for name, blocks in content.cell_data.items()
+    }
+    points = np.asarray(content.points, dtype=np.float64)
+    return points, faces, dict(content.point_data), face_fields
+
+
+def _merge_coincident(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    tolerance = RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(points), len(points)))
+    _, first, vertex = np.unique(
+        connected_components(graph, directed=False)[1], return_index=True, return_inverse=True
+    )
+    return points[first], vertex.ravel()[faces]
+
+
+def check_field_name(kind: str, name) -> None:
+    """Refuses what one of the formats could not hold: PLY ends a name at a space, and XML has signs of its own."""
+    if not (isinstance(name, str) and name and name.isprintable()) or set(name) & set(' "<>&'):
+        raise ValueError(
+            f'{kind} field names must be printable words without spaces and without any of " < > &, got {name!r}'
+        )
+
+
+def _checked_fields(kind: str, fields, rows: int) -> dict[str, np.ndarray]:
+    checked = {}
+    for name, values in named_values(f"{kind}_fields", fields).items():
+        check_field_name(kind, name)
+        shape = shape_of(f"{kind} field {name!r}", values)
+        if len(shape) not in (1, 2) or shape[0] != rows or 0 in shape:
+            raise ValueError(f"{kind} field {name!r} must have shape ({rows},) or ({rows}, k), got {shape}")
+        array = np.asarray(detached(values))
+        if array.dtype.kind not in "biuf":
+            raise ValueError(f"{kind} field {name!r} must hold real numbers, got dtype {array.dtype}")
+        fits = array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.abs(array).max() < 2**31)
+        checked[name] = array.astype(np.int32 if fits else np.float64)
+    return checked

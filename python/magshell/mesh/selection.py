@@ -1,0 +1,148 @@
+"""Vertices, edges and faces of a mesh by where they are.
+
+Every selection returns ascending indices. One that finds nothing raises a ValueError that says what is
+there: an empty support would otherwise surface much later, as a sheet that flies away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .._checks.arrays import index_array
+from .._checks.quantity import quantity
+
+RELATIVE_TOLERANCE = 1e-6  # of the mesh's size: far above round-off, far below any edge
+
+
+class MeshSelection:
+    """The selecting half of TriangleMesh."""
+
+    def vertices_at(self, x=None, y=None, z=None, tolerance: float | None = None) -> np.ndarray:
+        """Vertices whose given coordinates [m] match within `tolerance` [m].
+
+        The default tolerance is 1e-6 of the diagonal of the bounding box.
+
+        >>> import magshell as ms
+        >>> ms.meshes.rectangle(2.0, 1.0, cells=(2, 1)).vertices_at(x=0.0).tolist()
+        [0, 1]
+        """
+        wanted, tolerance = self._coordinates(x, y, z, tolerance)
+        found = np.flatnonzero(self._matches(wanted, tolerance))
+        if len(found) == 0:
+            raise ValueError(self._nothing_at("vertex", wanted, tolerance))
+        return found
+
+    def edges_at(self, x=None, y=None, z=None, tolerance: float | None = None) -> np.ndarray:
+        """Edges with both ends at the given coordinates [m]; see `vertices_at`."""
+        return self._at("edge", self.edges, x, y, z, tolerance)
+
+    def faces_at(self, x=None, y=None, z=None, tolerance: float | None = None) -> np.ndarray:
+        """Faces with all three vertices at the given coordinates [m]; see `vertices_at`."""
+        return self._at("face", self.faces, x, y, z, tolerance)
+
+    def vertices_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Vertices where predicate((n_v, 3) positions [m]) -> (n_v,) bool holds."""
+        return _where("vertex", predicate, self.rest_positions, np.arange(self.n_vertices))
+
+    def edges_where(
+        self, predicate: Callable[[np.ndarray], np.ndarray], boundary_only: bool = False
+    ) -> np.ndarray:
+        """Edges where predicate((n, 3) midpoints [m]) -> (n,) bool holds, of all or those on the boundary.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(2.0, 1.0, cells=(2, 1))
+        >>> len(mesh.edges_where(lambda midpoints: midpoints[:, 0] > 1.0, boundary_only=True))
+        3
+        """
+        if not boundary_only:
+            return _where("edge", predicate, self.edge_midpoints, np.arange(self.n_edges))
+        if len(self.boundary_edges) == 0:
+            raise ValueError("the mesh is closed: it has no boundary edges")
+        return _where(
+            "boundary edge", predicate, self.edge_midpoints[self.boundary_edges], self.boundary_edges
+        )
+
+    def faces_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Faces where predicate((n_f, 3) barycentres [m]) -> (n_f,) bool holds."""
+        return _where("face", predicate, self.face_barycenters, np.arange(self.n_faces))
+
+    def nearest_vertex(self, point) -> int:
+        """The vertex nearest to a point (3,) [m]; the lowest index where several are."""
+        point = quantity("point", "m", point, (3,))
+        return int(np.argmin(np.linalg.norm(self.rest_positions - point, axis=1)))
+
+    def edges_between(self, vertex_indices) -> np.ndarray:
+        """Edges with both ends among the given vertices."""
+        indices = index_array("vertex_indices", vertex_indices).ravel()
+        outside = indices[(indices < 0) | (indices >= self.n_vertices)]
+        if len(outside):
+            raise ValueError(
+                f"vertex_indices names vertex {outside[0]}, but they are numbered 0 to {self.n_vertices - 1}"
+            )
+        chosen = np.zeros(self.n_vertices, dtype=bool)
+        chosen[indices] = True
+        found = np.flatnonzero(chosen[self.edges].all(axis=1))
+        if len(found) == 0:
+            raise ValueError(f"no edge joins two of the {len(indices)} vertices given")
+        return found
+
+    def _coordinates(self, x, y, z, tolerance) -> tuple[dict[int, float], float]:
+        wanted = {
+            axis: float(quantity("xyz"[axis], "m", value, ()))
+            for axis, value in enumerate((x, y, z))
+            if value is not None
+        }
+        if not wanted:
+            raise ValueError("give at least one of x, y, z [m]")
+        if tolerance is None:
+            tolerance = RELATIVE_TOLERANCE * self.size
+        if not quantity("tolerance", "m", tolerance, ()) >= 0:
+            raise ValueError(f"tolerance [m] must not be negative, got {tolerance}")
+        return wanted, float(tolerance)
+
+    def _matches(self, wanted: dict[int, float], tolerance: float) -> np.ndarray:
+        axes, values = list(wanted), list(wanted.values())
+        return (np.abs(self.rest_positions[:, axes] - values) <= tolerance).all(axis=1)
+
+    def _at(self, kind: str, members: np.ndarray, x, y, z, tolerance) -> np.ndarray:
+        wanted, tolerance = self._coordinates(x, y, z, tolerance)
+        matching = self._matches(wanted, tolerance)
+        found = np.flatnonzero(matching[members].all(axis=1))
+        if len(found) == 0 and matching.any():
+            raise ValueError(
+                f"no {kind} has all its vertices at {_describe(wanted)} m, "
+                f"though vertex {np.argmax(matching)} is there"
+            )
+        if len(found) == 0:
+            raise ValueError(self._nothing_at(kind, wanted, tolerance))
+        return found
+
+    def _nothing_at(self, kind: str, wanted: dict[int, float], tolerance: float) -> str:
+        axes, values = list(wanted), list(wanted.values())
+        distance = np.abs(self.rest_positions[:, axes] - values).max(axis=1)
+        nearest = int(np.argmin(distance))
+        there = {axis: self.rest_positions[nearest, axis] for axis in axes}
+        return (
+            f"no {kind} at {_describe(wanted)} m (tolerance {tolerance:.3g} m): "
+            f"the nearest vertex, {nearest}, has {_describe(there)}"
+        )
+
+
+def _describe(coordinates: dict[int, float]) -> str:
+    return ", ".join(f"{'xyz'[axis]} = {value:.9g}" for axis, value in coordinates.items())
+
+
+def _where(kind: str, predicate: Callable, points: np.ndarray, indices: np.ndarray) -> np.ndarray:
+    mask = np.asarray(predicate(points))
+    if mask.shape != (len(points),) or mask.dtype != bool:
+        raise ValueError(
+            f"the predicate must return {len(points)} booleans for {len(points)} points, "
+            f"got shape {mask.shape}, dtype {mask.dtype}"
+        )
+    if not mask.any():
+        low, high = points.min(axis=0), points.max(axis=0)
+        spans = ", ".join(f"{name} {low[i]:.6g} to {high[i]:.6g}" for i, name in enumerate("xyz"))
+        raise ValueError(f"the predicate holds for no {kind}; they span {spans} m")
+    return indices[mask]

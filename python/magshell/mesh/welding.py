@@ -1,0 +1,191 @@
+"""Joins meshes where their boundaries meet."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from .._checks.quantity import quantity
+from .selection import RELATIVE_TOLERANCE
+from .triangle_mesh import TriangleMesh
+
+
+class Weld(NamedTuple):
+    """The joined mesh, and where each part went: vertex_maps[part][vertex of the part], faces alike."""
+
+    mesh: TriangleMesh
+    vertex_maps: tuple[np.ndarray, ...]
+    face_maps: tuple[np.ndarray, ...]
+
+
+def weld(*meshes: TriangleMesh, tolerance: float | None = None) -> Weld:
+    """Joins meshes along boundaries that they share vertex by vertex.
+
+    Boundary vertices of different parts within `tolerance` become one, at the position of the first part.
+    Vertices of one part are never joined, so its slits stay open.
+
+    Args:
+        meshes: two or more, their normals on the same side along the seams.
+        tolerance: m; 1e-6 of the largest part's size by default. Below half the shortest edge.
+
+    Raises:
+        ValueError: when a part shares no edge with the others, when the divisions of a shared boundary
+            differ, when two parts are oriented against each other, or when more than two faces would meet at
+            an edge.
+
+    >>> import magshell as ms
+    >>> left = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4))
+    >>> ms.weld(left, left.transformed(translation=(1.0, 0.0, 0.0))).mesh.n_vertices
+    45
+    """
+    if len(meshes) < 2:
+        raise ValueError(f"weld needs at least two meshes, got {len(meshes)}")
+    for part, mesh in enumerate(meshes):
+        if not isinstance(mesh, TriangleMesh):
+            raise ValueError(f"mesh {part} must be a TriangleMesh, got {type(mesh).__name__}")
+    tolerance = _checked_tolerance(meshes, tolerance)
+
+    maps = _vertex_maps(meshes, tolerance)
+    _check_seams(meshes, maps, tolerance)
+    _check_hanging_vertices(meshes, maps, tolerance)
+    merged = np.concatenate(maps)
+    first = np.unique(merged, return_index=True)[1]
+    positions = np.concatenate([mesh.rest_positions for mesh in meshes])[first]
+    faces = np.concatenate([mapped[mesh.faces] for mesh, mapped in zip(meshes, maps, strict=True)])
+
+    ends = np.cumsum([mesh.n_faces for mesh in meshes])
+    face_maps = tuple(np.arange(end - mesh.n_faces, end) for mesh, end in zip(meshes, ends, strict=True))
+    return Weld(TriangleMesh(positions, faces), tuple(maps), face_maps)
+
+
+def _checked_tolerance(meshes, tolerance: float | None) -> float:
+    if tolerance is None:
+        tolerance = RELATIVE_TOLERANCE * max(mesh.size for mesh in meshes)
+    shortest = min(float(mesh.edge_lengths.min()) for mesh in meshes)
+    tolerance = float(quantity("tolerance", "m", tolerance, ()))
+    if not 0 <= tolerance < 0.5 * shortest:
+        raise ValueError(
+            f"tolerance [m] must be at least 0 and below half of the shortest edge ({shortest:.4g} m), "
+            f"got {tolerance}"
+        )
+    return tolerance
+
+
+def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
+    """For each part, the merged vertex of each of its vertices, numbered as they first appear."""
+    part_of = np.concatenate([np.full(mesh.n_vertices, part) for part, mesh in enumerate(meshes)])
+    offsets = np.concatenate([[0], np.cumsum([mesh.n_vertices for mesh in meshes])])
+    rims = np.concatenate([mesh.boundary_vertices + offsets[part] for part, mesh in enumerate(meshes)])
+    positions = np.concatenate([mesh.rest_positions for mesh in meshes])
+
+    pairs = rims[cKDTree(positions[rims]).query_pairs(tolerance, output_type="ndarray")]
+    pairs = pairs[part_of[pairs[:, 0]] != part_of[pairs[:, 1]]]
+    if len(pairs) == 0:
+        _refuse_apart(meshes, np.arange(len(meshes)), tolerance)
+    graph = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(part_of), len(part_of)))
+    cluster = connected_components(graph, directed=False)[1]
+
+    # two vertices of one part in a cluster: a slit's two sides against one vertex of another part
+    owner = np.stack([cluster, part_of], axis=1)
+    _, which, counts = np.unique(owner, axis=0, return_inverse=True, return_counts=True)
+    doubled = np.flatnonzero(counts[which.ravel()] > 1)
+    if len(doubled):
+        part = part_of[doubled[0]]
+        vertices = doubled[(owner[doubled] == owner[doubled[0]]).all(axis=1)] - offsets[part]
+        raise ValueError(
+            f"vertices {vertices[0]} and {vertices[1]} of mesh {part} both coincide with a vertex of another "
+            "mesh; weld would close the slit between them"
+        )
+
+    _, first, number = np.unique(cluster, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return np.split(rank[number.ravel()], offsets[1:-1])
+
+
+def _check_seams(meshes, maps: list[np.ndarray], tolerance: float) -> None:
+    """Refuses what TriangleMesh would refuse too, but in terms of the parts; and parts that nothing holds."""
+    starts, ends, parts = [], [], []
+    for number, (mesh, mapped) in enumerate(zip(meshes, maps, strict=True)):
+        edges = mapped[mesh.edges[mesh.boundary_edges]]
+        backward = mesh.edge_faces[mesh.boundary_edges, 0] < 0
+        starts.append(np.where(backward, edges[:, 1], edges[:, 0]))
+        ends.append(np.where(backward, edges[:, 0], edges[:, 1]))
+        parts.append(np.full(len(edges), number))
+    start, end, part = np.concatenate(starts), np.concatenate(ends), np.concatenate(parts)
+
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = np.lexsort((part, high, low))
+    start, low, high, part = start[order], low[order], high[order], part[order]
+    same = (low[1:] == low[:-1]) & (high[1:] == high[:-1])
+    seams = np.flatnonzero(same)
+    crowded = np.flatnonzero(same[1:] & same[:-1])
+    if len(crowded):
+        k = crowded[0]
+        raise ValueError(
+            f"meshes {part[k]}, {part[k + 1]} and {part[k + 2]} meet at one edge; "
+            "a manifold surface has at most 2 faces at an edge"
+        )
+    against = seams[start[seams] == start[seams + 1]]
+    if len(against):
+        k = against[0]
+        raise ValueError(
+            f"meshes {part[k]} and {part[k + 1]} are oriented against each other along their seam: "
+            f"weld meshes[{part[k + 1]}].flipped() instead"
+        )
+    shape = (len(meshes), len(meshes))
+    graph = coo_array((np.ones(len(seams), dtype=bool), (part[seams], part[seams + 1])), shape=shape)
+    n_groups, group = connected_components(graph, directed=False)
+    if n_groups > 1:
+        _refuse_apart(meshes, group, tolerance)
+
+
+def _check_hanging_vertices(meshes, maps: list[np.ndarray], tolerance: float) -> None:
+    """A vertex in the middle of another part's boundary edge would leave a crack."""
+    for part, mesh in enumerate(meshes):
+        foreign = [
+            (other, vertex)
+            for other, (other_mesh, mapped) in enumerate(zip(meshes, maps, strict=True))
+            if other != part
+            for vertex in other_mesh.boundary_vertices[
+                ~np.isin(mapped[other_mesh.boundary_vertices], maps[part])
+            ]
+        ]
+        if not foreign or len(mesh.boundary_edges) == 0:
+            continue
+        points = np.array([meshes[other].rest_positions[vertex] for other, vertex in foreign])
+        edges = mesh.boundary_edges
+        near = cKDTree(points).query_ball_point(mesh.edge_midpoints[edges], 0.5 * mesh.edge_lengths[edges])
+        for edge, candidates in zip(edges, near, strict=True):
+            start, end = mesh.rest_positions[mesh.edges[edge]]
+            along = (end - start) / mesh.edge_lengths[edge]
+            offsets = points[candidates] - start
+            across = np.linalg.norm(offsets - np.outer(offsets @ along, along), axis=1)
+            hanging = np.flatnonzero(across <= tolerance)
+            if len(hanging):
+                other, vertex = foreign[candidates[hanging[0]]]
+                raise ValueError(
+                    f"vertex {vertex} of mesh {other} lies in the middle of edge {edge} of mesh {part}: "
+                    "divide the shared boundary alike in both, or the joined sheet would have a crack there"
+                )
+
+
+def _refuse_apart(meshes, group: np.ndarray, tolerance: float) -> None:
+    """group: (n_parts,), which parts hold together. Names those that the first part is not joined to."""
+    apart = np.flatnonzero(group == group[np.argmax(group != group[0])])
+    rims = [(part, vertex) for part in apart for vertex in meshes[part].boundary_vertices]
+    others = [mesh.rest_positions[mesh.boundary_vertices] for k, mesh in enumerate(meshes) if k not in apart]
+    if not rims or not sum(map(len, others)):
+        raise ValueError("a closed mesh has no boundary to weld")
+    points = np.array([meshes[part].rest_positions[vertex] for part, vertex in rims])
+    distance, _ = cKDTree(np.concatenate(others)).query(points)
+    part, vertex = rims[np.argmin(distance)]
+    raise ValueError(
+        f"mesh {part} shares no edge with the others: its boundary vertex {vertex} comes closest to theirs, "
+        f"at {distance.min():.4g} m (tolerance {tolerance:.3g} m). Move the parts together, and divide the "
+        "shared boundary alike in both"
+    )

@@ -1,0 +1,35 @@
+"""A flat rectangular sheet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.arrays import positive
+from ..mesh.triangle_mesh import TriangleMesh
+from ._grid import grid
+
+
+def rectangle(
+    length: float,
+    width: float,
+    cells: tuple[int, int],
+    diagonals: str = "alternating",
+    irregular: float | None = None,
+    seed: int = 0,
+) -> TriangleMesh:
+    """The sheet [0, length] x [0, width] [m] in the plane z = 0, its normal along +z.
+
+    Args:
+        length, width: along x and y, m.
+        cells: along x and y.
+        diagonals: "alternating", "aligned" (all from the origin outwards) or "crossed" (four faces a cell).
+        irregular: moves interior vertices at random by up to this fraction of their spacing, at most 0.25.
+        seed: of these moves; the same seed gives the same mesh.
+
+    >>> rectangle(0.12, 0.02, cells=(60, 10)).n_faces
+    1200
+    """
+    length, width = positive("length [m]", length), positive("width [m]", width)
+    g = grid(cells, diagonals, irregular, seed)
+    x, y = g.parameters.T
+    return TriangleMesh(np.stack([length * x, width * y, np.zeros_like(x)], axis=1), g.faces)

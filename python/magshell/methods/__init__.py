@@ -1,0 +1,1 @@
+"""How equilibria are looked for and time steps are taken: options as objects."""

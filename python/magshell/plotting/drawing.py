@@ -1,0 +1,126 @@
+"""ms.plot: a picture of sheets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.arrays import index_array
+from ..mesh.crossings import AFFORDABLE
+from ..states.state import State, states_of
+from ..states.units import length_unit
+from . import backend as backends
+from .colors import scalar_of
+from .limits import arrow_count, check_columns, checked_width
+from .panels import Options, draw, size_of
+from .picture import Picture, paint
+from .playing import spread
+from .view import view_of
+
+MOST_STATES = 9  # of a path, unless asked for more
+
+
+def plot(
+    what,
+    *,
+    positions=None,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    field=None,
+    obstacles=None,
+    states=None,
+    color="auto",
+    color_label: str | None = None,
+    color_range=None,
+    arrows: bool | int = True,
+    show_field: bool = True,
+    rest: bool = False,
+    mesh_lines: bool = False,
+    titles=None,
+    overlay: bool = False,
+    fade: bool = False,
+    columns: int | None = None,
+    view=None,
+    width: int = 1600,
+    backend: str | None = None,
+) -> Picture:
+    """A picture of a sheet, its magnetization and the field; of several, side by side or over each other.
+
+    what: a mesh, a Shell, a Scene, a result, or a list of those.
+    positions, remanent_magnetization, applied_flux_density, field: (n_v, 3) m, (n_f, 3) A/m, (3,) T and
+        fields that vary in space: for a mesh, which has none, or instead of a result's own.
+    obstacles: what is around the sheet, one one sees through; by default what the contacts of a scene are about.
+    states: numbers of those to draw, of a path or a motion; by default all, or nine evenly spread ones.
+    color: "magnetization" (the component of M_r along the axis that all of it shares, else its angle or
+        magnitude), "displacement", "magnetic_energy" (a rest volume), an array with a number a face or a
+        vertex, a list of such arrays, one a state, or None for plain sheets. "auto": magnetization if it
+        varies, else displacement.
+    color_label, color_range: the text, with the unit, and the ends of the colour bar.
+    arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
+    show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it.
+    rest: the rest shape as a faint outline. mesh_lines: the edges of the mesh.
+    titles: one a state; that a sheet passes through itself is added, where there are at most 20,000 faces to look at.
+    overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light shows a motion.
+    columns: of panels, by default what fits best.
+    view: (elevation, azimuth) in degrees of the eye, as in matplotlib; by default what suits the sheet.
+    width: pixels, 400 to 8000; a picture has at most 16 million of them.
+    backend: "pyvista" or "matplotlib"; by default the environment variable MAGSHELL_PLOT, else pyvista where
+        it can render off the screen, else matplotlib.
+
+    Raises ValueError on bad input, ImportError without matplotlib.
+
+    >>> import magshell as ms
+    >>> ms.plot(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), backend="matplotlib", width=800)
+    Picture(800 x 343 pixels, painted by matplotlib)
+    """
+    width = checked_width(width)
+    check_columns(columns, width)
+    count = arrow_count(arrows)
+    painter = backends.choose(backend)
+    drawn = states_of(
+        what,
+        positions=positions,
+        remanent_magnetization=remanent_magnetization,
+        applied_flux_density=applied_flux_density,
+        field=field,
+        obstacles=obstacles,
+    )
+    drawn = _chosen(drawn, states)
+    titles = noted_crossings(checked_titles(titles, drawn), drawn)
+    unit = length_unit(size_of(drawn))
+    scalar = scalar_of(drawn, color, color_label, color_range, unit)
+    groups = [drawn] if overlay or fade else [[state] for state in drawn]
+    options = Options(count, show_field, rest, mesh_lines, fade)
+    drawing = draw(groups, titles, scalar, view_of(drawn, view), unit, options)
+    return paint(drawing, width, columns, painter)
+
+
+def checked_titles(titles, states: list[State]) -> list[str]:
+    """One title a state; by default what its result calls it."""
+    if titles is None:
+        return [state.title for state in states]
+    listed = [titles] if isinstance(titles, str) else list(titles)
+    if len(listed) != len(states) or not all(isinstance(title, str) for title in listed):
+        raise ValueError(f"titles must be {len(states)} strings, one a state, got {titles!r}")
+    return listed
+
+
+def noted_crossings(titles: list[str], states: list[State]) -> list[str]:
+    """The titles, with a word where the sheet passes through itself. As they are where looking costs much."""
+    if sum(state.mesh.n_faces for state in states) > AFFORDABLE:
+        return titles
+    crosses = [len(state.mesh.self_intersections(state.positions)) > 0 for state in states]
+    word = "passes through itself"
+    return [
+        (f"{title}, {word}" if title else word) if crossing else title
+        for title, crossing in zip(titles, crosses, strict=True)
+    ]
+
+
+def _chosen(states: list[State], chosen) -> list[State]:
+    """The states of the given numbers; by default all, and of many some evenly spread ones."""
+    if chosen is None:
+        return spread(states, MOST_STATES)
+    numbers = np.atleast_1d(index_array("states", chosen))
+    if not numbers.size or numbers.min() < -len(states) or numbers.max() >= len(states):
+        raise ValueError(f"states must be numbers of the {len(states)} states, got {numbers.tolist()}")
+    return [states[k] for k in numbers]

@@ -1,0 +1,94 @@
+"""What a solve may replace of its scene's values, and how it is asked for."""
+
+from __future__ import annotations
+
+from .._checks.quantity import quantity
+from .._machine.keywords import controls_of, nearest_first
+from ..bodies.shell import Shell
+from ..surroundings.loads import EdgeCouple
+from .courses import refuse_functions
+
+# Those of a scene's one body that have a keyword of their own.
+SHELL_NAMES = tuple(name for name in Shell._replaceable if name != "remanent_magnetization")
+
+
+def requested(
+    scene, vertex_loads, values, moving: bool = False, in_time: bool = False, **shell
+) -> dict[object, dict[str, object]]:
+    """{object of the scene: {name: value}} from a solve's arguments. Raises ValueError on what has no place.
+
+    moving: the scene has inertia in this solve; in_time: values may change during it.
+    """
+    asked: dict[object, dict[str, object]] = {}
+    if values is not None and not isinstance(values, dict):
+        raise ValueError(
+            f"values must be a dict {{object of the scene: {{name: value}}}}, got {type(values).__name__}"
+        )
+    for owner, named in (values or {}).items():
+        _check(scene, owner, named)
+        for name, value in named.items():
+            if not in_time:
+                refuse_functions(owner, name, value, in_time)
+        asked[owner] = dict(named)
+    for name, value in shell.items():
+        if value is not None:
+            _add(asked, _one_body(scene, name), name, value)
+    if vertex_loads is not None:
+        _add(asked, scene, "vertex_loads", vertex_loads)
+    _check_against_scene(scene, asked, moving)
+    return asked
+
+
+def checked(scene, owner, name: str, value):
+    """The values that no constructor checks."""
+    if owner is not scene:
+        return value
+    unit, shape = {"gravity": ("m/s2", (3,)), "vertex_loads": ("N", (scene.mesh.n_vertices, 3))}[name]
+    return quantity(name, unit, value, shape)
+
+
+def _add(asked: dict, owner, name: str, value) -> None:
+    if name in asked.setdefault(owner, {}):
+        raise ValueError(f"{name} was given twice: as an argument and in values")
+    asked[owner][name] = value
+
+
+def _one_body(scene, name: str) -> Shell:
+    if len(scene.bodies) > 1:
+        raise ValueError(
+            f"{name} was given as an argument, but the scene has {len(scene.bodies)} bodies: say whose it is, "
+            f"values={{body: {{{name!r}: ...}}}}"
+        )
+    return scene.bodies[0]
+
+
+def _check(scene, owner, named) -> None:
+    if not any(owner is item for item in (scene, *scene.parts)):
+        raise ValueError(f"values has a key that is not the scene, nor an object of it: {owner!r}")
+    if not isinstance(named, dict):
+        raise ValueError(f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}")
+    names = (*getattr(owner, "_replaceable", ()), *controls_of(owner, scene))
+    for name in named:
+        if name not in names:
+            what = f"it has {nearest_first(name, names)}" if names else "it has none that can be"
+            raise ValueError(
+                f"{type(owner).__name__} has no value {name!r} to be replaced in a solve: {what}"
+            )
+
+
+def _check_against_scene(scene, asked: dict, moving: bool) -> None:
+    heavy = bool(scene.gravity.any())
+    dense = any("mass_density" in asked.get(body, {}) for body in scene.bodies)
+    idle_density = dense and not moving
+    if not heavy and ("gravity" in asked.get(scene, {}) or idle_density):
+        raise ValueError(
+            "gravity or mass_density was given, but the scene has no gravity: Scene(..., gravity=...)"
+        )
+    if "vertex_loads" in asked.get(scene, {}):
+        forces = [load for load in scene.loads if not isinstance(load, EdgeCouple)]
+        if not forces:
+            raise ValueError(
+                "vertex_loads was given, but the scene has no loads: Scene(..., loads=...), zero will do"
+            )
+        if any(load in asked for load in forces):
+            raise ValueError("vertex_loads stands for all loads: leave them out of values")

@@ -1,0 +1,287 @@
+"""A scene: one shell or several, how they are held, and what acts on them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable
+from contextlib import contextmanager
+from functools import cached_property
+
+import numpy as np
+
+from .. import _core
+from .._checks.checked_list import checked_list
+from .._checks.quantity import quantity
+from ..bodies.bodies import Bodies
+from ..bodies.caps import Caps
+from ..bodies.shell import Shell
+from ..fields.field import AppliedField, UniformField
+from ..mesh.triangle_mesh import TriangleMesh
+from ..surroundings.constraints import Constraints, free_rigid_motions, gather
+from ..surroundings.contact import Contact
+from ..surroundings.contact_inputs import contact_inputs, obstacles_of
+from ..surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
+from ..surroundings.supports import Clamp, Pin, SymmetryPlane, continuations
+from ..surroundings.water import Water
+from .layout import Layout
+from .values import Values
+
+_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple)
+_SUPPORTS = (Pin, Clamp, SymmetryPlane)
+
+
+class Scene:
+    """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
+    needs and, up to 256 MB, the memory of its last factorization.
+
+    bodies: a Shell, or several that do not touch each other. Positions and faces of a result are those of one body after
+        another, and `result[body]` has those of one; each may have its own `bending`.
+    supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
+    loads: PointLoad, EdgeLoad, AreaLoad and EdgeCouple objects; likewise.
+    field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
+    gravity: (3,), m/s2; needs the mass density of all bodies.
+    contacts: Contact objects, each with the obstacles that it is about.
+    water: what the sheet moves through, in ms.simulate only.
+    allow_rigid_motions: accept a scene that supports do not hold entirely, because a field or gravity does.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5)
+    >>> ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField()).n_unknowns
+    160
+
+    >>> other = ms.Shell(mesh.transformed(translation=(0, 0, 0.05)), thickness=5e-4, young_modulus=1e5, bending="hinge")
+    >>> held = [ms.Clamp(mesh.edges_at(x=0.0), body=body) for body in (sheet, other)]
+    >>> pair = ms.Scene([sheet, other], supports=held, field=ms.UniformField())
+    >>> rest = ms.equilibrium(
+    ...     pair,
+    ...     applied_flux_density=(0, 0, 1e-4),
+    ...     values={sheet: {"remanent_magnetization": (2e4, 0, 0)}, other: {"remanent_magnetization": (-1e4, 0, 0)}},
+    ... )
+    >>> rest[other].positions.shape, bool(rest[sheet].displacements[-1, 2] > 0 > rest[other].displacements[-1, 2])
+    ((33, 3), True)
+    """
+
+    _replaceable = ("gravity", "vertex_loads")
+
+    def __init__(
+        self,
+        bodies: Shell | Iterable[Shell],
+        *,
+        supports=(),
+        loads=(),
+        field=None,
+        gravity=None,
+        contacts=(),
+        water: Water | None = None,
+        allow_rigid_motions: bool = False,
+    ):
+        self._bodies = Bodies(bodies)
+        self.supports = checked_list("supports", supports, _SUPPORTS)
+        self.loads = checked_list("loads", loads, _LOADS)
+        self.fields = () if field is None else checked_list("field", field, (AppliedField,))
+        self.contacts = checked_list("contacts", contacts, (Contact,))
+        self.obstacles = obstacles_of(self.contacts)
+        if water is not None and not isinstance(water, Water):
+            raise ValueError(f"water must be a Water, got {type(water).__name__}")
+        self.water = water
+        self.gravity = np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
+        if any(f._core is None and not isinstance(f, UniformField) for f in self.fields):
+            raise ValueError("field holds an AppliedField without a value: use a CustomField")
+        if not isinstance(allow_rigid_motions, bool):
+            raise ValueError(f"allow_rigid_motions must be True or False, got {allow_rigid_motions!r}")
+        if sum(isinstance(f, UniformField) for f in self.fields) > 1:
+            raise ValueError(
+                "field holds several UniformFields: one is enough, its value comes when the scene is solved"
+            )
+        self._allow_rigid_motions = allow_rigid_motions
+        self._build(allow_rigid_motions)
+
+    def __getstate__(self) -> dict:
+        """What a copy, or another process, makes the scene from again."""
+        return {
+            "bodies": self.bodies,
+            "supports": self.supports,
+            "loads": self.loads,
+            "field": self.fields,
+            "gravity": self.gravity,
+            "contacts": self.contacts,
+            "water": self.water,
+            "allow_rigid_motions": self._allow_rigid_motions,
+        }
+
+    def __setstate__(self, arguments: dict) -> None:
+        self.__init__(**arguments)
+
+    def _build(self, allow_rigid_motions: bool) -> None:
+        bodies, mesh = self._bodies, self.mesh
+        edges = _couple_edges(bodies, self.loads)
+        self._couple_directions = _couple_directions(mesh, edges)
+        constraints = gather(bodies, self.supports, self._couple_directions)
+        held = np.intersect1d(edges, constraints.directed_edges[:, 0])
+        if held.size:
+            raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
+        free = [] if allow_rigid_motions else free_rigid_motions(bodies, constraints)
+        if free:
+            raise ValueError(
+                f"the supports leave the sheet free: {'; '.join(free)}. Hold it, or say allow_rigid_motions=True if a "
+                "field or gravity does"
+            )
+        n_directions, n_couples = len(constraints.directions), len(edges)
+        self._constraints, self._couple_edges = constraints, edges
+        self._turn, self._solving = threading.RLock(), False
+        self._warned_of_caps = False
+        self._warned_of_strain = 0.0
+        self._model = _core.Model(
+            n_vertices=mesh.n_vertices,
+            sheets=self._sheets(constraints),
+            directions=constraints.directions,
+            held_nodes=constraints.held_nodes,
+            held_frames=constraints.held_frames,
+            motions=len(constraints.motions),
+            couples=np.stack(
+                [*bodies.split(edges), n_directions - n_couples + np.arange(n_couples)], axis=1
+            ).astype(np.int32),
+            gravity=bool(self.gravity.any()),
+            loads=any(not isinstance(load, EdgeCouple) for load in self.loads),
+            field_sources=[source._core for source in self._sources],
+            contacts=contact_inputs(self.contacts, bodies),
+            obstacles=[each._core for each in self.obstacles],
+            water=None if self.water is None else self.water._core,
+        )
+        self._value_layout = Layout(self._model.parameters)
+        self._control_layout = Layout(self._model.controls)
+        # What the core holds now: a solve with other values puts its own there.
+        self._values = self._in_core = Values(self)
+        self._model.set_values(self._values.numbers)
+
+    def _sheets(self, constraints: Constraints) -> list[dict]:
+        """The bodies as the core takes them."""
+        of, edges = self._bodies.split(constraints.directed_edges[:, 0])
+        pairs = np.stack([edges, constraints.directed_edges[:, 1]], axis=1).astype(np.int32)
+        return [
+            {
+                "owner": f"body {k}",
+                "mesh": part.mesh._core,
+                "vertices": np.arange(part.vertices.start, part.vertices.stop),
+                "curvature_scale": shell.curvature_scale,
+                "directors": shell.bending == "midedge",
+                "magnetic": bool(self.fields),
+                "directed_edges": pairs[of == k],
+            }
+            for k, (shell, part) in enumerate(zip(self.bodies, self._bodies.parts, strict=True))
+        ]
+
+    @property
+    def _sources(self) -> list[AppliedField]:
+        return [field for field in self.fields if not isinstance(field, UniformField)]
+
+    @property
+    def _labels(self) -> list[tuple[object, str]]:
+        """Every object of it with the name that the core has for its values."""
+        kinds = (
+            ("body", self.bodies),
+            ("support", self.supports),
+            ("load", self.loads),
+            ("field", self._sources),
+            ("contact", self.contacts),
+            ("obstacle", self.obstacles),
+        )
+        labels = [(each, f"{kind} {k}") for kind, objects in kinds for k, each in enumerate(objects)]
+        return labels if self.water is None else [*labels, (self.water, "water")]
+
+    @contextmanager
+    def _exclusive(self):
+        """One solve at a time: the core keeps the magnetization and the last evaluated state."""
+        with self._turn:
+            if self._solving:
+                raise RuntimeError("the scene is being solved: what a solve calls cannot solve it again")
+            self._solving = True
+            try:
+                yield
+            finally:
+                self._solving = False
+
+    @cached_property
+    def _caps(self) -> Caps:
+        return Caps(self._values.whole, self._model.recut_faces)
+
+    @property
+    def bodies(self) -> tuple[Shell, ...]:
+        return self._bodies.shells
+
+    @property
+    def shell(self) -> Shell:
+        """The one body. Raises ValueError where there are several."""
+        if len(self.bodies) > 1:
+            raise ValueError(f"the scene has {len(self.bodies)} bodies: say which, scene.bodies[k]")
+        return self.bodies[0]
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """Of all bodies: vertices, edges and faces of one after another."""
+        return self._bodies.mesh
+
+    @property
+    def parts(self) -> tuple:
+        """Every object of it, always in the same order. What a solve's `values` may name beside the scene itself."""
+        water = () if self.water is None else (self.water,)
+        return (
+            *self.bodies,
+            *self.supports,
+            *self.loads,
+            *self.fields,
+            *self.contacts,
+            *self.obstacles,
+            *water,
+        )
+
+    @property
+    def has_uniform_field(self) -> bool:
+        return any(isinstance(f, UniformField) for f in self.fields)
+
+    @property
+    def has_forces_of_motion(self) -> bool:
+        """Whether forces act on it that no energy has: friction, water."""
+        return self.water is not None or any(
+            contact.friction_coefficient is not None for contact in self.contacts
+        )
+
+    @property
+    def n_unknowns(self) -> int:
+        """Free position components and edge rotations."""
+        return self._model.free_size
+
+    def __repr__(self) -> str:
+        several = len(self.bodies) > 1
+        lines = [f"Scene: {len(self.bodies)} bodies" if several else f"Scene: {self.bodies[0]!r}"]
+        if several:
+            lines += [f"  body {k}: {body!r}" for k, body in enumerate(self.bodies)]
+        lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
+        lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
+        lines += [f"  in {field!r}" for field in self.fields]
+        lines += [f"  kept out by {contact!r}{self._whose(contact)}" for contact in self.contacts]
+        if self.water is not None:
+            lines.append(f"  in {self.water!r}")
+        if self.gravity.any():
+            lines.append(f"  under gravity {tuple(self.gravity.tolist())} m/s2")
+        lines.append(f"  {self.n_unknowns} unknowns")
+        return "\n".join(lines)
+
+    def _whose(self, item) -> str:
+        """For the repr of a scene with several bodies."""
+        if len(self.bodies) == 1 or item.body is None:
+            return ""
+        return f" (body {self._bodies.number(item.body)})"
+
+
+def _couple_edges(bodies: Bodies, loads) -> np.ndarray:
+    """The scene's edges that couples turn, ascending, (k,)."""
+    places = [(load, bodies.of(load)) for load in loads if isinstance(load, EdgeCouple)]
+    edges = [part.first_edge + load.edge_couples(part.mesh)[0] for load, part in places]
+    return np.unique(np.concatenate(edges)) if edges else np.zeros(0, dtype=np.int64)
+
+
+def _couple_directions(mesh, edges: np.ndarray) -> np.ndarray:
+    """What each couple's edge angle is measured to: outwards in the plane of its face at rest, (k, 3)."""
+    return continuations(mesh, edges) if len(edges) else np.zeros((0, 3))

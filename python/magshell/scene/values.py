@@ -1,0 +1,158 @@
+"""The numbers of a scene as the core takes them, some replaced for one solve; gradients on the way back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..bodies.bodies import Whole, joined
+from ..bodies.shell import Shell
+from ..surroundings.constraints import Constraints, gather
+
+
+class Values:
+    """A scene's values, its own or with `replaced`: {object of the scene: {name: array}}.
+
+    The scene itself has the names "gravity" and "vertex_loads". magnetization: (n_f of all, 3) A/m, of a scene in a field,
+    in place of the bodies' own.
+    numbers: (n,), all of them, in the core's layout.
+    Raises ValueError where a value does not fit.
+    """
+
+    def __init__(
+        self,
+        scene,
+        replaced: dict[object, dict] | None = None,
+        magnetization: np.ndarray | None = None,
+    ):
+        self.scene = scene
+        self._now = {
+            item: item.replaced(**values) for item, values in (replaced or {}).items() if item is not scene
+        }
+        self.sheets = tuple(self.current(body) for body in scene.bodies)
+        self.constraints = scene._constraints
+        if any(support in self._now for support in scene.supports):
+            self.constraints = self._moved()
+        own = (replaced or {}).get(scene, {})
+        self.gravity = own.get("gravity", scene.gravity)
+        numbers: dict[tuple[str, str], np.ndarray] = {}
+        for owner, label in scene._labels:
+            self.current(owner).add_numbers(label, self, numbers)
+        if ("gravity", "forces") in scene._value_layout:
+            numbers["gravity", "forces"] = self.vertex_masses[:, None] * self.gravity
+        if "vertex_loads" in own:
+            numbers["loads", "forces"] = own["vertex_loads"]
+        if magnetization is not None:
+            for k, part in enumerate(scene._bodies.parts):
+                numbers[f"body {k}", "remanent_magnetization"] = magnetization[part.faces]
+        self.numbers = scene._value_layout.packed(numbers)
+
+    def same_as(self, other: Values) -> bool:
+        return np.array_equal(self.numbers, other.numbers)
+
+    def gradients(self, owner, gradient: Gradient) -> dict[str, np.ndarray]:
+        """By the values of one object of the scene, from the core's gradients; a row for each of its parts."""
+        if owner is not self.scene:
+            labels = [label for each, label in self.scene._labels if each is owner]
+            return self.current(owner).gradients(labels[0], self, gradient)
+        found = {}
+        if ("loads", "forces") in self.scene._value_layout:
+            found["vertex_loads"] = gradient.value("loads", "forces")
+        if (by_weights := self.by_weights(gradient)) is not None:
+            found["gravity"] = self.vertex_masses @ by_weights
+        return found
+
+    @property
+    def contacts(self) -> list[tuple]:
+        """(contact, its label, the sheets that touch) of all, as they are in this solve."""
+        labels = [(each, label) for each, label in self.scene._labels if each in self.scene.contacts]
+        return [(self.current(each), label, self.touching(each)) for each, label in labels]
+
+    @property
+    def whole(self) -> Shell | Whole:
+        """All sheets as one, for what looks at their faces."""
+        return self.sheets[0] if len(self.sheets) == 1 else Whole(self.scene.mesh, self.sheets)
+
+    def touching(self, contact) -> tuple:
+        """The sheets that a contact is about, as they are in this solve."""
+        return self.sheets[self.scene._bodies.of(contact).bodies]
+
+    def part_of(self, sheet):
+        """Where one of `sheets` stands among them."""
+        return next(
+            part for part, each in zip(self.scene._bodies.parts, self.sheets, strict=True) if each is sheet
+        )
+
+    @property
+    def vertex_masses(self) -> np.ndarray:
+        """Of all bodies, (n_v,), kg. Raises ValueError where one has no mass density."""
+        for k, sheet in enumerate(self.sheets):
+            if sheet.mass_density is None and len(self.sheets) > 1:
+                raise ValueError(f"body {k} of the scene has no mass_density [kg/m3]")
+        return joined([sheet.vertex_masses for sheet in self.sheets])
+
+    def by_masses(self, gradient: Gradient) -> np.ndarray | None:
+        """By the masses of the vertices (n_v,), of gravity and of inertia; None where they have no part."""
+        by_masses, by_weights = gradient.others.get("mass"), self.by_weights(gradient)
+        if by_weights is None:
+            return by_masses
+        return by_weights @ self.gravity + (0.0 if by_masses is None else by_masses)
+
+    def by_weights(self, gradient: Gradient) -> np.ndarray | None:
+        """By the vertices' weights, (n_v, 3); None where nothing is heavy."""
+        if ("gravity", "forces") not in self.scene._value_layout:
+            return None
+        return gradient.value("gravity", "forces")
+
+    def current(self, item):
+        """An object of the scene as it is in this solve."""
+        return self._now.get(item, item)
+
+    def move(self, obstacle, path) -> None:
+        """Has an obstacle, whose own place is the origin in `numbers`, follow a path."""
+        self._now[obstacle] = obstacle._on(path)
+
+    def _moved(self) -> Constraints:
+        """The same constraints with other motions."""
+        scene = self.scene
+        supports = [self.current(support) for support in scene.supports]
+        moved = gather(scene._bodies, supports, scene._couple_directions)
+        if not np.array_equal(moved.held_nodes, scene._constraints.held_nodes):
+            raise ValueError(
+                "a support that stays cannot be moved by a solve: "
+                "give it a displacement in the scene, zero will do"
+            )
+        return moved
+
+
+class Gradient:
+    """The core's gradient of a number by all values and controls of a scene.
+
+    values: (n,); controls: (m,), or (knots, m) of a motion; others: by what a motion has beside them, by name.
+    """
+
+    def __init__(self, scene, values: np.ndarray, controls: np.ndarray, others: dict | None = None):
+        self._scene, self._values, self._controls = scene, values, controls
+        self.others = others or {}
+
+    def has(self, owner: str, name: str) -> bool:
+        return (owner, name) in self._scene._value_layout
+
+    def value(self, owner: str, name: str) -> np.ndarray:
+        return self._scene._value_layout.part(self._values, owner, name)
+
+    def control(self, owner: str, name: str) -> np.ndarray:
+        """By a control, (knots, rows, width) of a motion."""
+        return self._scene._control_layout.part(self._controls, owner, name)
+
+    def of_controls(self, place: slice) -> np.ndarray:
+        """By what stands there in the vectors of controls."""
+        return self._controls[..., place]
+
+    def own(self, name: str) -> np.ndarray:
+        """By what a solve itself was given: a control, or one of the others."""
+        if name in self.others:
+            return self.others[name]
+        if name == "remanent_magnetization":
+            return joined([self.value(f"body {k}", name) for k in range(len(self._scene.bodies))])
+        by_control = self.control("scene", name)
+        return by_control[..., 0, :] if name == "applied_flux_density" else by_control[..., 0]

@@ -1,0 +1,1 @@
+"""The same optimization from many starts."""

@@ -1,0 +1,1 @@
+"""Results as states of sheets, to be drawn and written."""

@@ -1,0 +1,168 @@
+"""A motion as files: one VTU a state, and a PVD that says when each is."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from tqdm import tqdm
+
+from .._checks.arrays import named_values
+from .._checks.quantity import quantity, shape_of
+from .._checks.tensors import detached
+from .._machine.files import replacing
+from ..mesh.io import check_field_name, write_mesh
+from .state import State, states_of, with_times
+
+
+def write_series(
+    path,
+    what,
+    *,
+    positions=None,
+    times=None,
+    velocities=None,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    field=None,
+    vertex_fields: dict | None = None,
+    face_fields: dict | None = None,
+    progress: bool = True,
+) -> Path:
+    """Writes a motion for ParaView: strip.pvd, and in a folder strip/ beside it one VTU a state (the extra `io`).
+
+    what: a Trajectory, a Path, Equilibria, a mesh with positions, or whatever else `plot` takes.
+    positions: (n, n_v, 3) m, where `what` has none. times: (n,) s; by default its own, else 0, 1, 2, ...
+    velocities: (n, n_v, 3) m/s; by default its own.
+    remanent_magnetization, applied_flux_density, field: as in `plot`.
+    vertex_fields, face_fields: name -> (n, n_v) or (n, n_v, k), and (n, n_f) or (n, n_f, k), which are added.
+
+    Points have `displacement` [m], `velocity` [m/s] and, in a field, `flux_density` [T]; faces of a magnetized sheet
+    have `magnetization` [A/m], F_0 M_r, as it turns with them. Returns the path of the PVD. progress: show a bar once it
+    has taken two seconds.
+
+    Replaces an earlier series of this name. The PVD is there at the end, and lists whole files only: after an error,
+    a full disk or Ctrl-C those that are done.
+
+    Raises ValueError on bad input, FileNotFoundError without the folder, ImportError without meshio, and OSError, with
+    the states that are on disk, if a file cannot be written.
+
+    >>> import magshell as ms, tempfile
+    >>> strip = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> rising = [strip.rest_positions + (0, 0, height) for height in (0, 0.01, 0.02)]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_series(f"{folder}/rise.pvd", strip, positions=rising, times=(0, 0.1, 0.2)).name
+    'rise.pvd'
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".pvd":
+        raise ValueError(f"a series is saved as .pvd, got {path.name!r}; write_mesh writes one state as .vtu")
+    if not path.name.isprintable():
+        raise ValueError(f"the name of a series must be printable, got {path.name!r}")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"cannot write {path.name!r}: there is no folder {str(path.parent)!r}")
+    states = states_of(
+        what,
+        positions=positions,
+        remanent_magnetization=remanent_magnetization,
+        applied_flux_density=applied_flux_density,
+        field=field,
+    )
+    states = with_times(states, times)
+    velocities = getattr(what, "velocities", None) if velocities is None else velocities
+    more = {
+        "vertex": _by_state(vertex_fields, "vertex", states),
+        "face": _by_state(face_fields, "face", states),
+    }
+    if velocities is not None:
+        row = (states[0].mesh.n_vertices, 3)
+        more["vertex"]["velocity"] = quantity("velocities", "m/s", detached(velocities), (len(states), *row))
+    in_field = any(state.flux_density is not None or state.sources is not None for state in states)
+    magnetized = any(state.is_magnetized for state in states)
+    digits = len(str(len(states) - 1))
+    names = [f"{path.stem}/{path.stem}_{k:0{digits}}.vtu" for k in range(len(states))]
+    with _listed(path, names, states) as done:
+        for k, state in enumerate(tqdm(states, desc="write_series", delay=2.0, disable=not progress)):
+            on_vertices = {"displacement": state.displacements}
+            on_vertices |= {name: values[k] for name, values in more["vertex"].items()}
+            if in_field:
+                on_vertices["flux_density"] = state.flux_density_at(state.positions)
+            on_faces = {name: values[k] for name, values in more["face"].items()}
+            if magnetized:
+                on_faces["magnetization"] = state.magnetization
+            write_mesh(path.parent / names[k], state.mesh, state.positions, on_vertices, on_faces)
+            done.append(k)
+    return path
+
+
+def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
+    fields = named_values(f"{kind}_fields", fields)
+    mesh = states[0].mesh
+    rows = mesh.n_vertices if kind == "vertex" else mesh.n_faces
+    for name, values in fields.items():
+        check_field_name(kind, name)
+        shape = shape_of(f"{kind} field {name!r}", values)
+        if len(shape) not in (2, 3) or shape[:2] != (len(states), rows):
+            raise ValueError(
+                f"{kind} field {name!r} must have shape ({len(states)}, {rows}) or ({len(states)}, {rows}, k), "
+                f"got {shape}"
+            )
+    return {name: np.asarray(detached(values)) for name, values in fields.items()}
+
+
+@contextmanager
+def _listed(path: Path, names: list[str], states: list[State]) -> Iterator[list[int]]:
+    """Writes the PVD of the states whose numbers are appended to the list it gives, also after an error."""
+    done: list[int] = []
+    stopped = None
+    try:
+        with replacing(path) as part:
+            (path.parent / path.stem).mkdir(exist_ok=True)
+            _clear(path)
+            # in full at first, so that it has its place on a disk that the states fill
+            part.write_bytes(_contents(names, states, range(len(states))))
+            try:
+                yield done
+            except BaseException as error:
+                if not done:
+                    raise
+                stopped = error
+            with part.open("r+b") as file:
+                file.write(_contents(names, states, done))
+                file.truncate()
+        if stopped is not None:
+            raise stopped
+    except OSError as error:
+        kept = "no state is" if not done else f"{len(done)} of {len(states)} states are"
+        where = f", listed in {path.name!r}" if done else ""
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise OSError(
+            error.errno, f"cannot write the series {str(path)!r}: {reason}; {kept} on disk{where}"
+        ) from error
+
+
+def _clear(path: Path) -> None:
+    """Removes an earlier series of this name: its list, and the files that bear the names of its states."""
+    path.unlink(missing_ok=True)
+    state = re.compile(rf"\.?{re.escape(path.stem)}_\d+(\.[0-9a-f]+)?\.vtu")
+    for file in (path.parent / path.stem).glob("*.vtu"):
+        if state.fullmatch(file.name):
+            file.unlink()
+
+
+def _time(states: list[State], number: int) -> float:
+    time = states[number].time
+    return float(number) if time is None else time
+
+
+def _contents(names: list[str], states: list[State], chosen) -> bytes:
+    rows = [
+        f'    <DataSet timestep="{_time(states, k)!r}" part="0" file={quoteattr(names[k])}/>' for k in chosen
+    ]
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
+    return "\n".join([head, *rows, "  </Collection>\n</VTKFile>\n"]).encode()

@@ -1,0 +1,272 @@
+"""What there is to draw: the states of a sheet, from whatever holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .._checks.quantity import quantity
+from .._checks.tensors import detached
+from ..bodies.shell import Shell
+from ..dynamics.trajectory import Trajectory
+from ..fields.field import UniformField
+from ..mesh.triangle_mesh import TriangleMesh
+from ..obstacles import Obstacle
+from ..scene.scene import Scene
+from ..statics.equilibria import Equilibria
+from ..statics.path import Path
+from .units import clock
+
+
+@dataclass(frozen=True)
+class State:
+    """A sheet at one moment.
+
+    positions: (n_v, 3), m. remanent_magnetization: (n_f, 3), A/m, at rest, or None.
+    flux_density: (3,), T, the uniform field, or None without one.
+    sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
+    title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
+    """
+
+    mesh: TriangleMesh
+    positions: np.ndarray
+    remanent_magnetization: np.ndarray | None = None
+    flux_density: np.ndarray | None = None
+    sources: Callable[[np.ndarray], np.ndarray] | None = None
+    title: str = ""
+    time: float | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+
+    @property
+    def magnetization(self) -> np.ndarray:
+        """F_0 M_r, (n_f, 3), A/m: the magnetization as the sheet carries it along, [Chen22] (20)."""
+        if self.remanent_magnetization is None:
+            return np.zeros((self.mesh.n_faces, 3))
+        coordinates = np.linalg.solve(
+            _frames(self.mesh.rest_positions, self.mesh.faces), self.remanent_magnetization[:, :, None]
+        )
+        return (_frames(self.positions, self.mesh.faces) @ coordinates)[:, :, 0]
+
+    @property
+    def is_magnetized(self) -> bool:
+        return self.remanent_magnetization is not None and bool(self.remanent_magnetization.any())
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """(n_v, 3), m, from the rest shape."""
+        return self.positions - self.mesh.rest_positions
+
+    @property
+    def barycenters(self) -> np.ndarray:
+        """(n_f, 3), m."""
+        return self.positions[self.mesh.faces].mean(axis=1)
+
+    def flux_density_at(self, points: np.ndarray) -> np.ndarray:
+        """All of B, (n, 3), T, at points (n, 3), m."""
+        total = np.zeros_like(points)
+        if self.flux_density is not None:
+            total = total + self.flux_density
+        if self.sources is not None:
+            total = total + self.sources(points)
+        return total
+
+
+def states_of(
+    what,
+    *,
+    positions=None,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    field=None,
+    obstacles=None,
+) -> list[State]:
+    """The states in a mesh, a Shell, a Scene, a result, or a list of those; keywords come before their own.
+
+    A result is anything with a `scene` and `positions`: (n_v, 3) is one state, (k, n_v, 3) are k of them.
+    """
+    given = {
+        "positions": positions,
+        "remanent_magnetization": remanent_magnetization,
+        "applied_flux_density": applied_flux_density,
+        "field": field,
+        "obstacles": obstacles,
+    }
+    if isinstance(what, TriangleMesh):
+        return _states(what, given)
+    if isinstance(what, Shell):
+        return _states(what.mesh, _magnetized(given, [what]))
+    if isinstance(what, Scene):
+        return _states(what.mesh, _with_own(given, what), what.fields)
+    is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
+    if is_result and not isinstance(what, Equilibria):
+        own = _held_by(what)
+        merged = {name: own.get(name) if value is None else value for name, value in given.items()}
+        merged = _with_own(merged, what.scene)
+        states = _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
+        own_times = isinstance(what, Trajectory) and len(states) == len(what)
+        return timed(states, what.times) if own_times else states
+    if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
+        try:
+            states = [state for item in what for state in states_of(item, **given)]
+        except RecursionError:
+            raise ValueError("cannot draw a list that holds itself") from None
+        if states:
+            return states
+        raise ValueError("there is nothing to draw: the list is empty")
+    kinds = "a mesh, a Shell, a Scene, a result, or a list of them"
+    raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
+
+
+def timed(states: list[State], times) -> list[State]:
+    """The states at these times, (n,), s, which are their titles too. Raises ValueError unless there is one a state
+    and none falls."""
+    array = quantity("times", "s", detached(times), ("n",))
+    if len(array) != len(states):
+        raise ValueError(f"times [s] must be {len(states)} numbers, one a state, got {len(array)}")
+    if (np.diff(array) < 0).any():
+        first = int(np.argmax(np.diff(array) < 0))
+        raise ValueError(f"times [s] must not fall, but {array[first]:g} is followed by {array[first + 1]:g}")
+    written = clock(float(np.abs(array).max()))
+    return [
+        replace(state, time=time, title=written(time))
+        for state, time in zip(states, array.tolist(), strict=True)
+    ]
+
+
+def with_times(states: list[State], times) -> list[State]:
+    """The states at the times given; else at their own, which must not fall where a motion follows another."""
+    own = [state.time for state in states]
+    if times is None and None in own:
+        return [replace(state, time=None) for state in states]
+    return timed(states, own if times is None else times)
+
+
+def _held_by(result) -> dict[str, Any]:
+    """What a result says of its states; `strengths` are the factors on the fields that vary in space."""
+    held = {name: getattr(result, name, None) for name in ("positions", "remanent_magnetization", "field")}
+    if isinstance(result, Path):
+        flux_densities = result.applied_flux_densities
+        strengths = result._control("field_factor")[:, 0].tolist()
+        titles = [f"parameter {parameter:.4g}" for parameter in result.parameters]
+    elif isinstance(result, Trajectory):
+        flux_densities = result.applied_flux_density
+        strengths = result._field_factors.tolist()
+        titles = [""]
+    else:
+        flux_densities = getattr(result, "applied_flux_density", None)
+        strengths = [_field_factor(result)]
+        titles = [""]
+    if not result.scene.has_uniform_field:
+        flux_densities = None
+    return held | {"applied_flux_density": flux_densities, "strengths": strengths, "titles": titles}
+
+
+def _field_factor(result) -> float:
+    controls = getattr(result, "_controls", None)
+    if controls is None:
+        return 1.0
+    return float(result.scene._control_layout.part(controls, "scene", "field_factor")[0])
+
+
+def _states(
+    mesh: TriangleMesh, given: dict[str, Any], fields=(), strengths=(1.0,), titles=("",)
+) -> list[State]:
+    frames = _positions(mesh, given["positions"])
+    count = len(frames)
+    magnetization = _magnetization(mesh, given["remanent_magnetization"])
+    sources = [f for f in _listed(given["field"]) or fields if not isinstance(f, UniformField)]
+    flux_densities = _flux_densities(given["applied_flux_density"], count)
+    obstacles = _obstacles(given["obstacles"])
+    strengths, titles = (
+        list(each) if len(each) == count else [each[0]] * count for each in (strengths, titles)
+    )
+    return [
+        State(
+            mesh,
+            frame,
+            magnetization,
+            flux,
+            _sum_of(sources, strength) if sources and strength else None,
+            title,
+            obstacles=obstacles,
+        )
+        for frame, flux, strength, title in zip(frames, flux_densities, strengths, titles, strict=True)
+    ]
+
+
+def _positions(mesh: TriangleMesh, values) -> np.ndarray:
+    if values is None:
+        return mesh.rest_positions[None]
+    array = quantity("positions", "m", detached(values), ("...", "n_v", 3))
+    if array.shape[-2] != mesh.n_vertices or array.ndim not in (2, 3) or not array.size:
+        wanted = f"(n_v, 3) = ({mesh.n_vertices}, 3), or (k, n_v, 3) for k states"
+        raise ValueError(f"positions [m] must have shape {wanted}, got {array.shape}")
+    return array.reshape(-1, mesh.n_vertices, 3)
+
+
+def _magnetization(mesh: TriangleMesh, values) -> np.ndarray | None:
+    if values is None:
+        return None
+    array = quantity("remanent_magnetization", "A/m", detached(values), ("...", 3))
+    if array.shape not in ((3,), (mesh.n_faces, 3)):
+        wanted = f"(n_f, 3) = ({mesh.n_faces}, 3) or (3,)"
+        raise ValueError(f"remanent_magnetization [A/m] must have shape {wanted}, got {array.shape}")
+    return np.broadcast_to(array, (mesh.n_faces, 3))
+
+
+def _flux_densities(values, count: int) -> list[np.ndarray | None]:
+    if values is None:
+        return [None] * count
+    array = quantity("applied_flux_density", "T", detached(values), ("...", 3))
+    if array.shape not in ((3,), (count, 3)):
+        raise ValueError(f"applied_flux_density [T] must have shape (3,) or ({count}, 3), got {array.shape}")
+    return list(np.broadcast_to(array, (count, 3)))
+
+
+def _with_own(given: dict[str, Any], scene: Scene) -> dict[str, Any]:
+    """With the scene's obstacles and its bodies' magnetization, unless others are given."""
+    given = _magnetized(given, scene.bodies)
+    return {**given, "obstacles": scene.obstacles} if given["obstacles"] is None else given
+
+
+def _magnetized(given: dict[str, Any], bodies) -> dict[str, Any]:
+    """With the magnetization that the bodies themselves have, unless another is given."""
+    own = [body.remanent_magnetization for body in bodies]
+    if given["remanent_magnetization"] is not None or all(each is None for each in own):
+        return given
+    pairs = zip(own, bodies, strict=True)
+    rows = [np.zeros((body.mesh.n_faces, 3)) if each is None else each for each, body in pairs]
+    return {**given, "remanent_magnetization": np.concatenate(rows)}
+
+
+def _obstacles(values) -> tuple[Obstacle, ...]:
+    listed = (values,) if isinstance(values, Obstacle) else tuple(values or ())
+    for each in listed:
+        if not isinstance(each, Obstacle):
+            raise ValueError(f"obstacles must be obstacles of ms.obstacles, got a {type(each).__name__}")
+    return listed
+
+
+def _sum_of(fields, strength: float) -> Callable[[np.ndarray], np.ndarray]:
+    def flux_density(points: np.ndarray) -> np.ndarray:
+        return strength * np.sum([field.flux_density(points) for field in fields], axis=0)
+
+    return flux_density
+
+
+def _listed(value) -> tuple:
+    if value is None:
+        return ()
+    return tuple(value) if isinstance(value, list | tuple) else (value,)
+
+
+def _frames(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Columns a_1, a_2 and the unit normal of each face, (n_f, 3, 3)."""
+    x0, x1, x2 = np.moveaxis(positions[faces], 1, 0)
+    normal = np.cross(x1 - x0, x2 - x0)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    return np.stack([x1 - x0, x2 - x0, normal], axis=2)

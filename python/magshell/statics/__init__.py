@@ -1,0 +1,1 @@
+"""Equilibria of a scene: one, many load cases, paths, designs that change."""

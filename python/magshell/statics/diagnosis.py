@@ -1,0 +1,117 @@
+"""Why a search for an equilibrium failed, as far as can be seen, and what would help."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..bodies.caps import describe_faces
+from ..surroundings.constraints import free_rigid_motions
+
+NEARLY_NONE = (
+    1e-4  # a face's height over the usual length of an edge: below, round-off hides what is stiff less
+)
+FLAT = np.radians(150.0)
+_NAMED = 4
+_MOVES = 1e-6  # of the sheet's size, in one step of relaxation
+
+
+def why_not(inputs, found, at_rest: bool) -> str:
+    """The text of a NotConverged. found: what the core handed back; at_rest: whether it started from an equilibrium."""
+    scene, failed = inputs.scene, found.failed
+    whole = found.progress >= 1.0
+    head = (
+        f"no stable equilibrium was found at the new controls, in {found.iterations} iterations"
+        if whole
+        else f"the solve stopped at {found.progress:.3g} of the way to the new controls, after {found.iterations} "
+        "iterations"
+    )
+    kept = (
+        "The unstable one is in `error.last_good`; require_stable=False accepts it."
+        if whole
+        else "The last converged state is in `error.last_good`."
+    )
+    sentences = [f"{head}: {found.reason}."]
+    near = np.zeros(0, dtype=int)  # vertices that have to do with it
+    if failed.state.size:
+        sentences += _attempts(found, at_rest and not whole, scene._bodies.size)
+        told, near = _places(inputs, found)
+        sentences += told
+    return " ".join([*sentences, _advice(inputs, found, at_rest, near), kept])
+
+
+def _attempts(found, in_steps: bool, size: float) -> list[str]:
+    told = []
+    if in_steps and found.failed.shortest_step < 1.0:
+        told.append(f"Load steps were shortened to {found.failed.shortest_step:.2g} of the way.")
+    steps = found.relaxation_steps
+    if steps == 0:
+        told.append("Relaxation found no step to take.")
+    else:
+        taken, last = ("1 step", "it") if steps == 1 else (f"{steps} steps", "its last one")
+        moved = f"; {last} still moved the sheet by {found.failed.last_move:.2g} m"
+        stood = " and came to a standstill"
+        told.append(f"Relaxation took {taken}{moved if _still_moves(found.failed, size) else stood}.")
+    return told
+
+
+def _still_moves(failed, size: float) -> bool:
+    return failed.last_move > _MOVES * size
+
+
+def _places(inputs, found) -> tuple[list[str], np.ndarray]:
+    """Where forces are out of balance and where the energy still falls, in words and as vertices."""
+    if found.relaxation_steps == 0:  # the forces are still those that the new controls began with
+        return [], np.zeros(0, dtype=int)
+    model, failed = inputs.scene._model, found.failed
+    with inputs.in_core():
+        gradient = model.gradient(failed.state, failed.controls)
+    told, near = [], []
+    for vector, text in (
+        (model.expand(model.reduce(gradient)), "The forces are out of balance most"),
+        (failed.falling, "The energy still falls along a motion"),
+    ):
+        sizes = np.linalg.norm(model.positions(vector), axis=1) if vector.size else np.zeros(0)
+        if not (np.isfinite(sizes).all() and sizes.any()):
+            continue
+        vertices = np.argsort(-sizes, kind="stable")[:_NAMED]
+        vertices = vertices[sizes[vertices] > 0.1 * sizes.max()]
+        share = np.linalg.norm(sizes[vertices]) / np.linalg.norm(sizes)
+        many = "vertices" if len(vertices) > 1 else "vertex"
+        told.append(f"{text} at {many} {_listed(vertices)} ({share:.0%} of it).")
+        near.append(vertices)
+    return told, np.concatenate(near) if near else np.zeros(0, dtype=int)
+
+
+def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
+    scene, shell = inputs.scene, inputs.values.whole
+    mesh, quality = scene.mesh, shell.quality
+    tiny = np.flatnonzero(quality.heights < NEARLY_NONE * np.median(mesh.edge_lengths))
+    if tiny.size:
+        return (
+            f"{describe_faces(shell, tiny[np.argsort(quality.heights[tiny], kind='stable')])} nearly degenerate: "
+            "beside their stiffness, that of the rest is lost in round-off. Merge their vertices, or leave such faces "
+            "out of the mesh; `mesh.quality` has the shapes of all."
+        )
+    free = free_rigid_motions(scene._bodies, scene._constraints) if "singular" in found.reason else []
+    if free:
+        return (
+            f"The supports leave the sheet free ({'; '.join(free)}): hold it, unless a field or gravity does."
+        )
+    beside = np.flatnonzero(np.isin(mesh.faces, near).any(axis=1))
+    flat = beside[quality.largest_angles[beside] > FLAT]
+    if flat.size:
+        return (
+            f"{describe_faces(shell, flat[np.argsort(-quality.largest_angles[flat], kind='stable')])} beside that, and "
+            "almost flat: mend the mesh there first."
+        )
+    if _still_moves(found.failed, scene._bodies.size):
+        return "Allow it more steps (max_relaxation_steps of the solver), or start from a nearby equilibrium."
+    if not at_rest:
+        return "Start from positions closer to an equilibrium."
+    return (
+        "Start from a nearby equilibrium, or let load steps get shorter (smallest_load_step of the solver)."
+    )
+
+
+def _listed(numbers: np.ndarray) -> str:
+    return ", ".join(map(str, numbers.tolist()))

@@ -1,0 +1,81 @@
+"""The equilibria of several load cases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from .._checks.tensors import is_tensor
+from ..bodies.body_result import BodyResult
+from ..bodies.shell import Shell
+from .equilibrium import Equilibrium
+
+
+class Equilibria(Sequence):
+    """A scene at rest in each of k load cases; a sequence of Equilibrium.
+
+    positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
+    """
+
+    def __init__(self, cases: Iterable[Equilibrium]):
+        self._cases = tuple(cases)
+        for case in self._cases:
+            if not isinstance(case, Equilibrium):
+                raise ValueError(f"cases must hold Equilibrium objects, got {type(case).__name__}")
+        self.positions = _stacked([case.positions for case in self._cases])
+        self.edge_rotations = _stacked([case.edge_rotations for case in self._cases])
+
+    @property
+    def scene(self):
+        return self._cases[0].scene
+
+    @property
+    def displacements(self):
+        return _stacked([case.displacements for case in self._cases])
+
+    @property
+    def stable(self) -> bool:
+        """Whether all are."""
+        return all(case.stable for case in self._cases)
+
+    @property
+    def largest_membrane_strain(self) -> float:
+        """Of all cases."""
+        return max(case.largest_membrane_strain for case in self._cases)
+
+    @property
+    def largest_bending_strain(self) -> float:
+        """Of all cases."""
+        return max(case.largest_bending_strain for case in self._cases)
+
+    @property
+    def wall_time(self) -> float:
+        """s, in all."""
+        return sum(case.wall_time for case in self._cases)
+
+    @property
+    def factorizations(self) -> int:
+        """In all."""
+        return sum(case.factorizations for case in self._cases)
+
+    def __len__(self) -> int:
+        return len(self._cases)
+
+    def __getitem__(self, index):
+        """A case, some of them, or what all say of one body of the scene."""
+        if isinstance(index, Shell):
+            return BodyResult(self, index)
+        chosen = self._cases[index]
+        return Equilibria(chosen) if isinstance(index, slice) else chosen
+
+    def __repr__(self) -> str:
+        return "\n".join([f"Equilibria: {len(self)} load cases", *(repr(case) for case in self._cases)])
+
+
+def _stacked(parts: list):
+    if parts and is_tensor(parts[0]):
+        import torch
+
+        return torch.stack(parts)
+    return np.stack(parts) if parts else np.zeros(0)

@@ -1,0 +1,117 @@
+"""The state of a scene at rest, and what it took to find it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .._checks.tensors import detached
+from ..bodies.body_result import BodyResult
+from ..bodies.shell import Shell
+from ..bodies.strains import Largest, Strains, strains_of
+from ..mesh.crossings import told
+from ..scene.scene import Scene
+
+
+@dataclass(frozen=True, repr=False)
+class Equilibrium:
+    """A scene at rest. With several bodies, rows are those of one after another; `equilibrium[body]` has those of one.
+
+    positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
+    remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
+    energies: J, by term. stable: no direction lowers the energy; unstable_directions: how many do.
+    residual: relative to the forces that cancel in it. progress: how far the controls got, 1 unless a solve failed.
+    largest_membrane_strain, largest_bending_strain: magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet leaves
+        the model, of which ms.LargeStrainWarning warns.
+    wall_time, linear_time: s, in all and in factorizations and back-substitutions. memory: bytes, of the core.
+    """
+
+    scene: Scene
+    positions: Any
+    edge_rotations: Any
+    remanent_magnetization: Any
+    applied_flux_density: Any
+    energies: dict[str, float]
+    stable: bool
+    unstable_directions: int
+    iterations: int
+    factorizations: int
+    failed_factorizations: int
+    load_steps: int
+    relaxation_steps: int
+    saddles_left: int
+    residual: float
+    progress: float
+    largest_membrane_strain: float
+    largest_bending_strain: float
+    wall_time: float
+    linear_time: float
+    memory: int
+    factorization: str
+    _state: np.ndarray = field(repr=False)
+    _memory: list = field(repr=False)
+    _controls: Any = field(repr=False)
+    _values: Any = field(repr=False)
+
+    def __getstate__(self):
+        raise TypeError(
+            "an Equilibrium cannot be copied or pickled, as it holds the solver's own state: keep its positions, "
+            "edge_rotations and energies"
+        )
+
+    def __getitem__(self, body: Shell) -> BodyResult:
+        """What it says of one body of the scene."""
+        return BodyResult(self, body)
+
+    @property
+    def displacements(self):
+        """(n_v, 3) m, from the rest shape."""
+        rest = self.scene.mesh.rest_positions
+        if isinstance(self.positions, np.ndarray):
+            return self.positions - rest
+        return self.positions - self.positions.new_tensor(np.array(rest))
+
+    @property
+    def energy(self) -> float:
+        """The potential energy, J."""
+        return sum(self.energies.values())
+
+    def strains(self) -> Strains:
+        """The principal strains of every face.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+        >>> ends = [ms.Pin(mesh.vertices_at(x=0.0)), ms.Pin(mesh.vertices_at(x=0.1), displacement=(0.01, 0, 0))]
+        >>> rest = ms.equilibrium(ms.Scene(sheet, supports=ends))
+        >>> rest.strains().membrane[0].round(3)  # (1.1^2 - 1)/2 along, nothing across
+        array([0.105, 0.   ])
+        """
+        return strains_of(self.scene, self._state, self._values.whole.thickness)
+
+    def self_intersections(self) -> np.ndarray:
+        """The faces that pass through each other, as in TriangleMesh.self_intersections, (k, 2)."""
+        return self.scene.mesh.self_intersections(detached(self.positions))
+
+    def __repr__(self) -> str:
+        moved = float(np.linalg.norm(np.asarray(detached(self.displacements)), axis=1).max())
+        kind = "stable" if self.stable else f"unstable in {self.unstable_directions} directions"
+        if not self.stable and self.unstable_directions == 0:
+            kind = "not known to be stable"
+        if self.progress < 1.0:
+            kind += f", {self.progress:.1%} of the way"
+        energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())
+        strain = Largest(self.largest_membrane_strain, self.largest_bending_strain)
+        crossings = told(self.scene.mesh, np.asarray(detached(self.positions))[None])
+        extra = f", {self.saddles_left} saddles left" if self.saddles_left else ""
+        extra += f", {self.relaxation_steps} relaxation steps" if self.relaxation_steps else ""
+        return (
+            f"Equilibrium: {kind}; largest displacement {moved:.4g} m\n"
+            f"  {strain}\n"
+            f"  {crossings}\n"
+            f"  energy {self.energy:.6g} J ({energies})\n"
+            f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.load_steps} load steps{extra}\n"
+            f"  residual {self.residual:.1e}, {self.wall_time:.3g} s, {self.memory / 1e6:.3g} MB, {self.factorization}"
+        )

@@ -1,0 +1,163 @@
+"""One search for an equilibrium: from checked arguments to a result, or to an error that holds one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .._checks.tensors import dtype_like, is_tensor, like
+from ..adjoint.static import Adjoint
+from ..bodies.caps import warn_of_caps
+from ..bodies.strains import Largest, largest_of, warn_if_large
+from ..errors import Interrupted, NotConverged
+from ..methods.solvers import MixedNewton, Newton
+from ..scene.inputs import Inputs
+from ..scene.replacements import SHELL_NAMES, requested
+from ..scene.scene import Scene
+from .diagnosis import why_not
+from .equilibrium import Equilibrium
+from .start import starting_point
+
+FACTORS = ("load_factor", "gravity_factor", "field_factor", "motion_factor")
+
+
+class Solution(NamedTuple):
+    """An equilibrium, what the core found (with the factorization, where it was to be kept), and for what inputs."""
+
+    equilibrium: Equilibrium
+    found: Any
+    inputs: Inputs
+
+
+@dataclass(frozen=True)
+class Search:
+    """How to look. Raises ValueError where an option is no such thing."""
+
+    solver: Newton = field(default_factory=MixedNewton)
+    require_stable: bool = True
+    progress: Callable[[float, float], None] | None = None
+
+    def __post_init__(self):
+        if not isinstance(self.solver, Newton):
+            raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(self.solver).__name__}")
+        if not isinstance(self.require_stable, bool):
+            raise ValueError(f"require_stable must be True or False, got {self.require_stable!r}")
+        if self.progress is not None and not callable(self.progress):
+            raise ValueError(f"progress must be a function of (progress, residual), got {self.progress!r}")
+
+    def options(self) -> _core.StaticsOptions:
+        options = self.solver._options()
+        options.require_stable = self.require_stable
+        return options
+
+
+def find(
+    scene: Scene, arguments: dict, start=None, search: Search | None = None, keep_factor: bool = False
+) -> Solution:
+    """The equilibrium at the arguments of ms.equilibrium, cases apart. Raises as it does."""
+    search = Search() if search is None else search
+    inputs = inputs_of(scene, arguments)
+    state, memory, from_, at_rest = starting_point(scene, start, inputs)
+    options = search.options()
+    options.start_at_rest = at_rest
+    options.keep_factor = keep_factor
+    return solve(inputs, state, memory, from_, inputs.controls, options, search.progress)
+
+
+def inputs_of(scene: Scene, arguments: dict) -> Inputs:
+    """The arguments of ms.equilibrium, checked against the scene."""
+    given = dict(arguments)
+    shell = {name: given.pop(name, None) for name in SHELL_NAMES}
+    vertex_loads, values = given.pop("vertex_loads", None), given.pop("values", None)
+    replaced = requested(scene, vertex_loads, values, **shell) if isinstance(scene, Scene) else None
+    magnetization = given.pop("remanent_magnetization", None)
+    flux_density = given.pop("applied_flux_density", None)
+    factors = {name: given.pop(name, 1.0) for name in FACTORS}
+    if given:
+        raise TypeError(f"equilibrium() got an unexpected keyword argument {next(iter(given))!r}")
+    return Inputs(scene, magnetization, flux_density, replaced=replaced, differentiable=True, **factors)
+
+
+def solve(inputs: Inputs, state: np.ndarray, memory: list, from_, to, options, progress=None) -> Solution:
+    """The core's search for an equilibrium at the controls `to`, from a state at `from_`."""
+    scene = inputs.scene
+    options.keep_factor = options.keep_factor or bool(inputs.leaves)
+    began = time.perf_counter()
+    with inputs.in_core():
+        found = _core.find_equilibrium(scene._model, state, memory, from_, to, options, progress)
+        energies = _energies(scene, found)
+        result = _result(scene, inputs, found, energies, time.perf_counter() - began)
+    if found.outcome == _core.Outcome.interrupted or energies is None:
+        raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
+    if found.outcome == _core.Outcome.failed:
+        raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
+    positions = scene._model.positions(found.state)
+    warn_of_caps(scene, positions, inputs.values.whole, result.energies["bending"], "this equilibrium")
+    warn_if_large(
+        result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
+    )
+    return Solution(result, found, inputs)
+
+
+def _energies(scene: Scene, found) -> dict[str, float] | None:
+    """By term; None where Ctrl-C came meanwhile, in a field of the caller's."""
+    try:
+        return scene._model.energies(found.state, found.controls)
+    except KeyboardInterrupt:
+        return None
+
+
+def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_time: float) -> Equilibrium:
+    positions, edge_rotations = _outputs(inputs, found)
+    strain = largest_of(scene, found.state, inputs.values.whole.thickness)
+    return Equilibrium(
+        scene=scene,
+        positions=positions,
+        edge_rotations=edge_rotations,
+        remanent_magnetization=inputs.given_magnetization,
+        applied_flux_density=_flux_density(inputs, found),
+        energies=dict.fromkeys(scene._model.term_names, np.nan) if energies is None else energies,
+        stable=found.stable,
+        unstable_directions=found.unstable_directions,
+        iterations=found.iterations,
+        factorizations=found.factorizations,
+        failed_factorizations=found.failed_factorizations,
+        load_steps=found.load_steps,
+        relaxation_steps=found.relaxation_steps,
+        saddles_left=found.saddles_left,
+        residual=found.residual,
+        progress=found.progress,
+        largest_membrane_strain=strain.membrane,
+        largest_bending_strain=strain.bending,
+        wall_time=wall_time,
+        linear_time=found.linear_time,
+        memory=found.bytes,
+        factorization=found.factorization,
+        _state=found.state,
+        _memory=found.memory,
+        _controls=found.controls,
+        _values=inputs.values,
+    )
+
+
+def _outputs(inputs: Inputs, found):
+    """Positions and edge rotations, as tensors in a graph where an input asks for a gradient."""
+    model = inputs.scene._model
+    arrays = np.ascontiguousarray(model.positions(found.state)), model.edge_rotations(found.state)
+    if not inputs.leaves:
+        return tuple(like(array, *inputs.given) for array in arrays)
+    from ..adjoint.autograd import solved
+
+    return solved(Adjoint(inputs, found), arrays, dtype_like(*inputs.given), inputs.tensors)
+
+
+def _flux_density(inputs: Inputs, found):
+    if found.progress == 1.0 and is_tensor(inputs.given_flux_density):
+        return inputs.given_flux_density
+    flux_density = inputs.scene._control_layout.part(found.controls, "scene", "applied_flux_density")
+    return like(flux_density[0].copy(), *inputs.given)

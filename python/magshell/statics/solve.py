@@ -1,0 +1,93 @@
+"""Equilibria of a scene: ms.equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .._machine.entry import solve_entry
+from ..methods.solvers import MixedNewton, Newton
+from ..scene.scene import Scene
+from .cases import find_all, split, starts_of
+from .equilibria import Equilibria
+from .equilibrium import Equilibrium
+from .search import Search, find
+
+
+@solve_entry
+def equilibrium(
+    scene: Scene,
+    *,
+    remanent_magnetization=None,
+    applied_flux_density=None,
+    load_factor=1.0,
+    gravity_factor=1.0,
+    field_factor=1.0,
+    motion_factor=1.0,
+    thickness=None,
+    young_modulus=None,
+    poisson_ratio=None,
+    mass_density=None,
+    curvature_scale=None,
+    vertex_loads=None,
+    values: dict | None = None,
+    start: Equilibrium | Equilibria | np.ndarray | None = None,
+    require_stable: bool = True,
+    solver: Newton | None = None,
+    progress: Callable[[float, float], None] | None = None,
+) -> Equilibrium | Equilibria:
+    """A stable equilibrium of a scene, or one for each of several load cases.
+
+    remanent_magnetization: A/m, rest frame, world axes: (n_f, 3), or (3,) on every face. Needed in a scene with a field.
+    applied_flux_density: T, (3,): the value of the scene's UniformField. (k, 3): k load cases, and so many equilibria.
+    load_factor, gravity_factor, field_factor, motion_factor: on the loads, gravity, the field sources, and on how far
+        supports with a prescribed motion have gone; (k,) with load cases.
+    thickness, young_modulus, poisson_ratio, mass_density, curvature_scale: stand in for the shell's own in this solve.
+    vertex_loads: N, (n_v, 3): stand in for all forces of the scene's loads.
+    values: {object of the scene: {name: value}}, stand in for what the objects were made with: the values of loads, the
+        displacement, rotation and center of supports that move, positions and moments of Dipoles, the sizes,
+        magnetization, center and rotation of a magnet, the flux_density of a SampledField, the law of a Contact, the
+        center and rotation of an obstacle, the numbers of Water, and {scene: {"gravity": value}}. The scene is
+        not analysed again. `scene.parts` lists the objects.
+    start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
+        (n_v, 3) m. By default the rest shape, unloaded. Load cases may have Equilibria, one each.
+    require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.
+    solver: MixedNewton() by default.
+    progress: called now and then with how far the controls have come (0 to 1) and the residual.
+
+    Raises NotConverged and Interrupted (on Ctrl-C), both with the last converged state as `last_good`; ValueError on
+    bad input. With torch tensors among the inputs, positions and edge rotations come back as tensors, and gradients go
+    back from them to every input above but `start`. Each costs one back-substitution with the factorization at the
+    solution, kept as long as the result is. Asked for where the solve did not converge, or at an equilibrium that is
+    not stable, they raise NoGradient. So do second derivatives: differences of gradients are exact to some 1e-8, and
+    (g(x + h v) - g(x - h v)) / 2h is the Hessian's product with v.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    >>> rest = ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=(0, 0, 2e-3))
+    >>> rest.stable, bool(rest.positions[:, 2].max() > 0.01)
+    (True, True)
+    """
+    search = Search(MixedNewton() if solver is None else solver, require_stable, progress)
+    arguments = {
+        "remanent_magnetization": remanent_magnetization,
+        "applied_flux_density": applied_flux_density,
+        "load_factor": load_factor,
+        "gravity_factor": gravity_factor,
+        "field_factor": field_factor,
+        "motion_factor": motion_factor,
+        "thickness": thickness,
+        "young_modulus": young_modulus,
+        "poisson_ratio": poisson_ratio,
+        "mass_density": mass_density,
+        "curvature_scale": curvature_scale,
+        "vertex_loads": vertex_loads,
+        "values": values,
+    }
+    cases = split(arguments)
+    if cases is None:
+        return find(scene, arguments, start, search).equilibrium
+    return find_all(scene, cases, starts_of(start, len(cases)), search)

@@ -1,0 +1,53 @@
+"""Where a solve starts from."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .._checks.quantity import quantity
+from .._checks.tensors import to_array
+from ..scene.inputs import Inputs
+from ..scene.scene import Scene
+from ..surroundings.contact_inputs import check_outside
+from .equilibrium import Equilibrium
+
+
+class Origin(NamedTuple):
+    """A state that is an equilibrium for these inputs, and the core's memory of how it was reached."""
+
+    state: np.ndarray
+    memory: list
+    inputs: Inputs
+
+
+def starting_point(scene: Scene, start, inputs: Inputs):
+    """State, the core's memory of it, controls at which it holds, and whether it is an equilibrium there."""
+    model = scene._model
+    if start is None:
+        check_outside(scene, inputs.values, scene.mesh.rest_positions, 0.0)
+        return model.rest_state(), [], scene._control_layout.zeros(), True
+    if isinstance(start, Origin):
+        return start.state, start.memory, start.inputs.controls, True
+    if isinstance(start, Equilibrium):
+        if start.scene is not scene:
+            raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
+        return start._state, start._memory, start._controls, start._values.same_as(inputs.values)
+    positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
+    n_v = scene.mesh.n_vertices
+    if len(positions) != n_v:
+        raise ValueError(f"start [m] must have shape (n_v, 3) = ({n_v}, 3), got {positions.shape}")
+    check_faces(scene.mesh, positions)
+    check_outside(scene, inputs.values, positions, 0.0)
+    return model.state(positions, np.zeros(scene.mesh.n_edges)), [], inputs.controls, False
+
+
+def check_faces(mesh, positions: np.ndarray) -> None:
+    """A face without area has no normal, and no forces either."""
+    corners = positions[mesh.faces]
+    a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = 0.5 * np.linalg.norm(np.cross(a1, a2), axis=1)
+    flat = np.flatnonzero(area <= 1e-12 * mesh.face_areas)
+    if flat.size:
+        raise ValueError(f"start [m] leaves face {flat[0]} without area: {area[flat[0]]:.3g} m2")

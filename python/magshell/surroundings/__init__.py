@@ -1,0 +1,1 @@
+"""What holds bodies and acts on them: supports, loads, contact, water."""

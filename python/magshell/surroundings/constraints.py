@@ -1,0 +1,195 @@
+"""Supports put together: which nodes are held along which directions, and whether anything can still move freely."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..bodies.bodies import Bodies, Part
+from .supports import DirectedEdges, Held, RigidMotion
+
+_LOOKED_AT = (0.37, 1.0)  # a full turn ends where it began, but is elsewhere on its way
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """What the core takes. Nodes are vertices, followed by directions."""
+
+    directed_edges: np.ndarray  # (k, 2): the scene's edge, direction
+    directions: np.ndarray  # (n_d, 3)
+    held_nodes: np.ndarray  # (m, 3): node, how many directions, motion or -1
+    held_frames: np.ndarray  # (m, 3, 3): columns, the held directions first
+    motions: tuple[RigidMotion, ...]
+
+
+def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints:
+    """All supports of a scene as one. `free_directions` (k, 3) are appended to the directions, held and still."""
+    motions: list[RigidMotion] = []
+    mesh, places = bodies.mesh, [(s, bodies.of(s)) for s in supports]
+    nodes, frames = _held_vertices(bodies, [h for s, part in places for h in held_by(s, part)], motions)
+    pairs, directions, direction_motions = _directed_edges(
+        [d for s, part in places for d in _directed(s, part)], motions
+    )
+    directions = np.concatenate([directions, free_directions])
+    direction_motions += [-1] * len(free_directions)
+    for k, motion in enumerate(direction_motions):
+        nodes.append((mesh.n_vertices + k, 3, motion))
+        frames.append(np.eye(3))
+    return Constraints(
+        np.array(pairs, dtype=np.int32).reshape(-1, 2),
+        directions,
+        np.array(nodes, dtype=np.int32).reshape(-1, 3),
+        np.array(frames).reshape(-1, 3, 3),
+        tuple(motions),
+    )
+
+
+def check_shared(bodies: Bodies, supports, vertices: np.ndarray) -> None:
+    """Raises ValueError where supports disagree on where one of these vertices of the scene is."""
+    found = []
+    for held in (h for s in supports for h in held_by(s, bodies.of(s))):
+        some = np.isin(held.vertices, vertices)
+        found.append(held._replace(vertices=held.vertices[some], directions=held.directions[some]))
+    _held_vertices(bodies, found, [])
+
+
+def held_by(support, part: Part) -> list[Held]:
+    """With the scene's vertices."""
+    return [held._replace(vertices=held.vertices + part.first_vertex) for held in support.held(part.mesh)]
+
+
+def _directed(support, part: Part) -> list[DirectedEdges]:
+    """With the scene's edges."""
+    return [each._replace(edges=each.edges + part.first_edge) for each in support.directed(part.mesh)]
+
+
+def free_rigid_motions(bodies: Bodies, constraints: Constraints) -> list[str]:
+    """The rigid motions that no support prevents, in words; of every connected part."""
+    found, mesh, size = [], bodies.mesh, bodies.size
+    for part in range(mesh.n_components):
+        vertices = np.flatnonzero(mesh.components == part)
+        center = mesh.rest_positions[vertices].mean(axis=0)
+        rows = _prevented(bodies, constraints, mesh.components == part, center)
+        _, values, modes = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]))
+        for mode in modes[values < 1e-8 * max(values[0], 1e-300)]:
+            where = f" of part {part} (with vertex {vertices[0]})" if mesh.n_components > 1 else ""
+            found.append(_in_words(mode, center, size) + where)
+    return found
+
+
+def _held_vertices(bodies: Bodies, held: list[Held], motions: list[RigidMotion]):
+    directions: dict[int, list[np.ndarray]] = {}
+    motion_of: dict[int, RigidMotion] = {}
+    for support in held:
+        for vertex, along in zip(support.vertices.tolist(), support.directions, strict=True):
+            directions.setdefault(vertex, []).extend(along)
+            if support.motion is not None:
+                known = motion_of.setdefault(vertex, support.motion)
+                _check_same_motion(bodies, vertex, known, support.motion)
+    _check_against_still(bodies, held, motion_of)
+    numbers: dict[int, int] = {}
+    nodes, frames = [], []
+    for vertex, along in sorted(directions.items()):
+        frame, count = _frame(np.array(along))
+        motion = motion_of.get(vertex)
+        nodes.append((vertex, count, _number(motion, motions, numbers)))
+        frames.append(frame)
+    return nodes, frames
+
+
+def _number(motion: RigidMotion | None, motions: list[RigidMotion], numbers: dict[int, int]) -> int:
+    if motion is None:
+        return -1
+    if id(motion) not in numbers:
+        numbers[id(motion)] = len(motions)
+        motions.append(motion)
+    return numbers[id(motion)]
+
+
+def _check_same_motion(bodies, vertex: int, a: RigidMotion, b: RigidMotion) -> None:
+    if a is b:
+        return
+    point = bodies.mesh.rest_positions[[vertex]]
+    apart = max(np.abs(a.moved(point, at) - b.moved(point, at)).max() for at in _LOOKED_AT)
+    if apart > 1e-12 * bodies.size or not np.allclose(a.rotation, b.rotation):
+        raise ValueError(f"two supports move vertex {vertex} to different places")
+
+
+def _check_against_still(bodies, held: list[Held], motion_of: dict[int, RigidMotion]) -> None:
+    """A support that stays may share a vertex with one that moves, as long as it is not moved along what it holds."""
+    for support in held:
+        if support.motion is not None:
+            continue
+        for vertex, along in zip(support.vertices.tolist(), support.directions, strict=True):
+            motion = motion_of.get(vertex)
+            if motion is None:
+                continue
+            point = bodies.mesh.rest_positions[[vertex]]
+            moves = np.array([(motion.moved(point, at) - point)[0] for at in _LOOKED_AT])
+            if np.abs(moves @ along.T).max() > 1e-9 * bodies.size:
+                raise ValueError(
+                    f"one support holds vertex {vertex} along a direction in which another moves it"
+                )
+
+
+def _frame(directions: np.ndarray) -> tuple[np.ndarray, int]:
+    """Orthonormal columns, the held ones first, and their number. World axes where the directions are world axes."""
+    axes = np.unique(np.argmax(np.abs(directions), axis=1))
+    if np.all(np.abs(directions).max(axis=1) == 1.0):
+        order = [*axes, *np.setdiff1d(np.arange(3), axes)]
+        return np.eye(3)[:, order], len(axes)
+    _, values, rows = np.linalg.svd(directions)
+    count = int(np.sum(values > 1e-9))
+    return (np.eye(3) if count == 3 else rows.T), count
+
+
+def _directed_edges(directed: list[DirectedEdges], motions: list[RigidMotion]):
+    pairs, directions, direction_motions = [], [], []
+    seen: set[int] = set()
+    for group in directed:
+        motion = -1
+        if group.motion is not None:
+            motion = len(motions)
+            motions.append(group.motion)
+        # Edges that share a direction share a node.
+        keys = np.round(group.directions, 12) + 0.0
+        _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        for edge, which in zip(group.edges.tolist(), inverse.ravel().tolist(), strict=True):
+            if edge in seen:
+                raise ValueError(f"two supports hold the direction across edge {edge}")
+            seen.add(edge)
+            pairs.append((edge, len(directions) + which))
+        directions.extend(group.directions[first])
+        direction_motions.extend([motion] * len(first))
+    return pairs, np.array(directions).reshape(-1, 3), direction_motions
+
+
+def _prevented(bodies, constraints: Constraints, in_part: np.ndarray, center: np.ndarray) -> np.ndarray:
+    """Rows (k, 6) of the infinitesimal rigid motions (translation, size-scaled rotation) that supports see."""
+    rows, mesh, size = [np.zeros((1, 6))], bodies.mesh, bodies.size
+    for (node, count, _), frame in zip(constraints.held_nodes, constraints.held_frames, strict=True):
+        if node < mesh.n_vertices and in_part[node]:
+            along = frame[:, :count].T
+            arm = (mesh.rest_positions[node] - center) / size
+            rows.append(np.concatenate([along, np.cross(arm, along)], axis=1))
+    if len(constraints.directed_edges):
+        ends = mesh.edges[constraints.directed_edges[:, 0]]
+        ends = ends[in_part[ends[:, 0]]]
+        along = mesh.rest_positions[ends[:, 1]] - mesh.rest_positions[ends[:, 0]]
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        rows.append(np.concatenate([np.zeros_like(along), along], axis=1))
+    return np.concatenate(rows)
+
+
+def _in_words(mode: np.ndarray, center: np.ndarray, size: float) -> str:
+    translation, rotation = mode[:3], mode[3:]
+    if np.linalg.norm(rotation) < 1e-6:
+        return f"translation along {_vector(translation)}"
+    axis = rotation / np.linalg.norm(rotation)
+    point = center + np.cross(axis, translation) * size / np.linalg.norm(rotation)
+    return f"rotation about {_vector(axis)} through {_vector(point)} m"
+
+
+def _vector(values: np.ndarray) -> str:
+    return "(" + ", ".join(f"{0.0 if abs(v) < 1e-9 else v:.3g}" for v in values) + ")"

@@ -1,0 +1,173 @@
+"""Frictional contact of a sheet with obstacles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.checked_list import checked_list
+from .._checks.owner import Owner
+from .._checks.quantity import quantity
+from .._checks.selections import indices, selection
+from ..bodies.bodies import checked_body, joined, on_body
+from ..bodies.shell import Shell
+from ..mesh.triangle_mesh import TriangleMesh
+from ..obstacles import Obstacle
+
+_FACE_POINTS = {  # barycentric coordinates of the points on a face
+    0: np.zeros((0, 3)),
+    1: np.full((1, 3), 1.0 / 3.0),
+    3: np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0,
+}
+_SMOOTHING = 1e-2  # of the mean thickness
+_STICKING = 1e-2  # of the largest sheet's extent, a second
+
+
+class Contact(Owner):
+    """Keeps points of a sheet out of obstacles, with friction if wanted [Chen22, 6.1; Geilinger et al. 2020].
+
+    obstacles: one of ms.obstacles, or several.
+    contact_stiffness: N/m, of every point: a force that grows with the depth, from a short parabola on.
+    friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
+    sticking_speed: m/s. Below it friction holds: a point that carries a share r of its greatest friction creeps at
+        sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's extent in a second
+        (of the largest where there are several).
+    smoothing: m, the length of the parabola; by default a hundredth of the thickness.
+    offset: m, the distance from the obstacle at which the force begins; half the thickness lets the face of the sheet
+        touch instead of its middle surface.
+    lagged_friction: take normal forces and normals of friction from the beginning of each step. The matrix stays
+        symmetric; the friction is late by a step.
+    vertices: those that touch; all by default.
+    body: the Shell that touches; by default all, where no vertices are given.
+    face_samples: points on every face that touch too: 0, 1 or 3, for meshes that are coarse beside the obstacle.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> floor = ms.Contact(ms.obstacles.Plane(center=(0, 0, -1e-3)), friction_coefficient=0.6)
+    >>> scene = ms.Scene(sheet, contacts=[floor], gravity=(0, 0, -9.81), allow_rigid_motions=True)
+    >>> move = ms.simulate(scene, steps=50, time_step=1e-3, integrator=ms.ImplicitEuler())
+    >>> bool(abs(move.positions[-1, :, 2] + 1e-3).max() < 1e-4)
+    True
+    """
+
+    _replaceable = ("contact_stiffness", "smoothing", "offset", "friction_coefficient", "sticking_speed")
+
+    def __init__(
+        self,
+        obstacles,
+        *,
+        contact_stiffness=1e4,
+        friction_coefficient=None,
+        sticking_speed=None,
+        smoothing=None,
+        offset=0.0,
+        lagged_friction: bool = False,
+        vertices=None,
+        face_samples: int = 0,
+        body: Shell | None = None,
+    ):
+        self.body = checked_body(body)
+        listed = checked_list("obstacles", obstacles, (Obstacle,), "objects of ms.obstacles")
+        if not listed or len({id(item) for item in listed}) < len(listed):
+            raise ValueError("obstacles must hold at least one obstacle, and each of them once")
+        self.obstacles = listed
+        self.contact_stiffness = _positive("contact_stiffness", "N/m", contact_stiffness)
+        self.friction_coefficient = (
+            None
+            if friction_coefficient is None
+            else _not_negative("friction_coefficient", "1", friction_coefficient)
+        )
+        self.sticking_speed = (
+            None if sticking_speed is None else _positive("sticking_speed", "m/s", sticking_speed)
+        )
+        self.smoothing = None if smoothing is None else _positive("smoothing", "m", smoothing)
+        self.offset = _not_negative("offset", "m", offset)
+        if not isinstance(lagged_friction, bool):
+            raise ValueError(f"lagged_friction must be True or False, got {lagged_friction!r}")
+        self.lagged_friction = lagged_friction
+        self.vertices = None if vertices is None else selection("Contact vertices", vertices)
+        if isinstance(face_samples, bool) or face_samples not in _FACE_POINTS:
+            raise ValueError(f"face_samples must be 0, 1 or 3, got {face_samples!r}")
+        self.face_samples = int(face_samples)
+
+    def replaced(self, **values) -> Contact:
+        """The same contact with other numbers of its law."""
+        if "friction_coefficient" in values and self.friction_coefficient is None:
+            raise ValueError(
+                "a Contact without friction cannot get some in a solve: give it some, zero will do"
+            )
+        return Contact(
+            self.obstacles,
+            **{
+                "contact_stiffness": self.contact_stiffness,
+                "friction_coefficient": self.friction_coefficient,
+                "sticking_speed": self.sticking_speed,
+                "smoothing": self.smoothing,
+                "offset": self.offset,
+                "lagged_friction": self.lagged_friction,
+                "vertices": self.vertices,
+                "face_samples": self.face_samples,
+                "body": self.body,
+                **values,
+            },
+        )
+
+    @property
+    def for_all(self) -> bool:
+        """Whether it is about all bodies where it names none."""
+        return self.vertices is None
+
+    def points(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """What of a body touches: vertices (k, 3), -1 where there are fewer, and weights (k, 3); those on faces last."""
+        chosen = np.arange(mesh.n_vertices) if self.vertices is None else None
+        if chosen is None:
+            chosen = indices("Contact vertices", self.vertices, mesh.n_vertices)
+        alone = np.full((len(chosen), 3), -1)
+        alone[:, 0] = chosen
+        faces = mesh.faces[np.isin(mesh.faces, chosen).all(axis=1)]
+        weights = _FACE_POINTS[self.face_samples]
+        on_faces = np.repeat(faces, len(weights), axis=0)
+        return (
+            np.concatenate([alone, on_faces]).astype(np.int32),
+            np.concatenate([np.tile([1.0, 0.0, 0.0], (len(alone), 1)), np.tile(weights, (len(faces), 1))]),
+        )
+
+    def law(self, *sheets: Shell) -> tuple[float, ...]:
+        """The numbers of `_replaceable` for the sheets that touch: N/m, m, m, 1, m/s."""
+        extent = max(np.linalg.norm(np.ptp(sheet.mesh.rest_positions, axis=0)) for sheet in sheets)
+        thickness = joined([sheet.thickness for sheet in sheets])
+        return (
+            self.contact_stiffness,
+            _SMOOTHING * float(np.mean(thickness)) if self.smoothing is None else self.smoothing,
+            self.offset,
+            self.friction_coefficient or 0.0,
+            _STICKING * extent if self.sticking_speed is None else self.sticking_speed,
+        )
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        for name, number in zip(self._replaceable, self.law(*values.touching(self)), strict=True):
+            numbers[label, name] = number
+
+    def by_thickness(self, label: str, sheets, gradient) -> float:
+        """By the thickness of each face of the sheets that touch, which a default in `law` is made from."""
+        by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
+        return _SMOOTHING * by_smoothing / sum(sheet.thickness.size for sheet in sheets)
+
+    def __repr__(self) -> str:
+        friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
+        with_what = ", ".join(repr(each) for each in self.obstacles)
+        return f"Contact({with_what}; {self.contact_stiffness:g} N/m{friction}{on_body(self.body)})"
+
+
+def _positive(name: str, unit: str, value) -> float:
+    number = float(quantity(name, unit, value, ()))
+    if not number > 0:
+        raise ValueError(f"{name} [{unit}] must be positive, got {number:g}")
+    return number
+
+
+def _not_negative(name: str, unit: str, value) -> float:
+    number = float(quantity(name, unit, value, ()))
+    if number < 0:
+        raise ValueError(f"{name} [{unit}] must not be negative, got {number:g}")
+    return number

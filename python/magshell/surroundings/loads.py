@@ -1,0 +1,196 @@
+"""Dead loads and edge couples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.owner import Owner
+from .._checks.quantity import quantity, real_numbers
+from .._checks.selections import indices, selection
+from ..bodies.bodies import checked_body
+from ..bodies.shell import Shell
+from ..mesh.triangle_mesh import TriangleMesh
+
+
+class DeadLoad(Owner):
+    """Forces that keep size and direction, given by one value: so much of it on each of some parts of the mesh.
+
+    body: the Shell that they act on, or None. Meshes are that body's, and so are indices.
+    """
+
+    for_all = False  # whether it acts on all bodies where it names none
+
+    def __init__(self, label: str, values, body: Shell | None):
+        """label: the name and unit of the value."""
+        self._label, self.body = label, checked_body(body)
+        setattr(self, self._replaceable[0], _vectors(*label.rstrip("]").split(" [", 1), values))
+
+    def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
+        """(n_v, 3), N."""
+        vertices, weights = self._shares(mesh)
+        rows = _rows(self._label, getattr(self, self._replaceable[0]), len(vertices))
+        return _spread(mesh, vertices, rows * weights)
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        key = ("loads", "forces")
+        part = values.scene._bodies.of(self)
+        forces = np.zeros((values.scene.mesh.n_vertices, 3)) if key not in numbers else numbers[key]
+        forces[part.vertices] += self.vertex_forces(part.mesh)
+        numbers[key] = forces
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        part = values.scene._bodies.of(self)
+        vertices, weights = self._shares(part.mesh)
+        by_forces = gradient.value("loads", "forces")[part.vertices]
+        return {self._replaceable[0]: by_forces[vertices].sum(axis=1) * weights}
+
+    def _shares(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """The vertices of each part (k, m), and how much of the value each of them feels (k, 1)."""
+        raise TypeError(f"{type(self).__name__} is no load of its own")
+
+
+class PointLoad(DeadLoad):
+    """A force [N] on each of some vertices: `force` (3,) on every one of them, or (k, 3), one each.
+
+    body: the Shell whose vertices they are, in a scene of several.
+    """
+
+    _replaceable = ("force",)
+
+    def __init__(self, vertices, force, body: Shell | None = None):
+        self.vertices = selection("PointLoad vertices", vertices)
+        super().__init__("force [N]", force, body)
+
+    def replaced(self, *, force) -> PointLoad:
+        return PointLoad(self.vertices, force, self.body)
+
+    def _shares(self, mesh: TriangleMesh):
+        vertices = indices("PointLoad vertices", self.vertices, mesh.n_vertices)
+        return vertices[:, None], np.ones((len(vertices), 1))
+
+
+class EdgeLoad(DeadLoad):
+    """A force per rest length [N/m] along some edges, half to each end: (3,) or (k, 3), one an edge.
+
+    body: the Shell whose edges they are, in a scene of several.
+    """
+
+    _replaceable = ("force_per_length",)
+
+    def __init__(self, edges, force_per_length, body: Shell | None = None):
+        self.edges = selection("EdgeLoad edges", edges)
+        super().__init__("force_per_length [N/m]", force_per_length, body)
+
+    def replaced(self, *, force_per_length) -> EdgeLoad:
+        return EdgeLoad(self.edges, force_per_length, self.body)
+
+    def _shares(self, mesh: TriangleMesh):
+        edges = indices("EdgeLoad edges", self.edges, mesh.n_edges)
+        return mesh.edges[edges], (mesh.edge_lengths[edges] / 2.0)[:, None]
+
+
+class AreaLoad(DeadLoad):
+    """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face.
+
+    body: the Shell that it acts on; by default all, where no faces are given.
+    """
+
+    _replaceable = ("force_per_area",)
+
+    def __init__(self, force_per_area, faces=None, body: Shell | None = None):
+        self.faces = None if faces is None else selection("AreaLoad faces", faces)
+        self.for_all = faces is None
+        super().__init__("force_per_area [N/m2]", force_per_area, body)
+
+    def replaced(self, *, force_per_area) -> AreaLoad:
+        return AreaLoad(force_per_area, self.faces, self.body)
+
+    def _shares(self, mesh: TriangleMesh):
+        faces = (
+            np.arange(mesh.n_faces)
+            if self.faces is None
+            else indices("AreaLoad faces", self.faces, mesh.n_faces)
+        )
+        return mesh.faces[faces], (mesh.face_areas[faces] / 3.0)[:, None]
+
+
+class EdgeCouple(Owner):
+    """A couple per rest length [N] turning the director of free boundary edges about the edge itself.
+
+    couple_per_length: a number, about the edge's direction with the sheet on its left (seen from the side its normals
+        point to); positive lifts nothing but turns as a right hand along that direction does. Or a vector (3,), of which
+        the part along each rest edge counts. The axis follows the edge.
+    body: the Shell whose edges they are, in a scene of several.
+    """
+
+    _replaceable = ("couple_per_length",)
+    for_all = False
+
+    def __init__(self, edges, couple_per_length, body: Shell | None = None):
+        self.body = checked_body(body)
+        self.edges = selection("EdgeCouple edges", edges)
+        array = real_numbers("couple_per_length [N]", couple_per_length)
+        if array.shape not in ((), (3,)):
+            raise ValueError(f"couple_per_length [N] must be a number or have shape (3,), got {array.shape}")
+        self.couple_per_length = quantity("couple_per_length", "N", array, array.shape)
+
+    def edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """The edges (k,) and their couples (k,), N m."""
+        edges, along = self._along(mesh)
+        return edges, along @ np.atleast_1d(self.couple_per_length)
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        key, turned = ("couples", "couples"), values.scene._couple_edges
+        part = values.scene._bodies.of(self)
+        edges, couples = self.edge_couples(part.mesh)
+        n_edges = values.scene.mesh.n_edges
+        by_edge = np.bincount(part.first_edge + edges, weights=couples, minlength=n_edges)
+        numbers[key] = numbers.get(key, 0.0) + by_edge[turned]
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        part = values.scene._bodies.of(self)
+        edges, along = self._along(part.mesh)
+        of_edges = np.searchsorted(values.scene._couple_edges, part.first_edge + edges)
+        return {"couple_per_length": gradient.value("couples", "couples")[of_edges] @ along}
+
+    def replaced(self, *, couple_per_length) -> EdgeCouple:
+        changed = EdgeCouple(self.edges, couple_per_length, self.body)
+        if changed.couple_per_length.shape != self.couple_per_length.shape:
+            raise ValueError(
+                f"couple_per_length [N] must keep its shape {self.couple_per_length.shape}, "
+                f"got {changed.couple_per_length.shape}"
+            )
+        return changed
+
+    def _along(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """The edges and what a couple per length is multiplied by: lengths (k, 1), or edge vectors (k, 3)."""
+        edges = indices("EdgeCouple edges", self.edges, mesh.n_edges)
+        inside = np.setdiff1d(edges, mesh.boundary_edges)
+        if inside.size:
+            raise ValueError(f"EdgeCouple edges must be on the boundary, but edge {inside[0]} is not")
+        lengths = mesh.edge_lengths[edges]
+        if self.couple_per_length.ndim == 0:
+            return edges, lengths[:, None]
+        ends = mesh.rest_positions[mesh.edges[edges]]
+        along = (ends[:, 1] - ends[:, 0]) * np.where(mesh.edge_faces[edges, 0] >= 0, 1.0, -1.0)[:, None]
+        return edges, along
+
+
+def _vectors(name: str, unit: str, values) -> np.ndarray:
+    array = real_numbers(f"{name} [{unit}]", values)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3:
+        raise ValueError(f"{name} [{unit}] must have shape (3,) or (k, 3), got {array.shape}")
+    return quantity(name, unit, array, array.shape)
+
+
+def _rows(label: str, vectors: np.ndarray, count: int) -> np.ndarray:
+    if vectors.ndim == 2 and len(vectors) != count:
+        raise ValueError(f"{label} must have shape (3,) or ({count}, 3), got {vectors.shape}")
+    return np.broadcast_to(vectors, (count, 3))
+
+
+def _spread(mesh: TriangleMesh, vertices: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Each row's force on each of the row's vertices."""
+    at_vertices = np.zeros((mesh.n_vertices, 3))
+    np.add.at(at_vertices, vertices, forces[:, None, :])
+    return at_vertices
