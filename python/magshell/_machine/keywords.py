@@ -1,4 +1,4 @@
-"""Controls among `values`, and the keywords that are short forms of them."""
+"""What `values` may say of a solve itself, and the keywords that are short forms of it: controls, damping."""
 
 from __future__ import annotations
 
@@ -6,17 +6,24 @@ from difflib import SequenceMatcher
 
 FLUX_DENSITY = "applied_flux_density"
 FACTORS = ("load_factor", "gravity_factor", "field_factor", "motion_factor")
+CONTROLS = (FLUX_DENSITY, *FACTORS)
+OF_MOTION = (
+    "damping",
+    "stiffness_damping",
+    "maxwell_modulus",
+    "maxwell_time",
+)  # which ms.simulate has beside them
 
 
 def controls_of(owner, scene) -> tuple[str, ...]:
-    """The controls that an object has: all of them belong to the scene, the uniform field's to that field as well."""
+    """What an object has that is no value in the core: all belongs to the scene, its uniform field's to that as well."""
     if owner is scene:
-        return (FLUX_DENSITY, *FACTORS)
+        return (*CONTROLS, *OF_MOTION)
     return (FLUX_DENSITY,) if getattr(owner, "_is_uniform", False) else ()
 
 
 def as_keywords(scene, named: dict, known) -> dict:
-    """The keywords of a solve with the controls in `values` among them, as far as it has such a keyword (`known`).
+    """The keywords of a solve with what `values` say of it among them, as far as it has such a keyword (`known`).
 
     Raises ValueError where one is given twice. What else is wrong with `values` is told where they are checked.
     """

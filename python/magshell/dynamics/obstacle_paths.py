@@ -23,14 +23,14 @@ class ObstaclePath:
     """
 
     def __init__(self, asked, obstacle, courses: dict[str, object]):
-        self._asked = asked
+        self._clock, self._time_step = asked.clock, asked.given_time_step
         self._given = {
             "center": courses.get("center", obstacle.center),
             "rotation": courses.get("rotation", obstacle.rotation),
         }
         rows = []
         for (name, value), unit in zip(self._given.items(), ("m", "rad"), strict=True):
-            rows.append((asked.at_knots(name, unit, value, (3,)), self._rates(name, unit, value)))
+            rows.append((asked.at_knots(name, unit, value, (3,)), self._rates(asked, name, unit, value)))
         xp, ((center, velocity), (rotation, rate)) = alike(rows)
         self.knots = xp.stack((center, rotation, velocity, spin(xp, rotation, rate)), 1)
 
@@ -40,16 +40,20 @@ class ObstaclePath:
     def _at(self, name: str, time: float) -> np.ndarray:
         value = self._given[name]
         if callable(value):
-            return np.asarray(detached(value(time)), dtype=np.float64)
+            return np.asarray(detached(value(self._as_given(time))), dtype=np.float64)
         numbers = np.asarray(detached(value), dtype=np.float64)
         if numbers.ndim == 1:
             return numbers
-        ends = self._asked.clock.at(np.arange(len(numbers)))
+        ends = self._clock.at(np.arange(len(numbers)))
         return np.array([np.interp(time, ends, column) for column in numbers.T])
 
-    def _rates(self, name: str, unit: str, value):
+    def _as_given(self, time: float):
+        """A time as functions of it get it: a tensor where the time step is one."""
+        return self._time_step.new_tensor(time).double() if is_tensor(self._time_step) else time
+
+    @staticmethod
+    def _rates(asked, name: str, unit: str, value):
         """Of the value at all knots."""
-        asked = self._asked
         if callable(value):
             return asked.at_knots(f"the rate of {name}", f"{unit}/s", lambda time: _slope(value, time), (3,))
         if len(shape_of(name, value)) == 1:

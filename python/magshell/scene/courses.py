@@ -10,6 +10,7 @@ import numpy as np
 from .._checks.quantity import shape_of
 from .._machine.keywords import nearest_first
 from ..fields.field import AppliedField
+from ..obstacles import Obstacle
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class Course:
         if callable(self.value):
             return
         shape = shape_of(self._label, self.value)
+        if shape == self.row:
+            return
         allowed = {"(steps + 1, ...)": (steps + 1, *self.row)}
         if isinstance(self.owner, AppliedField):
             allowed["(steps, ...)"] = (steps, *self.row)
@@ -65,14 +68,17 @@ def over_time(scene, replaced: dict[object, dict]) -> tuple[dict[object, dict], 
                 continue
             refuse_functions(owner, name, value, in_time=True)
             still.setdefault(owner, {})[name] = value
-    for obstacle in [each for each in scene.obstacles if any(course.owner is each for course in courses)]:
-        if obstacle.motion is not None:
+    for owner in [each for each in scene.parts if any(course.owner is each for course in courses)]:
+        if getattr(owner, "motion", None) is not None:
             raise ValueError(
-                f"{obstacle!r} moves by its motion: give its center and rotation over time, or a motion, not both"
+                f"{owner!r} moves by its motion: give its center and rotation over time, or a motion, not both"
             )
-        constant = still.pop(obstacle, {})  # what of its place stays belongs to its path
-        courses += [Course(obstacle, name, _UNITS[name], value, (3,)) for name, value in constant.items()]
-        still[obstacle] = {"center": np.zeros(3), "rotation": np.zeros(3)}
+        if isinstance(owner, AppliedField):
+            continue
+        constant = still.pop(owner, {})  # of its place: the same all the time
+        courses += [Course(owner, name, _UNITS[name], value, (3,)) for name, value in constant.items()]
+        if isinstance(owner, Obstacle):
+            still[owner] = {"center": np.zeros(3), "rotation": np.zeros(3)}  # all of its place is on its path
     return still, courses
 
 

@@ -69,6 +69,8 @@ def _check(scene, owner, named) -> None:
         raise ValueError(f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}")
     names = (*getattr(owner, "_replaceable", ()), *controls_of(owner, scene))
     for name in named:
+        if name in controls_of(owner, scene):  # a solve that has it has taken it already
+            raise ValueError(f"{name} of the scene has no part in this solve: leave it out of values")
         if name not in names:
             what = f"it has {nearest_first(name, names)}" if names else "it has none that can be"
             raise ValueError(
