@@ -246,7 +246,7 @@ def test_functions_of_torch_have_gradients_by_what_they_are_made_of():
 def test_a_function_that_torch_cannot_follow_has_no_gradient_by_the_time_step():
     block, scene = on_a_block()
     time_step = torch.tensor(2e-3, dtype=torch.float64, requires_grad=True)
-    values = {block: {"center": lambda t: sliding(float(t))}}
+    values = {block: {"center": lambda t: sliding(float(t.detach()))}}
     move = ms.simulate(scene, steps=2, time_step=time_step, values=values, **EXACT)
     with pytest.raises(ms.NoGradient, match=r"by time_step: .*center is a function of the time"):
         move.positions.sum().backward()

@@ -112,7 +112,8 @@ def alike(values):
     """numpy or torch, and the values as arrays or tensors of it, float64: tensors if one of them is."""
     if any(is_tensor(each) for each in _flat(values)):
         torch = require_torch("a path")
-        return torch, _mapped(values, lambda each: torch.as_tensor(each).to(torch.float64))
+        tensor = lambda each: each if is_tensor(each) else torch.tensor(np.array(each, dtype=np.float64))  # noqa: E731
+        return torch, _mapped(values, lambda each: tensor(each).double())
     return np, _mapped(values, lambda each: np.asarray(each, dtype=np.float64))
 
 
