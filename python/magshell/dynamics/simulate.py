@@ -71,7 +71,14 @@ def simulate(
     start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
         bits. By default the rest shape.
     velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
-    remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density.
+    remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density. Controls, and the
+        damping, may stand in values={scene: {name: value}} as well: keywords are their short forms.
+    values in time: positions and moments of Dipoles, center and rotation of a PlacedField, an obstacle or a magnet, and
+        its magnetization, displacement, rotation and center of a Clamp or Pin that has one of them: a function of the time
+        [s], or an array with one more axis in front, at the ends of all steps (steps + 1, ...). As everything that is given
+        there, they lie on straight lines between (rotation vectors too), also at the stages within a step. Of field sources
+        one a step may be given, which lets them jump. The surface of an obstacle moves, for friction, with the slopes of
+        parabolas through three neighbouring ends, on straight lines between those: of second order, as its places are.
     integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(). A method of higher
         order makes an impact bounce, and each of its steps there is much work, unless the steps resolve it.
     record_every: steps between the states that come back, the start first.

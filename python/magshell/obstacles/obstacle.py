@@ -27,7 +27,8 @@ class Obstacle(Owner, ABC):
         rotation: rotation vector (3,) rad, about the center.
         motion: None, or a function of the time [s] that returns a displacement (3,) m, or (displacement (3,) m,
             rotation vector (3,) rad), in world axes. It must be smooth: its derivatives are taken from its values
-            within 2e-4 s before and after a time (4e-4 s after it at the start, never before time 0).
+            within 2e-4 s before and after a time (4e-4 s after it at the start, never before time 0). With gradients
+            by where it goes: center and rotation over time among the values of ms.simulate instead.
 
     `_core` is the shape in the C++ core; `_made_from` are the arguments a copy or another process makes it from again.
     """
