@@ -1,8 +1,8 @@
 """A kirigami tower that reaches for four targets, one after another: the motion of [Chen22] Fig. 13 and section 6.3.
 
 The tower of examples/kirigami_tower.py stands in its field. Four targets appear, 1.75 s each, drawn at random near
-where its centre comes to rest in fields that lean by 15 to 35 degrees. A uniform field in time, 50 mT at most in each
-component, is to bring the centre to the active target: what counts is the mean square of the distance from one second
+where its center comes to rest in fields that lean by 15 to 35 degrees. A uniform field in time, 50 mT at most in each
+component, is to bring the center to the active target: what counts is the mean square of the distance from one second
 after a target appears until the next one does, and, by very little, that of the field. The search starts from the
 field that points from the origin to the active target, which misses by 2.4 to 4.4 mm.
 
@@ -74,12 +74,12 @@ def main(
 
 
 def measured(task: Reaching, field: torch.Tensor, parts: int = 1) -> dict:
-    """What a field (steps, 3) T does: where the centre is, how far from the active target, and the angle between the
+    """What a field (steps, 3) T does: where the center is, how far from the active target, and the angle between the
     field and the vector from the origin to the target, as in [Chen22] Figure 13. parts: of each time step."""
     values = field.detach().numpy()
     move = task.tower.move(np.repeat(values, parts, axis=0), time_step=TIME_STEP / parts, record_every=parts)
     targets, counts = (each.numpy() for each in task.active)
-    distances = np.linalg.norm(move.positions[:, task.tower.sheet.centre] - targets, axis=1)
+    distances = np.linalg.norm(move.positions[:, task.tower.sheet.center] - targets, axis=1)
     counted = distances[counts > 0]
     aims = targets[1:] / np.linalg.norm(targets[1:], axis=1, keepdims=True)
     sines, cosines = np.linalg.norm(np.cross(values, aims), axis=1), (values * aims).sum(axis=1)

@@ -2,10 +2,10 @@
 
 A disc of 40 mm, 1 mm thick and soft, is cut into six rings, each held to the next by three bridges. The outermost
 one is glued to the floor. In a vertical field of 50 mT the remanent magnetization of every face, 80 kA/m at most, is
-to pull the centre as high as it goes, against the sheet's stiffness and its weight. The paper gives neither size nor
+to pull the center as high as it goes, against the sheet's stiffness and its weight. The paper gives neither size nor
 cuts nor field, so its objective of -2.8 is not to be compared with; its 4.1 s an iteration, for as many faces, are.
 
-What comes out: a tower 33.6 mm high, 1.68 radii, which is 79 % of the way from floor to centre along the rings.
+What comes out: a tower 33.6 mm high, 1.68 radii, which is 79 % of the way from floor to center along the rings.
 
 - L-BFGS takes 12 iterations to it, of four or five equilibria each; MMA, as in the paper, 95 of one each, for the
   same height. An iteration takes 0.02 to 0.1 s, though an equilibrium between designs that lie far apart, with snaps
@@ -17,7 +17,7 @@ What comes out: a tower 33.6 mm high, 1.68 radii, which is 79 % of the way from 
   that L-BFGS found from no magnetization rises to 33.4 mm by itself, and random changes of M by 2 % of the limit
   lower it by 0.1 mm at most.
 - The mesh, as coarse as the paper's, is part of the design: on four times as many faces the same magnetization
-  raises the centre to 31.8 mm. The lowest vertex lies 0.8 mm under the floor, which is no obstacle here.
+  raises the center to 31.8 mm. The lowest vertex lies 0.8 mm under the floor, which is no obstacle here.
 
 Run it: prints a summary and writes a picture into out/.
 """

@@ -3,7 +3,7 @@
 A bullet-shaped head of thin shell, open at the back, with six tentacles that are magnets along themselves, hangs in
 water as heavy as itself. A uniform field in time opens and closes the tentacles; their strokes push it on through a
 channel with a throat. What is looked for, as in the paper's section 6.3, is the field of every step: it is to bring the
-mass centre to twelve sample points along the channel, evenly in time, at little cost of field, and to be near a sum of
+mass center to twelve sample points along the channel, evenly in time, at little cost of field, and to be near a sum of
 five oscillations whose frequencies and amplitudes are looked for too (the DMP term, J = 5).
 
 What comes out, the objective in mm2. The guess passes none of the channels.
@@ -99,7 +99,7 @@ def main(
 
 
 def measured(swim: Swim, variables: Variables) -> dict:
-    """What a field does: where the mass centre is, and the last of the octopus; when it has passed the channel [s],
+    """What a field does: where the mass center is, and the last of the octopus; when it has passed the channel [s],
     or None."""
     field = variables.field(swim.times).detach().numpy()
     began = time.process_time()
@@ -111,7 +111,7 @@ def measured(swim: Swim, variables: Variables) -> dict:
     return {
         "field": field,
         "positions": move.positions,
-        "centre": swim.centre(move.positions).numpy(),
+        "center": swim.center(move.positions).numpy(),
         "tail": tail,
         "passed": float(move.times[beyond[0]]) if beyond.size else None,
         "deepest": float(-swim.channel.tube().signed_distance(move.positions).min()),

@@ -74,7 +74,7 @@ def walk(name: str, turns: int, time_step, **options) -> tuple[Crawler, ms.Traje
 
 
 def plot(result: dict):
-    """The crawler from the side on each ground, and the way of its centre."""
+    """The crawler from the side on each ground, and the way of its center."""
     from matplotlib import pyplot as plt
 
     walks = result["walks"]

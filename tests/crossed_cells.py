@@ -19,9 +19,9 @@ def crossed(length, width, cells, row_heights, across=False) -> ms.TriangleMesh:
     i, j = i.ravel(), j.ravel()
     share = np.full((nx * ny, 2), 0.5)
     share[:, 0 if across else 1] = np.asarray(row_heights)[j]
-    centres = np.stack([x[i], y[j]], axis=1) + share * (x[1], y[1])
+    centers = np.stack([x[i], y[j]], axis=1) + share * (x[1], y[1])
     corners = np.stack([i, i + 1, i + 1, i], axis=1) * (ny + 1) + np.stack([j, j, j + 1, j + 1], axis=1)
     new = len(grid) + np.arange(nx * ny)
     faces = [np.stack([corners[:, k], corners[:, (k + 1) % 4], new], axis=1) for k in range(4)]
-    points = np.concatenate([grid, centres])
+    points = np.concatenate([grid, centers])
     return ms.TriangleMesh(np.column_stack([points, np.zeros(len(points))]), np.concatenate(faces))

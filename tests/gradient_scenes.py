@@ -63,7 +63,7 @@ class Kind:
     @cached_property
     def of_objects(self) -> dict[tuple, np.ndarray]:
         """{(object, name): its value} of everything in the scene."""
-        owners = (self.scene, *self.scene.parts)
+        owners = (self.scene, *self.scene.objects)
         moving = self.function is ms.simulate
         return {
             (owner, name): self._over_time(owner, name, np.array(value, dtype=np.float64))
@@ -135,7 +135,7 @@ def label(kind: Kind, key: tuple) -> str:
     owner, name = key
     if owner is None:
         return name
-    owners = [kind.scene, *kind.scene.parts]
+    owners = [kind.scene, *kind.scene.objects]
     number = next(k for k, each in enumerate(owners) if each is owner)
     return f"{type(owner).__name__}[{number}].{name}"
 
@@ -170,7 +170,7 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
     names = getattr(owner, "_replaceable", ())
     if owner is scene:
         layout, key = scene._value_layout, ("loads", "forces")
-        loads = layout.part(scene._values.numbers, *key) if key in layout else np.zeros(0)
+        loads = layout.of(scene._values.numbers, *key) if key in layout else np.zeros(0)
         values = {"gravity": scene.gravity, "vertex_loads": loads}
         absent = {name for name, value in values.items() if not np.any(value)}
     elif isinstance(owner, ms.Contact):

@@ -61,6 +61,7 @@ ROOMS = [
     "__init__",
     "bench",
 ]
+OFFERED_ROOMS = {"control", "meshes", "objectives", "obstacles", "optim", "parametrize"}  # as ms.control, ...
 # Imports of a higher room, each with its reason.
 UPWARD_IMPORTS = {
     # Only autograd.py may see torch.autograd, which says what transforms a tensor is in. Asked for once torch is loaded.
@@ -87,6 +88,7 @@ OPTIONAL_MODULES = [
     "cloudpickle",
 ]
 LONGEST_FILE = 400
+SPELLINGS = {"cent" + "re": "center"}  # in two halves, as this file is read as well
 
 
 def cpp_files(root: Path) -> list[Path]:
@@ -225,6 +227,14 @@ def length_violations(root: Path) -> Iterator[str]:
             yield f"{path.relative_to(root)} has {length} lines"
 
 
+def spelling_violations(root: Path) -> Iterator[str]:
+    for path in cpp_files(root) + python_files(root, "python", "tests", "examples"):
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            for word, right in SPELLINGS.items():
+                if word in line.lower():
+                    yield f"{path.relative_to(root)}:{number}: {word} is spelled {right} here"
+
+
 RULES = [
     include_violations,
     import_violations,
@@ -232,6 +242,7 @@ RULES = [
     circle_violations,
     hidden_violations,
     length_violations,
+    spelling_violations,
 ]
 
 
@@ -310,6 +321,7 @@ def test_the_rules_look_at_files() -> None:
         (hidden_violations, "python/magshell/__init__.py", "from .mesh import *\n", "imports *"),
         (hidden_violations, "python/magshell/mesh/__init__.py", "from .weld import weld\n", "hides a module"),
         (length_violations, "tests/test_long.py", "\n" * (LONGEST_FILE + 1), "401 lines"),
+        (spelling_violations, "tests/test_a.py", f"x = bary{next(iter(SPELLINGS))}s\n", "spelled center"),
     ],
 )
 def test_rule_sees_a_violation(tmp_path: Path, rule, file: str, text: str, complaint: str) -> None:
@@ -346,6 +358,14 @@ def test_rules_let_good_code_through(tmp_path: Path, file: str, text: str) -> No
     path.parent.mkdir(parents=True)
     path.write_text(text)
     assert [complaint for rule in RULES for complaint in rule(tmp_path)] == []
+
+
+def test_users_are_not_led_into_the_bench_or_the_rooms() -> None:
+    code = "import sys, magshell; print(*dir(magshell), *(name for name in sys.modules if '.bench' in name))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    names = run.stdout.split()
+    assert "Scene" in names and "equilibrium" in names
+    assert not [name for name in names if "bench" in name or (name in ROOMS and name not in OFFERED_ROOMS)]
 
 
 def test_import_needs_no_optional_module() -> None:

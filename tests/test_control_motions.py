@@ -52,7 +52,7 @@ def test_derivatives_of_the_squared_distance(curve):
 
 @EVERY_CURVE
 def test_on_the_curve_and_in_the_middle_of_it_gradients_are_finite(curve):
-    middle = torch.tensor([[0.0, 0, 2], [1, 1, 1], [1, 0, 0]], dtype=torch.float64)  # the centres
+    middle = torch.tensor([[0.0, 0, 2], [1, 1, 1], [1, 0, 0]], dtype=torch.float64)  # the centers
     points = torch.cat([curve.at([0.0, 0.4, 1.0]), middle]).requires_grad_()
     (gradient,) = torch.autograd.grad(control.curve_distance(points, curve, smoothing=0.1), points)
     assert gradient.isfinite().all() and gradient[:3].abs().max() < 1e-12

@@ -248,8 +248,8 @@ def folded(degrees):
 def crease_edge(mesh):
     """The interior edge nearest to the middle of the mesh."""
     inner = mesh.interior_edges
-    centre = mesh.rest_positions.mean(axis=0)
-    return inner[np.argmin(np.linalg.norm(mesh.edge_midpoints[inner] - centre, axis=1))]
+    center = mesh.rest_positions.mean(axis=0)
+    return inner[np.argmin(np.linalg.norm(mesh.edge_midpoints[inner] - center, axis=1))]
 
 
 def face_tip(mesh, face, edge):

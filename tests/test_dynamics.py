@@ -189,7 +189,7 @@ def test_what_cannot_be_done_hands_back_the_motion_until_then(strip):
 
 
 def test_what_is_not_finite_is_named():
-    """A dipole in the very barycentre of a face."""
+    """A dipole in the very barycenter of a face."""
     mesh = ms.TriangleMesh([(0.0, 0, 0), (3.0, 0, 0), (0, 3.0, 0), (3.0, 3.0, 0)], [(0, 1, 2), (1, 3, 2)])
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     scene = ms.Scene(sheet, field=ms.Dipoles([(1.0, 1.0, 0.0)], [(0, 0, 1.0)]), allow_rigid_motions=True)
@@ -236,7 +236,7 @@ BAD = [
     ({"load_factor": np.zeros(3)}, "load_factor"),
     ({"damping": -1.0}, "damping .* must not be negative"),
     ({"damping": np.ones(3)}, r"\(n_v,\)"),
-    ({"stiffness_damping": -1.0}, "stiffness_damping must be positive"),
+    ({"stiffness_damping": -1.0}, r"stiffness_damping \[s\] must not be negative, got -1"),
     ({"maxwell_modulus": 1.0}, "maxwell_time"),
     ({"velocities": np.zeros((2, 3))}, r"velocities \[m/s\]"),
     ({"start": np.zeros((2, 3))}, "start"),

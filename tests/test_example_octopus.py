@@ -33,10 +33,10 @@ def test_the_search_lowers_the_objective(swim) -> None:
 
 
 def test_it_swims_forward(swim) -> None:
-    centre = swim["found"]["centre"]
-    assert centre[-1, 0] > centre[0, 0] + 1e-3
-    assert centre[-1, 0] > swim["guess"]["centre"][-1, 0]
-    assert np.abs(centre[:, 1:]).max() < 1e-6  # straight on: nothing pushes it aside
+    center = swim["found"]["center"]
+    assert center[-1, 0] > center[0, 0] + 1e-3
+    assert center[-1, 0] > swim["guess"]["center"][-1, 0]
+    assert np.abs(center[:, 1:]).max() < 1e-6  # straight on: nothing pushes it aside
 
 
 def test_it_stays_in_the_pipe_and_the_field_in_its_limit(swim) -> None:

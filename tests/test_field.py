@@ -118,12 +118,12 @@ def test_derivatives_of_the_energy_along_its_own_gradient(field, points, moments
     slope = np.einsum("nij,ni->nj", gradient, moments)
     direction = slope / np.linalg.norm(slope, axis=1, keepdims=True)
     step = 1e-4
-    forward, centre, backward = (
+    forward, center, backward = (
         np.einsum("ni,ni->n", field.flux_density(points + s * direction), moments) for s in (step, 0, -step)
     )
     assert_close(np.linalg.norm(slope, axis=1), (forward - backward) / (2 * step), 1e-4)
     bend = np.einsum("nj,njk,nk->n", direction, curvature, direction)
-    assert_close(bend, (forward - 2 * centre + backward) / step**2, 1e-3)
+    assert_close(bend, (forward - 2 * center + backward) / step**2, 1e-3)
 
 
 def test_curvature_is_symmetric(field, points, moments):

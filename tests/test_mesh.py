@@ -366,7 +366,7 @@ def test_scaled():
 @pytest.mark.parametrize(
     ("move", "message"),
     [
-        (lambda m: m.scaled(0.0), "factor must be positive and finite, got 0.0"),
+        (lambda m: m.scaled(0.0), "factor must be positive, got 0"),
         (lambda m: m.scaled(-1.0), "factor must be positive"),
         (lambda m: m.transformed(np.diag([1.0, 1, 0])), "rotation is singular"),
         (lambda m: m.transformed(np.eye(2)), r"rotation \[1\] must have shape \(3, 3\), got \(2, 2\)"),

@@ -30,9 +30,9 @@ def morley_plate(
     material = np.array([[1, poisson_ratio, 0], [poisson_ratio, 1, 0], [0, 0, (1 - poisson_ratio) / 2]])
     stiffness = np.zeros((n_v + n_e, n_v + n_e))
     for face, edges, area in zip(mesh.faces, mesh.face_edges, mesh.face_areas, strict=True):
-        centre = points[face].mean(axis=0)
-        x, y = (points[face] - centre).T
-        mid_x, mid_y = (mesh.edge_midpoints[edges, :2] - centre).T
+        center = points[face].mean(axis=0)
+        x, y = (points[face] - center).T
+        mid_x, mid_y = (mesh.edge_midpoints[edges, :2] - center).T
         n_x, n_y = normals[edges].T
         zero, one = np.zeros(3), np.ones(3)
         values = np.stack([one, x, y, x * x, x * y, y * y], axis=1)

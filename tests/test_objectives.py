@@ -136,9 +136,9 @@ def test_extension_does_not_depend_on_the_directions_length():
 
 def test_total_variation_of_a_step_is_its_height_times_its_length():
     mesh = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4))
-    centres = mesh.rest_positions[mesh.faces].mean(axis=1)
+    centers = mesh.rest_positions[mesh.faces].mean(axis=1)
     lengths = np.linalg.norm(np.diff(mesh.rest_positions[mesh.edges], axis=1)[:, 0], axis=1)
-    step = torch.tensor(np.where(centres[:, 0] < 0.5 * (centres[:, 0].min() + centres[:, 0].max()), 0.0, 3.0))
+    step = torch.tensor(np.where(centers[:, 0] < 0.5 * (centers[:, 0].min() + centers[:, 0].max()), 0.0, 3.0))
     found = objectives.total_variation(step, mesh.edge_faces, lengths, smoothing=1e-9)
     assert found.item() == pytest.approx(3.0)
     assert objectives.total_variation(torch.ones_like(step), mesh.edge_faces, lengths).item() == 0

@@ -106,7 +106,7 @@ def test_what_was_rejected_before_an_error_is_told(kind):
 
 def test_the_bar_says_why_while_an_iteration_goes_on(monkeypatch):
     shown = []
-    monkeypatch.setattr("magshell.design.minimize._READING", -1.0)
+    monkeypatch.setattr("magshell.design.minimize._TIME_TO_READ", -1.0)
     monkeypatch.setattr("tqdm.tqdm.set_postfix_str", lambda bar, text, *_: shown.append(text))
     found = run(walled(), iterations=4)
     assert any(", 1 rejected (jump in load case 1)" in text for text in shown)

@@ -19,10 +19,10 @@ def test_small_load_on_a_shallow_roof(load_factor: float) -> None:
 
 def test_fine_roof_takes_small_steps() -> None:
     mesh = cylinder_roof.quarter((32, 32))
-    centre = mesh.nearest_vertex((0, 0, cylinder_roof.RADIUS))
+    center = mesh.nearest_vertex((0, 0, cylinder_roof.RADIUS))
     path = ms.follow(
         cylinder_roof.scene(mesh, "midedge"),
-        until=lambda _, positions: positions[centre, 2] < cylinder_roof.RADIUS - 2.0,
+        until=lambda _, positions: positions[center, 2] < cylinder_roof.RADIUS - 2.0,
         first_step=0.005,
         progress=False,
     )

@@ -248,9 +248,9 @@ def test_what_costs_much_is_not_done_unasked(monkeypatch):
     mesh = square()
     states = np.stack([mesh.rest_positions] * 3)
     assert crossings.told(mesh, states) == "does not pass through itself in any state"
-    monkeypatch.setattr(crossings, "AFFORDABLE", 2 * mesh.n_faces)
+    monkeypatch.setattr(crossings, "AFFORDABLE_FACES", 2 * mesh.n_faces)
     assert crossings.told(mesh, states) == "does not pass through itself in the last state"
-    monkeypatch.setattr(crossings, "AFFORDABLE", mesh.n_faces - 1)
+    monkeypatch.setattr(crossings, "AFFORDABLE_FACES", mesh.n_faces - 1)
     assert "ask self_intersections()" in crossings.told(mesh, states)
 
 

@@ -87,7 +87,7 @@ def test_vertices_edges_and_faces_are_those_of_one_body_after_another(pair):
     assert scene.bodies == sheets
     np.testing.assert_array_equal(scene.mesh.edges, edges)
     np.testing.assert_array_equal(scene.mesh.faces[n_f:], sheets[1].mesh.faces + n_v)
-    for sheet, part in zip(sheets, scene._bodies.parts, strict=True):
+    for sheet, part in zip(sheets, scene._bodies.spans, strict=True):
         np.testing.assert_array_equal(scene.mesh.rest_positions[part.vertices], sheet.mesh.rest_positions)
         np.testing.assert_array_equal(scene.mesh.edge_lengths[part.edges], sheet.mesh.edge_lengths)
         np.testing.assert_array_equal(scene.mesh.face_normals[part.faces], sheet.mesh.face_normals)
@@ -106,7 +106,7 @@ def test_a_state_has_the_bits_of_two_scenes(pair, rng):
     hessian = symmetric(scene._model.hessian(state, controls, reduced=False))
     energies = dict.fromkeys(scene._model.term_names, 0.0)
     places = []
-    for one, part, x, phi in zip(alone, scene._bodies.parts, moved, turned, strict=True):
+    for one, part, x, phi in zip(alone, scene._bodies.spans, moved, turned, strict=True):
         own = one._model.state(x, phi)
         here, there = unknowns(scene._model, part.vertices, part.edges), unknowns(one._model)
         np.testing.assert_array_equal(gradient[here], one._model.gradient(own, controls)[there])
@@ -320,7 +320,7 @@ def test_strains_are_those_of_each_sheet(pair):
     _, scene, alone = pair
     both = ms.equilibrium(scene, applied_flux_density=STRONG, **EXACT)
     move = ms.simulate(scene, steps=2, time_step=4e-3, applied_flux_density=STRONG, progress=False)
-    for one, part in zip(alone, scene._bodies.parts, strict=True):
+    for one, part in zip(alone, scene._bodies.spans, strict=True):
         single = ms.equilibrium(one, applied_flux_density=STRONG, **EXACT)
         np.testing.assert_allclose(
             both.strains().bending[part.faces], single.strains().bending, rtol=0, atol=1e-8

@@ -131,8 +131,8 @@ def at_rest(values, **given):
         (lambda: simulate({CUBE: {"center": (0, 0, 1)}}), "not the scene, nor an object of it"),
         (lambda: simulate({ms.UniformField(): {"applied_flux_density": FIELD}}), "nor an object of it"),
         (
-            lambda: at_rest({CUBE: {"centre": (0, 0, 1)}}),
-            "CuboidMagnet has no value 'centre' .* it has center, ",
+            lambda: at_rest({CUBE: {"centers": (0, 0, 1)}}),
+            "CuboidMagnet has no value 'centers' .* it has center, ",
         ),
         (
             lambda: at_rest({SCENE: {"gravity_factors": 1}}),

@@ -24,9 +24,9 @@ def buckled():
 
 
 def design(field, strength=4e4):
-    centres = MESH.rest_positions[MESH.faces].mean(axis=1)
+    centers = MESH.rest_positions[MESH.faces].mean(axis=1)
     magnetization = np.zeros((MESH.n_faces, 3))
-    magnetization[:, 0] = np.where(centres[:, 0] < HALF, -strength, strength)
+    magnetization[:, 0] = np.where(centers[:, 0] < HALF, -strength, strength)
     return {"remanent_magnetization": magnetization, "applied_flux_density": (0, 0, field)}
 
 
@@ -226,7 +226,7 @@ def test_values_of_everything_in_a_scene_go_through_a_state(tmp_path):
         contact: {"contact_stiffness": 30.0, "offset": 1e-4},
         floor: {"center": (0, 0, -1.1e-3)},
     }
-    assert {id(each) for each in values} == {id(each) for each in (scene, *scene.parts)}
+    assert {id(each) for each in values} == {id(each) for each in (scene, *scene.objects)}
     one, other = ms.WarmStart(scene), ms.WarmStart(scene)
     one(remanent_magnetization=(1e4, 0, 0), values=values)
     torch.save(one.state_dict(), tmp_path / "state.pt")

@@ -9,7 +9,7 @@
 namespace magshell::bindings {
 namespace {
 
-PathResult follow(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
+PathResult follow(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
                   const Controls& to, const PathOptions& options, const std::vector<Index>& entries,
                   const py::object& until, const py::object& progress) {
     const Varying varying(model.registry(), entries);
@@ -26,7 +26,7 @@ PathResult follow(Model& model, const VectorXd& start, const Model::Memory& memo
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
     return follow_path(
-        model, start, memory, from, to, options, ends,
+        model, start, turns, from, to, options, ends,
         [&](double at, double residual) { watch(at, residual); }, varying);
 }
 
@@ -46,7 +46,7 @@ void register_continuation(py::module_& module) {
     py::class_<PathPoint>(module, "PathPoint")
         .def_readonly("state", &PathPoint::state)
         .def_readonly("parameter", &PathPoint::parameter)
-        .def_readonly("memory", &PathPoint::memory)
+        .def_readonly("turns", &PathPoint::turns)
         .def_readonly("unstable_directions", &PathPoint::unstable_directions);
 
     py::enum_<CriticalKind>(module, "CriticalKind")
@@ -68,9 +68,9 @@ void register_continuation(py::module_& module) {
         .def_readonly("factorizations", &PathResult::factorizations)
         .def_readonly("failed_factorizations", &PathResult::failed_factorizations);
 
-    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("memory"),
-               py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("varying"),
-               py::arg("until") = py::none(), py::arg("progress") = py::none());
+    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("turns"), py::arg("from_"),
+               py::arg("to"), py::arg("options"), py::arg("varying"), py::arg("until") = py::none(),
+               py::arg("progress") = py::none());
 }
 
 }  // namespace magshell::bindings

@@ -67,7 +67,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     MotionInput input;
     input.start.q = to_vector(array("state"));
     input.start.v = to_vector(array("velocity"));
-    input.start.memory = given["memory"].cast<Model::Memory>();
+    input.start.turns = given["turns"].cast<Model::Turns>();
     input.inertia = {model.bodies().vertex_weights(to_vector(array("mass"))),
                      model.bodies().vertex_weights(to_vector(array("damping")))};
     input.start.e = strains_of(model, given["maxwell_strains"].cast<Array>());
@@ -206,7 +206,7 @@ void register_dynamics(py::module_& module) {
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.d); })
         .def("last_maxwell_strain_rates",
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.e); })
-        .def_property_readonly("last_memory", [](const MotionResult& r) { return r.last.memory; })
+        .def_property_readonly("last_turns", [](const MotionResult& r) { return r.last.turns; })
         .def_readonly("kinetic_energy", &MotionResult::kinetic_energy)
         .def_readonly("energies", &MotionResult::energies)
         .def_readonly("halved", &MotionResult::halved)

@@ -65,7 +65,7 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     input.sheets = sheets_of(given["sheets"]);
     input.directions = to_rows3(array("directions"));
     input.held = held_nodes(indices("held_nodes"), array("held_frames"));
-    input.motions = given["motions"].cast<Index>();
+    input.moves = given["moves"].cast<Index>();
     const IndexArray couples = indices("couples");
     for (py::ssize_t k = 0; k < couples.shape(0); ++k)
         input.couples.push_back({couples.at(k, 0), couples.at(k, 1), couples.at(k, 2)});

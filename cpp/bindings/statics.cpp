@@ -8,12 +8,12 @@
 namespace magshell::bindings {
 namespace {
 
-StaticsResult solve(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
+StaticsResult solve(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
                     const Controls& to, const StaticsOptions& options, const py::object& progress) {
     const Watch watch(progress);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
-    return find_equilibrium(model, start, memory, from, to, options,
+    return find_equilibrium(model, start, turns, from, to, options,
                             [&](double at, double residual) { watch(at, residual); });
 }
 
@@ -58,7 +58,7 @@ void register_statics(py::module_& module) {
     py::class_<StaticsResult>(module, "StaticsResult")
         .def_readonly("outcome", &StaticsResult::outcome)
         .def_readonly("state", &StaticsResult::state)
-        .def_readonly("memory", &StaticsResult::memory)
+        .def_readonly("turns", &StaticsResult::turns)
         .def_readonly("controls", &StaticsResult::controls)
         .def_readonly("progress", &StaticsResult::progress)
         .def_readonly("reason", &StaticsResult::reason)
@@ -76,7 +76,7 @@ void register_statics(py::module_& module) {
         .def_readonly("bytes", &StaticsResult::bytes)
         .def_readonly("factorization", &StaticsResult::factorization);
 
-    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("memory"),
+    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("turns"),
                py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("progress") = py::none());
     module.def("first_order_change", &change, py::arg("model"), py::arg("equilibrium"), py::arg("to"),
                "The change of the state to first order, from an equilibrium whose factor was kept to these "

@@ -59,7 +59,7 @@ class Design:
 def design(edges_per_side: int, n_vertices: int) -> Design:
     """The sheet without gravity, held as far as a free body has to be, and no further.
 
-    The centre cannot move sideways, a corner of the hexagon cannot move round it, and every second corner
+    The center cannot move sideways, a corner of the hexagon cannot move round it, and every second corner
     keeps its height: six conditions for six rigid motions. The reactions are those that balance the field's
     torque on the whole sheet. Heights stay zero under a reflection of z, so the supports do not tell up from
     down.

@@ -9,7 +9,7 @@ import magshell as ms
 
 SIDE = 20e-3  # m, of the hexagon in the middle and of the arms, equilateral triangles on its sides
 ARM_LENGTH = np.sqrt(0.75) * SIDE  # m, from an arm's root, a side of the hexagon, to its tip
-ROOT_DISTANCE = np.sqrt(0.75) * SIDE  # m, from the centre to the roots
+ROOT_DISTANCE = np.sqrt(0.75) * SIDE  # m, from the center to the roots
 ARM_ANGLES = np.radians(60.0) * np.arange(6)  # from the x axis to each arm's axis
 
 _SMOOTHINGS = 40
@@ -17,7 +17,7 @@ _CLEARANCE = 0.6  # of an edge of the outline: no vertex closer to outline or ro
 
 
 def hexagram(edges_per_side: int, n_vertices: int) -> ms.TriangleMesh:
-    """The sheet in the plane z = 0, its centre at the origin, its arms' roots along edges of the mesh.
+    """The sheet in the plane z = 0, its center at the origin, its arms' roots along edges of the mesh.
 
     Each of the outline's 12 sides has `edges_per_side` edges. By Euler's formula a triangulation of n_v
     vertices, n_b of them on the outline, has 2 n_v - 2 - n_b faces: 1097 vertices and 12 edges a side give
@@ -107,7 +107,7 @@ def _outline(edges_per_side: int) -> np.ndarray:
 
 
 def _kept(edges_per_side: int) -> np.ndarray:
-    """The vertices along the roots, without their ends, and the centre."""
+    """The vertices along the roots, without their ends, and the center."""
     _, corner = _corners()
     roots = [_divided(*ends, edges_per_side)[1:] for ends in zip(corner, np.roll(corner, -1, 0), strict=True)]
     return np.concatenate([*roots, np.zeros((1, 2))])

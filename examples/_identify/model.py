@@ -16,15 +16,15 @@ FIELDS = 20e-3 * np.array(
 )  # T: three load cases, and one without
 NOISE = 0.1e-3  # m, standard deviation of each measured coordinate
 STRIPS = (5, 1)  # of equal magnetization: how many along and across
-INCLUSION, EDGE = ((18e-3, 16e-3), 8e-3), 1.5e-3  # its centre and radius, and how sharp it is, m
+INCLUSION, EDGE = ((18e-3, 16e-3), 8e-3), 1.5e-3  # its center and radius, and how sharp it is, m
 
 
 def true_young_modulus(points: np.ndarray) -> np.ndarray:
     """(n,) Pa, at points (n, 3): 1 to 2.5 MPa, smooth, and a stiff inclusion of 10 MPa."""
     x, y = points[:, 0] / LENGTH, points[:, 1] / WIDTH
     wave = 0.5 + 0.5 * np.cos(2 * np.pi * (x - 0.3 * y)) * np.cos(np.pi * y)
-    centre, radius = INCLUSION
-    distance = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
+    center, radius = INCLUSION
+    distance = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1])
     inside = 1 / (1 + np.exp((distance - radius) / EDGE))
     return 1e6 * 2.5 ** ((1 - inside) * wave) * 10**inside
 

@@ -22,7 +22,7 @@ def checks(sheet: Kirigami, found: dict, trials: int = 30) -> dict:
         "stable": rest.stable,
         "moved": float(np.abs(rest.positions - found["positions"]).max()),
         "lowest": float(rest.positions[:, 2].min()),
-        "off_axis": float(np.linalg.norm(rest.positions[sheet.centre, :2])),
+        "off_axis": float(np.linalg.norm(rest.positions[sheet.center, :2])),
         "largest_magnetization": float(np.linalg.norm(magnetization, axis=1).max()),
         "way": sheet.longest_way(),
         "energies": rest.energies,
@@ -67,7 +67,7 @@ def disturbed(
     sheet: Kirigami, rest, magnetization: np.ndarray, trials: int, size: float = 0.02
 ) -> np.ndarray:
     """(trials,) m: by how much random changes of every magnetization, a share of the limit in size, raise the
-    centre."""
+    center."""
     rng, gains = np.random.default_rng(4), []
     for _ in range(trials):
         moved = magnetization + size * LIMIT * rng.standard_normal(magnetization.shape)
@@ -78,7 +78,7 @@ def disturbed(
 
 
 def to_first_order(sheet: Kirigami, magnetization: np.ndarray, start=None) -> float:
-    """By how much the best magnetization within the limit would raise the centre if its height were linear [m]."""
+    """By how much the best magnetization within the limit would raise the center if its height were linear [m]."""
     values = torch.from_numpy(magnetization).requires_grad_()
     sheet.height(solve(sheet, values, start=start).positions).backward()
     gradient = values.grad.numpy()

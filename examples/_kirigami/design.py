@@ -19,7 +19,7 @@ FARTHEST = 5.0  # of a design's numbers: one of them takes |M_r| to 0.98 of the 
 
 
 class Tower:
-    """The objective: minus the centre's height [m]. Keeps the tallest tower of all that it was asked for.
+    """The objective: minus the center's height [m]. Keeps the tallest tower of all that it was asked for.
 
     A design is (n, 3) numbers u, three for each face; `threefold`, for each face of a third of the sheet, which the
     others repeat turned. M_r = LIMIT u / sqrt(1 + |u|^2). Jumps are followed: a sheet without magnetization hangs

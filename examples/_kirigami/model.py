@@ -22,26 +22,26 @@ GRAVITY = (0.0, 0.0, -9.81)  # m/s2
 
 @dataclass(frozen=True)
 class Kirigami:
-    """rings: (n_f,) the ring of each face, 0 the disc in the middle. centre: the vertex there."""
+    """rings: (n_f,) the ring of each face, 0 the disc in the middle. center: the vertex there."""
 
     scene: ms.Scene
     rings: np.ndarray
-    centre: int
+    center: int
 
     @property
     def mesh(self) -> ms.TriangleMesh:
         return self.scene.mesh
 
     def height(self, positions):
-        """Of the centre over the floor, m; positions: (n_v, 3), or (k, n_v, 3)."""
-        return positions[..., self.centre, 2]
+        """Of the center over the floor, m; positions: (n_v, 3), or (k, n_v, 3)."""
+        return positions[..., self.center, 2]
 
     def longest_way(self) -> float:
-        """From the centre to the glued ring along the edges of the mesh, m: no tower can be higher, but for
+        """From the center to the glued ring along the edges of the mesh, m: no tower can be higher, but for
         what the sheet stretches and for what shorter ways there are between the edges."""
         mesh = self.mesh
         graph = coo_array((mesh.edge_lengths, tuple(mesh.edges.T)), shape=(mesh.n_vertices,) * 2)
-        lengths = dijkstra(graph, directed=False, indices=self.centre)
+        lengths = dijkstra(graph, directed=False, indices=self.center)
         return float(lengths[mesh.faces[self.rings == RINGS]].min())
 
 

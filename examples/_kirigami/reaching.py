@@ -63,7 +63,7 @@ class Tower:
 
 
 def drawn_targets(tower: Tower, number: int, seed: int) -> np.ndarray:
-    """(number, 3) m, at random, each near where the centre comes to rest in some field within the limit."""
+    """(number, 3) m, at random, each near where the center comes to rest in some field within the limit."""
     rng, targets = np.random.default_rng(seed), []
     for _ in range(number):
         leaning, around = rng.uniform(*LEANING), rng.uniform(0, 2 * np.pi)
@@ -73,7 +73,7 @@ def drawn_targets(tower: Tower, number: int, seed: int) -> np.ndarray:
         rest = tower.at_rest(rng.uniform(*STRENGTHS) * direction)
         scatter = rng.standard_normal(3)
         scatter *= SCATTER * rng.uniform() ** (1 / 3) / np.linalg.norm(scatter)
-        targets.append(rest.positions[tower.sheet.centre] + scatter)
+        targets.append(rest.positions[tower.sheet.center] + scatter)
     return np.array(targets)
 
 
@@ -113,7 +113,7 @@ class Reaching:
     def objective(self, field: torch.Tensor) -> dict[str, torch.Tensor]:
         """field: (steps, 3) T."""
         targets, counts = self.active
-        track = self.tower.move(field).positions[:, self.tower.sheet.centre]
+        track = self.tower.move(field).positions[:, self.tower.sheet.center]
         return {
             "distance": ms.control.path_following(track, targets, counts) / counts.sum(),
             "strength": FIELD_COST * ms.control.field_strength(field),

@@ -71,7 +71,7 @@ def draw_field(axes, result: dict) -> None:
 
 
 def draw_towers(axes, result: dict) -> None:
-    """Where it is one delay after each target appeared, with the centre's height and the target's in the titles."""
+    """Where it is one delay after each target appeared, with the center's height and the target's in the titles."""
     from matplotlib import pyplot as plt
 
     frames, targets = result["marked_frames"], result["targets"]

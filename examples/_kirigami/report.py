@@ -63,7 +63,7 @@ def draw_convergence(axes, searches: list[dict]) -> None:
         )
     axes.axhline(0.0, color=GREY, lw=0.8)
     axes.text(0.98, 0.0, "floor", color=GREY, va="bottom", ha="right", transform=axes.get_yaxis_transform())
-    axes.set(xscale="log", xlabel="time [s]", ylabel="height of the centre [mm]")
+    axes.set(xscale="log", xlabel="time [s]", ylabel="height of the center [mm]")
     axes.legend(frameon=False, loc="center right", bbox_to_anchor=(1.0, 0.5))
 
 
@@ -80,7 +80,7 @@ def draw_switching(axes, found: dict, switched: dict) -> None:
         arrowprops={"arrowstyle": "-", "color": GREY, "shrinkB": 5},
         color=COLORS["L-BFGS"],
     )
-    axes.set(xlabel="flux density B [mT]", ylabel="height of the centre [mm]", ylim=(0, None))
+    axes.set(xlabel="flux density B [mT]", ylabel="height of the center [mm]", ylim=(0, None))
 
 
 def summary(result: dict) -> str:

@@ -13,7 +13,7 @@ PIXELS = 257  # a side: four a cell of the finest sheet here
 
 
 def height_map(letter: str, side: float, share: float, smoothing: float) -> np.ndarray:
-    """(PIXELS, PIXELS) from 0 beside the letter to 1 on it, row 0 at y = side; pixels centred on both edges.
+    """(PIXELS, PIXELS) from 0 beside the letter to 1 on it, row 0 at y = side; pixels centerd on both edges.
 
     side: of the square, m. share: of it that the letter's own height takes. smoothing: standard deviation of the
     Gaussian that its outline is blurred by, m.
@@ -21,10 +21,10 @@ def height_map(letter: str, side: float, share: float, smoothing: float) -> np.n
     outline = TextPath((0, 0), letter, size=1, prop=FONT)
     box = outline.get_extents()
     scale = share * side / box.height
-    centred = (outline.vertices - [box.x0 + box.width / 2, box.y0 + box.height / 2]) * scale + side / 2
+    centerd = (outline.vertices - [box.x0 + box.width / 2, box.y0 + box.height / 2]) * scale + side / 2
     x = np.linspace(0.0, side, PIXELS)
     points = np.stack(np.meshgrid(x, x[::-1]), axis=-1).reshape(-1, 2)
     inside = np.zeros(len(points), dtype=bool)
-    for loop in Path(centred, outline.codes).to_polygons():
+    for loop in Path(centerd, outline.codes).to_polygons():
         inside ^= Path(loop).contains_points(points)  # a second loop around a point is a hole
     return gaussian_filter(inside.reshape(PIXELS, PIXELS).astype(float), smoothing / (x[1] - x[0]))

@@ -18,7 +18,7 @@ class Channel:
 
     end: m, where its narrow part ends: it is passed once all of the octopus is beyond.
     after: the channel with whose field the search begins, if that was looked for before; else with a guess.
-    goal: m, where along x the mass centre is asked to be when the time set is over.
+    goal: m, where along x the mass center is asked to be when the time set is over.
     """
 
     name: str

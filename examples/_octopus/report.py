@@ -45,8 +45,8 @@ def draw_snapshot(axes, result: dict, name: str, time: float) -> None:
     frame = int(np.argmin(np.abs(result["times"] - time)))
     draw_swimmer(axes, result, motion["positions"][frame])
     axes.plot(
-        1e3 * motion["centre"][: frame + 1, 0],
-        1e3 * motion["centre"][: frame + 1, 2],
+        1e3 * motion["center"][: frame + 1, 0],
+        1e3 * motion["center"][: frame + 1, 2],
         color="k",
         lw=0.8,
         zorder=6,
@@ -55,15 +55,15 @@ def draw_snapshot(axes, result: dict, name: str, time: float) -> None:
 
 
 def draw_path(axes, result: dict) -> None:
-    """Along the channel: the centre of mass beside the sample points, and the last tip beside the channel's end."""
+    """Along the channel: the center of mass beside the sample points, and the last tip beside the channel's end."""
     for name in ("guess", "found"):
         motion = result[name]
         axes.plot(
             result["times"],
-            1e3 * motion["centre"][:, 0],
+            1e3 * motion["center"][:, 0],
             color=COLORS[name],
             lw=1.6,
-            label=f"centre, {LABELS[name]}",
+            label=f"center, {LABELS[name]}",
         )
         axes.plot(
             result["times"], 1e3 * motion["tail"], color=COLORS[name], lw=0.9, ls="--", label="last tip"
@@ -153,7 +153,7 @@ def _about(name: str, result: dict) -> str:
 def _about_motion(label: str, motion: dict) -> str:
     passed = "does not pass" if motion["passed"] is None else f"passes after {motion['passed']:.2f} s"
     return (
-        f"  {label:<20} {passed}; centre at {1e3 * motion['centre'][-1, 0]:.1f} mm in the end, last tip at "
+        f"  {label:<20} {passed}; center at {1e3 * motion['center'][-1, 0]:.1f} mm in the end, last tip at "
         f"{1e3 * motion['tail'][-1]:.1f} mm; field {1e3 * motion['rms']:.1f} mT rms, at most "
         f"{1e3 * motion['strongest']:.1f} mT; {motion['halved']} steps in parts"
     )

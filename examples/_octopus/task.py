@@ -22,14 +22,14 @@ SMOOTHING, STICKING_SPEED = (
 )  # m and m/s: with sharper contacts small changes of the field throw it about
 WATER = 1e3  # kg/m3, [Chen22] 6.3: as heavy as the octopus, which therefore floats and needs no gravity
 
-SAMPLES = 12  # points of the path that the mass centre is asked for
+SAMPLES = 12  # points of the path that the mass center is asked for
 STRENGTH_COST = 5e-3  # m2/T2: 10 mT all the time cost as much as 0.7 mm of distance
 DMP_COST = 1e-2  # m2/T2: a rest of 10 mT costs as much as 1 mm
 FREQUENCIES = 2 * np.pi * np.array([2.0, 4.0, 6.0, 8.0, 12.0])  # rad/s, to begin with; J = 5 as in the paper
 SLOWEST, FASTEST = 2 * np.pi * 0.2, 2 * np.pi * 15.0  # rad/s
 
 GUESS, GUESSED = 6e-3, 1  # T: the field of the start swings so far along x, and with which of the frequencies
-PRECISION = 1e-6  # of a step, relative: the centre's path is within 0.1 um of that with 1e-10
+PRECISION = 1e-6  # of a step, relative: the center's path is within 0.1 um of that with 1e-10
 
 
 class Variables(NamedTuple):
@@ -59,7 +59,7 @@ SIZES = Variables(20e-3, 2 * np.pi * 0.3, 5e-3, 5e-3)  # of the variables, for t
 class Swim:
     """The octopus in a channel, or in open water (None), for so many steps.
 
-    goal: m, where along x the mass centre is asked to be at the end; the sample points lead there evenly.
+    goal: m, where along x the mass center is asked to be at the end; the sample points lead there evenly.
     """
 
     body: Octopus
@@ -112,7 +112,7 @@ class Swim:
             progress=False,
         )
 
-    def centre(self, positions):
+    def center(self, positions):
         """Of mass, (n, 3) m; positions (n, n_v, 3) m."""
         return ms.control.track(positions, np.arange(self.body.mesh.n_vertices), self.body.masses)
 
@@ -127,10 +127,10 @@ class Swim:
         """Terms in m2."""
         field = variables.field(self.times)
         frames, points = self.samples()
-        centre = self.centre(self.move(field).positions)
+        center = self.center(self.move(field).positions)
         signal = variables.frequencies, variables.cosines, variables.sines
         return {
-            "distance": ms.control.path_following(centre[frames], points) / len(frames),
+            "distance": ms.control.path_following(center[frames], points) / len(frames),
             "strength": STRENGTH_COST * ms.control.field_strength(field),
             "low frequency": DMP_COST * ms.control.dmp(field, self.times, *signal),
         }

@@ -87,7 +87,7 @@ class Crawler:
             **({"integrator": ms.ImplicitEuler(), "progress": False} | options),
         )
 
-    def centres(self, motion: ms.Trajectory) -> np.ndarray:
+    def centers(self, motion: ms.Trajectory) -> np.ndarray:
         """Of mass, (n, 3) m."""
         masses = self.scene.shell.vertex_masses
         return np.einsum("v,tvi->ti", masses / masses.sum(), motion.positions)

@@ -56,18 +56,18 @@ def _foot(mesh: ms.TriangleMesh, root: int) -> np.ndarray:
 
 def draw_progress(axes, walks: dict) -> None:
     for name, (who, motion) in walks.items():
-        centre = 1e3 * who.centres(motion)
-        axes.plot(motion.times, centre[:, 0] - centre[0, 0], color=COLORS[name], label=name)
-    axes.set(xlabel="time [s]", ylabel="centre's way along x [mm]")
+        center = 1e3 * who.centers(motion)
+        axes.plot(motion.times, center[:, 0] - center[0, 0], color=COLORS[name], label=name)
+    axes.set(xlabel="time [s]", ylabel="center's way along x [mm]")
     axes.legend(frameon=False)
 
 
 def draw_paths(axes, walks: dict) -> None:
-    """The centre above the ground it is over."""
+    """The center above the ground it is over."""
     for name, (who, motion) in walks.items():
-        x, _, z = who.centres(motion).T
+        x, _, z = who.centers(motion).T
         axes.plot(1e3 * x, 1e3 * (z - who.ground.height(x)), color=COLORS[name], label=name)
-    axes.set(xlabel="centre's x [mm]", ylabel="its height above ground [mm]")
+    axes.set(xlabel="center's x [mm]", ylabel="its height above ground [mm]")
 
 
 def picture(who: Crawler, motion: ms.Trajectory, shown: int = 9) -> ms.Picture:

@@ -25,9 +25,9 @@ class Row:
 
 
 def advances(who: Crawler, motion: ms.Trajectory) -> np.ndarray:
-    """How far the centre of mass came in each full cycle, (cycles, 3) m."""
+    """How far the center of mass came in each full cycle, (cycles, 3) m."""
     a_cycle = round(1 / (FREQUENCY * (motion.times[1] - motion.times[0])))
-    return np.diff(who.centres(motion)[::a_cycle], axis=0)
+    return np.diff(who.centers(motion)[::a_cycle], axis=0)
 
 
 def study(steps=(2e-3, 1e-3, TIME_STEP), cycles=2) -> list[Row]:

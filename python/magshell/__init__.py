@@ -131,3 +131,8 @@ __all__ = [
     "write_page",
     "write_series",
 ]
+
+
+def __dir__() -> list[str]:
+    """What is public: neither the rooms that it is made in nor the bench."""
+    return sorted(__all__)

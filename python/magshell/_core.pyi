@@ -504,7 +504,7 @@ class StaticsResult:
     @property
     def load_steps(self) -> int: ...
     @property
-    def memory(self) -> list[list[float]]: ...
+    def turns(self) -> list[list[float]]: ...
     @property
     def outcome(self) -> Outcome: ...
     @property
@@ -551,7 +551,7 @@ class PathOptions:
 
 class PathPoint:
     @property
-    def memory(self) -> list[list[float]]: ...
+    def turns(self) -> list[list[float]]: ...
     @property
     def parameter(self) -> float: ...
     @property
@@ -696,7 +696,7 @@ class MotionResult:
     @property
     def last_acceleration(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
-    def last_memory(self) -> list[list[float]]: ...
+    def last_turns(self) -> list[list[float]]: ...
     @property
     def last_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
@@ -754,7 +754,7 @@ def factor_orderings() -> list[str]: ...
 def find_equilibrium(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    memory: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+    turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
     from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: StaticsOptions,
@@ -772,7 +772,7 @@ def first_order_change(
 def follow_path(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    memory: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+    turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
     from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: PathOptions,

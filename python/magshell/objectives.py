@@ -29,7 +29,7 @@ def height_map(positions, rest_positions, image, extent, weights=None):
 
     The image is sampled bilinearly where the vertices rest. positions: (n_v, 3) or (k, n_v, 3). rest_positions:
     (n_v, 3). image: (rows, columns) heights [m], row 0 at the largest y as pictures are drawn; one for all cases.
-    extent: (x_min, x_max, y_min, y_max) [m] of the centres of its outermost pixels; beyond, the nearest pixel counts.
+    extent: (x_min, x_max, y_min, y_max) [m] of the centers of its outermost pixels; beyond, the nearest pixel counts.
     weights: (n_v,) or (k, n_v), by default 1.
     """
     positions = real_tensor("positions", positions, ("...", "n_v", 3))

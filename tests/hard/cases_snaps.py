@@ -80,7 +80,7 @@ def toggle_by_arc_length():
 
 
 def roof(thickness: float, load: float) -> ms.Scene:
-    """A quarter of the shallow roof of the accuracy table, with a quarter of `load` [N] on its centre."""
+    """A quarter of the shallow roof of the accuracy table, with a quarter of `load` [N] on its center."""
     mesh = cylinder_roof.quarter((12, 12))
     sheet = ms.Shell(
         mesh,
@@ -90,14 +90,14 @@ def roof(thickness: float, load: float) -> ms.Scene:
     )
     hinge = mesh.vertices_at(x=cylinder_roof.RADIUS * np.sin(cylinder_roof.HALF_ANGLE))
     supports = [ms.Pin(hinge), ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]
-    centre = mesh.nearest_vertex((0, 0, cylinder_roof.RADIUS))
-    return ms.Scene(sheet, supports=supports, loads=[ms.PointLoad(centre, (0, 0, -load / 4.0))])
+    center = mesh.nearest_vertex((0, 0, cylinder_roof.RADIUS))
+    return ms.Scene(sheet, supports=supports, loads=[ms.PointLoad(center, (0, 0, -load / 4.0))])
 
 
 def sunk(scene: ms.Scene, positions: np.ndarray) -> np.ndarray:
-    """How far the centre has come down, mm."""
-    centre = scene.mesh.nearest_vertex((0, 0, cylinder_roof.RADIUS))
-    return cylinder_roof.RADIUS - positions[..., centre, 2]
+    """How far the center has come down, mm."""
+    center = scene.mesh.nearest_vertex((0, 0, cylinder_roof.RADIUS))
+    return cylinder_roof.RADIUS - positions[..., center, 2]
 
 
 @case("a roof under 1.45 times its limit load, at once: no equilibrium is near")

@@ -268,7 +268,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "time": 0.0,
         "state": s.state.state,
         "velocity": s.state.velocity,
-        "memory": s.state.memory,
+        "turns": s.state.turns,
         "acceleration": s.state.acceleration,
     }
     yield Call(

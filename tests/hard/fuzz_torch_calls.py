@@ -91,7 +91,7 @@ def _controls(s: Sample) -> Iterator[Call]:
     yield Call(
         "control.Arc",
         lambda **a: control.Arc(**a).at((0.5,)),
-        {"centre": (0, 0, 0), "start": (1, 0, 0), "axis": (0, 0, 1), "angle": 1.0},
+        {"center": (0, 0, 0), "start": (1, 0, 0), "axis": (0, 0, 1), "angle": 1.0},
     )
     yield Call("control.Polyline", lambda **a: control.Polyline(**a).at((0.5,)), {"points": np.eye(3)})
     yield Call(

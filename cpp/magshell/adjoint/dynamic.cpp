@@ -14,11 +14,13 @@ struct Rates {
     std::vector<VectorXd> x_hat, v_hat;
     std::vector<StageRates> all;
 
-    Rates(const StepAlgebra& step, const PartRecord& part, Index coordinates)
-        : x_hat(part.stages.size()), v_hat(part.stages.size()), all(first_rates(step.tableau(), part.begin)) {
-        for (int i = 0; i < static_cast<int>(part.stages.size()); ++i) {
-            step.start_of_stage(i, part.begin, all, x_hat[i], v_hat[i]);
-            step.finish_stage(part.stages[i].q, x_hat[i], v_hat[i], coordinates, all.emplace_back());
+    Rates(const StepAlgebra& step, const SubstepRecord& substep, Index coordinates)
+        : x_hat(substep.stages.size()),
+          v_hat(substep.stages.size()),
+          all(first_rates(step.tableau(), substep.begin)) {
+        for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
+            step.start_of_stage(i, substep.begin, all, x_hat[i], v_hat[i]);
+            step.finish_stage(substep.stages[i].q, x_hat[i], v_hat[i], coordinates, all.emplace_back());
         }
     }
 };
@@ -80,25 +82,26 @@ class Backward {
 
     void forward(Index begin, Index end, MotionState& state) {
         for (Index step = begin; step < end; ++step)
-            repeat_step(stepper_, input_, step, parts_of(motion_.halved, step), state, nullptr);
+            repeat_step(stepper_, input_, step, substeps_of(motion_.halved, step), state, nullptr);
     }
 
     void leaf(Index begin, Index end, MotionState state) {
-        std::vector<std::vector<PartRecord>> steps(end - begin);
+        std::vector<std::vector<SubstepRecord>> steps(end - begin);
         for (Index step = begin; step < end; ++step)
-            repeat_step(stepper_, input_, step, parts_of(motion_.halved, step), state, &steps[step - begin]);
+            repeat_step(stepper_, input_, step, substeps_of(motion_.halved, step), state,
+                        &steps[step - begin]);
         for (Index step = end - 1; step >= begin; --step) back(step, steps[step - begin]);
     }
 
-    void back(Index step, const std::vector<PartRecord>& records) {
+    void back(Index step, const std::vector<SubstepRecord>& records) {
         progress_ = 1.0 - static_cast<double>(step + 1) / static_cast<double>(motion_.steps_done);
-        const Parts parts = parts_of(motion_.halved, step);
-        for (std::size_t k = parts.size(); k-- > 0;) back(step, parts[k], records[k]);
+        const Substeps substeps = substeps_of(motion_.halved, step);
+        for (std::size_t k = substeps.size(); k-- > 0;) back(step, substeps[k], records[k]);
         take_in(step);
     }
 
-    void back(Index step, const std::pair<double, double>& part, const PartRecord& record) {
-        const double share = part.second - part.first;
+    void back(Index step, const std::pair<double, double>& substep, const SubstepRecord& record) {
+        const double share = substep.second - substep.first;
         const StepAlgebra algebra =
             stepper_.algebra(share * input_.time_step, stepper_.tableau_from(record.begin));
         const Tableau& tableau = algebra.tableau();
@@ -123,7 +126,8 @@ class Backward {
             by_x.head(coordinates) += by_vi.head(coordinates) / adt;
             by_x_hat.head(coordinates) = -by_vi.head(coordinates) / adt;
 
-            const auto [lambda, by_forces] = back_through(algebra, at, i, record, step, part, by_x, viscous);
+            const auto [lambda, by_forces] =
+                back_through(algebra, at, i, record, step, substep, by_x, viscous);
             const VectorXd accelerated = lambda.cwiseProduct(w), moved = lambda.cwiseProduct(v);
             g_.mass += accelerated;
             g_.damping += moved;
@@ -183,18 +187,18 @@ class Backward {
 
     // lambda of a stage, and what its forces say of how it moved; adds what it says of the scene and of the controls.
     std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const Rates& at, int i,
-                                                         const PartRecord& record, Index step,
-                                                         const std::pair<double, double>& part,
+                                                         const SubstepRecord& record, Index step,
+                                                         const std::pair<double, double>& substep,
                                                          VectorXd& by_x, ViscousAdjoint& viscous) {
         const StageState& stage = record.stages[i];
         const ElasticAfterwards elastic_afterwards(model_);
-        const double share = part.first + algebra.tableau().time(i) * (part.second - part.first);
+        const double share = substep.first + algebra.tableau().time(i) * (substep.second - substep.first);
         const Controls controls = input_.controls_at(step, share);
         model_.take(controls);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
-        model_.set_memory(stage.memory);
-        model_.begin_step(record.begin.q, input_.controls_at(step, part.first));
+        model_.set_turns(stage.turns);
+        model_.begin_step(record.begin.q, input_.controls_at(step, substep.first));
         viscous.set_history(i);
         const Anchor anchor{&algebra.weights(), &target, &motion};
         newton_.evaluate(stage.q, controls, anchor);
@@ -218,7 +222,7 @@ class Backward {
         }
         model_.varying().move_gradient(scene_);
         add_by_controls(step, share, scene_.controls);
-        if (model_.has_forces()) add_by_controls(step, part.first, by_forces.begin_controls);
+        if (model_.has_forces()) add_by_controls(step, substep.first, by_forces.begin_controls);
         return {lambda, std::move(by_forces)};
     }
 
@@ -238,7 +242,7 @@ class Backward {
             g_.positions += model_.strain_forces(by_strains_.e);
         }
         if (input_.rotations_given) return;
-        model_.set_memory(input_.start.memory);
+        model_.set_turns(input_.start.turns);
         const Controls controls = input_.controls_at(0, 0.0);
         const VectorXd lambda = RotationsAtRest(model_, q, controls).adjoint(g_.positions);
         VectorXd reaction(model_.size());

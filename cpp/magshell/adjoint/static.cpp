@@ -15,7 +15,7 @@ Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorX
     equilibrium.factor->solve(reduced);
     const VectorXd lambda = reduction.expand(reduced);
 
-    model.set_memory(equilibrium.memory);
+    model.set_turns(equilibrium.turns);
     model.evaluate(q, controls);
     Gradient gradient(model.registry());
     model.vjp(q, controls, lambda, gradient);

@@ -3,18 +3,19 @@
 namespace magshell {
 
 ViscousAdjoint::ViscousAdjoint(Model& model, const Viscosity& law, const StepAlgebra& step,
-                               const PartRecord& part, const ViscousGradient& by_end)
+                               const SubstepRecord& substep, const ViscousGradient& by_end)
     : model_(model), law_(law), step_(step) {
     if (!law.any()) return;
-    const StrainSet d_begin = model.strains(part.begin.q), zero = d_begin.times(0.0);
-    rates_ = first_rates(step.tableau(), part.begin);
+    const StrainSet d_begin = model.strains(substep.begin.q), zero = d_begin.times(0.0);
+    rates_ = first_rates(step.tableau(), substep.begin);
     first_ = rates_.size();
-    for (std::size_t i = 0; i < part.stages.size(); ++i) {
+    for (std::size_t i = 0; i < substep.stages.size(); ++i) {
         stages_.push_back(ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], rates_,
-                                       d_begin, part.begin.e));
-        stages_.back().finish(law, step.stage_time(), model.strains(part.stages[i].q), rates_.emplace_back());
+                                       d_begin, substep.begin.e));
+        stages_.back().finish(law, step.stage_time(), model.strains(substep.stages[i].q),
+                              rates_.emplace_back());
     }
-    const std::size_t n = part.stages.size();
+    const std::size_t n = substep.stages.size();
     by_d_hat_.assign(n, zero);
     by_e_.assign(n, zero);
     by_e_hat_.assign(n, zero);

@@ -13,7 +13,7 @@ struct ViscousGradient {
 class ViscousAdjoint {
   public:
     /// Finds the strains of the stages again. by_end: what later steps say of the end of this one.
-    ViscousAdjoint(Model& model, const Viscosity& law, const StepAlgebra& step, const PartRecord& part,
+    ViscousAdjoint(Model& model, const Viscosity& law, const StepAlgebra& step, const SubstepRecord& substep,
                    const ViscousGradient& by_end);
 
     /// The stresses of stage i have their history from now on.

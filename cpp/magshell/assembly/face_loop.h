@@ -9,7 +9,7 @@ namespace magshell {
 class FaceLoop {
   public:
     /// Of a surface's own triangles, or of others in their place.
-    FaceLoop(const std::vector<std::array<Index, 3>>& corners, const PartLoop& parts,
+    FaceLoop(const std::vector<std::array<Index, 3>>& corners, const ChunkLoop& chunks,
              const SystemMatrix& matrix);
 
     Index packs() const { return packs_for(faces_); }
@@ -35,30 +35,30 @@ class FaceLoop {
         }
     }
 
-    /// body(pack) for the packs of a part.
+    /// body(pack) for the packs of a chunk.
     template <class Body>
-    static void over_packs(const Part& part, const Body& body) {
-        for (Index pack = part.first / Pack::width; pack < packs_for(part.last); ++pack) body(pack);
+    static void over_packs(const Chunk& chunk, const Body& body) {
+        for (Index pack = chunk.first / Pack::width; pack < packs_for(chunk.last); ++pack) body(pack);
     }
 
     /// body(pack) for all packs, in the schedule's order, where body scatters.
     template <class Body>
     void scatter_packs(const Body& body) const {
-        parts_.scatter([&](const Part& part) { over_packs(part, body); });
+        chunks_.scatter([&](const Chunk& chunk) { over_packs(chunk, body); });
     }
 
     /// body(pack) for all packs, where body writes only what belongs to them.
     template <class Body>
     void each_pack(const Body& body) const {
-        parts_.each([&](const Part& part) { over_packs(part, body); });
+        chunks_.each([&](const Chunk& chunk) { over_packs(chunk, body); });
     }
 
     /// The sum of energy(pack) over the faces.
     template <class Energy>
     double sum(const Energy& energy) const {
-        return parts_.sum([&](const Part& part) {
+        return chunks_.sum([&](const Chunk& chunk) {
             double total = 0.0;
-            over_packs(part, [&](Index pack) {
+            over_packs(chunk, [&](Index pack) {
                 const Pack shares = energy(pack);
                 for (int lane = 0; lane < lanes_in(pack); ++lane) total += shares[lane];
             });
@@ -71,7 +71,7 @@ class FaceLoop {
   private:
     Index faces_;
     const std::vector<std::array<Index, 3>>* corners_;
-    const PartLoop& parts_;
+    const ChunkLoop& chunks_;
     std::vector<PairSlots<3>> slots_;
 };
 

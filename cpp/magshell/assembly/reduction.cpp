@@ -5,12 +5,12 @@
 
 namespace magshell {
 
-Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const Nodes& nodes,
-                     Index motions, Registry& registry)
-    : held_(std::move(held)), nodes_(nodes), motions_(motions), full_size_(matrix.size()) {
+Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const Nodes& nodes, Index moves,
+                     Registry& registry)
+    : held_(std::move(held)), nodes_(nodes), moves_(moves), full_size_(matrix.size()) {
     progress_ = registry.controls.add("scene", "motion_factor", "1", 1, 1);
-    for (Index k = 0; k < motions; ++k) {
-        const std::string owner = "motion " + std::to_string(k);
+    for (Index k = 0; k < moves; ++k) {
+        const std::string owner = "move " + std::to_string(k);
         slots_.push_back({registry.values.add(owner, "center", "m", 1, 3),
                           registry.values.add(owner, "rotation", "rad", 1, 3),
                           registry.values.add(owner, "displacement", "m", 1, 3)});
@@ -63,17 +63,17 @@ bool Reduction::axis_aligned(const HeldNode& h) const {
 
 void Reduction::set_values(const Values& values) {
     for (std::size_t k = 0; k < slots_.size(); ++k)
-        motions_[k] = {values.vector(slots_[k].center), values.vector(slots_[k].rotation),
-                       values.vector(slots_[k].displacement)};
+        moves_[k] = {values.vector(slots_[k].center), values.vector(slots_[k].rotation),
+                     values.vector(slots_[k].displacement)};
 }
 
 VectorXd Reduction::prescribed_increment(const VectorXd& q, const Controls& controls) const {
     VectorXd increment = VectorXd::Zero(q.size());
     for (const HeldNode& h : held_) {
         Vec3 wanted = nodes_.rest[h.node];
-        if (h.motion >= 0)
-            wanted = h.node < nodes_.n_vertices() ? motions_[h.motion].point(wanted, progress(controls))
-                                                  : motions_[h.motion].direction(wanted, progress(controls));
+        if (h.move >= 0)
+            wanted = h.node < nodes_.n_vertices() ? moves_[h.move].point(wanted, progress(controls))
+                                                  : moves_[h.move].direction(wanted, progress(controls));
         increment.segment<3>(3 * h.node) = held_part(h, wanted - q.segment<3>(3 * h.node));
     }
     return increment;
@@ -88,41 +88,41 @@ Vec3 Reduction::held_part(const HeldNode& h, const Vec3& vector) {
 VectorXd Reduction::prescribed_rate(const Controls& controls) const {
     VectorXd rate = VectorXd::Zero(full_size_);
     for (const HeldNode& h : held_)
-        if (h.motion >= 0) rate.segment<3>(3 * h.node) = held_part(h, rate_of(h, progress(controls)));
+        if (h.move >= 0) rate.segment<3>(3 * h.node) = held_part(h, rate_of(h, progress(controls)));
     return rate;
 }
 
 Vec3 Reduction::rate_of(const HeldNode& h, double progress) const {
-    const SupportMotion& motion = motions_[h.motion];
+    const SupportMove& move = moves_[h.move];
     const Vec3& rest = nodes_.rest[h.node];
-    return h.node < nodes_.n_vertices() ? motion.point_rate(rest, progress)
-                                        : motion.direction_rate(rest, progress);
+    return h.node < nodes_.n_vertices() ? move.point_rate(rest, progress)
+                                        : move.direction_rate(rest, progress);
 }
 
 void Reduction::vjp(const VectorXd& by_state, const Controls& controls, Gradient& out) const {
     const double t = progress(controls);
-    std::vector<SupportMotion> by_motion(motions_.size());
+    std::vector<SupportMove> by_move(moves_.size());
     for (const HeldNode& h : held_) {
-        if (h.motion < 0) continue;
+        if (h.move < 0) continue;
         const Vec3 by_place = held_part(h, by_state.segment<3>(3 * h.node));
-        const SupportMotion& motion = motions_[h.motion];
+        const SupportMove& move = moves_[h.move];
         const Vec3& rest = nodes_.rest[h.node];
         if (h.node < nodes_.n_vertices())
-            motion.point_vjp(rest, t, by_place, by_motion[h.motion]);
+            move.point_vjp(rest, t, by_place, by_move[h.move]);
         else
-            motion.direction_vjp(rest, t, by_place, by_motion[h.motion]);
+            move.direction_vjp(rest, t, by_place, by_move[h.move]);
         out.controls[progress_.first] += by_place.dot(rate_of(h, t));
     }
     for (std::size_t k = 0; k < slots_.size(); ++k) {
-        out.values.segment<3>(slots_[k].center.first) += by_motion[k].center;
-        out.values.segment<3>(slots_[k].rotation.first) += by_motion[k].rotation_vector;
-        out.values.segment<3>(slots_[k].displacement.first) += by_motion[k].translation;
+        out.values.segment<3>(slots_[k].center.first) += by_move[k].center;
+        out.values.segment<3>(slots_[k].rotation.first) += by_move[k].rotation_vector;
+        out.values.segment<3>(slots_[k].displacement.first) += by_move[k].translation;
     }
 }
 
 double Reduction::largest_turn() const {
     double turn = 0.0;
-    for (const SupportMotion& motion : motions_) turn = std::max(turn, motion.rotation_vector.norm());
+    for (const SupportMove& move : moves_) turn = std::max(turn, move.rotation_vector.norm());
     return turn;
 }
 

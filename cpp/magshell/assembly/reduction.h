@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "magshell/assembly/support_motion.h"
+#include "magshell/assembly/support_move.h"
 #include "magshell/assembly/system_matrix.h"
 #include "magshell/body/nodes.h"
 #include "magshell/core/parameters.h"
@@ -20,19 +20,19 @@ struct HeldNode {
     Index node;
     int held;
     Mat3 frame;
-    Index motion = -1;
+    Index move = -1;
 };
 
 class Reduction {
   public:
-    /// `motions`: how many the held nodes refer to. The nodes have to outlive it.
-    Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const Nodes& nodes, Index motions,
+    /// `moves`: how many the held nodes refer to. The nodes have to outlive it.
+    Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, const Nodes& nodes, Index moves,
               Registry& registry);
 
     void set_values(const Values& values);
-    bool moves() const { return !motions_.empty(); }
+    bool moves() const { return !moves_.empty(); }
 
-    /// How far the motions have gone: 0 at rest, 1 at their end.
+    /// How far the moves have gone: 0 at rest, 1 at their end.
     double progress(const Controls& controls) const { return controls[progress_.first]; }
 
     Index size() const { return pattern_->size; }
@@ -44,7 +44,7 @@ class Reduction {
     /// d(where the supports want their nodes)/d(progress).
     VectorXd prescribed_rate(const Controls& controls) const;
 
-    /// Adds the gradients by the motions and by their progress, given the gradient by what supports hold.
+    /// Adds the gradients by the moves and by their progress, given the gradient by what supports hold.
     void vjp(const VectorXd& by_state, const Controls& controls, Gradient& out) const;
 
     /// The largest angle [rad] by which a support turns in all.
@@ -65,18 +65,18 @@ class Reduction {
   private:
     /// The part of a node's vector along which it is held.
     static Vec3 held_part(const HeldNode& h, const Vec3& vector);
-    /// How fast its motion carries a node, as the progress changes.
+    /// How fast its move carries a node, as the progress changes.
     Vec3 rate_of(const HeldNode& h, double progress) const;
     bool axis_aligned(const HeldNode& h) const;
     void turn_blocks(SystemMatrix& full) const;
 
     std::vector<HeldNode> held_;
     const Nodes& nodes_;
-    struct MotionSlots {
+    struct MoveSlots {
         Slot center, rotation, displacement;
     };
-    std::vector<MotionSlots> slots_;
-    std::vector<SupportMotion> motions_;
+    std::vector<MoveSlots> slots_;
+    std::vector<SupportMove> moves_;
     Slot progress_;
     Index full_size_;
     std::vector<Index> frame_of_;       // per node: index into held_ where turned, else -1; empty if none is

@@ -1,9 +1,9 @@
-// Which parts of the bodies may be scattered at the same time.
+// Which chunks of the bodies may be scattered at the same time.
 //
-// The elements of a body are cut into parts of fixed length, those of a sheet each with the folds that it is
-// first to touch, and parts that share a node get different colours. Colours follow each other, parts of one
+// The elements of a body are cut into chunks of fixed length, those of a sheet each with the folds that it is
+// first to touch, and chunks that share a node get different colours. Colours follow each other, chunks of one
 // colour run in parallel: no two threads add to one place, and the order of additions at a place is that of
-// the colours, whatever the number of threads. Same bits on one thread and on many. A part also fits in a
+// the colours, whatever the number of threads. Same bits on one thread and on many. A chunk also fits in a
 // core's cache with its share of the Hessian.
 #pragma once
 
@@ -14,29 +14,29 @@
 
 namespace magshell {
 
-struct Part {
+struct Chunk {
     Index number;  // among those of all bodies
     Index body;
     Index first, last;  // elements; the first is a multiple of every pack width
     Index first_fold = 0, last_fold = 0;
 };
 
-/// The parts of one body.
-class PartLoop {
+/// The chunks of one body.
+class ChunkLoop {
   public:
-    /// body(part) for every part, colour after colour, where body scatters into shared arrays.
-    void scatter(const std::function<void(const Part&)>& body) const;
+    /// body(chunk) for every chunk, colour after colour, where body scatters into shared arrays.
+    void scatter(const std::function<void(const Chunk&)>& body) const;
 
-    /// body(part) for every part at once, where body writes only to its own elements and folds.
-    void each(const std::function<void(const Part&)>& body) const;
+    /// body(chunk) for every chunk at once, where body writes only to its own elements and folds.
+    void each(const std::function<void(const Chunk&)>& body) const;
 
-    /// The sum of body(part) over the parts, added up in their order.
-    double sum(const std::function<double(const Part&)>& body) const;
+    /// The sum of body(chunk) over the chunks, added up in their order.
+    double sum(const std::function<double(const Chunk&)>& body) const;
 
   private:
     friend class Schedule;
-    std::vector<Part> parts_;
-    std::vector<std::vector<Index>> colours_;  // of parts_
+    std::vector<Chunk> chunks_;
+    std::vector<std::vector<Index>> colours_;  // of chunks_
 };
 
 class Schedule {
@@ -45,12 +45,12 @@ class Schedule {
     Schedule(const Schedule&) = delete;
     Schedule& operator=(const Schedule&) = delete;
 
-    const PartLoop& of(Index body) const { return loops_[body]; }
+    const ChunkLoop& of(Index body) const { return loops_[body]; }
 
-    /// body(part) for the parts of all bodies, colour after colour.
-    void scatter(const std::function<void(const Part&)>& body) const { all_.scatter(body); }
-    /// The parts in an order in which scatter may come to them.
-    std::vector<Part> in_order() const;
+    /// body(chunk) for the chunks of all bodies, colour after colour.
+    void scatter(const std::function<void(const Chunk&)>& body) const { all_.scatter(body); }
+    /// The chunks in an order in which scatter may come to them.
+    std::vector<Chunk> in_order() const;
 
     std::size_t bytes() const;
 
@@ -58,8 +58,8 @@ class Schedule {
     void cut(const Sheet& sheet, Index body);
     void colour(Index nodes, const std::vector<const Sheet*>& bodies);
 
-    PartLoop all_;
-    std::vector<PartLoop> loops_;
+    ChunkLoop all_;
+    std::vector<ChunkLoop> loops_;
 };
 
 }  // namespace magshell

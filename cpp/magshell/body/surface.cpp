@@ -14,12 +14,12 @@ Surface::Surface(std::string owner_, const TriangleMesh& mesh, const std::vector
     const auto place = [&](Index face, int k) -> Vec3 {
         return mesh.rest_positions().row(mesh.faces()(face, k)).transpose();
     };
-    std::vector<Vec3> barycentres(mesh.n_faces());
+    std::vector<Vec3> barycenters(mesh.n_faces());
     for (Index f = 0; f < mesh.n_faces(); ++f) {
-        barycentres[f].setZero();
-        for (int k = 0; k < 3; ++k) barycentres[f] += place(f, k) / 3.0;
+        barycenters[f].setZero();
+        for (int k = 0; k < 3; ++k) barycenters[f] += place(f, k) / 3.0;
     }
-    faces = order_along_curve(barycentres);
+    faces = order_along_curve(barycenters);
     corners.resize(n_faces());
     rest_corners_.resize(n_faces());
     for (Index f = 0; f < n_faces(); ++f)

@@ -26,7 +26,7 @@ struct Magnetic {
         Pack alpha, beta, gamma;  // M~_r [A/m] in (a~_1, a~_2, n~)
     };
 
-    /// The applied field at the barycentre. Gradient and curvature only where it varies in space.
+    /// The applied field at the barycenter. Gradient and curvature only where it varies in space.
     struct Field {
         Pack3 flux;        // B                      [T]
         Pack33 gradient;   // dB_i/dx_j              [T/m]

@@ -86,7 +86,7 @@ void SampledField::set_values(std::span<const double> values) {
 }
 
 bool SampledField::Axis::contains(double x) const {
-    constexpr double slack = 1e-9;
+    constexpr double slack = 1e-9;  // of a spacing, beyond the samples' ends
     const double u = knots_from_origin(x);
     return u >= -slack && u <= samples - 1 + slack;  // false for NaN
 }

@@ -6,13 +6,13 @@
 
 namespace magshell {
 
-BoxTree::BoxTree(const std::vector<Bounds>& boxes, const std::vector<Vec3>& centres) : items_(boxes.size()) {
+BoxTree::BoxTree(const std::vector<Bounds>& boxes, const std::vector<Vec3>& centers) : items_(boxes.size()) {
     std::iota(items_.begin(), items_.end(), 0);
-    build(0, static_cast<Index>(items_.size()), boxes, centres);
+    build(0, static_cast<Index>(items_.size()), boxes, centers);
 }
 
 Index BoxTree::build(Index first, Index count, const std::vector<Bounds>& boxes,
-                     const std::vector<Vec3>& centres) {
+                     const std::vector<Vec3>& centers) {
     constexpr Index few = 4;
     constexpr double endless = std::numeric_limits<double>::infinity();
     const Index node = static_cast<Index>(nodes_.size());
@@ -27,23 +27,23 @@ Index BoxTree::build(Index first, Index count, const std::vector<Bounds>& boxes,
     (around.high - around.low).maxCoeff(&axis);
     const auto begin = items_.begin() + first;
     std::nth_element(begin, begin + count / 2, begin + count,
-                     [&](Index a, Index b) { return centres[a][axis] < centres[b][axis]; });
-    build(first, count / 2, boxes, centres);
-    const Index right = build(first + count / 2, count - count / 2, boxes, centres);
+                     [&](Index a, Index b) { return centers[a][axis] < centers[b][axis]; });
+    build(first, count / 2, boxes, centers);
+    const Index right = build(first + count / 2, count - count / 2, boxes, centers);
     nodes_[node].right = right;
     return node;
 }
 
 BoxTree tree_of_faces(const Rows3& positions, const Rows3i& faces) {
     std::vector<Bounds> boxes;
-    std::vector<Vec3> centres;
+    std::vector<Vec3> centers;
     for (Index f = 0; f < static_cast<Index>(faces.rows()); ++f) {
         const auto at = [&](int i) { return Vec3(positions.row(faces(f, i)).transpose()); };
         const Vec3 corners[3] = {at(0), at(1), at(2)};
         boxes.push_back(bounds_around(corners));
-        centres.push_back(corners[0] + corners[1] + corners[2]);
+        centers.push_back(corners[0] + corners[1] + corners[2]);
     }
-    return BoxTree(boxes, centres);
+    return BoxTree(boxes, centers);
 }
 
 }  // namespace magshell

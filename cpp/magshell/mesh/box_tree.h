@@ -29,9 +29,9 @@ class BoxTree {
         Index right;         // the right one is here; -1 in a leaf
     };
 
-    /// Halves the things at the median of their centres along the longest side, until few are left. A tree of
+    /// Halves the things at the median of their centers along the longest side, until few are left. A tree of
     /// nothing is one empty leaf.
-    BoxTree(const std::vector<Bounds>& boxes, const std::vector<Vec3>& centres);
+    BoxTree(const std::vector<Bounds>& boxes, const std::vector<Vec3>& centers);
 
     /// The root first.
     const std::vector<Node>& nodes() const { return nodes_; }
@@ -39,7 +39,7 @@ class BoxTree {
     const std::vector<Index>& items() const { return items_; }
 
   private:
-    Index build(Index first, Index count, const std::vector<Bounds>& boxes, const std::vector<Vec3>& centres);
+    Index build(Index first, Index count, const std::vector<Bounds>& boxes, const std::vector<Vec3>& centers);
 
     std::vector<Index> items_;
     std::vector<Node> nodes_;

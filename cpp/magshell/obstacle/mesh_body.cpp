@@ -154,7 +154,7 @@ Distance MeshBody::distance(const Vec3& point) const {
     if (!contains(point)) return bounds_.distance(point - middle_);
     const Level at = level(point);
     const double slope = at.gradient.norm();
-    if (!(slope > on_the_centre)) return {at.value, Vec3::UnitZ(), Mat3::Zero()};
+    if (!(slope > on_the_center)) return {at.value, Vec3::UnitZ(), Mat3::Zero()};
     Distance result;
     if (nearest(point, at, result)) return result;
     const Vec3 normal = at.gradient / slope;

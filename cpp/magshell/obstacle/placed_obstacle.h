@@ -1,7 +1,7 @@
 // An obstacle where it stands in a scene, at rest or on its way.
 //
 //   a point x of the world is R^T (x - c) in the obstacle's own frame,   R = R(pose) R(placement),
-//   c = centre + displacement; the body moves there with  v(x) = velocity + spin x (x - c)
+//   c = center + displacement; the body moves there with  v(x) = velocity + spin x (x - c)
 #pragma once
 
 #include <memory>

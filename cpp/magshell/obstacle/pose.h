@@ -1,4 +1,4 @@
-// Where an obstacle has moved from its place: about its centre, and how fast it does.
+// Where an obstacle has moved from its place: about its center, and how fast it does.
 #pragma once
 
 #include "magshell/core/types.h"
@@ -7,7 +7,7 @@ namespace magshell {
 
 struct ObstaclePose {
     Vec3 displacement = Vec3::Zero(), rotation_vector = Vec3::Zero();
-    Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of its centre [m/s]; [rad/s], world axes
+    Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of its center [m/s]; [rad/s], world axes
 };
 
 }  // namespace magshell

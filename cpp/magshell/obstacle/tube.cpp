@@ -74,7 +74,7 @@ void Tube::check(double first_knot) const {
             problem << "the radius of the tube is " << at.value[3] << " m";
         } else if (!(std::abs(at.first[3]) < at.first.head<3>().norm())) {
             problem << "the radius of the tube changes by " << at.first[3]
-                    << " m a knot while its centre advances by " << at.first.head<3>().norm()
+                    << " m a knot while its center advances by " << at.first.head<3>().norm()
                     << " m, so that its balls lie in each other";
         } else {
             continue;
@@ -123,18 +123,18 @@ double Tube::nearest(const Vec3& point, std::size_t sample) const {
 }
 
 Distance Tube::distance_at(double s, const Vec3& point) const {
-    constexpr double smallest = 1e-6;  // of d psi_ss, which is zero in a centre of curvature
+    constexpr double least_curvature = 1e-6;  // of d psi_ss, which is zero in a center of curvature
     const Section at = section(s);
     const Vec3 offset = point - at.value.head<3>(), along = at.first.head<3>();
     const Vec3 straight = along.normalized();
     Distance result = ball_distance(offset, at.value[3], Mat3::Identity(), straight.unitOrthogonal());
-    const bool at_an_end = s == 0.0 || s == last_;  // its ball: the centre does not follow the point
+    const bool at_an_end = s == 0.0 || s == last_;  // its ball: the center does not follow the point
     if (at_an_end || result.curvature.isZero(0.0)) return result;
     const double d = offset.norm();
     const double squared = along.squaredNorm();
     const Vec3 across = along - along.dot(result.normal) * result.normal;
     const double second = across.squaredNorm() - offset.dot(at.second.head<3>()) - d * at.second[3];
-    result.curvature -= across * across.transpose() / (d * std::max(second, smallest * squared));
+    result.curvature -= across * across.transpose() / (d * std::max(second, least_curvature * squared));
     return result;
 }
 
@@ -172,7 +172,7 @@ Distance Tube::distance(const Vec3& point) const {
     Distance result;
     bool on_a_ray = false;
     if (!closed_) {
-        const double slack = on_the_centre * std::abs(best);
+        const double slack = on_the_center * std::abs(best);
         for (const Ray& ray : rays_) {
             if (!beyond(ray, point, best + slack, result)) continue;
             on_a_ray = true;

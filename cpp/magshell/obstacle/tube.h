@@ -7,7 +7,7 @@
 //   H = psi_xx - psi_xs psi_xs^T / psi_ss,      psi_xx = P / d,   psi_xs = - P c' / d,   P = I - n n^T
 //   psi_ss = (|c'|^2 - (n . c')^2) / d - n . c'' - r''
 //
-// F is the distance to the union of the balls outside it, and inside as far as the centres of curvature.
+// F is the distance to the union of the balls outside it, and inside as far as the centers of curvature.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ class Tube final : public Obstacle {
     Distance distance(const Vec3& point) const override;
 
   private:
-    // The spline and its derivatives by s [knots]: centre and radius.
+    // The spline and its derivatives by s [knots]: center and radius.
     struct Section {
         Vec4 value, first, second;
     };
@@ -55,7 +55,7 @@ class Tube final : public Obstacle {
 
     bool closed_;
     std::vector<Vec4> coefficients_;  // c_{i-1} ... c_{i+2} belong to the segment from knot i on
-    std::vector<Vec4> samples_;       // of centre and radius, several a segment
+    std::vector<Vec4> samples_;       // of center and radius, several a segment
     double last_;                     // knot; the first is 0
     std::array<Ray, 2> rays_;
 };

@@ -43,7 +43,7 @@ CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& m
 Model::Model(const SceneInput& input)
     : bodies_(input),
       matrix_(nodes().n_nodes(), nodes().scalars, bodies_.stencils(input)),
-      reduction_(matrix_, renumbered(input.held, nodes()), nodes(), input.motions, registry_),
+      reduction_(matrix_, renumbered(input.held, nodes()), nodes(), input.moves, registry_),
       schedule_(nodes().n_nodes(), bodies_.sheets()),
       sources_(input.field_sources, registry_),
       of_body_(bodies_.sheets().size()),
@@ -64,12 +64,12 @@ Model::Model(const SceneInput& input)
 
 void Model::add_loops(Index body, const VectorXd& curvature_scale) {
     const Sheet& sheet = *bodies_.sheets()[body];
-    const PartLoop& parts = schedule_.of(body);
-    loops_.push_back(std::make_unique<FaceLoop>(sheet.corners, parts, matrix_));
+    const ChunkLoop& chunks = schedule_.of(body);
+    loops_.push_back(std::make_unique<FaceLoop>(sheet.corners, chunks, matrix_));
     membrane_faces_.push_back(std::make_unique<MembraneFaces>(sheet, nodes(), curvature_scale));
     const MembraneFaces& faces = *membrane_faces_.back();
     membrane_loops_.push_back(faces.own() ? nullptr
-                                          : std::make_unique<FaceLoop>(faces.corners(), parts, matrix_));
+                                          : std::make_unique<FaceLoop>(faces.corners(), chunks, matrix_));
 }
 
 void Model::add_terms(const SceneInput& input) {
@@ -266,36 +266,36 @@ std::string Model::not_finite(const VectorXd& q, const Controls& controls) {
 }
 
 void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress) {
-    const auto clear = [&](std::size_t part) {
-        for (const Index node : first_nodes_[part]) matrix_.clear_node(node);
-        for (const Index rotation : first_rotations_[part]) matrix_.clear_rotation(rotation);
+    const auto clear = [&](std::size_t chunk) {
+        for (const Index node : first_nodes_[chunk]) matrix_.clear_node(node);
+        for (const Index rotation : first_rotations_[chunk]) matrix_.clear_rotation(rotation);
     };
     clear(first_nodes_.size() - 1);
-    // All terms of a part before the next part: its share of the matrix is cleared and filled in the cache.
+    // All terms of a chunk before the next chunk: its share of the matrix is cleared and filled in the cache.
     for (const std::unique_ptr<Term>& term : terms_) term->prepare_assembly(q.data(), controls);
-    schedule_.scatter([&](const Part& part) {
-        clear(part.number);
-        for (const Term* term : of_body_[part.body])
-            term->assemble(part, q.data(), controls, extrapolated_stress, matrix_);
+    schedule_.scatter([&](const Chunk& chunk) {
+        clear(chunk.number);
+        for (const Term* term : of_body_[chunk.body])
+            term->assemble(chunk, q.data(), controls, extrapolated_stress, matrix_);
     });
     for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
 }
 
 void Model::share_out_columns() {
-    const std::vector<Part> parts = schedule_.in_order();
+    const std::vector<Chunk> chunks = schedule_.in_order();
     std::vector<bool> node_taken(nodes().n_nodes(), false), rotation_taken(nodes().scalars, false);
-    first_nodes_.resize(parts.size() + 1);
-    first_rotations_.resize(parts.size() + 1);
+    first_nodes_.resize(chunks.size() + 1);
+    first_rotations_.resize(chunks.size() + 1);
     const auto take = [](std::vector<bool>& taken, Index number, std::vector<Index>& list) {
         if (number < 0 || taken[number]) return;
         taken[number] = true;
         list.push_back(number);
     };
-    for (const Part& part : parts)
-        for (Index element = part.first; element < part.last; ++element) {
-            const Stencil& stencil = bodies_.sheets()[part.body]->stencils[element];
-            for (const Index node : stencil.nodes) take(node_taken, node, first_nodes_[part.number]);
-            for (const Index r : stencil.rotations) take(rotation_taken, r, first_rotations_[part.number]);
+    for (const Chunk& chunk : chunks)
+        for (Index element = chunk.first; element < chunk.last; ++element) {
+            const Stencil& stencil = bodies_.sheets()[chunk.body]->stencils[element];
+            for (const Index node : stencil.nodes) take(node_taken, node, first_nodes_[chunk.number]);
+            for (const Index r : stencil.rotations) take(rotation_taken, r, first_rotations_[chunk.number]);
         }
     for (Index node = 0; node < nodes().n_nodes(); ++node) take(node_taken, node, first_nodes_.back());
 }
@@ -304,20 +304,19 @@ void Model::extrapolate(const VectorXd& p) {
     for (const std::unique_ptr<Term>& term : terms_) term->extrapolate(p.data());
 }
 
-Model::Memory Model::memory() const {
-    Memory memory;
-    for (const std::unique_ptr<Term>& term : terms_) memory.push_back(term->memory());
-    return memory;
+Model::Turns Model::turns() const {
+    Turns turns;
+    for (const std::unique_ptr<Term>& term : terms_) turns.push_back(term->turns());
+    return turns;
 }
 
-void Model::set_memory(const Memory& memory) {
-    bool fits = memory.empty() || memory.size() == terms_.size();
-    for (std::size_t k = 0; fits && k < memory.size(); ++k)
-        fits = memory[k].size() == terms_[k]->memory().size();
+void Model::set_turns(const Turns& turns) {
+    bool fits = turns.empty() || turns.size() == terms_.size();
+    for (std::size_t k = 0; fits && k < turns.size(); ++k)
+        fits = turns[k].size() == terms_[k]->turns().size();
     if (!fits) throw InvalidInput("the start remembers a motion of another scene: start from its positions");
     for (std::size_t k = 0; k < terms_.size(); ++k)
-        terms_[k]->set_memory(memory.empty() ? std::vector<double>(terms_[k]->memory().size(), 0.0)
-                                             : memory[k]);
+        terms_[k]->set_turns(turns.empty() ? std::vector<double>(terms_[k]->turns().size(), 0.0) : turns[k]);
 }
 
 StrainSet Model::no_strains() const {

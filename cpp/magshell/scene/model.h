@@ -119,10 +119,10 @@ class Model {
     /// How often the pattern was analysed.
     int analyses() const { return analyses_; }
 
-    /// What the terms remember of how the state was reached. An empty memory is that of the rest state.
-    using Memory = std::vector<std::vector<double>>;
-    Memory memory() const;
-    void set_memory(const Memory& memory);
+    /// The terms' angles with full turns, which depend on the way there. None at all are those of the rest state.
+    using Turns = std::vector<std::vector<double>>;
+    Turns turns() const;
+    void set_turns(const Turns& turns);
 
     std::size_t bytes() const;
     std::mutex& in_use() { return in_use_; }
@@ -147,11 +147,11 @@ class Model {
     std::vector<std::unique_ptr<FaceLoop>> membrane_loops_;  // nullptr where those are the sheet's own
     FieldSources sources_;
     std::vector<std::unique_ptr<Term>> terms_;
-    std::vector<std::vector<const Term*>> of_body_;  // those assembled by its parts
+    std::vector<std::vector<const Term*>> of_body_;  // those assembled by its chunks
     std::vector<ElasticTerm*> elastic_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
     const ContactTerm* contact_ = nullptr;
-    // By part: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
+    // By chunk: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
     std::vector<std::vector<Index>> first_nodes_, first_rotations_;
     Values values_;
     Varying varying_;

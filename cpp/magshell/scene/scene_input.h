@@ -34,7 +34,7 @@ struct SceneInput {
     std::vector<SheetInput> sheets;
     Rows3 directions;  // (n_d, 3), of directed edges and of couples
     std::vector<HeldNode> held;
-    Index motions = 0;  // that held nodes refer to
+    Index moves = 0;  // that held nodes refer to
     std::vector<EdgeCoupleInput> couples;
     bool gravity = false, loads = false;
     std::vector<std::shared_ptr<const AppliedField>> field_sources;

@@ -41,7 +41,7 @@ class Follower {
         PathPoint here{start, 0.0, {}, 0};
         const NewtonReport at_rest = newton_.solve(here.state, controls(0.0));
         if (!at_rest.converged) return fail("the start is not an equilibrium: " + at_rest.reason);
-        here.memory = model_.memory();
+        here.turns = model_.turns();
         Tangent tangent;
         if (!find_tangent(here, tangent)) return fail("the tangent does not exist at the start");
         const double moved = length(tangent.state);
@@ -115,7 +115,7 @@ class Follower {
     bool correct(const PathPoint& base, const Tangent& along, double step, PathPoint& found,
                  int& iterations) {
         VectorXd q = base.state;
-        model_.set_memory(base.memory);
+        model_.set_turns(base.turns);
         double parameter = base.parameter + step * along.parameter;
         VectorXd increment = step * along.state;
         for (iterations = 0;; ++iterations, newton_.count_iteration()) {
@@ -128,7 +128,7 @@ class Follower {
             const VectorXd gap = model_.reduction().prescribed_increment(q, at);
             const bool in_place = gap.lpNorm<Eigen::Infinity>() <= 1e-14 * model_.extent();
             if (in_place && residual <= newton_.options().tolerance) {
-                found = {q, parameter, model_.memory(), 0};
+                found = {q, parameter, model_.turns(), 0};
                 return true;
             }
             if (!std::isfinite(residual) || iterations == corrector_iterations) return false;
@@ -168,7 +168,7 @@ class Follower {
             if (turn < smallest_turn_cosine) continue;
             if (options_.locate_critical && next.unstable_directions != base.unstable_directions)
                 locate({0.0, base}, {step_, next}, tangent);
-            model_.set_memory(next.memory);
+            model_.set_turns(next.turns);
             model_.evaluate(next.state, controls(next.parameter));
             result_.points.push_back(std::move(next));
             tangent = std::move(there);
@@ -183,7 +183,7 @@ class Follower {
         if (end == point.parameter) return true;
         if (!newton_.solve(point.state, controls(end)).converged) return false;
         point.parameter = end;
-        point.memory = model_.memory();
+        point.turns = model_.turns();
         return true;
     }
 
@@ -274,11 +274,11 @@ class Follower {
 
 }  // namespace
 
-PathResult follow_path(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
+PathResult follow_path(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
                        const Controls& to, const PathOptions& options, const Until& until,
                        const StaticsWatch& watch, const Varying& varying) {
     const WhileVarying while_varying(model, varying);
-    model.set_memory(memory);
+    model.set_turns(turns);
     PathResult result;
     Newton newton(model, options.newton, [&](double residual) {
         if (watch) watch(result.points.empty() ? 0.0 : result.points.back().parameter, residual);

@@ -29,7 +29,7 @@ struct PathOptions {
 struct PathPoint {
     VectorXd state;
     double parameter = 0.0;
-    Model::Memory memory;
+    Model::Turns turns;
     Index unstable_directions = 0;
 };
 
@@ -55,7 +55,7 @@ using Until = std::function<bool(const PathPoint&)>;
 
 /// From an equilibrium at `from`, following the controls towards `to`; the numbers of what varies follow the others
 /// in both.
-PathResult follow_path(Model& model, const VectorXd& start, const Model::Memory& memory, const Controls& from,
+PathResult follow_path(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
                        const Controls& to, const PathOptions& options, const Until& until,
                        const StaticsWatch& watch = {}, const Varying& varying = {});
 

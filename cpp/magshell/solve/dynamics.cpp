@@ -14,11 +14,11 @@ constexpr double smallest_part = 1.0 / 64.0;  // of a step
 
 // At the beginning of a step or of a part of one, and at its stages.
 std::vector<Controls> controls_of(const MotionInput& input, const Tableau& tableau, Index step,
-                                  std::pair<double, double> part) {
-    std::vector<Controls> controls = {input.controls_at(step, part.first)};
+                                  std::pair<double, double> substep) {
+    std::vector<Controls> controls = {input.controls_at(step, substep.first)};
     for (int i = 0; i < tableau.stages; ++i)
         controls.push_back(
-            input.controls_at(step, part.first + tableau.time(i) * (part.second - part.first)));
+            input.controls_at(step, substep.first + tableau.time(i) * (substep.second - substep.first)));
     return controls;
 }
 
@@ -27,9 +27,9 @@ std::size_t bytes_of(const MotionState& state) {
            state.e.bytes() + state.rates.d.bytes() + state.rates.e.bytes();
 }
 
-std::size_t bytes_of(const PartRecord& part) {
-    std::size_t bytes = bytes_of(part.begin);
-    for (const StageState& stage : part.stages)
+std::size_t bytes_of(const SubstepRecord& substep) {
+    std::size_t bytes = bytes_of(substep.begin);
+    for (const StageState& stage : substep.stages)
         bytes += sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->own_bytes() : 0);
     return bytes;
 }
@@ -37,7 +37,7 @@ std::size_t bytes_of(const PartRecord& part) {
 // The start with its edge rotations at rest, if none were given, and the Maxwell branch relaxed, if it is new.
 MotionState beginning(Model& model, const MotionInput& input) {
     MotionState start = input.start;
-    model.set_memory(start.memory);
+    model.set_turns(start.turns);
     model.take(input.controls_at(0, 0.0));
     if (!input.rotations_given)
         start.q += RotationsAtRest(model, start.q, input.controls_at(0, 0.0)).correction();
@@ -48,7 +48,7 @@ MotionState beginning(Model& model, const MotionInput& input) {
 // The last state; its energies are not known yet.
 void record_state(const Model& model, const MotionInput& input, MotionResult& result) {
     const MotionState& state = result.last;
-    result.recorded.push_back({state.q, state.v, state.memory, {}, {}});
+    result.recorded.push_back({state.q, state.v, state.turns, {}, {}});
     result.kinetic_energy.push_back(0.5 * state.v.dot(input.inertia.mass.cwiseProduct(state.v)));
     result.energies.emplace_back(model.term_names().size(), std::numeric_limits<double>::quiet_NaN());
 }
@@ -113,34 +113,34 @@ class Run {
         aim(step);
     }
 
-    // In parts where the whole fails.
+    // In substeps where the whole fails.
     bool take(Index step, MotionState& state) {
         const bool last = step >= input_.steps - result_.leaf;
         const bool keep = result_.keep == Keep::stages || result_.keep == Keep::factors ||
                           (result_.keep == Keep::checkpoints && last);
-        std::vector<PartRecord> records;
-        Parts done, ahead = {{0.0, 1.0}};
+        std::vector<SubstepRecord> records;
+        Substeps done, ahead = {{0.0, 1.0}};
         while (!ahead.empty()) {
-            const std::pair<double, double> part = ahead.back();
+            const std::pair<double, double> substep = ahead.back();
             ahead.pop_back();
-            PartRecord record;
+            SubstepRecord record;
             const std::vector<Controls> controls =
-                controls_of(input_, stepper_.tableau_from(state), step, part);
-            const double share = part.second - part.first;
+                controls_of(input_, stepper_.tableau_from(state), step, substep);
+            const double share = substep.second - substep.first;
             if (stepper_.step(state, share * input_.time_step, controls, keep ? &record : nullptr,
                               result_.keep == Keep::factors, result_.reason)) {
-                done.push_back(part);
+                done.push_back(substep);
                 if (keep) records.push_back(std::move(record));
                 continue;
             }
             if (share <= smallest_part) return false;
-            const double middle = 0.5 * (part.first + part.second);
-            ahead.push_back({middle, part.second});
-            ahead.push_back({part.first, middle});
+            const double middle = 0.5 * (substep.first + substep.second);
+            ahead.push_back({middle, substep.second});
+            ahead.push_back({substep.first, middle});
         }
         if (done.size() > 1) result_.halved[step] = done;
         if (keep) {
-            for (const PartRecord& part : records) result_.bytes += bytes_of(part);
+            for (const SubstepRecord& substep : records) result_.bytes += bytes_of(substep);
             result_.steps.push_back(std::move(records));
         }
         return true;
@@ -151,7 +151,7 @@ class Run {
         const Index done = result_.steps_done;
         const Controls now = done == 0 ? input_.controls_at(0, 0.0) : input_.controls_at(done - 1, 1.0);
         const MotionState& state = result_.last;
-        model_.set_memory(state.memory);
+        model_.set_turns(state.turns);
         model_.take(now);
         std::vector<double>& of_terms = result_.energies.back();
         std::size_t term = 0;
@@ -188,18 +188,18 @@ Controls MotionInput::controls_at(Index step, double share) const {
     return interpolate(controls[first], controls[first + 1], weight);
 }
 
-Parts parts_of(const std::map<Index, Parts>& halved, Index step) {
+Substeps substeps_of(const std::map<Index, Substeps>& halved, Index step) {
     const auto found = halved.find(step);
-    return found == halved.end() ? Parts{{0.0, 1.0}} : found->second;
+    return found == halved.end() ? Substeps{{0.0, 1.0}} : found->second;
 }
 
-void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts,
-                 MotionState& state, std::vector<PartRecord>* kept) {
-    for (const std::pair<double, double>& part : parts) {
-        PartRecord record;
+void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Substeps& substeps,
+                 MotionState& state, std::vector<SubstepRecord>* kept) {
+    for (const std::pair<double, double>& substep : substeps) {
+        SubstepRecord record;
         std::string reason;
-        const std::vector<Controls> controls = controls_of(input, stepper.tableau_from(state), step, part);
-        if (!stepper.step(state, (part.second - part.first) * input.time_step, controls,
+        const std::vector<Controls> controls = controls_of(input, stepper.tableau_from(state), step, substep);
+        if (!stepper.step(state, (substep.second - substep.first) * input.time_step, controls,
                           kept ? &record : nullptr, false, reason))
             throw InvalidInput("a step that was taken before cannot be repeated: " + reason);
         if (kept) kept->push_back(std::move(record));

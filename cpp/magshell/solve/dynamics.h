@@ -38,8 +38,8 @@ struct KeepOptions {
     Keep wanted = Keep::nothing;  // nothing: stages, or checkpoints where the budget does not hold them
 };
 
-/// A step in parts, each from a share of the step to another.
-using Parts = std::vector<std::pair<double, double>>;
+/// A step in substeps, each from a share of the step to another.
+using Substeps = std::vector<std::pair<double, double>>;
 
 struct MotionResult {
     Outcome outcome = Outcome::failed;
@@ -50,11 +50,11 @@ struct MotionResult {
     std::vector<MotionState> recorded;          // every record_every steps, the start first
     std::vector<double> kinetic_energy;         // [J], of those
     std::vector<std::vector<double>> energies;  // [J], of those, term by term; NaN if interrupted meanwhile
-    std::map<Index, Parts> halved;              // the steps that were taken in parts
+    std::map<Index, Substeps> halved;           // the steps that were taken in substeps
     Keep keep = Keep::nothing;
-    std::vector<std::vector<PartRecord>> steps;  // where stages are kept
-    std::map<Index, MotionState> checkpoints;    // by the step that begins there
-    Index leaf = 0, slots = 0;                   // steps that fit at once; checkpoints that do
+    std::vector<std::vector<SubstepRecord>> steps;  // where stages are kept
+    std::map<Index, MotionState> checkpoints;       // by the step that begins there
+    Index leaf = 0, slots = 0;                      // steps that fit at once; checkpoints that do
     int iterations = 0, factorizations = 0;
     double linear_time = 0.0;
     std::size_t bytes = 0;  // of what is kept for gradients
@@ -67,12 +67,12 @@ using MotionWatch = std::function<void(double progress, double residual)>;
 MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions& keep,
                       const MotionWatch& watch = {});
 
-/// The parts in which a step was taken.
-Parts parts_of(const std::map<Index, Parts>& halved, Index step);
+/// The substeps in which a step was taken.
+Substeps substeps_of(const std::map<Index, Substeps>& halved, Index step);
 
-/// Takes one step again exactly as it was taken; `kept` gets its parts.
-void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Parts& parts,
-                 MotionState& state, std::vector<PartRecord>* kept);
+/// Takes one step again exactly as it was taken; `kept` gets its substeps.
+void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Substeps& substeps,
+                 MotionState& state, std::vector<SubstepRecord>* kept);
 
 /// Where to put the next checkpoint in a stretch of so many steps (Griewank and Walther's revolve): the
 /// number of steps before it, or 0 where the stretch fits at once.

@@ -39,15 +39,15 @@ double deserved(double residual, double tolerance) {
 }
 
 // A Hessian changes as much as the sheet has moved, of its thickness. A mixed step's stresses are off by the
-// square of the step before.
-constexpr double nothing = 1e-7, little = 1e-4;
+// square of the step before: negligible after a small move.
+constexpr double negligible_move = 1e-7, small_move = 1e-4;
 
 // Of solves with an unsymmetric matrix for gradients.
-constexpr double exact_solve = 1e-13;
-constexpr int many_vectors = 300;
+constexpr double gradient_tolerance = 1e-13;
+constexpr int gradient_vectors = 300;
 // Of those with a factorization from nearby: a soft sheet's solution has up to four digits less than its residual.
-constexpr double exact_nearby = 1e-14;
-constexpr int few_vectors = 30;
+constexpr double nearby_gradient_tolerance = 1e-14;
+constexpr int nearby_gradient_vectors = 30;
 
 // Friction keeps its normal forces while it lives, also where an interruption ends that.
 class HeldForces {
@@ -184,7 +184,8 @@ GmresReport Newton::solve_nearby(const VectorXd& q, const Controls& controls, co
         nearby.solve(x);
     };
     VectorXd reduced = scale.cwiseProduct(reduction.vector(rhs));
-    const GmresReport report = gmres(assembled, precondition, reduced, {exact_nearby, few_vectors});
+    const GmresReport report =
+        gmres(assembled, precondition, reduced, {nearby_gradient_tolerance, nearby_gradient_vectors});
     if (report.converged) rhs = reduction.expand(reduced);
     return report;
 }
@@ -193,7 +194,7 @@ VectorXd Newton::solve_with_factor(const VectorXd& rhs, double tolerance) const 
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
     if (unsymmetric_)
-        solve_unsymmetric(false, {tolerance, many_vectors}, reduced);
+        solve_unsymmetric(false, {tolerance, gradient_vectors}, reduced);
     else
         factor_->solve(reduced);
     return model_.reduction().expand(reduced);
@@ -203,7 +204,7 @@ VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
     if (!unsymmetric_) return solve_with_factor(rhs);
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
-    const GmresReport report = solve_unsymmetric(true, {exact_solve, many_vectors}, reduced);
+    const GmresReport report = solve_unsymmetric(true, {gradient_tolerance, gradient_vectors}, reduced);
     if (!report.converged)
         throw InvalidInput("a linear solve with friction or water stopped at a residual of " +
                            std::to_string(report.residual));
@@ -242,12 +243,12 @@ NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const An
 // until Newton finds the rest of the way.
 NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor) {
     constexpr int most_rounds = 12, most_steps = 20, last_steps = 8;
-    constexpr double closer = 1e-2;  // than a round began, it ends at least
+    constexpr double least_gain = 1e-2;  // than a round began, it ends at least
     NewtonReport report;
     q += model_.reduction().prescribed_increment(q, controls);
     evaluate(q, controls, anchor);
     for (int round = 0; round < most_rounds; ++round) {
-        const double enough = std::max(options_.tolerance, closer * relative_residual(q, anchor));
+        const double enough = std::max(options_.tolerance, least_gain * relative_residual(q, anchor));
         if (!descend(q, controls, anchor, enough, most_steps, report)) return report;
         VectorXd end = q;
         const NewtonReport last = iterate(end, controls, anchor, last_steps, false);
@@ -333,7 +334,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (in_place && settled &&
             (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
-            report.in_place = moved <= nothing * model_.length_scale();
+            report.in_place = moved <= negligible_move * model_.length_scale();
             return report;
         }
         if (report.iterations == max_iterations)
@@ -349,8 +350,8 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             if (report.iterations == 0) first_negative_pivots = negative_pivots;
             report.lost = negative_pivots > first_negative_pivots + most_new_negative_pivots;
             if (mixed && report.lost) return fail("the iteration lost its way");
-            moved =
-                last_step <= little * model_.length_scale() ? 0.0 : std::numeric_limits<double>::infinity();
+            moved = last_step <= small_move * model_.length_scale() ? 0.0
+                                                                    : std::numeric_limits<double>::infinity();
         }
         const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
                                                        deserved(report.residual, options_.tolerance));

@@ -101,10 +101,10 @@ class Relaxation {
 
     bool finish() {
         VectorXd trial = q_;
-        const Model::Memory memory = model_.memory();
+        const Model::Turns turns = model_.turns();
         const NewtonReport report = newton_.solve(trial, controls_);
         if (!report.converged || !lowers(model_.energy(trial, controls_))) {
-            model_.set_memory(memory);
+            model_.set_turns(turns);
             return false;
         }
         report_.residual = report.residual;
@@ -115,14 +115,14 @@ class Relaxation {
     bool step() {
         const VectorXd anchor = q_;
         VectorXd trial = q_;
-        const Model::Memory memory = model_.memory();
+        const Model::Turns turns = model_.turns();
         const VectorXd weights = rate_ * model_.metric();
         const NewtonReport report = newton_.solve(trial, controls_, {&weights, &anchor}, iterations_a_step);
         const VectorXd moved = trial - anchor;
         const double energy = report.converged ? model_.energy(trial, controls_) : 0.0;
         const double pull = 0.5 * moved.dot(weights.cwiseProduct(moved));
         if (!report.converged || !lowers(energy + pull)) {
-            model_.set_memory(memory);
+            model_.set_turns(turns);
             return false;
         }
         q_ = trial;

@@ -10,7 +10,7 @@ VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, cons
     const VectorXd& q = equilibrium.state;
     const Reduction& reduction = model.reduction();
 
-    model.set_memory(equilibrium.memory);
+    model.set_turns(equilibrium.turns);
     model.evaluate(q, to);
     VectorXd change = reduction.prescribed_increment(q, to);
     VectorXd force = model.residual().gradient;

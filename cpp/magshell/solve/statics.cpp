@@ -48,7 +48,7 @@ class Statics {
                 failed_step *= forgetting;
                 continue;
             }
-            newton_.model().set_memory(result_.memory);
+            newton_.model().set_turns(result_.turns);
             result_.reason = report.reason;
             failed_step = target - result_.progress;
             result_.failed.shortest_step = std::min(result_.failed.shortest_step, failed_step);
@@ -72,13 +72,13 @@ class Statics {
         if (report.converged)
             accept(trial, controls, target, report.residual);
         else
-            newton_.model().set_memory(result_.memory);
+            newton_.model().set_turns(result_.turns);
         return report.converged;
     }
 
     void accept(const VectorXd& state, const Controls& controls, double progress, double residual) {
         result_.state = state;
-        result_.memory = newton_.model().memory();
+        result_.turns = newton_.model().turns();
         result_.controls = controls;
         result_.progress = progress;
         result_.residual = residual;
@@ -106,7 +106,7 @@ class Statics {
             result_.relaxation_steps += report.steps;
             result_.saddles_left += report.saddles_left;
             if (!report.converged) {
-                newton_.model().set_memory(result_.memory);
+                newton_.model().set_turns(result_.turns);
                 result_.reason = report.reason;
                 result_.failed.state = std::move(trial);
                 result_.failed.controls = controls;
@@ -133,13 +133,13 @@ class Statics {
 
 }  // namespace
 
-StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Memory& memory,
+StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Turns& turns,
                                const Controls& from, const Controls& to, const StaticsOptions& options,
                                const StaticsWatch& watch) {
-    model.set_memory(memory);
+    model.set_turns(turns);
     StaticsResult result;
     result.state = start;
-    result.memory = memory;
+    result.turns = turns;
     result.controls = from;
     Newton newton(model, options.newton, [&](double residual) {
         if (watch) watch(result.progress, residual);
@@ -148,7 +148,7 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model:
         Statics statics(newton, from, to, options, result);
         result.outcome = statics.run() ? Outcome::converged : Outcome::failed;
     } catch (const Interrupted&) {
-        model.set_memory(result.memory);
+        model.set_turns(result.turns);
         result.outcome = Outcome::interrupted;
         result.reason = "interrupted";
     }

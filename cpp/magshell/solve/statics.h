@@ -29,7 +29,7 @@ struct FailedAttempt {
 struct StaticsResult {
     Outcome outcome = Outcome::failed;
     VectorXd state;         // the equilibrium, or the last good state
-    Model::Memory memory;   // of the terms, at `state`
+    Model::Turns turns;     // of the terms, at `state`
     Controls controls;      // at which `state` holds
     double progress = 0.0;  // how far the controls got, 0 to 1
     std::string reason;
@@ -48,8 +48,8 @@ struct StaticsResult {
 /// Called now and then with the progress of the controls and the residual; throws Interrupted to stop.
 using StaticsWatch = std::function<void(double progress, double residual)>;
 
-/// From an equilibrium `start` at `from`, with the terms' memory of it, to one at `to`.
-StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Memory& memory,
+/// From an equilibrium `start` at `from`, with the terms' turns there, to one at `to`.
+StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Turns& turns,
                                const Controls& from, const Controls& to, const StaticsOptions& options,
                                const StaticsWatch& watch = {});
 

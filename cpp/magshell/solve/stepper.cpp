@@ -52,13 +52,13 @@ std::vector<StageRates> first_rates(const Tableau& tableau, const MotionState& s
     return {state.rates};
 }
 
-bool Stepper::step(MotionState& state, double dt, std::span<const Controls> controls, PartRecord* kept,
+bool Stepper::step(MotionState& state, double dt, std::span<const Controls> controls, SubstepRecord* kept,
                    bool with_factors, std::string& reason) {
     const StepAlgebra& step = algebra(dt, tableau_from(state));
     const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
     const Index coordinates = model.n_coordinates();
-    model.set_memory(state.memory);
+    model.set_turns(state.turns);
     model.begin_step(state.q, controls.front());
     const ElasticAfterwards elastic_afterwards(model);
     const StrainSet at_begin = viscosity_.any() ? model.strains(state.q) : StrainSet();
@@ -81,18 +81,18 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
         const Anchor anchor{&step.weights(), &target, &motion};
         const VectorXd predicted = q;
-        const Model::Memory memory = model.memory();
+        const Model::Turns turns = model.turns();
         NewtonReport report = newton_.solve(q, controls[i + 1], anchor);
         if (!report.converged && (model.has_contact() || newton_.options().mixed)) {
             q = predicted;
-            model.set_memory(memory);
+            model.set_turns(turns);
             report = model.has_contact() ? newton_.solve_damped(q, controls[i + 1], anchor)
                                          : newton_.solve_plain(q, controls[i + 1], anchor);
         }
         if (!report.converged) {
             reason = model.not_finite(q, controls[i + 1]);
             if (reason.empty()) reason = report.reason;
-            model.set_memory(state.memory);
+            model.set_turns(state.turns);
             return false;
         }
         StageRates& now = rates.emplace_back();
@@ -103,15 +103,15 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         }
         if (kept) {
             const bool factorized = with_factors && report.iterations > 0;
-            stages.push_back({q, model.memory(), factorized ? newton_.release_factor() : nullptr});
+            stages.push_back({q, model.turns(), factorized ? newton_.release_factor() : nullptr});
         }
     }
     reason = model.blocked(state.q, controls.front(), q, controls.back());
     if (!reason.empty()) {
-        model.set_memory(state.memory);
+        model.set_turns(state.turns);
         return false;
     }
-    MotionState end{std::move(q), rates.back().v, model.memory(), std::move(e), {}};
+    MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {}};
     if (tableau_.begins_explicitly) end.rates = std::move(rates.back());
     std::swap(state, end);
     if (kept) *kept = {std::move(end), std::move(stages)};

@@ -17,7 +17,7 @@ namespace magshell {
 /// Where a sheet is and how fast it moves; v and w are zero for unknowns that are no vertex.
 struct MotionState {
     VectorXd q, v;
-    Model::Memory memory;
+    Model::Turns turns;
     StrainSet e;       // of the Maxwell branch; empty without one
     StageRates rates;  // at the end of the step that led here, for a method that begins with them; else empty
 };
@@ -30,12 +30,12 @@ struct Inertia {
 /// One stage once it is solved.
 struct StageState {
     VectorXd q;
-    Model::Memory memory;
+    Model::Turns turns;
     std::shared_ptr<const Factor> factor;  // of Newton's last step, if it was to be kept
 };
 
 /// A step, or a part of one: all that its adjoint needs.
-struct PartRecord {
+struct SubstepRecord {
     MotionState begin;
     std::vector<StageState> stages;
 };
@@ -71,7 +71,7 @@ class Stepper {
     /// Takes the state over a step with these controls at its beginning and at its stages. On failure the
     /// state stays, and the reason tells why. `kept`, if given, gets the step; with_factors: Newton's last
     /// factorizations too.
-    bool step(MotionState& state, double dt, std::span<const Controls> controls, PartRecord* kept,
+    bool step(MotionState& state, double dt, std::span<const Controls> controls, SubstepRecord* kept,
               bool with_factors, std::string& reason);
 
     /// The method of a step from this state: SDIRK2 where there are no rates to begin with.

@@ -6,12 +6,12 @@
 
 namespace magshell {
 
-BendingTerm::BendingTerm(const Sheet& sheet, Index body, const PartLoop& parts, const Nodes& nodes,
+BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
                          const SystemMatrix& matrix, Registry& registry)
     : StrainScaffold(sheet.n_faces()),
       sheet_(sheet),
       body_(body),
-      parts_(parts),
+      chunks_(chunks),
       first_scalar_(nodes.first_scalar()),
       materials_(sheet, registry),
       curvature_scale_(registry.values.add(sheet.owner, "curvature_scale", "1", sheet.n_edges(), 1)),
@@ -57,9 +57,9 @@ Vec3 BendingTerm::scales_of(Index face) const {
 }
 
 void BendingTerm::store_folds(const double* q) {
-    parts_.each([&](const Part& part) {
-        for (Index first = part.first_fold; first < part.last_fold; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, part.last_fold);
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_fold);
             const Fold fold = folds_at(sheet_, first, last, q);
             const Pack angle = fold.angle();
             Pack3 g[4];
@@ -89,18 +89,18 @@ void BendingTerm::measure(Index pack, const double* q, const double FoldState::*
 
 double BendingTerm::energy(const double* q, const Controls&) const {
     std::vector<double> turns(folds_.size());
-    parts_.each([&](const Part& part) {
-        for (Index first = part.first_fold; first < part.last_fold; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, part.last_fold);
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_fold);
             const Pack angle = folds_at(sheet_, first, last, q).angle();
             for (Index h = first; h < last; ++h) turns[h] = turn_from(sheet_.folds[h], angle[h - first]);
         }
     });
     const auto turn_of = [&](Index fold) { return turns[fold]; };
     const double* rotation = q + first_scalar_;
-    return parts_.sum([&](const Part& part) {
+    return chunks_.sum([&](const Chunk& chunk) {
         double total = 0.0;
-        for (Index f = part.first; f < part.last; ++f) {
+        for (Index f = chunk.first; f < chunk.last; ++f) {
             double delta[3];
             for (int i = 0; i < 3; ++i) delta[i] = bending_strain(sheet_.sides[f][i], turn_of, rotation);
             const Symmetric3& stiffness = stiffness_[f / Pack::width];
@@ -131,15 +131,15 @@ double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const
 }
 
 void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
-    // Faces that share a rotation share an edge and so a node: parts of one colour meet at no rotation either.
-    parts_.scatter([&](const Part& part) {
-        for (Index h = part.first_fold; h < part.last_fold; ++h) {
+    // Faces that share a rotation share an edge and so a node: chunks of one colour meet at no rotation either.
+    chunks_.scatter([&](const Chunk& chunk) {
+        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h) {
             const double m = moment(sheet_.folds[h], stresses);
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)
                     out.add(3 * sheet_.folds[h].nodes[k] + c, m * folds_[h].gradient[3 * k + c]);
         }
-        for (Index f = part.first; f < part.last; ++f)
+        for (Index f = chunk.first; f < chunk.last; ++f)
             for (int i = 0; i < 3; ++i) {
                 const FaceSide& side = sheet_.sides[f][i];
                 if (side.rotation >= 0)
@@ -148,12 +148,12 @@ void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
     });
 }
 
-void BendingTerm::assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+void BendingTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                            SystemMatrix& out) const {
-    FaceLoop::over_packs(part, [&](Index pack) { assemble_faces(pack, out); });
+    FaceLoop::over_packs(chunk, [&](Index pack) { assemble_faces(pack, out); });
     const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
-    for (Index first = part.first_fold; first < part.last_fold; first += Pack::width)
-        assemble_folds(first, std::min(first + Pack::width, part.last_fold), q, stress, out);
+    for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width)
+        assemble_folds(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
 }
 
 void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
@@ -214,8 +214,8 @@ void BendingTerm::assemble_folds(Index first, Index last, const double* q, const
 }
 
 void BendingTerm::store_rates(const double* p) {
-    parts_.each([&](const Part& part) {
-        for (Index h = part.first_fold; h < part.last_fold; ++h) {
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h) {
             folds_[h].rate = 0.0;
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)

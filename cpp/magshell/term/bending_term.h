@@ -14,7 +14,7 @@ namespace magshell {
 
 class BendingTerm final : public StrainScaffold<BendingTerm> {
   public:
-    BendingTerm(const Sheet& sheet, Index body, const PartLoop& parts, const Nodes& nodes,
+    BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
                 const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "bending"; }
@@ -23,7 +23,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
-    void assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
@@ -48,7 +48,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     Index face_packs() const { return packs_for(sheet_.n_faces()); }
     template <class Body>
     void each_pack(const Body& body) const {
-        parts_.each([&](const Part& part) { FaceLoop::over_packs(part, body); });
+        chunks_.each([&](const Chunk& chunk) { FaceLoop::over_packs(chunk, body); });
     }
     void measure(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const;
     void begin_strains(const double* q) { store_folds(q); }
@@ -66,7 +66,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
 
     const Sheet& sheet_;
     const Index body_;
-    const PartLoop& parts_;
+    const ChunkLoop& chunks_;
     const Index first_scalar_;
     SheetMaterials materials_;
     Slot curvature_scale_;

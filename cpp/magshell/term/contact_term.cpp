@@ -23,12 +23,12 @@ bool passes(const Obstacle& shape, const Vec3& from, const Vec3& to) {
     Distance at = shape.distance(from);
     if (at.value > 0.0) {
         if (length <= at.value) return false;
-        constexpr double smallest = 1e-3;  // of the way
+        constexpr double least_advance = 1e-3;  // of the way
         double travelled = at.value / length;
         while (at.value > 0.0) {
             if (travelled >= 1.0) return false;
             at = shape.distance(from + travelled * (to - from));
-            travelled += std::max(at.value / length, smallest);
+            travelled += std::max(at.value / length, least_advance);
         }
     }
     return at.normal.dot(shape.distance(to).normal) < -1e-6;  // opposite faces; an edge of a box is none

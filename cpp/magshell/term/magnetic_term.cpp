@@ -57,10 +57,10 @@ void MagneticTerm::place(const double* q, std::vector<Vec3>& points,
     loop_.each_pack([&](Index pack) {
         Pack3 x[3];
         loop_.gather(pack, q, x);
-        const Pack3 centre = Pack(1.0 / 3.0) * (x[0] + x[1] + x[2]);
+        const Pack3 center = Pack(1.0 / 3.0) * (x[0] + x[1] + x[2]);
         const Pack3 m = Magnetic(x).magnetization(elements_[pack]);
         for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            points[loop_.face(pack, lane)] = lane_of(centre, lane);
+            points[loop_.face(pack, lane)] = lane_of(center, lane);
             magnetizations[loop_.face(pack, lane)] = lane_of(m, lane);
         }
     });
@@ -125,12 +125,12 @@ void MagneticTerm::prepare_assembly(const double* q, const Controls& controls) {
     if (sampled(controls)) fields_ = sample(q, controls, 2);
 }
 
-void MagneticTerm::assemble(const Part& part, const double* q, const Controls& controls, bool,
+void MagneticTerm::assemble(const Chunk& chunk, const double* q, const Controls& controls, bool,
                             SystemMatrix& out) const {
     const bool varies = !fields_.empty();
     if (!varies && (!normal_magnetization_ || uniform(controls).isZero(0.0))) return;
     const Pack3 everywhere = broadcast(uniform(controls));
-    FaceLoop::over_packs(part, [&](Index pack) {
+    FaceLoop::over_packs(chunk, [&](Index pack) {
         Pack3 x[3];
         Pack33 h[6];
         loop_.gather(pack, q, x);

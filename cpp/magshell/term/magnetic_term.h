@@ -23,7 +23,7 @@ class MagneticTerm final : public Term {
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void prepare_assembly(const double* q, const Controls& controls) override;
-    void assemble(const Part& part, const double* q, const Controls& controls, bool,
+    void assemble(const Chunk& chunk, const double* q, const Controls& controls, bool,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
     std::size_t bytes() const override;
@@ -33,9 +33,9 @@ class MagneticTerm final : public Term {
         return !sources_.empty() && controls[field_factor_.first] != 0.0;
     }
     Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
-    /// The barycentres and the magnetizations [A/m] there, by face.
+    /// The barycenters and the magnetizations [A/m] there, by face.
     void place(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
-    /// The applied field at every barycentre, in packs. Order as in AppliedField::add_samples.
+    /// The applied field at every barycenter, in packs. Order as in AppliedField::add_samples.
     std::vector<Magnetic::Field> sample(const double* q, const Controls& controls, int order) const;
 
     const Surface& surface_;

@@ -62,10 +62,10 @@ void MembraneTerm::evaluate(const double* q, const Controls&, Residual& out) {
     });
 }
 
-void MembraneTerm::assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+void MembraneTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                             SystemMatrix& out) const {
     const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
-    FaceLoop::over_packs(part, [&](Index pack) {
+    FaceLoop::over_packs(chunk, [&](Index pack) {
         Pack3 x[3];
         Pack33 h[6];
         loop_.gather(pack, q, x);
@@ -88,7 +88,7 @@ void MembraneTerm::rate(Index pack, const double* p, Pack d[3]) const {
 }
 
 void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
-    // Of each share: work, and work by the Poisson ratio. A share may be of a face in another part.
+    // Of each share: work, and work by the Poisson ratio. A share may be of a face in another chunk.
     using OfShares = std::array<Eigen::Vector2d, 2>;
     std::vector<OfShares> by_shares(surface_.n_faces(),
                                     OfShares{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});

@@ -21,7 +21,7 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
-    void assemble(const Part& part, const double* q, const Controls&, bool extrapolated_stress,
+    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;

@@ -20,7 +20,7 @@ class Term {
 
     virtual std::string_view name() const = 0;
 
-    /// The body whose parts it is assembled by; negative: it has none of them.
+    /// The body whose chunks it is assembled by; negative: it has none of them.
     virtual Index body() const { return -1; }
 
     /// Takes what it reads of the values; whether anything of that has changed.
@@ -41,8 +41,8 @@ class Term {
     /// What the Hessian at the last evaluated state needs beforehand.
     virtual void prepare_assembly(const double* /*q*/, const Controls&) {}
 
-    /// Adds a part's share of the Hessian; parts that share no node may run at the same time.
-    virtual void assemble(const Part&, const double* /*q*/, const Controls&, bool /*extrapolated_stress*/,
+    /// Adds a chunk's share of the Hessian; chunks that share no node may run at the same time.
+    virtual void assemble(const Chunk&, const double* /*q*/, const Controls&, bool /*extrapolated_stress*/,
                           SystemMatrix& /*out*/) const {}
 
     /// Adds the share of the Hessian that is not on faces.
@@ -60,10 +60,10 @@ class Term {
     /// dC/dk d for a strain.
     virtual void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) = 0;
 
-    /// What the term must know of how its state was reached, such as full turns; a solve that rejects a state
-    /// puts back what it was.
-    virtual std::vector<double> memory() const { return {}; }
-    virtual void set_memory(const std::vector<double>&) {}
+    /// Angles [rad] at the last evaluated state with their full turns, which positions do not tell; a solve that rejects it
+    /// puts them back.
+    virtual std::vector<double> turns() const { return {}; }
+    virtual void set_turns(const std::vector<double>&) {}
 
     virtual std::size_t bytes() const = 0;
 };

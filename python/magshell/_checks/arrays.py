@@ -44,14 +44,6 @@ def named_values(name: str, values) -> Mapping:
     return values or {}
 
 
-def positive(name: str, value) -> float:
-    """A positive finite float, or a ValueError that says the name."""
-    found = number(name, value)
-    if not (np.isfinite(found) and found > 0):
-        raise ValueError(f"{name} must be positive and finite, got {value}")
-    return found
-
-
 def number(name: str, value) -> float:
     """A float, infinite or not a number as well."""
     array = real_numbers(name, value)

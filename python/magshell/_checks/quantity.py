@@ -15,19 +15,24 @@ def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.n
     >>> quantity("positions", "m", [[0, 0, 1]], ("n", 3)).shape
     (1, 3)
     """
-    label = f"{name} [{unit}]"
-    array = real_numbers(label, values)
+    named = label(name, unit)
+    array = real_numbers(named, values)
     if not fits(array.shape, shape):
         if shape == ():
-            raise ValueError(f"{label} must be a number, got shape {array.shape}")
+            raise ValueError(f"{named} must be a number, got shape {array.shape}")
         wanted = ", ".join(str(size) for size in shape) + ("," if len(shape) == 1 else "")
-        raise ValueError(f"{label} must have shape ({wanted}), got {array.shape}")
+        raise ValueError(f"{named} must have shape ({wanted}), got {array.shape}")
     if not np.isfinite(array).all():
         index = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
         entry = f"{name}[{', '.join(map(str, index))}]" if index else name
-        raise ValueError(f"{label} must be finite, but {entry} is {array[index]}")
+        raise ValueError(f"{named} must be finite, but {entry} is {array[index]}")
     array.flags.writeable = False
     return array
+
+
+def label(name: str, unit: str) -> str:
+    """What messages call a quantity; unit "" for a number without one."""
+    return f"{name} [{unit}]" if unit else name
 
 
 def real_numbers(label: str, values) -> np.ndarray:

@@ -6,7 +6,8 @@ import sys
 
 import numpy as np
 
-from .quantity import fits, quantity, real_numbers
+from .quantity import fits, real_numbers
+from .scalars import positive
 from .tensor_kinds import is_tensor, numbers_of, why_not
 
 
@@ -43,9 +44,7 @@ def real_tensor(name: str, values, shape: tuple[int | str, ...]):
 
 def positive_number(name: str, unit: str, value):
     """A positive float, or the tensor that holds one."""
-    number = float(quantity(name, unit, detached(value), ()))
-    if not number > 0:
-        raise ValueError(f"{name} [{unit}] must be positive, got {value}")
+    number = positive(name, unit, detached(value))
     return value if is_tensor(value) else number
 
 

@@ -173,9 +173,9 @@ def _gradient(scene: ms.Scene, inputs: dict, found: ms.Equilibrium, rounds: int)
     """By everything that the solve takes, of a function of all positions, from the factorization that was kept."""
     options = ms.MixedNewton()._options()
     options.keep_factor = True
-    state, memory, controls = found._state, found._memory, found._controls
+    state, turns, controls = found._state, found._turns, found._controls
     with Inputs(scene, **inputs, differentiable=True).in_core():
-        kept = _core.find_equilibrium(scene._model, state, memory, controls, controls, options)
+        kept = _core.find_equilibrium(scene._model, state, turns, controls, controls, options)
         by_positions = np.ones((scene.mesh.n_vertices, 3))
         by_rotations = np.zeros(scene.mesh.n_edges)
         return clocked(lambda: _core.pull_back(scene._model, kept, by_positions, by_rotations), rounds=rounds)

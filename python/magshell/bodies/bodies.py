@@ -13,7 +13,7 @@ from ..mesh.triangle_mesh import TriangleMesh
 from .shell import Shell
 
 
-class Part(NamedTuple):
+class Span(NamedTuple):
     """One body, or all of them: `mesh`, and the numbers in the scene of its first vertex, edge and face.
 
     bodies: which of the scene's they are.
@@ -50,11 +50,11 @@ class Bodies:
                 raise ValueError(
                     f"bodies must differ, but bodies {before} and {k} are one Shell: make another of its mesh"
                 )
-        self.parts: list[Part] = []
+        self.spans: list[Span] = []
         vertex = edge = face = 0
         for k, shell in enumerate(self.shells):
             mesh = shell.mesh
-            self.parts.append(Part(mesh, slice(k, k + 1), vertex, edge, face))
+            self.spans.append(Span(mesh, slice(k, k + 1), vertex, edge, face))
             vertex, edge, face = vertex + mesh.n_vertices, edge + mesh.n_edges, face + mesh.n_faces
 
     def __len__(self) -> int:
@@ -69,7 +69,7 @@ class Bodies:
         """Of all: as edges are sorted by their lower vertex, they too are those of one body after another."""
         if len(self) == 1:
             return self.shells[0].mesh
-        faces = [part.mesh.faces + part.first_vertex for part in self.parts]
+        faces = [span.mesh.faces + span.first_vertex for span in self.spans]
         return TriangleMesh(
             np.concatenate([mesh.rest_positions for mesh in self.meshes]), np.concatenate(faces)
         )
@@ -92,31 +92,31 @@ class Bodies:
         what = "a Shell that is not in it" if isinstance(shell, Shell) else f"{shell!r:.60}"
         raise ValueError(f"a body of the scene is one of scene.bodies, got {what}")
 
-    def of(self, item) -> Part:
+    def of(self, item) -> Span:
         """What a support, a load or a contact is about. Raises ValueError where it does not say so, and has to."""
         kind = type(item).__name__
         if item.body is None:
             if len(self) == 1:
-                return self.parts[0]
+                return self.spans[0]
             if item.for_all:
-                return Part(self.mesh, slice(None))
+                return Span(self.mesh, slice(None))
             raise ValueError(
                 f"the scene has {len(self)} bodies, so a {kind} must say which of them it is about: {kind}(..., body=...)"
             )
         try:
-            return self.parts[self.number(item.body)]
+            return self.spans[self.number(item.body)]
         except ValueError:
             raise ValueError(f"a {kind} is about a body that is not in the scene: {item.body!r}") from None
 
     def contact_points(self, contact) -> tuple[np.ndarray, np.ndarray]:
         """Its points with the scene's vertices: (k, 3), -1 where there are fewer, and their weights (k, 3)."""
-        part = self.of(contact)
-        vertices, weights = contact.points(part.mesh)
-        return np.where(vertices < 0, vertices, vertices + np.int32(part.first_vertex)), weights
+        span = self.of(contact)
+        vertices, weights = contact.points(span.mesh)
+        return np.where(vertices < 0, vertices, vertices + np.int32(span.first_vertex)), weights
 
     def split(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The body of each of the scene's edges, (k,), and its number there, (k,)."""
-        first = np.array([part.first_edge for part in self.parts])
+        first = np.array([span.first_edge for span in self.spans])
         of = np.searchsorted(first, edges, side="right") - 1
         return of, edges - first[of]
 

@@ -16,7 +16,7 @@ class BodyResult:
 
     def __init__(self, result, body: Shell):
         bodies = result.scene._bodies
-        self._result, self._part = result, bodies.parts[bodies.number(body)]
+        self._result, self._span = result, bodies.spans[bodies.number(body)]
         self.body = body
 
     @property
@@ -26,28 +26,28 @@ class BodyResult:
     @property
     def positions(self):
         """(..., n_v, 3) m."""
-        return self._result.positions[..., self._part.vertices, :]
+        return self._result.positions[..., self._span.vertices, :]
 
     @property
     def displacements(self):
         """(..., n_v, 3) m, from the rest shape."""
-        return self._result.displacements[..., self._part.vertices, :]
+        return self._result.displacements[..., self._span.vertices, :]
 
     @property
     def edge_rotations(self):
         """(..., n_e) rad, zero where an edge has none."""
-        return self._result.edge_rotations[..., self._part.edges]
+        return self._result.edge_rotations[..., self._span.edges]
 
     @property
     def velocities(self):
         """(n, n_v, 3) m/s, of a motion."""
-        return self._result.velocities[..., self._part.vertices, :]
+        return self._result.velocities[..., self._span.vertices, :]
 
     @property
     def remanent_magnetization(self):
         """(n_f, 3) or (3,) A/m, or None."""
         given = self._result.remanent_magnetization
-        return given if np.ndim(given) < 2 else given[self._part.faces]
+        return given if np.ndim(given) < 2 else given[self._span.faces]
 
     def __repr__(self) -> str:
         return f"{type(self._result).__name__} of {self.body!r}"

@@ -22,8 +22,8 @@ from ..errors import MeshQualityWarning
 LEAST_ANGLE = np.radians(120.0)  # of faces that are looked at
 # Share of the bending energy that is in the way of caps. Measured on strips of crossed cells, of 1/25 to 1/400 of their
 # length thick and bent by 0.1 to 1 rad: the end is off by 0.1 to 0.6 of it, so here by 0.3 to 2 %.
-TRUSTED = 0.03
-_NAMED = 4
+TRUSTED_SHARE = 0.03
+_MOST_NAMED = 4  # faces in a warning
 
 
 class Caps:
@@ -76,7 +76,7 @@ def warn_of_caps(scene, positions: np.ndarray, shell, bending_energy: float, whe
         return
     caps = scene._caps
     shares = caps.held_back(positions, shell, bending_energy)
-    if shares.sum() <= TRUSTED:
+    if shares.sum() <= TRUSTED_SHARE:
         return
     scene._warned_of_caps = True
     worst = np.argsort(-shares, kind="stable")
@@ -99,5 +99,7 @@ def describe_faces(shell, faces: np.ndarray) -> str:
     )
     if len(faces) == 1:
         return f"Face {shape} is"
-    others = ", ".join(map(str, faces[1:_NAMED].tolist()))
-    return f"{len(faces)} faces, {'among them' if len(faces) > _NAMED else 'namely'} {shape}, {others}, are"
+    others = ", ".join(map(str, faces[1:_MOST_NAMED].tolist()))
+    return (
+        f"{len(faces)} faces, {'among them' if len(faces) > _MOST_NAMED else 'namely'} {shape}, {others}, are"
+    )

@@ -11,7 +11,7 @@ from .._machine.callers import callers_level
 from ..errors import LargeStrainWarning
 
 SMALL = 0.2  # the largest strain for which St. Venant-Kirchhoff material is of use
-_NAMED = 5  # faces in a warning
+_MOST_NAMED = 5  # faces in a warning
 
 
 class Strains(NamedTuple):
@@ -110,7 +110,7 @@ _ADVICE = (
 def _faces(strains: Strains) -> str:
     largest = strains.largest
     beyond = np.flatnonzero(~(largest <= SMALL))
-    named = beyond[np.argsort(-largest[beyond], kind="stable")][:_NAMED]
+    named = beyond[np.argsort(-largest[beyond], kind="stable")][:_MOST_NAMED]
     first = "the first of them " if len(beyond) > len(named) else ""
     return f"{len(beyond)} of {len(largest)} faces are, {first}{', '.join(map(str, named.tolist()))}"
 

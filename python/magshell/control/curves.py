@@ -81,7 +81,7 @@ class Polyline(Curve):
 class Arc(Curve):
     """Part of a circle, or all of it.
 
-    centre: (3,) m. start: (3,) m, where it begins. axis: (3,), perpendicular to start - centre, of any length but zero.
+    center: (3,) m. start: (3,) m, where it begins. axis: (3,), perpendicular to start - center, of any length but zero.
     angle: rad, counter-clockwise about the axis, up to a full turn; clockwise if negative.
 
     >>> quarter = ms.control.Arc((0, 0, 0.02), start=(0, 0, 0), axis=(0, -1, 0), angle=np.pi / 2)  # doctest: +SKIP
@@ -89,44 +89,44 @@ class Arc(Curve):
     tensor([0.0200, 0.0000, 0.0200], dtype=torch.float64)
     """
 
-    def __init__(self, centre, start, axis, angle: float):
-        centre = quantity("centre", "m", centre, (3,))
-        arm = quantity("start", "m", start, (3,)) - centre
+    def __init__(self, center, start, axis, angle: float):
+        center = quantity("center", "m", center, (3,))
+        arm = quantity("start", "m", start, (3,)) - center
         axis = quantity("axis", "1", axis, (3,))
         angle = float(quantity("angle", "rad", angle, ()))
         self._radius, axis_length = float(np.linalg.norm(arm)), np.linalg.norm(axis)
         if not self._radius > 0:
-            raise ValueError("start and centre are the same point")
+            raise ValueError("start and center are the same point")
         if not axis_length > 0:
             raise ValueError("axis must not be zero")
         if abs(arm @ axis) > 1e-9 * self._radius * axis_length:
-            raise ValueError("axis must be perpendicular to start - centre")
+            raise ValueError("axis must be perpendicular to start - center")
         if not 0 < abs(angle) <= _TURN:
             raise ValueError(f"angle [rad] must not be zero, nor more than a full turn, got {angle}")
         outwards = arm / self._radius
         onwards = np.sign(angle) * np.cross(axis / axis_length, outwards)
         self._angle, self.length = abs(angle), abs(angle) * self._radius
-        self._centre = tensor("centre", "m", centre, (3,))
+        self._center = tensor("center", "m", center, (3,))
         self._plane = tensor("plane", "1", np.stack([outwards, onwards]), (2, 3))
 
     def nearest(self, points):
         torch = require_torch("ms.control.Arc")
         points = tensor("points", "m", points, ("n", 3))
-        centre, plane = self._centre, self._plane
-        flat = (points - centre) @ plane.T
+        center, plane = self._center, self._plane
+        flat = (points - center) @ plane.T
         squares = (flat**2).sum(-1, keepdim=True)
         # On the axis all of the circle is equally near: there its start stands for it, and no root is taken of zero.
         off_axis = squares > 0
         direction = torch.where(off_axis, flat, flat.new_tensor([1.0, 0.0]))
         direction = direction / torch.where(off_axis, squares, torch.ones_like(squares)) ** 0.5
-        on_circle = centre + self._radius * direction @ plane
+        on_circle = center + self._radius * direction @ plane
         angles = torch.atan2(direction[:, 1], direction[:, 0]).detach().remainder(_TURN)
         ends = torch.stack([self.start, self.end]).expand(len(points), 2, 3)
         return torch.where((angles <= self._angle)[:, None], on_circle, _nearest_of(points, ends))
 
     def at(self, shares):
         angles = _shares(shares)[:, None] * self._angle
-        return self._centre + self._radius * (angles.cos() * self._plane[0] + angles.sin() * self._plane[1])
+        return self._center + self._radius * (angles.cos() * self._plane[0] + angles.sin() * self._plane[1])
 
 
 class Chain(Curve):

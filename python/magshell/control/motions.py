@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.quantity import quantity, shape_of
+from .._checks.scalars import not_negative
 from .._checks.tensors import detached, positive_number
 from ._arguments import indices, tensor
 from .curves import Curve
@@ -86,8 +87,7 @@ def successive_targets(targets, begin, times, delay: float = 0.0):
     times = quantity("times", "s", detached(times), ("n",))
     if len(begin) == 0 or not (np.diff(begin) > 0).all():
         raise ValueError("begin [s] must be ascending, one a target, at least one")
-    if not quantity("delay", "s", delay, ()) >= 0:
-        raise ValueError(f"delay [s] must not be negative, got {delay}")
+    delay = not_negative("delay", "s", delay)
     rounding = 1e-9 * np.abs(times).max(initial=0.0)  # times are multiples of a step
     last = np.searchsorted(begin - rounding, times, side="right") - 1
     counts = (last >= 0) & (times >= begin[last] + delay - rounding)

@@ -17,7 +17,7 @@ from .checkpoint import load, save
 from .minimum import Minimum, Record
 from .run import PARTS, Run
 
-_READING = 0.2  # s
+_TIME_TO_READ = 0.2  # s, between two texts of the progress bar
 
 
 def minimize(
@@ -167,7 +167,7 @@ class _Watch:
     shown: float = -math.inf
 
     def __call__(self) -> None:
-        if time.monotonic() - self.shown > _READING:
+        if time.monotonic() - self.shown > _TIME_TO_READ:
             self.bar.set_postfix_str(self.run.summary())
             self.shown = time.monotonic()
 

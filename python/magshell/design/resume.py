@@ -5,7 +5,7 @@ from __future__ import annotations
 from .answer import Answer
 from .configuration import changes
 
-_RELATIVE = 1e-6  # of the objective: another thread count or release may round otherwise
+_SAME_OBJECTIVE = 1e-6  # of the objective: another thread count or release may round otherwise
 _ROUNDING = 1e-12  # of the largest objective so far: one that has all but vanished is round-off
 
 
@@ -45,7 +45,7 @@ def check_objective(run, snapshot: dict) -> None:
             ("objective", best["objective"], found),
             ("violation", best["violation"], violation),
         ):
-            if not abs(is_ - was) <= _RELATIVE * abs(was) + _ROUNDING * largest:
+            if not abs(is_ - was) <= _SAME_OBJECTIVE * abs(was) + _ROUNDING * largest:
                 raise ValueError(
                     f"the best design of the checkpoint has the {what} {was:.9g} there and {is_:.9g} now: `objective`, "
                     "or something that it uses, is another one. Resume with that of the checkpoint, or begin anew with "

@@ -45,7 +45,7 @@ class InTime:
         owner, values = course.owner, self._asked.inputs.values
         labels = [label for each, label in self._asked.inputs.scene._labels if each is owner]
         if isinstance(owner, Support):
-            labels = [label for label, _ in owner._motions(values)]
+            labels = [label for label, _ in owner._moves(values)]
             if not labels:
                 raise ValueError(
                     "a support that stays cannot be moved by a solve: give it a displacement in the scene, zero will do"

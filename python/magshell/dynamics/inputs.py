@@ -7,6 +7,7 @@ import numpy as np
 from .. import _core
 from .._checks.arrays import count
 from .._checks.quantity import quantity, shape_of
+from .._checks.scalars import not_negative, positive
 from .._checks.tensors import detached, is_tensor, wants_gradient
 from .._machine.memory import check_memory
 from ..methods.clock import Clock, clock_of
@@ -55,15 +56,12 @@ class MotionInputs:
         self.inputs, self.integrator = inputs, integrator
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
         check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
-        if not quantity("memory_budget", "bytes", memory_budget, ()) >= 0:
-            raise ValueError(f"memory_budget must not be negative, got {memory_budget}")
+        memory_budget = not_negative("memory_budget", "bytes", memory_budget)
         if keep not in (None, "stages", "checkpoints", "factors"):
             raise ValueError(f'keep must be "stages", "checkpoints", "factors" or None, got {keep!r}')
         self.keep = getattr(_core.Keep, keep or "nothing")
         self.given_time_step, self._outside = time_step, None
-        self.time_step = float(quantity("time_step", "s", inputs.take("time_step", time_step), ()))
-        if not self.time_step > 0:
-            raise ValueError(f"time_step [s] must be positive, got {self.time_step}")
+        self.time_step = positive("time_step", "s", inputs.take("time_step", time_step))
         self._mass = inputs.values.vertex_masses
         self._damping = self._checked_damping(inputs.take("damping", damping))
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
@@ -79,7 +77,7 @@ class MotionInputs:
             {
                 "state": self.start.state,
                 "velocity": self.start.velocity,
-                "memory": self.start.memory,
+                "turns": self.start.turns,
                 **self._history(law),
                 "rotations_given": self.start.rotations_known,
                 **law,
@@ -168,12 +166,11 @@ class MotionInputs:
         if maxwell_time is not None:
             given["maxwell_time"] = ("s", maxwell_time)
         law = {
-            name: float(quantity(name, unit, self.inputs.take(name, value), ()))
+            name: (positive if name == "maxwell_time" else not_negative)(
+                name, unit, self.inputs.take(name, value)
+            )
             for name, (unit, value) in given.items()
         }
-        for name, value in law.items():
-            if value < 0 or (name == "maxwell_time" and value == 0):
-                raise ValueError(f"{name} must be positive, got {value:g}")
         if law["maxwell_modulus"] and maxwell_time is None:
             raise ValueError("maxwell_modulus needs the relaxation time of the branch, maxwell_time [s]")
         return {"maxwell_time": 1.0, **law}
@@ -194,7 +191,7 @@ class MotionInputs:
             origin.time,
             origin.state,
             velocity,
-            origin.memory,
+            origin.turns,
             maxwell_strains=origin.maxwell_strains,
             clock=origin.clock,
             rotations_known=origin.rotations_known,
@@ -216,7 +213,7 @@ class MotionInputs:
             if wants_gradient(start.positions):
                 inputs.take("positions", start.positions)
                 inputs.take("edge_rotations", start.edge_rotations)
-            return MotionState(0.0, start._state, still, start._memory)
+            return MotionState(0.0, start._state, still, start._turns)
         if isinstance(start, MotionState):
             return _checked_state(start, model.size, model.n_strains)
         given = inputs.take("positions", start)
@@ -238,12 +235,10 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
     for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
         values = getattr(start, name)
         quantity(f"start.{name}", "SI", values, (0 if np.size(values) == 0 else n_strains,))
-    if not isinstance(start.memory, list):
-        raise ValueError(
-            f"start.memory must be a list of lists of numbers, got {type(start.memory).__name__}"
-        )
-    for k, each in enumerate(start.memory):
-        quantity(f"start.memory[{k}]", "SI", each, ("n",))
+    if not isinstance(start.turns, list):
+        raise ValueError(f"start.turns must be a list of lists of numbers, got {type(start.turns).__name__}")
+    for k, each in enumerate(start.turns):
+        quantity(f"start.turns[{k}]", "SI", each, ("n",))
     quantity("start.time", "s", start.time, ())
     if not isinstance(start.clock, Clock | None):
         raise ValueError(f"start.clock must be that of a motion, or None, got {type(start.clock).__name__}")

@@ -220,7 +220,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
             ended.time,
             found.last_state,
             found.last_velocity,
-            found.last_memory,
+            found.last_turns,
             found.last_acceleration,
             found.last_strain_rates(model),
             found.last_maxwell_strains(model),

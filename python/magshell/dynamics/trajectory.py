@@ -35,7 +35,7 @@ class MotionState:
     time: float
     state: np.ndarray = field(repr=False)
     velocity: np.ndarray = field(repr=False)
-    memory: list = field(repr=False, default_factory=list)
+    turns: list = field(repr=False, default_factory=list)
     acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
@@ -45,15 +45,15 @@ class MotionState:
 
     def save(self, path: str | Path) -> None:
         """Writes an .npz file."""
-        lengths = np.array([len(each) for each in self.memory], dtype=np.int64)
-        remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.memory)])
+        lengths = np.array([len(each) for each in self.turns], dtype=np.int64)
+        remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.turns)])
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         arrays |= {
             "time": self.time,
             "clock": astuple(clock_of(self)),
             "rotations_known": self.rotations_known,
-            "memory": remembered,
-            "memory_lengths": lengths,
+            "turns": remembered,
+            "turn_lengths": lengths,
         }
         replace_file(path, lambda file: np.savez(file, **arrays))
 
@@ -64,8 +64,8 @@ class MotionState:
             with np.load(Path(path), allow_pickle=False) as file:
                 time = float(quantity("time", "s", file["time"], ()))
                 origin, time_step, steps = quantity("clock", "SI", file["clock"], (3,)).tolist()
-                remembered = quantity("memory", "SI", file["memory"], ("n",))
-                lengths = index_array("memory_lengths", file["memory_lengths"])
+                remembered = quantity("turns", "SI", file["turns"], ("n",))
+                lengths = index_array("turn_lengths", file["turn_lengths"])
                 known = bool(file["rotations_known"])
                 arrays = {name: file[name] for name in _ARRAYS}
             clock = Clock(origin, time_step, int(steps))
@@ -74,7 +74,7 @@ class MotionState:
             raise ValueError(f"{path} is not a saved MotionState: {error}") from error
         return cls(
             time,
-            memory=[part.tolist() for part in parts],
+            turns=[part.tolist() for part in parts],
             clock=clock,
             rotations_known=known,
             **arrays,

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import _core as core
-from .._checks.quantity import quantity, real_numbers
-from .differences import STEP, FluxSampler, Function, GradientSampler
+from .._checks.quantity import real_numbers
+from .._checks.scalars import positive
+from .differences import RELATIVE_STEP, FluxSampler, Function, GradientSampler
 from .field import AppliedField
 
 
@@ -30,10 +31,10 @@ class CustomField(AppliedField):
     """
 
     def __init__(self, function: Function, *, length_scale: float, gradient: Function | None = None) -> None:
-        self.length_scale = _checked_length_scale(length_scale)
+        self.length_scale = positive("length_scale", "m", length_scale)
         self.name = getattr(function, "__name__", type(function).__name__)
         self._made_from = {"function": function, "length_scale": self.length_scale, "gradient": gradient}
-        step = STEP * self.length_scale
+        step = RELATIVE_STEP * self.length_scale
         flux_density = _checked_function("function", "T", function, (3,))
         if gradient is None:
             self._core = core.PythonField(FluxSampler(flux_density, step))
@@ -64,7 +65,7 @@ class MagpylibField(AppliedField):
 
     def __init__(self, sources, *, length_scale: float) -> None:
         magpylib = _import_magpylib()
-        self.length_scale = _checked_length_scale(length_scale)
+        self.length_scale = positive("length_scale", "m", length_scale)
         listed = list(sources) if isinstance(sources, list | tuple) else [sources]
         try:
             copies = [source.copy() for source in listed]
@@ -83,17 +84,10 @@ class MagpylibField(AppliedField):
 
         self._made_from = {"sources": copies, "length_scale": self.length_scale}
         self.names = [type(source).__name__ for source in listed]
-        self._core = core.PythonField(FluxSampler(flux_density, STEP * self.length_scale))
+        self._core = core.PythonField(FluxSampler(flux_density, RELATIVE_STEP * self.length_scale))
 
     def __repr__(self) -> str:
         return f"MagpylibField({', '.join(self.names)}, length_scale={self.length_scale:g} m)"
-
-
-def _checked_length_scale(length_scale: float) -> float:
-    value = float(quantity("length_scale", "m", length_scale, ()))
-    if value <= 0:
-        raise ValueError(f"length_scale [m] must be positive, got {value}")
-    return value
 
 
 def _checked_function(name: str, unit: str, function: Function, tail: tuple[int, ...]) -> Callable:

@@ -3,7 +3,7 @@
 Along a direction d, with the step s and the weights of the usual seven-point stencils,
 
     f'(x)  = 1/s   sum_k FIRST[k]  (f(x + k s d) - f(x - k s d))                          k = 1, 2, 3
-    f''(x) = 1/s^2 sum_k SECOND[k] (f(x + k s d) + f(x - k s d)) + CENTRE f(x)/s^2
+    f''(x) = 1/s^2 sum_k SECOND[k] (f(x + k s d) + f(x - k s d)) + CENTER f(x)/s^2
 
 Mixed second derivatives follow from directional ones: 2 f_jk = f''(along e_j + e_k) - f_jj - f_kk.
 """
@@ -16,7 +16,7 @@ import numpy as np
 
 FIRST = np.array([3 / 4, -3 / 20, 1 / 60])
 SECOND = np.array([3 / 2, -3 / 20, 1 / 90])
-CENTRE = -49 / 18
+CENTER = -49 / 18
 
 AXES = np.eye(3)
 PAIRS = [(0, 1), (1, 2), (2, 0)]
@@ -24,7 +24,7 @@ DIAGONALS = np.array([AXES[j] + AXES[k] for j, k in PAIRS])
 
 # The step in units of the length scale. For a dipole at that distance, truncation and rounding together are
 # then below 1e-10 of the largest entry, for the first and for the second derivatives.
-STEP = 4e-3
+RELATIVE_STEP = 4e-3
 
 Function = Callable[[np.ndarray], np.ndarray]
 
@@ -45,11 +45,11 @@ def first_derivatives(forward: np.ndarray, backward: np.ndarray, step: float) ->
 
 
 def second_derivatives(
-    centre: np.ndarray, forward: np.ndarray, backward: np.ndarray, step: float
+    center: np.ndarray, forward: np.ndarray, backward: np.ndarray, step: float
 ) -> np.ndarray:
     """(n, ..., directions)"""
     sides = np.einsum("k,dk...->...d", SECOND, forward + backward)
-    return (sides + CENTRE * centre[..., None]) / step**2
+    return (sides + CENTER * center[..., None]) / step**2
 
 
 class FluxSampler:
@@ -67,10 +67,10 @@ class FluxSampler:
         gradient = first_derivatives(forward[:3], backward[:3], self._step)
         if order == 1:
             return flux, gradient
-        centre, ahead, behind = (
+        center, ahead, behind = (
             np.einsum("...i,...i", values, moments) for values in (flux, forward, backward)
         )
-        second = second_derivatives(centre, ahead, behind, self._step)
+        second = second_derivatives(center, ahead, behind, self._step)
         curvature = second[:, :3, None] * np.eye(3)
         for along_diagonal, (j, k) in zip(second[:, 3:].T, PAIRS, strict=True):
             mixed = (along_diagonal - second[:, j] - second[:, k]) / 2

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .. import _core as core
-from .._checks.flags import positive
 from .._checks.quantity import quantity
+from .._checks.scalars import all_positive, positive
 from .field import AppliedField
 
 
@@ -74,11 +74,7 @@ class CuboidMagnet(Magnet):
     def __init__(
         self, dimensions, remanent_magnetization, center=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)
     ) -> None:
-        self.dimensions = quantity("dimensions", "m", dimensions, (3,))
-        if (bad := np.flatnonzero(self.dimensions <= 0)).size:
-            raise ValueError(
-                f"dimensions [m] must be positive, but dimensions[{bad[0]}] is {self.dimensions[bad[0]]:g}"
-            )
+        self.dimensions = all_positive("dimensions", "m", dimensions, (3,))
         super().__init__(remanent_magnetization, center, rotation)
 
     def __repr__(self) -> str:

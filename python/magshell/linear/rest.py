@@ -57,7 +57,7 @@ class RestStiffness:
         """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports move."""
         model, layout = self._model, inputs.scene._control_layout
         unloaded = layout.zeros()
-        moved = model.prescribed_rate(unloaded) * layout.part(inputs.controls, "scene", "motion_factor")
+        moved = model.prescribed_rate(unloaded) * layout.of(inputs.controls, "scene", "motion_factor")
         forces = model.gradient(self.rest, unloaded) - model.gradient(self.rest, inputs.controls)
         if moved.any():
             forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved

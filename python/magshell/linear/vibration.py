@@ -18,10 +18,14 @@ from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
 from .mode_shapes import mode_shapes
 
-_LOST = 64.0 * np.finfo(float).eps  # of the fastest vibration's square: below, a square is round-off
+_ROUND_OFF_SHARE = (
+    64.0 * np.finfo(float).eps
+)  # of the fastest vibration's square: below, a square is round-off
 _SHIFT_GROWTH = 8.0
 _ATTEMPTS = 3  # each searches a larger space
-_SAME = 1e-6  # squares that differ by less, relative to their distance from the shift, are not told apart
+_TOLD_APART = (
+    1e-6  # squares that differ by less, relative to their distance from the shift, are not told apart
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -135,7 +139,7 @@ class _Pencil:
         self._factor = _core.analyze(*pattern, points=points)
         self.factorizations = 0
         stiffest = self._values[self._diagonal][self._moving] / masses[self._moving]
-        self._lost = _LOST * stiffest.max()
+        self._lost = _ROUND_OFF_SHARE * stiffest.max()
         # Below zero, because nothing may resist a rigid motion; and further, the faster something grows.
         self._shift = -max(slow_square, 16.0 * self._lost)
         while self._squares_below(self._shift):
@@ -155,7 +159,7 @@ class _Pencil:
             squares, modes = self._search(count, seed=attempt, space=(2 * count + 20) << attempt)
             # A search may miss one of several equal ones. By Sylvester's law K - s M has as many negative pivots as
             # there are squares below s.
-            below = squares[-1] - max(_SAME * (squares[-1] - self._shift), 2.0 * self._lost)
+            below = squares[-1] - max(_TOLD_APART * (squares[-1] - self._shift), 2.0 * self._lost)
             if self._squares_below(below) == np.count_nonzero(squares < below):
                 squares[np.abs(squares) <= self._lost] = 0.0
                 return squares, modes

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 # Faces that are looked at unasked, when a result is printed or drawn: some 30 ms.
-AFFORDABLE = 20_000
+AFFORDABLE_FACES = 20_000
 
 
 def told(mesh, states: np.ndarray) -> str:
     """In words, of states (n, n_v, 3), m: all of them, or the last, or none, whatever is affordable."""
     count = len(states)
-    if not count or mesh.n_faces > AFFORDABLE:
+    if not count or mesh.n_faces > AFFORDABLE_FACES:
         return "whether it passes through itself: ask self_intersections()"
-    looked_at = range(count) if count * mesh.n_faces <= AFFORDABLE else [count - 1]
+    looked_at = range(count) if count * mesh.n_faces <= AFFORDABLE_FACES else [count - 1]
     pairs = {k: len(mesh.self_intersections(states[k])) for k in looked_at}
     crossing = [k for k, found in pairs.items() if found]
     where = "" if count == 1 else " in any state" if len(pairs) == count else " in the last state"

@@ -12,6 +12,7 @@ import numpy as np
 
 from .._checks.arrays import index_array
 from .._checks.quantity import quantity
+from .._checks.scalars import not_negative
 
 RELATIVE_TOLERANCE = 1e-6  # of the mesh's size: far above round-off, far below any edge
 
@@ -65,7 +66,7 @@ class MeshSelection:
         )
 
     def faces_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Faces where predicate((n_f, 3) barycentres [m]) -> (n_f,) bool holds."""
+        """Faces where predicate((n_f, 3) barycenters [m]) -> (n_f,) bool holds."""
         return _where("face", predicate, self.face_barycenters, np.arange(self.n_faces))
 
     def nearest_vertex(self, point) -> int:
@@ -98,9 +99,7 @@ class MeshSelection:
             raise ValueError("give at least one of x, y, z [m]")
         if tolerance is None:
             tolerance = RELATIVE_TOLERANCE * self.size
-        if not quantity("tolerance", "m", tolerance, ()) >= 0:
-            raise ValueError(f"tolerance [m] must not be negative, got {tolerance}")
-        return wanted, float(tolerance)
+        return wanted, not_negative("tolerance", "m", tolerance)
 
     def _matches(self, wanted: dict[int, float], tolerance: float) -> np.ndarray:
         axes, values = list(wanted), list(wanted.values())

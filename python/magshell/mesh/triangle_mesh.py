@@ -9,8 +9,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .. import _core
-from .._checks.arrays import index_array, positive
+from .._checks.arrays import index_array
 from .._checks.quantity import quantity
+from .._checks.scalars import positive
 from .quality import MeshQuality
 from .selection import MeshSelection
 from .summary import boundary_loops, summary
@@ -224,7 +225,7 @@ class TriangleMesh(MeshSelection):
 
     def scaled(self, factor: float) -> TriangleMesh:
         """The mesh with all coordinates multiplied by a positive factor."""
-        positions = self.rest_positions * positive("factor", factor)
+        positions = self.rest_positions * positive("factor", "", factor)
         return TriangleMesh(positions, self.faces)
 
 

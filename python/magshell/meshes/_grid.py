@@ -60,13 +60,13 @@ def grid(
     on_edge = _on_edge(number, periodic)
 
     if diagonals == "crossed":
-        # a cell at a pole is a triangle already: it gets no centre
+        # a cell at a pole is a triangle already: it gets no center
         whole = (corners[0] != corners[3]) & (corners[1] != corners[2])
-        centre = np.full(len(i), -1)
-        centre[whole] = n_corners + np.arange(whole.sum())
+        center = np.full(len(i), -1)
+        center[whole] = n_corners + np.arange(whole.sum())
         parameters = np.concatenate([parameters, np.stack([(i + 0.5) / n_u, (j + 0.5) / n_v], axis=1)[whole]])
         on_edge = np.concatenate([on_edge, np.zeros(whole.sum(), dtype=bool)])
-        faces = _crossed_faces(corners, centre, whole)
+        faces = _crossed_faces(corners, center, whole)
     else:
         towards_one = np.ones(len(i), dtype=bool) if diagonals == "aligned" else (i + j) % 2 == 0
         faces = _halved_faces(corners, towards_one)
@@ -127,8 +127,8 @@ def _halved_faces(corners: list[np.ndarray], towards_one: np.ndarray) -> np.ndar
     return faces[faces[:, 0] >= 0]
 
 
-def _crossed_faces(corners: list[np.ndarray], centre: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    fans = [[corners[k], corners[(k + 1) % 4], centre] for k in range(4)]
+def _crossed_faces(corners: list[np.ndarray], center: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    fans = [[corners[k], corners[(k + 1) % 4], center] for k in range(4)]
     at_pole = _halved_faces([corner[~whole] for corner in corners], np.ones((~whole).sum(), dtype=bool))
     return np.concatenate([np.transpose(fans, (2, 0, 1))[whole].reshape(-1, 3), at_pole])
 

@@ -10,7 +10,7 @@ from ..mesh.triangle_mesh import TriangleMesh
 
 
 def surface(points: np.ndarray, faces: np.ndarray, outwards: Callable) -> TriangleMesh:
-    """The mesh, if the normal of each face is on the side of outwards(barycentres).
+    """The mesh, if the normal of each face is on the side of outwards(barycenters).
 
     Bending a grid is not linear: a face that is merely slanted in the unit square may turn over on a
     coarse or pointed surface.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._checks.arrays import positive
 from .._checks.quantity import quantity
+from .._checks.scalars import positive
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import angle_span, is_full_turn
 from ._grid import grid
@@ -51,7 +51,7 @@ def sector(
     >>> sector(0.0, 0.01, math.pi / 2, cells=(4, 6)).boundary_loops[0].size
     14
     """
-    outer = positive("outer_radius [m]", outer_radius)
+    outer = positive("outer_radius", "m", outer_radius)
     inner = float(quantity("inner_radius", "m", inner_radius, ()))
     if not 0 <= inner < outer:
         raise ValueError(f"inner_radius [m] must be in [0, outer_radius = {outer}), got {inner_radius}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._checks.arrays import positive
+from .._checks.scalars import positive
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
@@ -38,7 +38,7 @@ def cylinder(
     >>> len(roof.vertices_at(x=0.0, z=25.0))
     17
     """
-    radius, length = positive("radius [m]", radius), positive("length [m]", length)
+    radius, length = positive("radius", "m", radius), positive("length", "m", length)
     start, stop = angle_span("angle", angle, symmetric=True)
     # the grid closes along its second parameter, so that is phi; -y then keeps d/du x d/dv outwards
     around, along = checked_cells(cells)

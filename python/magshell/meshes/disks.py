@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._checks.arrays import positive
+from .._checks.scalars import positive
 from ..mesh.triangle_mesh import TriangleMesh
 from ._grid import check_size
 
@@ -17,7 +17,7 @@ def disk(radius: float, cells: int) -> TriangleMesh:
     >>> disk(0.01, cells=8).n_faces
     384
     """
-    radius = positive("radius [m]", radius)
+    radius = positive("radius", "m", radius)
     if isinstance(cells, bool) or not isinstance(cells, (int, np.integer)) or cells < 1:
         raise ValueError(f"cells is the number of rings, an integer of at least 1, got {cells!r}")
     check_size(6 * int(cells) ** 2)

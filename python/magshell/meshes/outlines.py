@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._checks.arrays import positive
+from .._checks.scalars import positive
 from ..mesh.triangle_mesh import TriangleMesh
 from ._gmsh_session import gmsh_session
 from ._grid import check_size
@@ -45,7 +45,7 @@ def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -
     >>> len(outline(square, slits=[[(0.3, 0.5), (0.7, 0.5)]], size=0.1).boundary_loops)
     2
     """
-    size = positive("size [m]", size)
+    size = positive("size", "m", size)
     outer = checked_polygon("outer", outer)
     holes = [checked_polygon(f"hole {k}", hole) for k, hole in enumerate(holes)]
     slits = [checked_polyline(f"slit {k}", slit, 2) for k, slit in enumerate(slits)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._checks.arrays import positive
+from .._checks.scalars import positive
 from ..mesh.triangle_mesh import TriangleMesh
 from ._grid import grid
 
@@ -29,7 +29,7 @@ def rectangle(
     >>> rectangle(0.12, 0.02, cells=(60, 10)).n_faces
     1200
     """
-    length, width = positive("length [m]", length), positive("width [m]", width)
+    length, width = positive("length", "m", length), positive("width", "m", width)
     g = grid(cells, diagonals, irregular, seed)
     x, y = g.parameters.T
     return TriangleMesh(np.stack([length * x, width * y, np.zeros_like(x)], axis=1), g.faces)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._checks.arrays import positive
 from .._checks.quantity import quantity
+from .._checks.scalars import positive
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
@@ -38,7 +38,7 @@ def spherical_cap(
     >>> len(quarter.vertices_at(y=0.0)), len(quarter.vertices_at(z=0.0))
     (17, 17)
     """
-    radius = positive("radius [m]", radius)
+    radius = positive("radius", "m", radius)
     angle_from = float(quantity("angle_from", "rad", angle_from, ()))
     angle_to = float(quantity("angle_to", "rad", angle_to, ()))
     if not 0 <= angle_from < angle_to <= np.pi:

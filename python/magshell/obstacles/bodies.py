@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import _core as core
-from .._checks.flags import flag, positive
 from .._checks.quantity import quantity, shape_of
+from .._checks.scalars import all_positive, flag, positive
 from ._surfaces import box_surface, sphere_surface, swept_surface
 from .obstacle import Obstacle, Surface
 
@@ -73,9 +73,7 @@ class Box(Obstacle):
         motion: Callable | None = None,
     ) -> None:
         super().__init__(center, rotation, motion)
-        self.size = quantity("size", "m", size, (3,))
-        if self.size.min() <= 0:
-            raise ValueError(f"size [m] must be positive, got {self.size.tolist()}")
+        self.size = all_positive("size", "m", size, (3,))
         self.rounding = float(quantity("rounding", "m", rounding, ()))
         if not 0 <= self.rounding <= self.size.min() / 2:
             raise ValueError(

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import _core as core
-from .._checks.flags import flag, positive
 from .._checks.quantity import quantity
+from .._checks.scalars import flag, positive
 from ._surfaces import grid_faces
 from .obstacle import Obstacle, Surface
 
-EVEN = 1e-6  # of a spacing: how far coordinates may be from equal ones
+LARGEST_UNEVENNESS = 1e-6  # of a spacing: how far coordinates may be from equal ones
 
 
 class HeightField(Obstacle):
@@ -106,7 +106,7 @@ def _axis(name: str, values) -> np.ndarray:
         )
     mean = (values[-1] - values[0]) / (len(values) - 1)
     k = int(np.abs(steps - mean).argmax())
-    if abs(steps[k] - mean) > EVEN * mean:
+    if abs(steps[k] - mean) > LARGEST_UNEVENNESS * mean:
         raise ValueError(
             f"{name} [m] must rise in equal steps of {mean:g}, but {name}[{k + 1}] - {name}[{k}] is {steps[k]:g}"
         )

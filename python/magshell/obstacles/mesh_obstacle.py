@@ -13,8 +13,8 @@ from ..mesh.io import read_mesh
 from ..mesh.triangle_mesh import TriangleMesh
 from .obstacle import Obstacle, Surface
 
-FINEST = 256  # cells; 140 MB of samples
-TOUCHING = 1e-9  # of the mesh's size: vertices so near are in one place
+MOST_CELLS = 256  # cells; 140 MB of samples
+SAME_PLACE = 1e-9  # of the mesh's size: vertices so near are in one place
 
 
 class MeshObstacle(Obstacle):
@@ -56,8 +56,8 @@ class MeshObstacle(Obstacle):
         super().__init__(center, rotation, motion)
         if isinstance(resolution, bool) or not isinstance(resolution, int | np.integer):
             raise ValueError(f"resolution must be an integer, got {resolution!r:.60}")
-        if not 4 <= resolution <= FINEST:
-            raise ValueError(f"resolution must lie between 4 and {FINEST}, got {resolution}")
+        if not 4 <= resolution <= MOST_CELLS:
+            raise ValueError(f"resolution must lie between 4 and {MOST_CELLS}, got {resolution}")
         self.mesh = _mesh_of(mesh, faces)
         _check_closed(self.mesh)
         _check_orientation(self.mesh)
@@ -91,7 +91,7 @@ def _mesh_of(mesh, faces) -> TriangleMesh:
 
 def _check_closed(mesh: TriangleMesh) -> None:
     x = mesh.rest_positions
-    pairs = cKDTree(x).query_pairs(TOUCHING * mesh.size, output_type="ndarray")
+    pairs = cKDTree(x).query_pairs(SAME_PLACE * mesh.size, output_type="ndarray")
     same = ""
     if len(pairs):
         a, b = pairs[np.lexsort(pairs.T[::-1])[0]].tolist()

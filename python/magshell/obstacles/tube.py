@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import _core as core
-from .._checks.flags import flag
 from .._checks.quantity import quantity, shape_of
+from .._checks.scalars import all_positive, flag
 from ._surfaces import swept_surface
 from .obstacle import Obstacle, Surface
 
@@ -57,10 +57,7 @@ class Tube(Obstacle):
             )
         constant = shape_of("radius [m]", radius) == ()
         given = np.full(len(self.points), radius) if constant else radius
-        self.radius = quantity("radius", "m", given, (len(self.points),))
-        if self.radius.min() <= 0:
-            k = int(self.radius.argmin())
-            raise ValueError(f"radius [m] must be positive, but radius[{k}] is {self.radius[k]:g}")
+        self.radius = all_positive("radius", "m", given, (len(self.points),))
         self.inside, self.closed = flag("inside", inside), flag("closed", closed)
         shape = core.Obstacle.tube(self.points, self.radius, self.closed)
         self._of(

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .._checks.arrays import positive
+from .._checks.scalars import positive
 from ..errors import DesignRejected
 from .approximation import Asymptotes, Surroundings
 from .base import BoxOptimizer, require_range
@@ -56,7 +56,7 @@ class MMA(BoxOptimizer):
         penalty: float = 1000.0,
         max_shortenings: int = 6,
     ):
-        self.penalty = positive("penalty", penalty)
+        self.penalty = positive("penalty", "", penalty)
         super().__init__(
             params,
             {

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_BARRIER_END = 1e-10
+_LAST_BARRIER = 1e-10
 _NEWTON_LIMIT = 100  # a barrier value takes 3 to 10
 
 
@@ -44,7 +44,7 @@ class Subproblem:
     def _interior_point(self) -> np.ndarray:
         point = _Point.start(self)
         barrier = 1.0
-        while barrier > _BARRIER_END:
+        while barrier > _LAST_BARRIER:
             for _ in range(_NEWTON_LIMIT):
                 residual = point.residual(self, barrier)
                 if np.abs(residual).max() < 0.9 * barrier:

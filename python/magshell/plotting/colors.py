@@ -125,7 +125,7 @@ def _displacement(states: list[State], unit: LengthUnit) -> Scalar:
 
 
 def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
-    """- (F_0 M_r) . B at the barycentres, per rest volume, [Chen22] (24)."""
+    """- (F_0 M_r) . B at the barycenters, per rest volume, [Chen22] (24)."""
     densities = []
     for state in states:
         if not state.is_magnetized or (state.flux_density is None and state.sources is None):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.arrays import index_array
-from ..mesh.crossings import AFFORDABLE
+from ..mesh.crossings import AFFORDABLE_FACES
 from ..states.state import State, states_of
 from ..states.units import length_unit
 from . import backend as backends
@@ -106,7 +106,7 @@ def checked_titles(titles, states: list[State]) -> list[str]:
 
 def noted_crossings(titles: list[str], states: list[State]) -> list[str]:
     """The titles, with a word where the sheet passes through itself. As they are where looking costs much."""
-    if sum(state.mesh.n_faces for state in states) > AFFORDABLE:
+    if sum(state.mesh.n_faces for state in states) > AFFORDABLE_FACES:
         return titles
     crosses = [len(state.mesh.self_intersections(state.positions)) > 0 for state in states]
     word = "passes through itself"

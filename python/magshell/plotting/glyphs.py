@@ -38,7 +38,7 @@ def spacing_of(mesh: TriangleMesh, count: int) -> float:
 
 
 def spread_faces(mesh: TriangleMesh, spacing: float) -> np.ndarray:
-    """Faces about a spacing apart: the one next to the centre of each box of a lattice at rest."""
+    """Faces about a spacing apart: the one next to the center of each box of a lattice at rest."""
     centers = mesh.face_barycenters
     low, extent = mesh.rest_positions.min(axis=0), np.ptp(mesh.rest_positions, axis=0)
     counts = np.maximum(1, np.round(extent / spacing)).astype(np.int64)
@@ -53,7 +53,7 @@ def spread_faces(mesh: TriangleMesh, spacing: float) -> np.ndarray:
 def magnetization_glyphs(state: State, count: int, unit_vector: float) -> Glyphs:
     """About `count` arrows F_0 M_r; a vector of length `unit_vector` [A/m] is drawn LENGTH spacings long.
 
-    An arrow in the sheet is centred on its face, one that leaves it starts there.
+    An arrow in the sheet is centerd on its face, one that leaves it starts there.
     """
     spacing = spacing_of(state.mesh, count)
     faces = spread_faces(state.mesh, spacing)
@@ -84,7 +84,7 @@ def halo(states: list[State], size: float) -> np.ndarray:
 
 
 def field_glyphs(points: np.ndarray, flux_densities: np.ndarray, size: float, unit_vector: float) -> Glyphs:
-    """B (k, 3) at points (k, 3), where it has a value, each arrow centred on its point.
+    """B (k, 3) at points (k, 3), where it has a value, each arrow centerd on its point.
 
     Fields of `unit_vector` [T] and more are drawn at full length.
     """

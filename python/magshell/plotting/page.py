@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .._checks.quantity import quantity
+from .._checks.scalars import positive
 from .._machine.files import replace_file
 from ..states.state import State, states_of, with_times
 from ..states.units import LengthUnit, length_unit, prefixed, with_unit
@@ -77,8 +77,7 @@ def write_page(
     )
     mesh = states[0].mesh
     same_faces(states, "a page")
-    if not quantity("size_limit", "bytes", size_limit, ()) > 0:
-        raise ValueError(f"size_limit [bytes] must be positive, got {size_limit}")
+    size_limit = positive("size_limit", "bytes", size_limit)
     states = with_times(states, times)
     speed = speed_of(states, speed)
     size = size_of(states)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .._checks.arrays import positive
+from .._checks.scalars import positive
 from .._machine.files import replace_file
 from ..states.units import round_below
 from . import colors, polygons, vtk
@@ -66,7 +66,7 @@ class Picture:
         pyplot.show()
 
     def _repr_png_(self, dpi: float | None = None) -> bytes:
-        dpi = self.figure.dpi if dpi is None else positive("dpi", dpi)
+        dpi = self.figure.dpi if dpi is None else positive("dpi", "", dpi)
         check_pixels(*(dpi * self.figure.get_size_inches()), "ask for fewer dots an inch (`dpi`)")
         buffer = io.BytesIO()
         self.figure.savefig(buffer, format="png", dpi=dpi)

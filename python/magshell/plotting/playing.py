@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._checks.quantity import quantity
+from .._checks.scalars import positive
 from ..states.state import State
 from ..states.units import clock
 from .limits import check_frames
@@ -34,10 +34,7 @@ def duration_of(states: list[State]) -> float:
 def speed_of(states: list[State], speed) -> float:
     """Seconds of the motion that one second shows: as asked for, else 1 or the round number that shows it well."""
     if speed is not None:
-        speed = float(quantity("speed", "1", speed, ()))
-        if speed <= 0:
-            raise ValueError(f"speed must be positive, got {speed:g}")
-        return speed
+        return positive("speed", "", speed)
     duration = duration_of(states)
     if duration <= 0 or BEARABLE[0] <= duration <= BEARABLE[1]:
         return 1.0

@@ -68,7 +68,7 @@ def over_time(scene, replaced: dict[object, dict]) -> tuple[dict[object, dict], 
                 continue
             refuse_functions(owner, name, value, in_time=True)
             still.setdefault(owner, {})[name] = value
-    for owner in [each for each in scene.parts if any(course.owner is each for course in courses)]:
+    for owner in [each for each in scene.objects if any(course.owner is each for course in courses)]:
         if getattr(owner, "motion", None) is not None:
             raise ValueError(
                 f"{owner!r} moves by its motion: give its center and rotation over time, or a motion, not both"

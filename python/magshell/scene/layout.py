@@ -59,7 +59,7 @@ class Layout:
             vectors[:, self._places[key].slice] = np.reshape(each, (count, -1))
         return vectors
 
-    def part(self, vector: np.ndarray, owner: str, name: str) -> np.ndarray:
+    def of(self, vector: np.ndarray, owner: str, name: str) -> np.ndarray:
         """(..., rows, width) of vectors (..., size), or (..., rows) of single numbers."""
         place = self._places[owner, name]
         shape = (

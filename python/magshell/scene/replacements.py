@@ -63,7 +63,7 @@ def _one_body(scene, name: str) -> Shell:
 
 
 def _check(scene, owner, named) -> None:
-    if not any(owner is item for item in (scene, *scene.parts)):
+    if not any(owner is item for item in (scene, *scene.objects)):
         raise ValueError(f"values has a key that is not the scene, nor an object of it: {owner!r}")
     if not isinstance(named, dict):
         raise ValueError(f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}")

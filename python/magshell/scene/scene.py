@@ -138,7 +138,7 @@ class Scene:
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
             held_frames=constraints.held_frames,
-            motions=len(constraints.motions),
+            moves=len(constraints.moves),
             couples=np.stack(
                 [*bodies.split(edges), n_directions - n_couples + np.arange(n_couples)], axis=1
             ).astype(np.int32),
@@ -162,14 +162,14 @@ class Scene:
         return [
             {
                 "owner": f"body {k}",
-                "mesh": part.mesh._core,
-                "vertices": np.arange(part.vertices.start, part.vertices.stop),
+                "mesh": span.mesh._core,
+                "vertices": np.arange(span.vertices.start, span.vertices.stop),
                 "curvature_scale": shell.curvature_scale,
                 "directors": shell.bending == "midedge",
                 "magnetic": bool(self.fields),
                 "directed_edges": pairs[of == k],
             }
-            for k, (shell, part) in enumerate(zip(self.bodies, self._bodies.parts, strict=True))
+            for k, (shell, span) in enumerate(zip(self.bodies, self._bodies.spans, strict=True))
         ]
 
     @property
@@ -223,7 +223,7 @@ class Scene:
         return self._bodies.mesh
 
     @property
-    def parts(self) -> tuple:
+    def objects(self) -> tuple:
         """Every object of it, always in the same order. What a solve's `values` may name beside the scene itself."""
         water = () if self.water is None else (self.water,)
         return (
@@ -278,7 +278,7 @@ class Scene:
 def _couple_edges(bodies: Bodies, loads) -> np.ndarray:
     """The scene's edges that couples turn, ascending, (k,)."""
     places = [(load, bodies.of(load)) for load in loads if isinstance(load, EdgeCouple)]
-    edges = [part.first_edge + load.edge_couples(part.mesh)[0] for load, part in places]
+    edges = [span.first_edge + load.edge_couples(span.mesh)[0] for load, span in places]
     return np.unique(np.concatenate(edges)) if edges else np.zeros(0, dtype=np.int64)
 
 

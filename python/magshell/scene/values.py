@@ -42,8 +42,8 @@ class Values:
         if "vertex_loads" in own:
             numbers["loads", "forces"] = own["vertex_loads"]
         if magnetization is not None:
-            for k, part in enumerate(scene._bodies.parts):
-                numbers[f"body {k}", "remanent_magnetization"] = magnetization[part.faces]
+            for k, span in enumerate(scene._bodies.spans):
+                numbers[f"body {k}", "remanent_magnetization"] = magnetization[span.faces]
         self.numbers = scene._value_layout.packed(numbers)
 
     def same_as(self, other: Values) -> bool:
@@ -79,7 +79,7 @@ class Values:
     def part_of(self, sheet):
         """Where one of `sheets` stands among them."""
         return next(
-            part for part, each in zip(self.scene._bodies.parts, self.sheets, strict=True) if each is sheet
+            span for span, each in zip(self.scene._bodies.spans, self.sheets, strict=True) if each is sheet
         )
 
     @property
@@ -112,7 +112,7 @@ class Values:
         self._now[obstacle] = obstacle._on(path)
 
     def _moved(self) -> Constraints:
-        """The same constraints with other motions."""
+        """The same constraints with other moves."""
         scene = self.scene
         supports = [self.current(support) for support in scene.supports]
         moved = gather(scene._bodies, supports, scene._couple_directions)
@@ -138,11 +138,11 @@ class Gradient:
         return (owner, name) in self._scene._value_layout
 
     def value(self, owner: str, name: str) -> np.ndarray:
-        return self._scene._value_layout.part(self._values, owner, name)
+        return self._scene._value_layout.of(self._values, owner, name)
 
     def control(self, owner: str, name: str) -> np.ndarray:
         """By a control, (knots, rows, width) of a motion."""
-        return self._scene._control_layout.part(self._controls, owner, name)
+        return self._scene._control_layout.of(self._controls, owner, name)
 
     def of_controls(self, place: slice) -> np.ndarray:
         """By what stands there in the vectors of controls."""

@@ -11,7 +11,7 @@ import numpy as np
 from .._checks.tensors import is_tensor
 from ..design.digest import closure, digest, is_own_function, used_globals
 
-_LONGEST = 60  # characters of a value that is told in full
+_LONGEST_TOLD = 60  # characters of a value that is told in full
 
 
 def described(run) -> dict[str, str]:
@@ -67,7 +67,7 @@ def told_apart(name: str, value) -> str:
 
 
 def _in_words(value) -> str:
-    if value is None or (type(value) in (bool, int, float, str) and len(repr(value)) <= _LONGEST):
+    if value is None or (type(value) in (bool, int, float, str) and len(repr(value)) <= _LONGEST_TOLD):
         return repr(value)
     found = digest(value)[:16]
     if is_tensor(value) or isinstance(value, np.ndarray):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-_SHOWN = 5
+_MOST_SHOWN = 5  # starts in a printed Multistart
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +72,12 @@ class Multistart(Sequence):
         head = f"Multistart: {len(self.finished)} of {total} starts finished in {self.seconds:.3g} s"
         head += f", {len(self.resumed)} of them earlier (from the checkpoint)" if self.resumed else ""
         head += f", {len(self.failed)} failed" if self.failed else ""
-        lines = [f"  start {found.number}: {_in_words(found)}" for found in self.finished[:_SHOWN]]
-        if len(self.finished) > _SHOWN:
-            lines.append(f"  ... and {len(self.finished) - _SHOWN} more, up to {self.objectives[-1]:.6g}")
-        lines += [f"  start {lost.number} failed: {lost.error:.200}" for lost in self.failed[:_SHOWN]]
+        lines = [f"  start {found.number}: {_in_words(found)}" for found in self.finished[:_MOST_SHOWN]]
+        if len(self.finished) > _MOST_SHOWN:
+            lines.append(
+                f"  ... and {len(self.finished) - _MOST_SHOWN} more, up to {self.objectives[-1]:.6g}"
+            )
+        lines += [f"  start {lost.number} failed: {lost.error:.200}" for lost in self.failed[:_MOST_SHOWN]]
         return "\n".join([head, *lines])
 
 

@@ -11,7 +11,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 
 from .one_thread import one_thread_in_children
 
-_LEAVING = 1.0  # s, that an idle process may take to end
+_TIME_TO_LEAVE = 1.0  # s, that an idle process may take to end
 
 
 class WorkerDied(RuntimeError):
@@ -138,7 +138,7 @@ class _Worker:
 
     def leave(self) -> None:
         """Gives the process a moment to end in order."""
-        self._process.join(_LEAVING)
+        self._process.join(_TIME_TO_LEAVE)
         self._process.kill()
 
 

@@ -168,7 +168,7 @@ def _field_factor(result) -> float:
     controls = getattr(result, "_controls", None)
     if controls is None:
         return 1.0
-    return float(result.scene._control_layout.part(controls, "scene", "field_factor")[0])
+    return float(result.scene._control_layout.of(controls, "scene", "field_factor")[0])
 
 
 def _states(

@@ -57,23 +57,21 @@ class AlongPath:
         return there
 
     def _part(self, values: Values, key: tuple[str, str]) -> np.ndarray:
-        return self._layout.part(values.numbers, *key)
+        return self._layout.of(values.numbers, *key)
 
 
 def _keys_that_move(inputs: Inputs) -> dict[tuple[str, str], object]:
     """{(the core's name for an object, name of a value): the object} of all that can move."""
     scene = inputs.scene
     can = {(label, name): each for each, label in scene._labels for name in names_in_time(each)}
-    for k, motion in enumerate(scene._constraints.motions):
-        can |= {(f"motion {k}", name): motion.support for name in names_in_time(motion.support)}
+    for k, move in enumerate(scene._constraints.moves):
+        can |= {(f"move {k}", name): move.support for name in names_in_time(move.support)}
     return can
 
 
 def _between(before, after, parameter: float):
     """The object with its place between two."""
-    at = [
-        each._motion.as_arguments() if isinstance(each, Support) else vars(each) for each in (before, after)
-    ]
+    at = [each._move.as_arguments() if isinstance(each, Support) else vars(each) for each in (before, after)]
     named = {}
     for name in names_in_time(after):
         ends = [np.zeros(3) if each[name] is None and name != "center" else each[name] for each in at]

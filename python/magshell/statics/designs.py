@@ -55,4 +55,4 @@ def unpacked(scene, design: dict) -> dict:
 
 
 def _objects(scene) -> list:
-    return [scene, *scene.parts]
+    return [scene, *scene.objects]

@@ -7,12 +7,11 @@ import numpy as np
 from ..bodies.caps import describe_faces
 from ..surroundings.constraints import free_rigid_motions
 
-NEARLY_NONE = (
-    1e-4  # a face's height over the usual length of an edge: below, round-off hides what is stiff less
-)
-FLAT = np.radians(150.0)
-_NAMED = 4
-_MOVES = 1e-6  # of the sheet's size, in one step of relaxation
+# Of a face, over the usual length of an edge: below, round-off hides what is stiff less.
+SHORTEST_HEIGHT = 1e-4
+NEARLY_FLAT = np.radians(150.0)  # largest angle of a face that counts as almost flat
+_MOST_NAMED = 4  # places in a message
+_SMALLEST_MOVE = 1e-6  # of the sheet's size, in one step of relaxation
 
 
 def why_not(inputs, found, at_rest: bool) -> str:
@@ -55,7 +54,7 @@ def _attempts(found, in_steps: bool, size: float) -> list[str]:
 
 
 def _still_moves(failed, size: float) -> bool:
-    return failed.last_move > _MOVES * size
+    return failed.last_move > _SMALLEST_MOVE * size
 
 
 def _places(inputs, found) -> tuple[list[str], np.ndarray]:
@@ -73,7 +72,7 @@ def _places(inputs, found) -> tuple[list[str], np.ndarray]:
         sizes = np.linalg.norm(model.positions(vector), axis=1) if vector.size else np.zeros(0)
         if not (np.isfinite(sizes).all() and sizes.any()):
             continue
-        vertices = np.argsort(-sizes, kind="stable")[:_NAMED]
+        vertices = np.argsort(-sizes, kind="stable")[:_MOST_NAMED]
         vertices = vertices[sizes[vertices] > 0.1 * sizes.max()]
         share = np.linalg.norm(sizes[vertices]) / np.linalg.norm(sizes)
         many = "vertices" if len(vertices) > 1 else "vertex"
@@ -85,7 +84,7 @@ def _places(inputs, found) -> tuple[list[str], np.ndarray]:
 def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
     scene, shell = inputs.scene, inputs.values.whole
     mesh, quality = scene.mesh, shell.quality
-    tiny = np.flatnonzero(quality.heights < NEARLY_NONE * np.median(mesh.edge_lengths))
+    tiny = np.flatnonzero(quality.heights < SHORTEST_HEIGHT * np.median(mesh.edge_lengths))
     if tiny.size:
         return (
             f"{describe_faces(shell, tiny[np.argsort(quality.heights[tiny], kind='stable')])} nearly degenerate: "
@@ -98,7 +97,7 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
             f"The supports leave the sheet free ({'; '.join(free)}): hold it, unless a field or gravity does."
         )
     beside = np.flatnonzero(np.isin(mesh.faces, near).any(axis=1))
-    flat = beside[quality.largest_angles[beside] > FLAT]
+    flat = beside[quality.largest_angles[beside] > NEARLY_FLAT]
     if flat.size:
         return (
             f"{describe_faces(shell, flat[np.argsort(-quality.largest_angles[flat], kind='stable')])} beside that, and "

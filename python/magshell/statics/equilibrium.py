@@ -51,7 +51,7 @@ class Equilibrium:
     memory: int
     factorization: str
     _state: np.ndarray = field(repr=False)
-    _memory: list = field(repr=False)
+    _turns: list = field(repr=False)
     _controls: Any = field(repr=False)
     _values: Any = field(repr=False)
 

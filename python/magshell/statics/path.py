@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .._checks.arrays import count, number, positive
+from .._checks.arrays import count, number
+from .._checks.scalars import positive
 from .._machine.entry import solve_entry
 from .._machine.progress import progress_bar
 from ..bodies.caps import warn_of_caps
@@ -83,7 +84,7 @@ class Path:
         point = self._points[index]
         inputs = copy.copy(self._inputs)
         inputs.values = self._moving.values(self.parameters[index])
-        return solve(inputs, point.state, point.memory, controls, controls, options).equilibrium
+        return solve(inputs, point.state, point.turns, controls, controls, options).equilibrium
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face at one of the points, by default the last."""
@@ -101,7 +102,7 @@ class Path:
         return (1.0 - along) * self._from + along * self._to
 
     def _control(self, name: str) -> np.ndarray:
-        return self.scene._control_layout.part(self._controls, "scene", name)
+        return self.scene._control_layout.of(self._controls, "scene", name)
 
     @property
     def stable(self) -> np.ndarray:
@@ -176,7 +177,10 @@ def follow(
     solver = MixedNewton() if solver is None else solver
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
-    first_step, largest_step = positive("first_step", first_step), positive("largest_step", largest_step)
+    first_step, largest_step = (
+        positive("first_step", "", first_step),
+        positive("largest_step", "", largest_step),
+    )
     max_points = count("max_points", max_points, least=2)
     lowest_parameter = number("lowest_parameter", lowest_parameter)
     if not lowest_parameter < 0:
@@ -195,7 +199,7 @@ def follow(
         field_factor=field_factor,
         motion_factor=motion_factor,
     )
-    state, memory, from_, _ = starting_point(scene, start, inputs)
+    state, turns, from_, _ = starting_point(scene, start, inputs)
     moving = AlongPath(inputs, start)
     options = _core.PathOptions()
     options.newton = solver._newton_options()
@@ -208,7 +212,7 @@ def follow(
         found = _core.follow_path(
             scene._model,
             state,
-            memory,
+            turns,
             np.concatenate([from_, moving.before]),
             np.concatenate([inputs.controls, moving.after]),
             options,

@@ -61,11 +61,11 @@ def find(
     """The equilibrium at the arguments of ms.equilibrium, cases apart. Raises as it does."""
     search = Search() if search is None else search
     inputs = inputs_of(scene, arguments)
-    state, memory, from_, at_rest = starting_point(scene, start, inputs)
+    state, turns, from_, at_rest = starting_point(scene, start, inputs)
     options = search.options()
     options.start_at_rest = at_rest
     options.keep_factor = keep_factor
-    return solve(inputs, state, memory, from_, inputs.controls, options, search.progress)
+    return solve(inputs, state, turns, from_, inputs.controls, options, search.progress)
 
 
 def inputs_of(scene: Scene, arguments: dict) -> Inputs:
@@ -82,13 +82,13 @@ def inputs_of(scene: Scene, arguments: dict) -> Inputs:
     return Inputs(scene, magnetization, flux_density, replaced=replaced, differentiable=True, **factors)
 
 
-def solve(inputs: Inputs, state: np.ndarray, memory: list, from_, to, options, progress=None) -> Solution:
+def solve(inputs: Inputs, state: np.ndarray, turns: list, from_, to, options, progress=None) -> Solution:
     """The core's search for an equilibrium at the controls `to`, from a state at `from_`."""
     scene = inputs.scene
     options.keep_factor = options.keep_factor or bool(inputs.leaves)
     began = time.perf_counter()
     with inputs.in_core():
-        found = _core.find_equilibrium(scene._model, state, memory, from_, to, options, progress)
+        found = _core.find_equilibrium(scene._model, state, turns, from_, to, options, progress)
         energies = _energies(scene, found)
         result = _result(scene, inputs, found, energies, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted or energies is None:
@@ -138,7 +138,7 @@ def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_tim
         memory=found.bytes,
         factorization=found.factorization,
         _state=found.state,
-        _memory=found.memory,
+        _turns=found.turns,
         _controls=found.controls,
         _values=inputs.values,
     )
@@ -158,5 +158,5 @@ def _outputs(inputs: Inputs, found):
 def _flux_density(inputs: Inputs, found):
     if found.progress == 1.0 and is_tensor(inputs.given_flux_density):
         return inputs.given_flux_density
-    flux_density = inputs.scene._control_layout.part(found.controls, "scene", "applied_flux_density")
+    flux_density = inputs.scene._control_layout.of(found.controls, "scene", "applied_flux_density")
     return like(flux_density[0].copy(), *inputs.given)

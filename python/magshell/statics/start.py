@@ -15,25 +15,25 @@ from .equilibrium import Equilibrium
 
 
 class Origin(NamedTuple):
-    """A state that is an equilibrium for these inputs, and the core's memory of how it was reached."""
+    """A state that is an equilibrium for these inputs, and the turns that its terms have made on the way."""
 
     state: np.ndarray
-    memory: list
+    turns: list
     inputs: Inputs
 
 
 def starting_point(scene: Scene, start, inputs: Inputs):
-    """State, the core's memory of it, controls at which it holds, and whether it is an equilibrium there."""
+    """State, the turns its terms have made, controls at which it holds, and whether it is an equilibrium there."""
     model = scene._model
     if start is None:
         check_outside(scene, inputs.values, scene.mesh.rest_positions, 0.0)
         return model.rest_state(), [], scene._control_layout.zeros(), True
     if isinstance(start, Origin):
-        return start.state, start.memory, start.inputs.controls, True
+        return start.state, start.turns, start.inputs.controls, True
     if isinstance(start, Equilibrium):
         if start.scene is not scene:
             raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
-        return start._state, start._memory, start._controls, start._values.same_as(inputs.values)
+        return start._state, start._turns, start._controls, start._values.same_as(inputs.values)
     positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
     n_v = scene.mesh.n_vertices
     if len(positions) != n_v:

@@ -20,9 +20,9 @@ from .equilibrium import Equilibrium
 from .search import Search, Solution, find, inputs_of
 from .start import Origin
 
-_FAR = 0.5  # of the first-order change: a step that ends farther from it is taken in halves
-_SMALL = 1e-3  # of the mesh's size: so little is no jump
-_SHORTEST = 1.0 / 32.0  # of the way to a new design
+_LARGEST_SECOND_ORDER = 0.5  # of the first-order change: a step that ends farther from it is taken in halves
+_NO_JUMP = 1e-3  # of the mesh's size: so little is no jump
+_SHORTEST_STEP = 1.0 / 32.0  # of the way to a new design
 
 
 class WarmStart:
@@ -101,7 +101,7 @@ class WarmStart:
     def state_dict(self) -> dict:
         """What a later WarmStart of an equal scene needs to go on with the same bits: tensors and plain values."""
         torch = require_torch("a state_dict")
-        states = [{"state": torch.tensor(s.found.state), "memory": s.found.memory} for s in self._last]
+        states = [{"state": torch.tensor(s.found.state), "turns": s.found.turns} for s in self._last]
         designs = [packed(self.scene, arguments, torch.from_numpy) for arguments in self._design]
         return {"states": states, "designs": designs, "of_cases": self._of_cases}
 
@@ -110,7 +110,7 @@ class WarmStart:
         designs = [unpacked(self.scene, arguments) for arguments in state["designs"]]
         last = []
         for arguments, kept in zip(designs, state["states"], strict=True):
-            origin = Origin(kept["state"].numpy(), kept["memory"], inputs_of(self.scene, arguments))
+            origin = Origin(kept["state"].numpy(), kept["turns"], inputs_of(self.scene, arguments))
             last.append(find(self.scene, arguments, origin, self._search, keep_factor=True))
         self._last, self._design, self._of_cases = last, designs, state["of_cases"]
 
@@ -130,8 +130,8 @@ class WarmStart:
             trial = self._try(solution, arguments if to == 1.0 else between(old, new, to))
             if trial is not None:
                 solution, at, step = trial, to, 2.0 * step
-            elif step > _SHORTEST:
-                step = max(0.5 * (to - at), _SHORTEST)
+            elif step > _SHORTEST_STEP:
+                step = max(0.5 * (to - at), _SHORTEST_STEP)
             else:
                 raise EquilibriumJumped(
                     f"the equilibrium jumps at {at:.3g} to {to:.3g} of the way from the last design to this one: "
@@ -161,7 +161,7 @@ class WarmStart:
         expected = model.positions(expected)
         moved = model.positions(there.found.state - last.found.state)
         strayed, size = _largest(moved - expected), _largest(expected)
-        return strayed <= max(_FAR * size, _SMALL * self.scene._bodies.extent)
+        return strayed <= max(_LARGEST_SECOND_ORDER * size, _NO_JUMP * self.scene._bodies.extent)
 
     def _check(self, cases: list[dict] | None) -> None:
         count = 1 if cases is None else len(cases)

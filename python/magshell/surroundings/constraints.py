@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..bodies.bodies import Bodies, Part
-from .supports import DirectedEdges, Held, RigidMotion
+from ..bodies.bodies import Bodies, Span
+from .supports import DirectedEdges, Held, RigidMove
 
 _LOOKED_AT = (0.37, 1.0)  # a full turn ends where it began, but is elsewhere on its way
 
@@ -18,30 +18,30 @@ class Constraints:
 
     directed_edges: np.ndarray  # (k, 2): the scene's edge, direction
     directions: np.ndarray  # (n_d, 3)
-    held_nodes: np.ndarray  # (m, 3): node, how many directions, motion or -1
+    held_nodes: np.ndarray  # (m, 3): node, how many directions, move or -1
     held_frames: np.ndarray  # (m, 3, 3): columns, the held directions first
-    motions: tuple[RigidMotion, ...]
+    moves: tuple[RigidMove, ...]
 
 
 def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints:
     """All supports of a scene as one. `free_directions` (k, 3) are appended to the directions, held and still."""
-    motions: list[RigidMotion] = []
+    moves: list[RigidMove] = []
     mesh, places = bodies.mesh, [(s, bodies.of(s)) for s in supports]
-    nodes, frames = _held_vertices(bodies, [h for s, part in places for h in held_by(s, part)], motions)
-    pairs, directions, direction_motions = _directed_edges(
-        [d for s, part in places for d in _directed(s, part)], motions
+    nodes, frames = _held_vertices(bodies, [h for s, span in places for h in held_by(s, span)], moves)
+    pairs, directions, direction_moves = _directed_edges(
+        [d for s, span in places for d in _directed(s, span)], moves
     )
     directions = np.concatenate([directions, free_directions])
-    direction_motions += [-1] * len(free_directions)
-    for k, motion in enumerate(direction_motions):
-        nodes.append((mesh.n_vertices + k, 3, motion))
+    direction_moves += [-1] * len(free_directions)
+    for k, move in enumerate(direction_moves):
+        nodes.append((mesh.n_vertices + k, 3, move))
         frames.append(np.eye(3))
     return Constraints(
         np.array(pairs, dtype=np.int32).reshape(-1, 2),
         directions,
         np.array(nodes, dtype=np.int32).reshape(-1, 3),
         np.array(frames).reshape(-1, 3, 3),
-        tuple(motions),
+        tuple(moves),
     )
 
 
@@ -54,14 +54,14 @@ def check_shared(bodies: Bodies, supports, vertices: np.ndarray) -> None:
     _held_vertices(bodies, found, [])
 
 
-def held_by(support, part: Part) -> list[Held]:
+def held_by(support, span: Span) -> list[Held]:
     """With the scene's vertices."""
-    return [held._replace(vertices=held.vertices + part.first_vertex) for held in support.held(part.mesh)]
+    return [held._replace(vertices=held.vertices + span.first_vertex) for held in support.held(span.mesh)]
 
 
-def _directed(support, part: Part) -> list[DirectedEdges]:
+def _directed(support, span: Span) -> list[DirectedEdges]:
     """With the scene's edges."""
-    return [each._replace(edges=each.edges + part.first_edge) for each in support.directed(part.mesh)]
+    return [each._replace(edges=each.edges + span.first_edge) for each in support.directed(span.mesh)]
 
 
 def free_rigid_motions(bodies: Bodies, constraints: Constraints) -> list[str]:
@@ -78,36 +78,36 @@ def free_rigid_motions(bodies: Bodies, constraints: Constraints) -> list[str]:
     return found
 
 
-def _held_vertices(bodies: Bodies, held: list[Held], motions: list[RigidMotion]):
+def _held_vertices(bodies: Bodies, held: list[Held], moves: list[RigidMove]):
     directions: dict[int, list[np.ndarray]] = {}
-    motion_of: dict[int, RigidMotion] = {}
+    move_of: dict[int, RigidMove] = {}
     for support in held:
         for vertex, along in zip(support.vertices.tolist(), support.directions, strict=True):
             directions.setdefault(vertex, []).extend(along)
-            if support.motion is not None:
-                known = motion_of.setdefault(vertex, support.motion)
-                _check_same_motion(bodies, vertex, known, support.motion)
-    _check_against_still(bodies, held, motion_of)
+            if support.move is not None:
+                known = move_of.setdefault(vertex, support.move)
+                _check_same_move(bodies, vertex, known, support.move)
+    _check_against_still(bodies, held, move_of)
     numbers: dict[int, int] = {}
     nodes, frames = [], []
     for vertex, along in sorted(directions.items()):
         frame, count = _frame(np.array(along))
-        motion = motion_of.get(vertex)
-        nodes.append((vertex, count, _number(motion, motions, numbers)))
+        move = move_of.get(vertex)
+        nodes.append((vertex, count, _number(move, moves, numbers)))
         frames.append(frame)
     return nodes, frames
 
 
-def _number(motion: RigidMotion | None, motions: list[RigidMotion], numbers: dict[int, int]) -> int:
-    if motion is None:
+def _number(move: RigidMove | None, moves: list[RigidMove], numbers: dict[int, int]) -> int:
+    if move is None:
         return -1
-    if id(motion) not in numbers:
-        numbers[id(motion)] = len(motions)
-        motions.append(motion)
-    return numbers[id(motion)]
+    if id(move) not in numbers:
+        numbers[id(move)] = len(moves)
+        moves.append(move)
+    return numbers[id(move)]
 
 
-def _check_same_motion(bodies, vertex: int, a: RigidMotion, b: RigidMotion) -> None:
+def _check_same_move(bodies, vertex: int, a: RigidMove, b: RigidMove) -> None:
     if a is b:
         return
     point = bodies.mesh.rest_positions[[vertex]]
@@ -116,17 +116,17 @@ def _check_same_motion(bodies, vertex: int, a: RigidMotion, b: RigidMotion) -> N
         raise ValueError(f"two supports move vertex {vertex} to different places")
 
 
-def _check_against_still(bodies, held: list[Held], motion_of: dict[int, RigidMotion]) -> None:
+def _check_against_still(bodies, held: list[Held], move_of: dict[int, RigidMove]) -> None:
     """A support that stays may share a vertex with one that moves, as long as it is not moved along what it holds."""
     for support in held:
-        if support.motion is not None:
+        if support.move is not None:
             continue
         for vertex, along in zip(support.vertices.tolist(), support.directions, strict=True):
-            motion = motion_of.get(vertex)
-            if motion is None:
+            move = move_of.get(vertex)
+            if move is None:
                 continue
             point = bodies.mesh.rest_positions[[vertex]]
-            moves = np.array([(motion.moved(point, at) - point)[0] for at in _LOOKED_AT])
+            moves = np.array([(move.moved(point, at) - point)[0] for at in _LOOKED_AT])
             if np.abs(moves @ along.T).max() > 1e-9 * bodies.size:
                 raise ValueError(
                     f"one support holds vertex {vertex} along a direction in which another moves it"
@@ -144,14 +144,14 @@ def _frame(directions: np.ndarray) -> tuple[np.ndarray, int]:
     return (np.eye(3) if count == 3 else rows.T), count
 
 
-def _directed_edges(directed: list[DirectedEdges], motions: list[RigidMotion]):
-    pairs, directions, direction_motions = [], [], []
+def _directed_edges(directed: list[DirectedEdges], moves: list[RigidMove]):
+    pairs, directions, direction_moves = [], [], []
     seen: set[int] = set()
     for group in directed:
-        motion = -1
-        if group.motion is not None:
-            motion = len(motions)
-            motions.append(group.motion)
+        move = -1
+        if group.move is not None:
+            move = len(moves)
+            moves.append(group.move)
         # Edges that share a direction share a node.
         keys = np.round(group.directions, 12) + 0.0
         _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
@@ -161,8 +161,8 @@ def _directed_edges(directed: list[DirectedEdges], motions: list[RigidMotion]):
             seen.add(edge)
             pairs.append((edge, len(directions) + which))
         directions.extend(group.directions[first])
-        direction_motions.extend([motion] * len(first))
-    return pairs, np.array(directions).reshape(-1, 3), direction_motions
+        direction_moves.extend([move] * len(first))
+    return pairs, np.array(directions).reshape(-1, 3), direction_moves
 
 
 def _prevented(bodies, constraints: Constraints, in_part: np.ndarray, center: np.ndarray) -> np.ndarray:

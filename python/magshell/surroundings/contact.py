@@ -6,7 +6,7 @@ import numpy as np
 
 from .._checks.checked_list import checked_list
 from .._checks.owner import Owner
-from .._checks.quantity import quantity
+from .._checks.scalars import not_negative, positive
 from .._checks.selections import indices, selection
 from ..bodies.bodies import checked_body, joined, on_body
 from ..bodies.shell import Shell
@@ -71,17 +71,17 @@ class Contact(Owner):
         if not listed or len({id(item) for item in listed}) < len(listed):
             raise ValueError("obstacles must hold at least one obstacle, and each of them once")
         self.obstacles = listed
-        self.contact_stiffness = _positive("contact_stiffness", "N/m", contact_stiffness)
+        self.contact_stiffness = positive("contact_stiffness", "N/m", contact_stiffness)
         self.friction_coefficient = (
             None
             if friction_coefficient is None
-            else _not_negative("friction_coefficient", "1", friction_coefficient)
+            else not_negative("friction_coefficient", "1", friction_coefficient)
         )
         self.sticking_speed = (
-            None if sticking_speed is None else _positive("sticking_speed", "m/s", sticking_speed)
+            None if sticking_speed is None else positive("sticking_speed", "m/s", sticking_speed)
         )
-        self.smoothing = None if smoothing is None else _positive("smoothing", "m", smoothing)
-        self.offset = _not_negative("offset", "m", offset)
+        self.smoothing = None if smoothing is None else positive("smoothing", "m", smoothing)
+        self.offset = not_negative("offset", "m", offset)
         if not isinstance(lagged_friction, bool):
             raise ValueError(f"lagged_friction must be True or False, got {lagged_friction!r}")
         self.lagged_friction = lagged_friction
@@ -157,17 +157,3 @@ class Contact(Owner):
         friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
         with_what = ", ".join(repr(each) for each in self.obstacles)
         return f"Contact({with_what}; {self.contact_stiffness:g} N/m{friction}{on_body(self.body)})"
-
-
-def _positive(name: str, unit: str, value) -> float:
-    number = float(quantity(name, unit, value, ()))
-    if not number > 0:
-        raise ValueError(f"{name} [{unit}] must be positive, got {number:g}")
-    return number
-
-
-def _not_negative(name: str, unit: str, value) -> float:
-    number = float(quantity(name, unit, value, ()))
-    if number < 0:
-        raise ValueError(f"{name} [{unit}] must not be negative, got {number:g}")
-    return number

@@ -33,7 +33,9 @@ def poses(obstacle, times: np.ndarray) -> np.ndarray:
     return np.array([(*obstacle.pose(time), *obstacle.rates(time)) for time in times]).reshape(-1, 4, 3)
 
 
-KINKED = 0.3  # rad, by which normals of smooth bodies do not turn within the smoothing of a contact
+LARGEST_SMOOTH_TURN = (
+    0.3  # rad, by which normals of smooth bodies do not turn within the smoothing of a contact
+)
 
 
 def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: float) -> np.ndarray:
@@ -50,7 +52,7 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
         here = places[touching]
         around = obstacle.normals(here[:, None, :] + reach, time)
         turn = np.einsum("pc,pkc->pk", obstacle.normals(here, time), around).min(axis=1, initial=1.0)
-        found.append(vertices[touching][turn < np.cos(KINKED)].ravel())
+        found.append(vertices[touching][turn < np.cos(LARGEST_SMOOTH_TURN)].ravel())
     every = np.unique(np.concatenate(found))
     return every[every >= 0]
 
@@ -58,8 +60,8 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
 def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
     """A body that starts deeper in an obstacle than half its thickness would be shot out of it."""
     allowed = np.empty(scene.mesh.n_vertices)
-    for part, sheet in zip(scene._bodies.parts, values.sheets, strict=True):
-        allowed[part.vertices] = 0.5 * np.max(sheet.thickness)
+    for span, sheet in zip(scene._bodies.spans, values.sheets, strict=True):
+        allowed[span.vertices] = 0.5 * np.max(sheet.thickness)
     for contact in scene.contacts:
         vertices, weights = scene._bodies.contact_points(contact)
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])

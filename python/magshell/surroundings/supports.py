@@ -9,6 +9,7 @@ import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity
+from .._checks.scalars import not_negative
 from .._checks.selections import indices, selection
 from ..bodies.bodies import checked_body, on_body
 from ..bodies.shell import Shell
@@ -18,10 +19,10 @@ _AXES = "xyz"
 _ORDERS = {"".join(axes) for n in (1, 2, 3) for axes in permutations(_AXES, n)}
 
 
-class RigidMotion(NamedTuple):
-    """x -> center + R(rotation) (x - center) + translation; gone through evenly as the motion progresses.
+class RigidMove(NamedTuple):
+    """x -> center + R(rotation) (x - center) + translation; gone through evenly as the move progresses.
 
-    support: whose motion it is.
+    support: whose move it is.
     """
 
     center: np.ndarray
@@ -40,7 +41,7 @@ class Held(NamedTuple):
 
     vertices: np.ndarray
     directions: np.ndarray
-    motion: RigidMotion | None
+    move: RigidMove | None
 
 
 class DirectedEdges(NamedTuple):
@@ -48,11 +49,11 @@ class DirectedEdges(NamedTuple):
 
     edges: np.ndarray
     directions: np.ndarray
-    motion: RigidMotion | None
+    move: RigidMove | None
 
 
 class Support(Owner):
-    """What moves of a support are the rigid motions of the nodes that it holds, all alike.
+    """What moves of a support are the rigid moves of the nodes that it holds, all alike.
 
     body: the Shell that it holds, or None. Meshes are that body's, and so are indices.
     """
@@ -60,22 +61,22 @@ class Support(Owner):
     for_all = False  # whether it holds all bodies where it names none
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
-        for owner, motion in self._motions(values):
-            numbers[owner, "center"] = motion.center
-            numbers[owner, "rotation"] = motion.rotation
-            numbers[owner, "displacement"] = motion.translation
+        for owner, move in self._moves(values):
+            numbers[owner, "center"] = move.center
+            numbers[owner, "rotation"] = move.rotation
+            numbers[owner, "displacement"] = move.translation
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
-        owners = [owner for owner, _ in self._motions(values)]
+        owners = [owner for owner, _ in self._moves(values)]
         return {
             name: np.sum([gradient.value(owner, name)[0] for owner in owners], axis=0)
             for name in ("center", "rotation", "displacement")
         }
 
-    def _motions(self, values) -> list[tuple[str, RigidMotion]]:
+    def _moves(self, values) -> list[tuple[str, RigidMove]]:
         """With the labels that the core has for them."""
-        motions = enumerate(values.constraints.motions)
-        return [(f"motion {k}", motion) for k, motion in motions if motion.support is self]
+        moves = enumerate(values.constraints.moves)
+        return [(f"move {k}", move) for k, move in moves if move.support is self]
 
 
 class Pin(Support):
@@ -107,8 +108,8 @@ class Pin(Support):
         if not isinstance(components, str) or components not in _ORDERS:
             raise ValueError(f'components must be some of "x", "y", "z", got {components!r}')
         self.components = components
-        self._motion = _Motion(displacement, rotation, center)
-        moves = np.zeros(3) if displacement is None else self._motion.displacement
+        self._move = _Move(displacement, rotation, center)
+        moves = np.zeros(3) if displacement is None else self._move.displacement
         for axis, move in zip(_AXES, moves, strict=True):
             if move != 0.0 and axis not in components:
                 raise ValueError(f"displacement [m] moves along {axis}, but the Pin holds only {components}")
@@ -116,20 +117,18 @@ class Pin(Support):
     def held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = indices("Pin vertices", self.vertices, mesh.n_vertices)
         directions = np.eye(3)[[_AXES.index(c) for c in self.components]]
-        motion = self._motion.about(mesh.rest_positions[vertices], self)
-        return [Held(vertices, np.broadcast_to(directions, (len(vertices), *directions.shape)), motion)]
+        move = self._move.about(mesh.rest_positions[vertices], self)
+        return [Held(vertices, np.broadcast_to(directions, (len(vertices), *directions.shape)), move)]
 
     def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
         return []
 
     def replaced(self, **values) -> Pin:
         """The same Pin with another displacement, rotation or center."""
-        return Pin(
-            self.vertices, self.components, body=self.body, **{**self._motion.as_arguments(), **values}
-        )
+        return Pin(self.vertices, self.components, body=self.body, **{**self._move.as_arguments(), **values})
 
     def __repr__(self) -> str:
-        done = self._motion.summary() + on_body(self.body)
+        done = self._move.summary() + on_body(self.body)
         return f"Pin({len(self.vertices)} vertices, components {self.components}{done})"
 
 
@@ -150,29 +149,29 @@ class Clamp(Support):
     def __init__(self, edges, *, displacement=None, rotation=None, center=None, body: Shell | None = None):
         self.body = checked_body(body)
         self.edges = selection("Clamp edges", edges)
-        self._motion = _Motion(displacement, rotation, center)
+        self._move = _Move(displacement, rotation, center)
 
     def held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = np.unique(mesh.edges[self._checked(mesh)])
-        return [Held(vertices, np.broadcast_to(np.eye(3), (len(vertices), 3, 3)), self._motion_on(mesh))]
+        return [Held(vertices, np.broadcast_to(np.eye(3), (len(vertices), 3, 3)), self._move_on(mesh))]
 
     def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
         edges = self._checked(mesh)
         # Continues the face in its own plane, so that a clamped flat sheet has no fold at its clamp.
-        return [DirectedEdges(edges, continuations(mesh, edges), self._motion_on(mesh))]
+        return [DirectedEdges(edges, continuations(mesh, edges), self._move_on(mesh))]
 
     def replaced(self, **values) -> Clamp:
         """The same Clamp with another displacement, rotation or center."""
-        return Clamp(self.edges, body=self.body, **{**self._motion.as_arguments(), **values})
+        return Clamp(self.edges, body=self.body, **{**self._move.as_arguments(), **values})
 
     def _checked(self, mesh: TriangleMesh) -> np.ndarray:
         return indices("Clamp edges", self.edges, mesh.n_edges)
 
-    def _motion_on(self, mesh: TriangleMesh) -> RigidMotion | None:
-        return self._motion.about(mesh.rest_positions[np.unique(mesh.edges[self._checked(mesh)])], self)
+    def _move_on(self, mesh: TriangleMesh) -> RigidMove | None:
+        return self._move.about(mesh.rest_positions[np.unique(mesh.edges[self._checked(mesh)])], self)
 
     def __repr__(self) -> str:
-        return f"Clamp({len(self.edges)} edges{self._motion.summary()}{on_body(self.body)})"
+        return f"Clamp({len(self.edges)} edges{self._move.summary()}{on_body(self.body)})"
 
 
 class SymmetryPlane(Support):
@@ -201,9 +200,7 @@ class SymmetryPlane(Support):
             raise ValueError("normal must not be zero")
         self.normal = normal / length
         self.point = quantity("point", "m", point, (3,))
-        self.tolerance = None if tolerance is None else float(quantity("tolerance", "m", tolerance, ()))
-        if self.tolerance is not None and self.tolerance < 0.0:
-            raise ValueError(f"tolerance [m] must not be negative, got {self.tolerance:g}")
+        self.tolerance = None if tolerance is None else not_negative("tolerance", "m", tolerance)
 
     def _vertices(self, mesh: TriangleMesh) -> np.ndarray:
         height = (mesh.rest_positions - self.point) @ self.normal
@@ -255,7 +252,7 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
 
 
-class _Motion:
+class _Move:
     """A displacement and a rotation as a caller gives them."""
 
     def __init__(self, displacement, rotation, center):
@@ -270,13 +267,13 @@ class _Motion:
     def as_arguments(self) -> dict[str, np.ndarray | None]:
         return {"displacement": self.displacement, "rotation": self.rotation, "center": self.center}
 
-    def about(self, points: np.ndarray, support) -> RigidMotion | None:
+    def about(self, points: np.ndarray, support) -> RigidMove | None:
         if self.displacement is None and self.rotation is None:
             return None
         zero = np.zeros(3)
         center = points.mean(axis=0) if self.center is None else self.center
         translation = zero if self.displacement is None else self.displacement
-        return RigidMotion(center, zero if self.rotation is None else self.rotation, translation, support)
+        return RigidMove(center, zero if self.rotation is None else self.rotation, translation, support)
 
     def summary(self) -> str:
         done = [

@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline
 from .. import _core
 from .._checks.owner import Owner
 from .._checks.quantity import quantity
+from .._checks.scalars import not_negative
 
 _HEAD_ON = 0.5 * np.pi
 _NONE = 1e-9  # what of a table counts as zero, over its largest value; and how far its angles may miss the ends [rad]
@@ -66,11 +67,11 @@ class Water(Owner):
         thrust_table=None,
         added_mass=0.0,
     ):
-        self.fluid_density = _not_negative("fluid_density", "kg/m3", fluid_density)
+        self.fluid_density = not_negative("fluid_density", "kg/m3", fluid_density)
         self.velocity = quantity("velocity", "m/s", velocity, (3,))
-        self.drag_coefficient = _not_negative("drag_coefficient", "1", drag_coefficient)
-        self.thrust_coefficient = _not_negative("thrust_coefficient", "1", thrust_coefficient)
-        self.added_mass = _not_negative("added_mass", "kg/m2", added_mass)
+        self.drag_coefficient = not_negative("drag_coefficient", "1", drag_coefficient)
+        self.thrust_coefficient = not_negative("thrust_coefficient", "1", thrust_coefficient)
+        self.added_mass = not_negative("added_mass", "kg/m2", added_mass)
         self.attack_table = _table("attack_table", attack_table)
         self.thrust_table = _table("thrust_table", thrust_table)
         self._drag_curve = _curve(self.attack_table)
@@ -147,13 +148,6 @@ class Water(Owner):
         if self.added_mass:
             parts.append(f"added_mass {self.added_mass:g} kg/m2")
         return f"Water({', '.join(parts)})"
-
-
-def _not_negative(name: str, unit: str, value) -> float:
-    number = float(quantity(name, unit, value, ()))
-    if number < 0:
-        raise ValueError(f"{name} [{unit}] must not be negative, got {number:g}")
-    return number
 
 
 def _table(name: str, table) -> tuple[np.ndarray, ...] | None:

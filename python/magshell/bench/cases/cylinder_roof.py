@@ -57,12 +57,12 @@ BEYOND = 1.2  # times the full load: towards there the path is followed, past th
 
 
 def quarter(cells: tuple[int, int], irregular: float | None = None) -> ms.TriangleMesh:
-    """A quarter of the roof, from its centre at x = y = 0 to the hinge and to the free curved edge."""
+    """A quarter of the roof, from its center at x = y = 0 to the hinge and to the free curved edge."""
     return ms.meshes.cylinder(RADIUS, LENGTH / 2, (0.0, HALF_ANGLE), cells=cells, irregular=irregular)
 
 
 def scene(mesh: ms.TriangleMesh, bending: str) -> ms.Scene:
-    """A quarter of BEYOND times the full load on its centre; its hinge may turn."""
+    """A quarter of BEYOND times the full load on its center; its hinge may turn."""
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
     )
@@ -87,11 +87,11 @@ def snap_through(
     0.155 mm P / Pmax explains all but 0.45 %.
     """
     mesh = quarter(cells, irregular)
-    centre = mesh.nearest_vertex((0, 0, RADIUS))
+    center = mesh.nearest_vertex((0, 0, RADIUS))
     deflections, references = np.array(list(LOADS_AT.items())).T
 
     def deflection(positions: np.ndarray) -> np.ndarray:
-        return RADIUS - positions[..., centre, 2]
+        return RADIUS - positions[..., center, 2]
 
     path = ms.follow(
         scene(mesh, bending),

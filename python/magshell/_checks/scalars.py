@@ -1,0 +1,40 @@
+"""Single numbers and switches that a caller hands in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .quantity import label, quantity
+
+
+def positive(name: str, unit: str, value) -> float:
+    """A positive finite number, or a ValueError that names it and its unit ("" for a number without one)."""
+    number = float(quantity(name, unit, value, ()))
+    if number <= 0:
+        raise ValueError(f"{label(name, unit)} must be positive, got {number:g}")
+    return number
+
+
+def not_negative(name: str, unit: str, value) -> float:
+    """As `positive`; zero will do."""
+    number = float(quantity(name, unit, value, ()))
+    if number < 0:
+        raise ValueError(f"{label(name, unit)} must not be negative, got {number:g}")
+    return number
+
+
+def all_positive(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.ndarray:
+    """An array of positive finite numbers, or a ValueError that names the first other entry."""
+    array = quantity(name, unit, values, shape)
+    if (wrong := np.argwhere(array <= 0)).size:
+        index = tuple(wrong[0].tolist())
+        entry = f"{name}[{', '.join(map(str, index))}]"
+        raise ValueError(f"{label(name, unit)} must be positive, but {entry} is {array[index]:g}")
+    return array
+
+
+def flag(name: str, value) -> bool:
+    """True or False, or a ValueError that names it."""
+    if not isinstance(value, bool):
+        raise ValueError(f"{name} must be True or False, got {value!r:.60}")
+    return value
