@@ -177,7 +177,7 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
         values = dict(zip(names, owner.law(*scene._values.touching(owner)), strict=True))
         absent = set() if scene.has_forces_of_motion else {"friction_coefficient"}
     elif isinstance(owner, ms.Pin | ms.Clamp):
-        motion = owner.held(scene._bodies.of(owner).mesh)[0].motion
+        motion = owner.held(scene._bodies.of(owner).mesh)[0].move
         values = {} if motion is None else {**motion._asdict(), "displacement": motion.translation}
         absent = set(names) if motion is None else set()
     elif isinstance(owner, ms.PlacedField):

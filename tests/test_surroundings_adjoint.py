@@ -270,7 +270,7 @@ def driven_into_ground(turn=None):
 @pytest.mark.parametrize("name", ["displacement", "rotation"])
 def test_by_a_support_that_presses_the_sheet_onto_the_ground(integrator, name):
     scene, clamp, _ = driven_into_ground()
-    value = {"displacement": clamp._motion.displacement, "rotation": clamp._motion.rotation}[name]
+    value = {"displacement": clamp._move.displacement, "rotation": clamp._move.rotation}[name]
     found = against_differences(
         scene,
         clamp,
