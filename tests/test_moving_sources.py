@@ -293,7 +293,7 @@ def test_gradient_by_the_path_of_a_support(integrator):
     check_gradients(loss, given, {"displacement": 1e-6, "rotation": 1e-4, "center": 1e-5})
 
 
-def test_all_that_moves_at_once_from_checkpoints_and_in_halves():
+def test_all_that_moves_at_once_from_checkpoints():
     """However little is kept of a motion, its gradient has the same bits; a solve after it finds the scene as it was."""
     block, _ = on_a_block()
     clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 0))
@@ -325,6 +325,30 @@ def test_all_that_moves_at_once_from_checkpoints_and_in_halves():
     assert np.array_equal(ms.equilibrium(alone, **MAGNETIZED).positions, before)
 
 
+def test_gradients_through_a_step_that_was_taken_in_parts():
+    """What moves is asked for between its knots there."""
+    ball, steps, time_step = ob.Sphere(0.004, center=(0.03, 0.01, -0.03)), 5, 1e-3
+    hits = ms.Contact(ball, contact_stiffness=200.0, friction_coefficient=0.3)
+    scene = ms.Scene(SHEET, supports=[CLAMP], field=CUBE, contacts=[hits])
+    weights = torch.tensor(1e3 * np.random.default_rng(0).standard_normal((N_V, 3)))
+    given = {
+        "ball": ends(lambda t: (0.03, 0.01, -0.03 + 6 * t), steps, time_step),
+        "lift": ends(lambda t: (0, 0, 0.3 * t), steps, time_step),
+    }
+
+    def loss(given):
+        values = {
+            ball: {"center": given["ball"]},
+            CLAMP: {"displacement": given["lift"]},
+            CUBE: {"center": approach},
+        }
+        move = ms.simulate(scene, steps=steps, time_step=time_step, values=values, **MAGNETIZED, **EXACT)
+        assert move.halved
+        return (weights * torch.as_tensor(move.displacements)[-1]).sum()
+
+    check_gradients(loss, given, {"ball": 1e-8, "lift": 1e-8})
+
+
 def test_a_motion_in_two_parts_goes_on_with_functions_of_the_time():
     scene, given = in_field(CUBE), {"time_step": 2e-3, **MAGNETIZED, **EXACT}
     values = {CUBE: {"center": approach, "rotation": turn}}
@@ -342,49 +366,3 @@ def test_a_trajectory_knows_where_its_obstacles_went():
     (there,) = move._obstacles
     np.testing.assert_allclose(there.signed_distance((0.025, 0.01, 0.0), 4e-3), -0.003, atol=1e-15)
     np.testing.assert_allclose(there.signed_distance((0.025, 0.01, 0.0), 2.5e-3), -0.0015, atol=1e-15)
-
-
-def test_a_path_of_equilibria_along_which_things_move():
-    """A magnet comes near and turns, a clamp lifts, a floor rises: the end is an equilibrium with them there."""
-    floor = ob.Plane(center=(0, 0, -0.01))
-    clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 0), rotation=(0, 0, 0))
-    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, remanent_magnetization=(2e4, 0, 0))
-    near = ms.Contact(floor, contact_stiffness=10.0)
-    scene = ms.Scene(sheet, supports=[clamp], field=CUBE, contacts=[near])
-    far = ms.equilibrium(scene)
-    values = {
-        CUBE: {"center": (0.05, 0.01, 0.022), "rotation": (0.3, 0.2, 0)},
-        clamp: {"displacement": (0, 0, 1e-3), "rotation": (0, -0.1, 0)},
-        floor: {"center": (0, 0, -0.004)},
-    }
-    path = ms.follow(scene, start=far, values=values, progress=False)
-    assert (
-        path.parameters[0] == 0
-        and path.parameters[-1] == 1
-        and np.array_equal(path.positions[0], far.positions)
-    )
-    there = ms.equilibrium(scene, start=path.positions[-1], values=values)
-    np.testing.assert_allclose(path.positions[-1], there.positions, atol=1e-9)
-    middle = len(path) // 2
-    share = path.parameters[middle]
-    half = {
-        owner: {name: (1 - share) * begin + share * np.array(named[name]) for name, begin in at_start.items()}
-        for (owner, named), at_start in zip(
-            values.items(),
-            (
-                {"center": CUBE.center, "rotation": CUBE.rotation},
-                {"displacement": np.zeros(3), "rotation": np.zeros(3)},
-                {"center": floor.center},
-            ),
-            strict=True,
-        )
-    }
-    known = path.equilibrium(middle)
-    again = ms.equilibrium(scene, start=path.positions[middle], values=half, require_stable=False)
-    np.testing.assert_allclose(known.positions, path.positions[middle], atol=1e-12)
-    np.testing.assert_allclose(again.positions, path.positions[middle], atol=1e-9)
-    assert known.iterations <= 2 and np.array_equal(ms.equilibrium(scene).positions, far.positions)
-    with pytest.raises(
-        ValueError, match="start has another thickness than the path, which cannot change on its way"
-    ):
-        ms.follow(scene, start=far, values={sheet: {"thickness": 1.1e-3}}, progress=False)
