@@ -120,6 +120,43 @@ def among_magnets() -> Kind:
     return Kind(scene, controls, fixed=EXACT, reach=REACH)
 
 
+def swirl(x):
+    return 0.01 * np.stack([np.sin(10 * x[:, 1]), 30 * x[:, 2] * x[:, 0], np.cos(10 * x[:, 0])], axis=1)
+
+
+def placed_grid():
+    grid = ms.SampledField.from_function(swirl, (-0.2,) * 3, (0.2,) * 3, (5, 5, 5))
+    return ms.PlacedField(grid, center=(1e-3, 2e-3, -1e-3), rotation=(0.1, 0.2, -0.1))
+
+
+def in_a_placed_grid() -> Kind:
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=placed_grid())
+    controls = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.1}
+    return Kind(scene, controls, fixed=EXACT, reach=REACH)
+
+
+def among_fields_that_move() -> Kind:
+    """Magnets, dipoles, and fields that were put somewhere."""
+    place = {"center": 1e-3 * np.array([1.0, 2.0, -1.0]), "rotation": (0.1, 0.2, -0.1)}
+    strong = {"remanent_magnetization": 3e4 * np.array([0.3, -0.5, 0.9]), "rotation": (0.3, -0.2, 0.5)}
+    up = np.array([0.0, 0.0, 0.07])
+    fields = [
+        ms.CuboidMagnet((0.03, 0.02, 0.02), center=MIDDLE - up, **strong),
+        ms.CylinderMagnet(0.01, 0.02, center=MIDDLE + up, **strong),
+        DIPOLES,
+        placed_grid(),
+        ms.PlacedField(ms.CustomField(swirl, length_scale=0.05), **place),
+    ]
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    turned = ms.Clamp(MESH.edges_at(x=0.0), displacement=(1e-4, 0, 2e-4), rotation=(0.0, 0.1, 0.0))
+    lifted = ms.Pin(MESH.vertices_at(x=0.1), "z", displacement=(0, 0, 1e-4), rotation=(0.0, 0.0, 0.1))
+    scene = ms.Scene(sheet, supports=[turned, lifted], field=fields)
+    controls = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.5, "time_step": 3e-3}
+    fixed = {**EXACT, "steps": STEPS, "integrator": ms.SDIRK2(), "progress": False}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH, in_time=STEPS)
+
+
 def load_cases() -> Kind:
     fields = np.array([DEFAULTS["applied_flux_density"], (0, 0, -2e-3)])
     controls = {**DEFAULTS, **FACTORS, "applied_flux_density": fields, "load_factor": np.array([0.9, 0.2])}
@@ -135,17 +172,29 @@ def warm(scene, values, start=None, solver=None, **design):
         return last(values=values, **design)
 
 
-def moving(integrator, bending="midedge", **options) -> Kind:
+def moving(integrator, bending="midedge", in_time=0, **options) -> Kind:
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     controls = {**IN_TIME, **BEGIN, **VISCOUS}
     reach = {
         **REACH,
         **{name: 1e2 * np.max(value) for name, value in VISCOUS.items()},
     }  # which do little here
-    return Kind(everything(bending), controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+    return Kind(
+        everything(bending), controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach, in_time=in_time
+    )
 
 
-def thrown(shape, integrator=None, swims=False, motion=None, extra=None, options=None, step=1e-5, **contact):
+def thrown(
+    shape,
+    integrator=None,
+    swims=False,
+    motion=None,
+    extra=None,
+    options=None,
+    step=1e-5,
+    in_time=0,
+    **contact,
+):
     """A sheet that is thrown onto an obstacle, or through water, or both. extra: controls, options: other keywords."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     contacts = []
@@ -176,7 +225,8 @@ def thrown(shape, integrator=None, swims=False, motion=None, extra=None, options
     fixed = {**EXACT, "steps": 6, "integrator": integrator or ms.ImplicitEuler(), "progress": False}
     if motion is not None:  # a function of the time: there is no gradient by time_step
         fixed["time_step"] = controls.pop("time_step")
-    return Kind(scene, controls, ms.simulate, fixed={**fixed, **(options or {})}, step=step, reach=REACH)
+    fixed |= options or {}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=REACH, in_time=in_time)
 
 
 def in_a_corner() -> Kind:
@@ -429,6 +479,17 @@ MAKERS = {
         ob.Sphere, ms.SDIRK2(), smoothing=2e-4, sticking_speed=0.3, face_samples=3, **RUBS
     ),
     "onto a Box that sways": lambda: thrown(ob.Box, motion=swaying, options={"keep": "factors"}, **RUBS),
+    "at rest in a placed grid": in_a_placed_grid,
+    "among fields that move": among_fields_that_move,
+    "in motion, everything moves": lambda: moving(ms.TRBDF2(), in_time=STEPS),
+    "in motion, everything moves, euler": lambda: moving(ms.ImplicitEuler(), "hinge", in_time=STEPS),
+    **{
+        f"onto a {shape.__name__} that is carried": lambda shape=shape: thrown(shape, in_time=6, **RUBS)
+        for shape in UNDER
+    },
+    "onto a Box that is carried, late": lambda: thrown(
+        ob.Box, ms.TRBDF2(), in_time=6, lagged_friction=True, **RUBS
+    ),
     "through water": lambda: thrown(None, ms.TRBDF2(), swims=True),
     "through water onto a Plane": lambda: thrown(ob.Plane, ms.TRBDF2(), True, extra=VISCOUS, **RUBS),
     "in a corner": in_a_corner,

@@ -14,6 +14,7 @@ import numpy as np
 
 import magshell as ms
 
+IN_TIME = ", in time"
 # Keywords of a solve that are no numbers to differentiate by.
 SETTINGS = {"scene", "values", "solver", "progress"}
 SETTINGS_OF = {
@@ -34,7 +35,8 @@ class Kind:
 
     solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it.
     controls: by keyword, the inputs that belong to no object. fixed: other keywords.
-    step: of differences, over the size of a value; reach: that size, where it is not the value's own.
+    step: of differences, over the size of a value; reach: that size, where it is not the value's own. in_time: steps of
+    the motion over which everything goes somewhere that can, or 0.
     """
 
     scene: ms.Scene
@@ -44,6 +46,7 @@ class Kind:
     fixed: dict[str, object] = field(default_factory=dict)
     step: float = 1e-4
     reach: dict[str, float] = field(default_factory=dict)
+    in_time: int = 0
 
     def found(self, given: dict[tuple, object], start=None):
         """The solution with these inputs, {(object or None, name): value}, in place of those that it has."""
@@ -63,10 +66,26 @@ class Kind:
         owners = (self.scene, *self.scene.objects)
         moving = self.function is ms.simulate
         return {
-            (owner, name): np.array(value, dtype=np.float64)
+            (owner, name): self._over_time(owner, name, np.array(value, dtype=np.float64))
             for owner in owners
             for name, value in _values_of(self.scene, owner, moving).items()
         }
+
+    def goes(self, owner, name: str) -> bool:
+        """Whether this value is another at each end of a step."""
+        return self.in_time > 0 and name in getattr(owner, "_in_time", ())
+
+    def _over_time(self, owner, name: str, value: np.ndarray) -> np.ndarray:
+        if not self.goes(owner, name):
+            return value
+        rng = np.random.default_rng(len(name))
+        way = (
+            free((owner, name))
+            * self.reach.get(name, 0.1 * np.abs(value).max())
+            * rng.standard_normal(value.shape)
+        )
+        share = np.linspace(0.0, 1.0, self.in_time + 1).reshape(-1, *(1 for _ in value.shape))
+        return value + 0.3 * share * (0.5 + share) * way
 
     @cached_property
     def of_solve(self) -> dict[tuple, np.ndarray]:
@@ -86,10 +105,16 @@ class Kind:
         """All inputs, each once and a little off what it was made with, so that nothing is left to a default."""
         once = {key: value for key, value in self.entries.items() if self._once(key)}
         rng = np.random.default_rng(23)
-        off = {key: value * (1.0 + 0.02 * rng.uniform(-1, 1, value.shape)) for key, value in once.items()}
+        off = {key: 0.02 * rng.uniform(-1, 1, value.shape) for key, value in once.items()}
+        moved = {
+            (owner, name): value + off[owner, name] * self.reach.get(name, value)
+            if self.goes(owner, name)
+            else value * (1.0 + off[owner, name])
+            for (owner, name), value in once.items()
+        }
         if self.scene.rigid_parts:  # which a start must not bend
-            off |= {key: value for key, value in once.items() if key[1] in ("start", "velocities")}
-        return off
+            moved |= {key: value for key, value in once.items() if key[1] in ("start", "velocities")}
+        return moved
 
     def _once(self, key: tuple) -> bool:
         owner, name = key
@@ -119,8 +144,10 @@ def label(kind: Kind, key: tuple) -> str:
 
 
 def subject(kind: Kind, key: tuple) -> tuple:
-    """(class or function, name) of an input: what coverage counts."""
+    """(class or function, name) of an input: what coverage counts; one over time is told apart."""
     owner, name = key
+    if owner is not None and kind.goes(owner, name):
+        name += IN_TIME
     return (kind.function if owner is None else type(owner), name)
 
 
@@ -133,7 +160,10 @@ def subjects() -> set[tuple]:
         (each, name)
         for each in classes
         if not inspect.isabstract(each)
-        for name in getattr(each, "_replaceable", ())
+        for name in (
+            *getattr(each, "_replaceable", ()),
+            *(name + IN_TIME for name in getattr(each, "_in_time", ())),
+        )
     }
     return of_classes | {(solve, name) for solve in SETTINGS_OF for name in continuous(solve)}
 
@@ -154,6 +184,8 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
         motion = owner.held(scene._bodies.of(owner).mesh)[0].move
         values = {} if motion is None else {**motion._asdict(), "displacement": motion.translation}
         absent = set(names) if motion is None else set()
+    elif isinstance(owner, ms.PlacedField):
+        values, absent = {**owner.field._made_from, **owner._made_from}, set()
     elif isinstance(owner, ms.SampledField):
         values, absent = owner._made_from, set()
     else:

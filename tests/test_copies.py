@@ -27,6 +27,7 @@ FIELDS = {
     "cylinder": lambda: ms.CylinderMagnet(0.1, 0.2, (0, 1e5, 0), (0, 0, -0.2), (0.1, 0, 0.3)),
     "sampled": lambda: ms.SampledField.from_function(swirl, [-1, -1, -1], [1, 1, 1], [4, 4, 4]),
     "custom": lambda: ms.CustomField(swirl, length_scale=1.0),
+    "placed": lambda: ms.PlacedField(magnet(), center=(0, 0, -0.1), rotation=(0.1, 0, 0.3)),
     "magpylib": magnet,
 }
 

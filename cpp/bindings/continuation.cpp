@@ -4,13 +4,18 @@
 #include "bindings/arrays.h"
 #include "bindings/call_python.h"
 #include "bindings/watch.h"
+#include "magshell/core/errors.h"
 
 namespace magshell::bindings {
 namespace {
 
 PathResult follow(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
-                  const Controls& to, const PathOptions& options, const py::object& until,
-                  const py::object& progress) {
+                  const Controls& to, const PathOptions& options, const std::vector<Index>& entries,
+                  const py::object& until, const py::object& progress) {
+    const Varying varying(model.registry(), entries);
+    const Index width = model.registry().controls.size() + varying.size();
+    if (from.size() != width || to.size() != width)
+        throw InvalidInput("controls must have shape (" + std::to_string(width) + ",)");
     const Watch watch(progress);
     Until ends;
     if (!until.is_none())
@@ -20,8 +25,9 @@ PathResult follow(Model& model, const VectorXd& start, const Model::Turns& turns
         };
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
-    return follow_path(model, start, turns, from, to, options, ends,
-                       [&](double at, double residual) { watch(at, residual); });
+    return follow_path(
+        model, start, turns, from, to, options, ends,
+        [&](double at, double residual) { watch(at, residual); }, varying);
 }
 
 }  // namespace
@@ -63,7 +69,7 @@ void register_continuation(py::module_& module) {
         .def_readonly("failed_factorizations", &PathResult::failed_factorizations);
 
     module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("turns"), py::arg("from_"),
-               py::arg("to"), py::arg("options"), py::arg("until") = py::none(),
+               py::arg("to"), py::arg("options"), py::arg("varying"), py::arg("until") = py::none(),
                py::arg("progress") = py::none());
 }
 

@@ -22,8 +22,8 @@ Tableau tableau_of(const std::string& name) {
 // A row a knot.
 using Knots = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-std::vector<Controls> controls_of(const Model& model, const Array& rows) {
-    const Index width = model.registry().controls.size();
+std::vector<Controls> controls_of(const Model& model, const Varying& varying, const Array& rows) {
+    const Index width = model.registry().controls.size() + varying.size();
     if (rows.ndim() != 2 || rows.shape(1) != width)
         throw InvalidInput("controls must have shape (knots, " + std::to_string(width) + ")");
     std::vector<Controls> controls;
@@ -32,8 +32,8 @@ std::vector<Controls> controls_of(const Model& model, const Array& rows) {
     return controls;
 }
 
-Knots rows_of(const Model& model, const std::vector<Controls>& controls) {
-    Knots rows(controls.size(), model.registry().controls.size());
+Knots rows_of(const std::vector<Controls>& controls) {
+    Knots rows(controls.size(), controls.empty() ? 0 : controls.front().size());
     for (std::size_t k = 0; k < controls.size(); ++k) rows.row(k) = controls[k].transpose();
     return rows;
 }
@@ -83,7 +83,8 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.tableau = tableau_of(given["integrator"].cast<std::string>());
     input.time_step = given["time_step"].cast<double>();
     input.steps = given["steps"].cast<Index>();
-    input.controls = controls_of(model, array("controls"));
+    input.varying = Varying(model.registry(), given["varying"].cast<std::vector<Index>>());
+    input.controls = controls_of(model, input.varying, array("controls"));
     input.newton = given["newton"].cast<NewtonOptions>();
     input.record_every = given["record_every"].cast<Index>();
     return input;
@@ -166,7 +167,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     }
     py::dict result;
     result["values"] = values_to_user(model, gradient.values);
-    result["controls"] = rows_of(model, gradient.controls);
+    result["controls"] = rows_of(gradient.controls);
     result["positions"] = model.bodies().gradient_by_vectors(gradient.positions);
     result["edge_rotations"] = model.bodies().edge_rotations(gradient.positions);
     result["velocities"] = model.bodies().gradient_by_vectors(gradient.velocities);

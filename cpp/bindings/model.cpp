@@ -42,13 +42,6 @@ std::vector<ContactInput> contacts_of(const py::list& given) {
     return contacts;
 }
 
-std::vector<ObstacleInput> obstacles_of(const py::list& given) {
-    std::vector<ObstacleInput> obstacles;
-    for (const py::handle each : given)
-        obstacles.push_back({each["shape"].cast<std::shared_ptr<Obstacle>>(), each["moves"].cast<bool>()});
-    return obstacles;
-}
-
 std::vector<SheetInput> sheets_of(const py::list& given) {
     std::vector<SheetInput> sheets;
     for (const py::handle each : given) {
@@ -94,7 +87,8 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     for (const py::handle source : given["field_sources"])
         input.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
     input.contacts = contacts_of(given["contacts"]);
-    input.obstacles = obstacles_of(given["obstacles"]);
+    for (const py::handle obstacle : given["obstacles"])
+        input.obstacles.push_back(obstacle.cast<std::shared_ptr<Obstacle>>());
     input.water = given["water"].cast<std::shared_ptr<Water>>();
     const py::gil_scoped_release unlocked;
     return std::make_unique<Model>(input);

@@ -27,6 +27,7 @@ from .errors import (
 from .fields.adapters import CustomField, MagpylibField
 from .fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .fields.magnets import CuboidMagnet, CylinderMagnet
+from .fields.placed import PlacedField
 from .linear.buckling import Buckling, linear_buckling
 from .linear.response import LinearResponse, linear_response
 from .linear.vibration import VibrationModes, vibration_modes
@@ -92,6 +93,7 @@ __all__ = [
     "Path",
     "Picture",
     "Pin",
+    "PlacedField",
     "PointLoad",
     "Rigid",
     "RigidResult",

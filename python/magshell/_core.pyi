@@ -32,6 +32,7 @@ __all__: list[str] = [
     "PathOptions",
     "PathPoint",
     "PathResult",
+    "PlacedField",
     "PythonField",
     "SampledField",
     "StaticsOptions",
@@ -193,6 +194,18 @@ class SampledField(AppliedField):
         flux_density: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     ) -> None: ...
     def contains(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> list[bool]: ...
+
+class PlacedField(AppliedField):
+    def __init__(
+        self,
+        field: AppliedField,
+        center: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+        rotation: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+    ) -> None: ...
 
 class PythonField(AppliedField):
     def __init__(self, sampler: collections.abc.Callable) -> None: ...
@@ -791,6 +804,7 @@ def follow_path(
     from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: PathOptions,
+    varying: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
     until: typing.Any = None,
     progress: typing.Any = None,
 ) -> PathResult: ...

@@ -182,6 +182,9 @@ def _fields(s: Sample) -> Iterator[Call]:
     yield Call("Dipoles", ms.Dipoles, {"positions": np.ones((2, 3)), "moments": np.ones((2, 3))})
     sampled = {"origin": (0, 0, 0), "spacing": (1, 1, 1), "flux_density": np.ones((2, 3, 4, 3))}
     yield Call("SampledField", ms.SampledField, sampled)
+    grid = ms.SampledField((0, 0, 0), (1, 1, 1), np.ones((2, 3, 4, 3)))
+    place = {"center": (0, 0, 0.5), "rotation": (0.1, 0, 0)}
+    yield Call("PlacedField", ms.PlacedField, {"field": grid, **place})
     function = {"function": lambda x: 0.1 * x, "lower": (0, 0, 0), "upper": (1, 1, 1), "counts": (2, 2, 3)}
     yield Call("SampledField.from_function", ms.SampledField.from_function, function)
 

@@ -37,6 +37,7 @@ class Backward {
           by_v_(by_v),
           stepper_(newton, input.tableau, input.inertia, input.viscosity),
           scene_(model_.registry()) {
+        scene_.controls = model_.no_controls();
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
         g_.controls.assign(input.controls.size(), model_.no_controls());
     }
@@ -194,6 +195,7 @@ class Backward {
         const ElasticAfterwards elastic_afterwards(model_);
         const double share = substep.first + algebra.tableau().time(i) * (substep.second - substep.first);
         const Controls controls = input_.controls_at(step, share);
+        model_.take(controls);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
         model_.set_turns(stage.turns);
@@ -219,15 +221,23 @@ class Backward {
             reaction += by_x;
             model_.reduction().vjp(reaction, controls, scene_);
         }
-        const auto [first, weight] = input_.between(step, share);
-        g_.controls[first] += (1.0 - weight) * scene_.controls;
-        g_.controls[first + 1] += weight * scene_.controls;
+        model_.varying().move_gradient(scene_);
+        add_by_controls(step, share, scene_.controls);
+        if (model_.has_forces()) add_by_controls(step, substep.first, by_forces.begin_controls);
         return {lambda, std::move(by_forces)};
+    }
+
+    // What the controls at a share of a step do is that of the two knots that they lie between.
+    void add_by_controls(Index step, double share, const Controls& by) {
+        const auto [first, weight] = input_.between(step, share);
+        g_.controls[first] += (1.0 - weight) * by;
+        g_.controls[first + 1] += weight * by;
     }
 
     // Rotations that were put to rest depend on everything else.
     void back_to_start() {
         const VectorXd& q = motion_.start.q;
+        model_.take(input_.controls_at(0, 0.0));
         if (input_.viscosity.maxwell() && input_.start.e.empty()) {
             model_.evaluate(q, input_.controls_at(0, 0.0));
             g_.positions += model_.strain_forces(by_strains_.e);
@@ -241,6 +251,7 @@ class Backward {
         g_.positions += reaction;
         scene_.controls.setZero();
         model_.vjp(q, controls, lambda, scene_);
+        model_.varying().move_gradient(scene_);
         g_.controls[0] += scene_.controls;
     }
 
@@ -273,6 +284,7 @@ MotionGradient pull_back(Model& model, const MotionInput& input, const MotionRes
                          const MotionWatch& watch) {
     if (motion.keep == Keep::nothing)
         throw InvalidInput("the motion was computed without keeping its states");
+    const WhileVarying varying(model, input.varying);
     const Backward* running = nullptr;
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(running ? running->progress() : 0.0, residual);

@@ -20,11 +20,16 @@ Distance StandingObstacle::distance(const Vec3& x) const {
 }
 
 void StandingObstacle::vjp(const Vec3& x, const Distance& at, double by_distance, const Vec3& by_normal,
-                           const Vec3& by_relative_velocity, Placement& out) const {
+                           const Vec3& by_relative_velocity, ObstacleGradient& out) const {
     const Vec3 from_center = x - center_, by_place = by_distance * at.normal + at.curvature * by_normal;
-    out.center += by_relative_velocity.cross(pose_.spin) - by_place;
+    const Vec3 by_center = by_relative_velocity.cross(pose_.spin) - by_place;
+    out.placement.center += by_center;
+    out.pose.displacement += by_center;
+    out.pose.velocity -= by_relative_velocity;
+    out.pose.spin += by_relative_velocity.cross(from_center);
     const Vec3 by_turn = at.normal.cross(by_normal) - from_center.cross(by_place);
-    out.rotation_vector +=
+    out.pose.rotation_vector += transposed_jacobian_times(pose_.rotation_vector, by_turn);
+    out.placement.rotation_vector +=
         transposed_jacobian_times(placement_.rotation_vector, moved_.transpose() * by_turn);
 }
 

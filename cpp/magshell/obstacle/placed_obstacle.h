@@ -11,9 +11,15 @@
 
 namespace magshell {
 
-/// Where it was put; also the gradient by that.
+/// Where it was put.
 struct Placement {
     Vec3 center = Vec3::Zero(), rotation_vector = Vec3::Zero();
+};
+
+/// By where it was put, and by where it has moved from there.
+struct ObstacleGradient {
+    Placement placement;
+    ObstaclePose pose;
 };
 
 struct PlacedObstacle {
@@ -34,10 +40,10 @@ class StandingObstacle {
     Vec3 velocity(const Vec3& x) const { return pose_.velocity + pose_.spin.cross(x - center_); }
     const Vec3& spin() const { return pose_.spin; }
 
-    /// Adds the gradient by the placement of a function of the distance at x, its normal there and a velocity
+    /// Adds the gradient by placement and pose of a function of the distance at x, its normal there and a velocity
     /// relative to the body, given the gradients by the three.
     void vjp(const Vec3& x, const Distance& at, double by_distance, const Vec3& by_normal,
-             const Vec3& by_relative_velocity, Placement& out) const;
+             const Vec3& by_relative_velocity, ObstacleGradient& out) const;
 
   private:
     const Obstacle* shape_;

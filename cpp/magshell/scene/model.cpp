@@ -153,6 +153,25 @@ void Model::add_contacts(const SceneInput& input) {
 
 void Model::set_values(const VectorXd& in_user_order) {
     values_.set(registry_.values, registry_.values.to_core(in_user_order));
+    hand_out_values();
+}
+
+void Model::vary(Varying varying) {
+    if (varying_.empty()) standing_ = values_.numbers();
+    varying_ = std::move(varying);
+    values_.set(registry_.values, standing_);
+    hand_out_values();
+}
+
+void Model::take(const Controls& controls) {
+    if (varying_.empty()) return;
+    VectorXd numbers = values_.numbers();
+    if (!varying_.take(controls, numbers)) return;
+    values_.set(registry_.values, std::move(numbers));
+    hand_out_values();
+}
+
+void Model::hand_out_values() {
     reduction_.set_values(values_);
     sources_.set_values(values_);
     bool cancels_otherwise = false;
@@ -311,14 +330,6 @@ void Model::share_out_columns() {
 
 void Model::extrapolate(const VectorXd& p) {
     for (const std::unique_ptr<Term>& term : terms_) term->extrapolate(p.data());
-}
-
-VectorXd Model::gradient_rate(const VectorXd& q, const Controls& rate) {
-    Residual change;
-    change.reset(size());
-    for (const std::unique_ptr<Term>& term : terms_)
-        if (term->driven()) term->evaluate(q.data(), rate, change);
-    return change.gradient;
 }
 
 Model::Turns Model::turns() const {

@@ -15,6 +15,7 @@
 #include "magshell/body/membrane_faces.h"
 #include "magshell/linalg/factor.h"
 #include "magshell/scene/bodies.h"
+#include "magshell/scene/varying.h"
 #include "magshell/term/elastic_term.h"
 #include "magshell/term/field_sources.h"
 #include "magshell/term/force_term.h"
@@ -31,7 +32,13 @@ class Model {
     const Registry& registry() const { return registry_; }
     /// All values, in the caller's order of rows; solves need them set once.
     void set_values(const VectorXd& in_user_order);
-    Controls no_controls() const { return Controls::Zero(registry_.controls.size()); }
+    Controls no_controls() const { return Controls::Zero(registry_.controls.size() + varying_.size()); }
+
+    /// Values that vary from now on; none: those that did are again what they were before.
+    void vary(Varying varying);
+    const Varying& varying() const { return varying_; }
+    /// Puts what varies in place for what is evaluated next, at these controls.
+    void take(const Controls& controls);
 
     const Bodies& bodies() const { return bodies_; }
     const Nodes& nodes() const { return bodies_.nodes(); }
@@ -63,8 +70,11 @@ class Model {
     /// The Hessian at the last evaluated state, in matrix().
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
     void extrapolate(const VectorXd& p);
-    /// How fast the gradient at q changes while the controls change at this rate; exact, as it is linear in them.
-    VectorXd gradient_rate(const VectorXd& q, const Controls& rate);
+    /// How fast the gradient at q changes while the controls, now `at`, change at this rate: exact for those that it is
+    /// linear in, by differences of fourth order for what varies. Leaves the model as evaluated elsewhere.
+    VectorXd gradient_rate(const VectorXd& q, const Controls& at, const Controls& rate);
+    /// Likewise how fast supports carry what they hold; zero elsewhere.
+    VectorXd prescribed_rate(const VectorXd& q, const Controls& at, const Controls& rate);
 
     /// Forces that no energy has act only within the stages of time steps. A step begins at q; at a stage,
     /// after evaluate and after assemble at the same q, they add to the residual and to matrix(), and leave
@@ -124,6 +134,9 @@ class Model {
     void add_couples(const SceneInput& input);
     void add_contacts(const SceneInput& input);
     void share_out_columns();
+    void hand_out_values();
+    template <class Function>
+    VectorXd rate_by_varying(const Controls& at, const Controls& rate, const Function& function);
 
     Registry registry_;
     Bodies bodies_;
@@ -142,6 +155,8 @@ class Model {
     // By chunk: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
     std::vector<std::vector<Index>> first_nodes_, first_rotations_;
     Values values_;
+    Varying varying_;
+    VectorXd standing_;      // the values, before any varied
     Kinematics kinematics_;  // where the forces were evaluated last
     Remainder remainder_;
     std::unique_ptr<Factor> analysed_;
@@ -155,6 +170,23 @@ class Model {
     double history_scale_ = 1.0;
     double extent_, rest_reach_;  // [m]
     std::mutex in_use_;
+};
+
+/// Has values vary until its end.
+class WhileVarying {
+  public:
+    WhileVarying(Model& model, const Varying& varying) : model_(model), varies_(!varying.empty()) {
+        if (varies_) model_.vary(varying);
+    }
+    ~WhileVarying() {
+        if (varies_) model_.vary({});
+    }
+    WhileVarying(const WhileVarying&) = delete;
+    WhileVarying& operator=(const WhileVarying&) = delete;
+
+  private:
+    Model& model_;
+    bool varies_;
 };
 
 }  // namespace magshell

@@ -43,7 +43,8 @@ void Model::assemble_forces(const Controls& controls, bool cautious) {
 }
 
 KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda, Gradient& out) const {
-    KinematicsGradient by{VectorXd::Zero(size()), VectorXd::Zero(size()), VectorXd::Zero(size())};
+    KinematicsGradient by{VectorXd::Zero(size()), VectorXd::Zero(size()), VectorXd::Zero(size()),
+                          no_controls()};
     for (const std::unique_ptr<ForceTerm>& force : forces_)
         force->vjp(kinematics_, controls, lambda, by, out);
     return by;

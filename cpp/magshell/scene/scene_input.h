@@ -61,7 +61,7 @@ struct SceneInput {
     bool gravity = false, loads = false;
     std::vector<std::shared_ptr<const AppliedField>> field_sources;
     std::vector<ContactInput> contacts;
-    std::vector<ObstacleInput> obstacles;
+    std::vector<std::shared_ptr<const Obstacle>> obstacles;
     std::shared_ptr<const Water> water;
 };
 

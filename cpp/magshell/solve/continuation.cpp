@@ -39,7 +39,7 @@ class Follower {
 
     bool run(const VectorXd& start) {
         PathPoint here{start, 0.0, {}, 0};
-        const NewtonReport at_rest = newton_.solve(here.state, from_);
+        const NewtonReport at_rest = newton_.solve(here.state, controls(0.0));
         if (!at_rest.converged) return fail("the start is not an equilibrium: " + at_rest.reason);
         here.turns = model_.turns();
         Tangent tangent;
@@ -62,7 +62,12 @@ class Follower {
     }
 
   private:
-    Controls controls(double parameter) const { return interpolate(from_, to_, parameter); }
+    /// Those at a parameter, with what varies in place.
+    Controls controls(double parameter) const {
+        Controls there = interpolate(from_, to_, parameter);
+        model_.take(there);
+        return there;
+    }
 
     bool fail(std::string reason) {
         result_.reason = std::move(reason);
@@ -88,20 +93,21 @@ class Follower {
     }
 
     // K dq = -(dR/dlambda + K dq_held) with the factorization at hand; the pull of dq_held is handed in.
-    VectorXd response(const VectorXd& q, const VectorXd& held, const VectorXd& pull) const {
-        return held + newton_.solve_with_factor(-model_.gradient_rate(q, rate_) - pull);
+    VectorXd response(const VectorXd& q, const Controls& at, const VectorXd& held,
+                      const VectorXd& pull) const {
+        return held + newton_.solve_with_factor(-model_.gradient_rate(q, at, rate_) - pull);
     }
 
     // Factorizes at a point: its tangent (not normalized) and its stability.
     bool find_tangent(PathPoint& point, Tangent& tangent) {
         const Controls at = controls(point.parameter);
         model_.evaluate(point.state, at);
-        const VectorXd held = model_.reduction().progress(rate_) * model_.reduction().prescribed_rate(at);
+        const VectorXd held = model_.prescribed_rate(point.state, at, rate_);
         Eigen::MatrixXd pull = held;
         const FactorReport factor = newton_.factorize(point.state, at, false, {}, pull);
         if (!factor.succeeded) return false;
         point.unstable_directions = factor.negative_pivots;
-        tangent = {response(point.state, held, pull.col(0)), 1.0};
+        tangent = {response(point.state, at, held, pull.col(0)), 1.0};
         return true;
     }
 
@@ -126,13 +132,13 @@ class Follower {
                 return true;
             }
             if (!std::isfinite(residual) || iterations == corrector_iterations) return false;
-            const VectorXd held = model_.reduction().progress(rate_) * model_.reduction().prescribed_rate(at);
+            const VectorXd held = model_.prescribed_rate(q, at, rate_);
             Eigen::MatrixXd pulls(q.size(), 2);
             pulls << gap, held;
             if (!newton_.factorize(q, at, newton_.options().mixed, {}, pulls).succeeded) return false;
             const VectorXd correction =
                 gap + newton_.solve_with_factor(-model_.residual().gradient - pulls.col(0));
-            const VectorXd by_parameter = response(q, held, pulls.col(1));
+            const VectorXd by_parameter = response(q, at, held, pulls.col(1));
             const double change = -product(along.state, correction) /
                                   (product(along.state, by_parameter) + psi_ * psi_ * along.parameter);
             increment = correction + change * by_parameter;
@@ -247,7 +253,7 @@ class Follower {
                 side = -1;
             }
         }
-        const VectorXd drive = model_.gradient_rate(best.state, rate_);
+        const VectorXd drive = model_.gradient_rate(best.state, controls(best.parameter), rate_);
         const VectorXd free_drive = model_.reduction().vector(drive),
                        free_mode = model_.reduction().vector(mode);
         const double alignment =
@@ -270,7 +276,8 @@ class Follower {
 
 PathResult follow_path(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
                        const Controls& to, const PathOptions& options, const Until& until,
-                       const StaticsWatch& watch) {
+                       const StaticsWatch& watch, const Varying& varying) {
+    const WhileVarying while_varying(model, varying);
     model.set_turns(turns);
     PathResult result;
     Newton newton(model, options.newton, [&](double residual) {

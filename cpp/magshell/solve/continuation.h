@@ -53,9 +53,10 @@ struct PathResult {
 /// Called with every accepted point; true ends the path there.
 using Until = std::function<bool(const PathPoint&)>;
 
-/// From an equilibrium at `from`, following the controls towards `to`.
+/// From an equilibrium at `from`, following the controls towards `to`; the numbers of what varies follow the others
+/// in both.
 PathResult follow_path(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
                        const Controls& to, const PathOptions& options, const Until& until,
-                       const StaticsWatch& watch = {});
+                       const StaticsWatch& watch = {}, const Varying& varying = {});
 
 }  // namespace magshell

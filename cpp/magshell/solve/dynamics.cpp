@@ -38,6 +38,7 @@ std::size_t bytes_of(const SubstepRecord& substep) {
 MotionState beginning(Model& model, const MotionInput& input) {
     MotionState start = input.start;
     model.set_turns(start.turns);
+    model.take(input.controls_at(0, 0.0));
     if (!input.rotations_given)
         start.q += RotationsAtRest(model, start.q, input.controls_at(0, 0.0)).correction();
     if (input.viscosity.maxwell() && start.e.empty()) start.e = model.strains(start.q);
@@ -165,6 +166,7 @@ class Run {
         const Controls now = done == 0 ? input_.controls_at(0, 0.0) : input_.controls_at(done - 1, 1.0);
         const MotionState& state = result_.last;
         model_.set_turns(state.turns);
+        model_.take(now);
         std::vector<double>& of_terms = result_.energies.back();
         std::size_t term = 0;
         for (const auto& [name, energy] : model_.energies(state.q, now)) of_terms[term++] = energy;
@@ -230,6 +232,7 @@ MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions&
                       const MotionWatch& watch) {
     MotionResult result;
     result.last = input.start;
+    const WhileVarying varying(model, input.varying);
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(static_cast<double>(result.steps_done) / static_cast<double>(input.steps), residual);
     });

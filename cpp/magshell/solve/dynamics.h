@@ -19,6 +19,7 @@ struct MotionInput {
     Index steps = 0;
     /// Per step, at its beginning and at its stages: steps (stages + 1). In between, straight lines.
     std::vector<Controls> controls;
+    Varying varying;  // values whose numbers stand in them, after the others
     NewtonOptions newton;
     Index record_every = 1;  // steps between the states handed out, from the start on
 

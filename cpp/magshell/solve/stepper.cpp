@@ -68,6 +68,7 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
     StrainSet e;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
+        model.take(controls[i + 1]);
         const VectorXd target = step.target(x_hat, v_hat);
         // As fast as until now; what has no velocity begins where it was.
         q.head(coordinates) = x_hat.head(coordinates) +

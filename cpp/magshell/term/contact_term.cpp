@@ -45,7 +45,7 @@ Pack33 to_pack(const Mat3& block) {
 
 ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
                          const std::vector<ContactInput>& contacts,
-                         const std::vector<ObstacleInput>& obstacles, Registry& registry)
+                         const std::vector<std::shared_ptr<const Obstacle>>& obstacles, Registry& registry)
     : laws_(contacts.size()) {
     for (const ContactInput& given : contacts) {
         const std::string owner = "contact " + std::to_string(contacts_.size());
@@ -69,12 +69,12 @@ ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
                 contact.slots.push_back(pair_slots<3>(matrix, point.nodes));
         }
     }
-    for (const ObstacleInput& given : obstacles) {
+    for (const std::shared_ptr<const Obstacle>& shape : obstacles) {
         const std::string owner = "obstacle " + std::to_string(obstacles_.size());
-        obstacles_.push_back({given.shape, {}});
+        obstacles_.push_back({shape, {}});
         obstacle_slots_.push_back({registry.values.add(owner, "center", "m", 1, 3),
                                    registry.values.add(owner, "rotation", "rad", 1, 3),
-                                   given.moves ? registry.controls.add(owner, "pose", "SI", 4, 3) : Slot()});
+                                   registry.controls.add(owner, "pose", "SI", 4, 3)});
     }
 }
 
@@ -93,22 +93,27 @@ bool ContactTerm::set_values(const Values& values) {
 
 StandingObstacle ContactTerm::standing(Index obstacle, const Controls& controls) const {
     const Slot& pose = obstacle_slots_[obstacle].pose;
-    if (pose.entry < 0) return {obstacles_[obstacle], ObstaclePose()};
     const auto row = [&](Index k) -> Vec3 { return controls.segment<3>(pose.at(k)); };
     return {obstacles_[obstacle], ObstaclePose{row(0), row(1), row(2), row(3)}};
 }
 
 void ContactTerm::add_vjp(const Touch& touch, double by_force, const ContactLaw& by_friction,
-                          const Placement& by_placement, Gradient& out) const {
+                          const ObstacleGradient& by_obstacle, VectorXd& by_values,
+                          Controls& by_controls) const {
     const Contact& contact = contacts_[touch.contact];
-    out.values[contact.stiffness.first] += by_force * touch.force / law(touch).stiffness;
-    out.values[contact.smoothing.first] += by_force * touch.by_smoothing;
-    out.values[contact.offset.first] += by_force * touch.stiffness;
-    out.values[contact.friction.first] += by_friction.friction;
-    out.values[contact.sticking_speed.first] += by_friction.sticking_speed;
+    by_values[contact.stiffness.first] += by_force * touch.force / law(touch).stiffness;
+    by_values[contact.smoothing.first] += by_force * touch.by_smoothing;
+    by_values[contact.offset.first] += by_force * touch.stiffness;
+    by_values[contact.friction.first] += by_friction.friction;
+    by_values[contact.sticking_speed.first] += by_friction.sticking_speed;
     const ObstacleSlots& obstacle = obstacle_slots_[touch.obstacle];
-    out.values.segment<3>(obstacle.center.first) += by_placement.center;
-    out.values.segment<3>(obstacle.rotation.first) += by_placement.rotation_vector;
+    by_values.segment<3>(obstacle.center.first) += by_obstacle.placement.center;
+    by_values.segment<3>(obstacle.rotation.first) += by_obstacle.placement.rotation_vector;
+    const auto by_row = [&](Index k) { return by_controls.segment<3>(obstacle.pose.at(k)); };
+    by_row(0) += by_obstacle.pose.displacement;
+    by_row(1) += by_obstacle.pose.rotation_vector;
+    by_row(2) += by_obstacle.pose.velocity;
+    by_row(3) += by_obstacle.pose.spin;
 }
 
 std::vector<ContactTerm::Touch> ContactTerm::touches(const double* q, const Controls& controls) const {
@@ -220,11 +225,11 @@ void ContactTerm::vjp(const double*, const Controls& controls, const double* lam
     for (const Touch& touch : touching_) {
         const Vec3 along = at_point(touch, lambda);
         const double by_force = -along.dot(touch.at.normal);
-        Placement by_placement;
+        ObstacleGradient by_obstacle;
         standing(touch.obstacle, controls)
             .vjp(touch.place, touch.at, -touch.stiffness * by_force, -touch.force * along, Vec3::Zero(),
-                 by_placement);
-        add_vjp(touch, by_force, {}, by_placement, out);
+                 by_obstacle);
+        add_vjp(touch, by_force, {}, by_obstacle, out.values, out.controls);
     }
 }
 

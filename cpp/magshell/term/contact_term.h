@@ -27,12 +27,6 @@ struct ContactInput {
          lagged = false;  // whether there is friction, and whether with the normal force of before
 };
 
-/// A body in the way, and whether it moves.
-struct ObstacleInput {
-    std::shared_ptr<const Obstacle> shape;
-    bool moves = false;
-};
-
 /// A 3x3 block of a matrix in every lane.
 Pack33 to_pack(const Mat3& block);
 
@@ -48,7 +42,7 @@ class ContactTerm final : public Term {
     };
 
     ContactTerm(const Nodes& nodes, const SystemMatrix& matrix, const std::vector<ContactInput>& contacts,
-                const std::vector<ObstacleInput>& obstacles, Registry& registry);
+                const std::vector<std::shared_ptr<const Obstacle>>& obstacles, Registry& registry);
 
     bool set_values(const Values& values) override;
 
@@ -68,9 +62,10 @@ class ContactTerm final : public Term {
     const ContactLaw& law(const Touch& touch) const { return laws_[touch.contact]; }
     StandingObstacle standing(Index obstacle, const Controls& controls) const;
     /// Adds the gradient of a function of a point's normal force and friction: by what the force is made
-    /// from, by friction's own numbers and by the place of the obstacle.
+    /// from, by friction's own numbers and by the place of the obstacle; by its pose to `by_controls`, those that
+    /// it stood at.
     void add_vjp(const Touch& touch, double by_force, const ContactLaw& by_friction,
-                 const Placement& by_placement, Gradient& out) const;
+                 const ObstacleGradient& by_obstacle, VectorXd& by_values, Controls& by_controls) const;
 
     /// Adds a symmetric block between the nodes of a point, weighted.
     void add_block(const Touch& touch, const Mat3& block, SystemMatrix& out) const;
@@ -103,7 +98,7 @@ class ContactTerm final : public Term {
     };
     struct ObstacleSlots {
         Slot center, rotation;
-        Slot pose;  // a control; none where it stays
+        Slot pose;  // a control
     };
 
     std::vector<Contact> contacts_;

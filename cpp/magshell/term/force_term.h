@@ -28,6 +28,7 @@ struct Kinematics {
 /// By what a force depends on besides the end of the stage.
 struct KinematicsGradient {
     VectorXd velocity, acceleration, begin;
+    Controls begin_controls;  // those at the beginning of the step
 };
 
 class ForceTerm {

@@ -82,14 +82,14 @@ void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambd
             contact_.spread(touch, by_begin.transpose() * along, by.begin);
         }
         const double by_force = -law.friction * along.dot(friction.by_normal_force);
-        Placement by_placement;
+        ObstacleGradient by_obstacle;
         each.obstacle.vjp(touch.place, touch.at, -touch.stiffness * by_force,
                           -law.friction * (friction.by_normal.transpose() * along), -by_velocity,
-                          by_placement);
+                          by_obstacle);
         contact_.add_vjp(touch, by_force,
                          {.friction = -along.dot(friction.force),
                           .sticking_speed = -law.friction * along.dot(friction.by_sticking_speed)},
-                         by_placement, out);
+                         by_obstacle, out.values, each.lagged ? by.begin_controls : out.controls);
     }
 }
 

@@ -29,7 +29,7 @@ class Term {
     /// A displacement [m] that matters to its Hessian: a sheet's thickness.
     virtual double length_scale() const { return std::numeric_limits<double>::infinity(); }
 
-    /// Whether the controls drive it. Every term that they do is linear in them.
+    /// Whether the controls drive it. Every term that they do is linear in them; poses move in time steps only.
     virtual bool driven() const { return true; }
 
     /// The energy [J] at q; changes nothing.

@@ -10,6 +10,7 @@ class Owner:
     each is the transpose of the other."""
 
     _replaceable: tuple[str, ...] = ()
+    _in_time: tuple[str, ...] = ()  # those that may change during a motion
 
     def add_numbers(self, label: str, values, numbers: dict[tuple[str, str], np.ndarray]) -> None:
         """Puts its numbers in place, by owner and name. values: those of the solve; label: its own name there."""

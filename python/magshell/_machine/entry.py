@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import sys
 from collections.abc import Callable
 from typing import TypeVar
 
 from ..errors import Interrupted
+from .keywords import as_keywords
 
 F = TypeVar("F", bound=Callable)
 
@@ -16,13 +18,16 @@ def solve_entry(function: F) -> F:
     """A solve as users call it.
 
     Ctrl-C before there is anything to hand back, in a function of the caller's too, is an Interrupted as anywhere else,
-    with no `last_good`. Within torch.compile, the solve runs as it is, between the graphs.
+    with no `last_good`. Within torch.compile, the solve runs as it is, between the graphs. Controls among `values` become
+    the keywords that are their short forms.
     """
+    known = set(inspect.signature(function).parameters)
 
     @functools.wraps(function)
     def called(*arguments, **named):
         try:
-            return _untraced(function)(*arguments, **named)
+            scene = arguments[0] if arguments else named.get("scene")
+            return _untraced(function)(*arguments, **as_keywords(scene, named, known))
         except Interrupted:
             raise
         except KeyboardInterrupt as stopped:

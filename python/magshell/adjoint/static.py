@@ -46,6 +46,8 @@ def by_leaf(inputs: Inputs, leaf, gradient: Gradient) -> np.ndarray:
         raise NoGradient(f"no gradient by {leaf.name}: {leaf.refusal}")
     if leaf.owner is None:
         by_rows = np.asarray(gradient.own(leaf.name))
+    elif hasattr(leaf.owner, "by_knots"):
+        by_rows = np.asarray(leaf.owner.by_knots(gradient))
     else:
         by_rows = np.asarray(inputs.values.gradients(leaf.owner, gradient)[leaf.name])
     if by_rows.size == np.prod(leaf.shape, dtype=int):

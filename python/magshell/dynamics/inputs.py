@@ -18,6 +18,7 @@ from ..scene.inputs import Inputs
 from ..statics.equilibrium import Equilibrium
 from ..statics.start import check_faces
 from ..surroundings.contact_inputs import check_outside, poses
+from .in_time import InTime
 from .schedule import scheduled
 from .trajectory import MotionState, Trajectory
 
@@ -50,6 +51,7 @@ class MotionInputs:
         maxwell_time,
         integrator: Integrator,
         solver: Newton,
+        courses=(),
         **controls,
     ):
         self.inputs, self.integrator = inputs, integrator
@@ -59,14 +61,18 @@ class MotionInputs:
         if keep not in (None, "stages", "checkpoints", "factors"):
             raise ValueError(f'keep must be "stages", "checkpoints", "factors" or None, got {keep!r}')
         self.keep = getattr(_core.Keep, keep or "nothing")
-        self._given_time_step = time_step
+        self.given_time_step, self._outside = time_step, None
         self.time_step = positive("time_step", "s", inputs.take("time_step", time_step))
         self._mass = inputs.values.masses
         self._damping = self._checked_damping(inputs.take("damping", damping))
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
         self.start = self._begin(start, velocities)
         self.clock = clock_of(self.start).going_on(self.time_step)
-        self._knots = {name: self._controls(name, value, time_step) for name, value in controls.items()}
+        self.knots = self.steps * (len(integrator._times) + 1)
+        self._knots = {name: self._controls(name, value) for name, value in controls.items()}
+        self._in_time = InTime(self, list(courses))
+        if self._outside is not None:
+            check_outside(inputs.scene, inputs.values, self._outside, 0.0)
         self.core = _core.MotionInput(
             inputs.scene._model,
             {
@@ -82,6 +88,7 @@ class MotionInputs:
                 "time_step": self.time_step,
                 "steps": self.steps,
                 "controls": self._all_controls(),
+                "varying": self._in_time.entries,
                 "newton": solver._newton_options(),
                 "record_every": self.record_every,
             },
@@ -96,23 +103,22 @@ class MotionInputs:
 
     def _all_controls(self) -> np.ndarray:
         """(knots, m), in the core's layout."""
-        layout, moving = self.inputs.scene._control_layout, self._poses()
+        layout, moving = self.inputs.scene._control_layout, {**self._poses(), **self._in_time.poses}
         rows = {("scene", name): array for name, array in self._knots.items()}
-        for k, _ in enumerate(self.inputs.scene.obstacles):
-            if (f"obstacle {k}", "pose") in layout:
-                rows[f"obstacle {k}", "pose"] = moving[:, k]
-        return layout.rows(rows, self.steps * (len(self.integrator._times) + 1))
+        rows |= {(f"obstacle {k}", "pose"): array for k, array in moving.items()}
+        return np.concatenate([layout.rows(rows, self.knots), self._in_time.rows], axis=1)
 
-    def _poses(self) -> np.ndarray:
-        """Of the obstacles at all knots."""
-        values, scene = self.inputs.values, self.inputs.scene
+    def _poses(self) -> dict[int, np.ndarray]:
+        """Of the obstacles that a motion of their own moves, by number, at all knots."""
+        values, obstacles = self.inputs.values, self.inputs.scene.obstacles
+        moving = {k: values.current(each) for k, each in enumerate(obstacles) if each.motion is not None}
+        if moving:
+            self.inputs.refuse("time_step", self.given_time_step, "obstacles move by a function of the time")
         shares = np.array((0.0, *self.integrator._times))
-        if any(values.current(each).motion is not None for each in scene.obstacles):
-            self.inputs.refuse("time_step", self._given_time_step, "obstacles move by a function of the time")
         times = self.clock.at(np.arange(self.steps)[:, None], shares).ravel()
-        return poses([values.current(each) for each in scene.obstacles], times)
+        return {k: poses(each, times) for k, each in moving.items()}
 
-    def _controls(self, name: str, value, time_step) -> np.ndarray:
+    def _controls(self, name: str, value) -> np.ndarray:
         unit, row = _CONTROLS[name]
         if name == "applied_flux_density" and value is None:
             if self.inputs.scene.has_uniform_field:
@@ -120,11 +126,17 @@ class MotionInputs:
             value = np.zeros(3)
         elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
+        knots = self.at_knots(name, unit, value, row)
+        return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
+
+    def at_knots(self, name: str, unit: str, value, row: tuple[int, ...]):
+        """A value in time, as in `scheduled`, at all knots: a tensor in its graph if it is one."""
+        time_step = self.given_time_step
         knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)
         if callable(value) and wants_gradient(time_step) and not _differentiable_in_time(knots, time_step):
             why = f"{name} is a function of the time that torch cannot follow; make its values from the time by torch"
             self.inputs.refuse("time_step", time_step, why)
-        return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
+        return knots
 
     def _checked_damping(self, given) -> np.ndarray:
         n_v = self.inputs.scene.mesh.n_vertices
@@ -202,7 +214,7 @@ class MotionInputs:
         inputs, model, mesh = self.inputs, self.inputs.scene._model, self.inputs.scene.mesh
         still = np.zeros(model.size)
         if start is None:
-            check_outside(inputs.scene, inputs.values, mesh.rest_positions, 0.0)
+            self._outside = mesh.rest_positions
             return MotionState(0.0, model.rest_state(), still, [])
         if isinstance(start, Equilibrium | Trajectory):
             if start.scene is not inputs.scene:
@@ -221,7 +233,7 @@ class MotionInputs:
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
         inputs.scene._bodies.check_welded("start", "m", positions)
         check_faces(mesh, positions)
-        check_outside(inputs.scene, inputs.values, positions, 0.0)
+        self._outside = positions
         state = model.state(positions, np.zeros(mesh.n_edges))
         check_rigid(inputs.scene, positions, model.positions(state), "start [m]", mesh.size)
         return MotionState(0.0, state, still, rotations_known=False)

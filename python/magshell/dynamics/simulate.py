@@ -16,6 +16,7 @@ from ..bodies.strains import StrainHistory, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler, Integrator
 from ..methods.solvers import MixedNewton, Newton
+from ..scene.courses import over_time
 from ..scene.inputs import Inputs
 from ..scene.replacements import requested
 from ..scene.scene import Scene
@@ -70,7 +71,14 @@ def simulate(
     start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
         bits. By default the rest shape.
     velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
-    remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density.
+    remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density. Controls, and the
+        damping, may stand in values={scene: {name: value}} as well: keywords are their short forms.
+    values in time: positions and moments of Dipoles, center and rotation of a PlacedField, an obstacle or a magnet, and
+        its magnetization, displacement, rotation and center of a Clamp or Pin that has one of them: a function of the time
+        [s], or an array with one more axis in front, at the ends of all steps (steps + 1, ...). As everything that is given
+        there, they lie on straight lines between (rotation vectors too), also at the stages within a step. Of field sources
+        one a step may be given, which lets them jump. The surface of an obstacle moves, for friction, with the slopes of
+        parabolas through three neighbouring ends, on straight lines between those: of second order, as its places are.
     integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(). A method of higher
         order makes an impact bounce, and each of its steps there is much work, unless the steps resolve it.
     record_every: steps between the states that come back, the start first.
@@ -117,12 +125,14 @@ def simulate(
         vertex_loads,
         values,
         moving=True,
+        in_time=True,
         thickness=thickness,
         young_modulus=young_modulus,
         poisson_ratio=poisson_ratio,
         mass_density=mass_density,
         curvature_scale=curvature_scale,
     )
+    replaced, courses = over_time(scene, replaced)
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if integrator is None:
         integrator = ImplicitEuler() if scene.contacts else TRBDF2()
@@ -149,6 +159,7 @@ def simulate(
         maxwell_time=maxwell_time,
         integrator=integrator,
         solver=solver,
+        courses=courses,
         applied_flux_density=applied_flux_density,
         load_factor=load_factor,
         gravity_factor=gravity_factor,

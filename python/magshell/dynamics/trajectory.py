@@ -143,6 +143,11 @@ class Trajectory:
         return self.positions - self.positions.new_tensor(np.array(rest))
 
     @property
+    def _obstacles(self) -> tuple:
+        """Of the scene, where they were and went."""
+        return tuple({id(each): each for _, obstacles, *_ in self._placed for each in obstacles}.values())
+
+    @property
     def energy(self) -> np.ndarray:
         """Kinetic and potential, (n,) J."""
         return self.kinetic_energy + sum(self.energies.values())

@@ -49,8 +49,9 @@ class CustomField(AppliedField):
 class MagpylibField(AppliedField):
     """The field of magpylib's sources (version 5 or later, which works in SI), as they stand now.
 
-    The sources are copied, so that moving them later leaves this field alone. Derivatives are differences,
-    as in `CustomField`. B jumps at the surface of a magnet: points must keep 0.02 length scales away.
+    The sources are copied, so that moving them later leaves this field alone; a PlacedField of it moves all as one.
+    Derivatives are differences, as in `CustomField`. B jumps at the surface of a magnet: points must keep 0.02 length
+    scales away.
 
     Args:
         sources: a source, a collection, or a list of them

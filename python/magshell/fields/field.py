@@ -82,6 +82,8 @@ class UniformField(AppliedField):
     UniformField()
     """
 
+    _is_uniform = True
+
     def __repr__(self) -> str:
         return "UniformField()"
 
@@ -100,7 +102,7 @@ class Dipoles(AppliedField):
     array([0.    , 0.    , 0.0002])
     """
 
-    _replaceable = ("positions", "moments")
+    _replaceable = _in_time = ("positions", "moments")
 
     def __init__(self, positions, moments) -> None:
         self.positions = quantity("positions", "m", positions, ("n", 3))

@@ -21,6 +21,8 @@ class Magnet(AppliedField):
     jumps, so no sheet should reach through one: a Contact with an obstacle of the same shape keeps it out.
     """
 
+    _in_time = ("remanent_magnetization", "center", "rotation")
+
     def __init__(self, remanent_magnetization, center, rotation) -> None:
         self.remanent_magnetization = quantity("remanent_magnetization", "A/m", remanent_magnetization, (3,))
         self.center = quantity("center", "m", center, (3,))

@@ -12,6 +12,7 @@ from .._checks.arrays import count
 from .._machine.entry import solve_entry
 from ..errors import NotConverged
 from ..scene.inputs import Inputs
+from ..scene.replacements import requested
 from ..scene.scene import Scene
 from .mode_shapes import mode_shapes
 from .rest import RestStiffness
@@ -52,6 +53,7 @@ def linear_buckling(
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
+    values: dict | None = None,
     modes: int = 1,
 ) -> Buckling:
     """The smallest positive multiples of the controls at which a scene buckles, by linear theory.
@@ -62,7 +64,7 @@ def linear_buckling(
 
     so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact
     in the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells.
-    A shallow arch that softens on its way needs ms.follow. Controls as in ms.equilibrium; a field's own
+    A shallow arch that softens on its way needs ms.follow. Controls and values as in ms.equilibrium; a field's own
     stiffness counts.
 
     modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
@@ -84,6 +86,7 @@ def linear_buckling(
         scene,
         remanent_magnetization,
         applied_flux_density,
+        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,

@@ -11,6 +11,7 @@ import numpy as np
 from .._checks.tensors import like
 from .._machine.entry import solve_entry
 from ..scene.inputs import Inputs
+from ..scene.replacements import requested
 from ..scene.scene import Scene
 from .rest import RestStiffness
 
@@ -52,11 +53,12 @@ def linear_response(
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
+    values: dict | None = None,
 ) -> LinearResponse:
     """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
 
     The stiffness is that of the unloaded sheet: loads and fields act as the forces they are at rest, without
-    the stiffness they add; supports that move do so at the rate they start with. Controls as in
+    the stiffness they add; supports that move do so at the rate they start with. Controls and values as in
     ms.equilibrium.
 
     Raises ValueError on bad input, and where the supports leave the sheet a motion without stiffness; Interrupted.
@@ -74,6 +76,7 @@ def linear_response(
         scene,
         remanent_magnetization,
         applied_flux_density,
+        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,

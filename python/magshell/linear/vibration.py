@@ -14,6 +14,7 @@ from .._machine.entry import solve_entry
 from ..bodies.shell import Shell
 from ..errors import NotConverged
 from ..scene.inputs import Inputs
+from ..scene.replacements import requested
 from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
 from .mode_shapes import mode_shapes
@@ -70,7 +71,7 @@ class VibrationModes:
 
 @solve_entry
 def vibration_modes(
-    scene: Scene, equilibrium: Equilibrium | None = None, *, count: int = 6
+    scene: Scene, equilibrium: Equilibrium | None = None, *, values: dict | None = None, count: int = 6
 ) -> VibrationModes:
     """The slowest small vibrations of a scene about an equilibrium, loaded, magnetised or buckled.
 
@@ -81,6 +82,7 @@ def vibration_modes(
 
     equilibrium: of this scene, with the controls and values it was found for; one that is not stable has modes that
         grow. By default the rest shape without loads and fields.
+    values: as in ms.equilibrium, where there is no equilibrium, which has its own.
     count: how many modes.
 
     Raises ValueError on bad input, NotConverged where the search for the modes does not come to its end, Interrupted.
@@ -93,7 +95,7 @@ def vibration_modes(
     >>> modes.frequencies.round(1)  # 3.516 and 22.03 sqrt(E h^2 / 12 rho) / (2 pi L^2)
     array([0.5, 3.2])
     """
-    inputs = _inputs(scene, equilibrium)
+    inputs = _inputs(scene, equilibrium, values)
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
         raise ValueError(f"count must be an integer of at least 1, got {count!r}")
     began = time.perf_counter()
@@ -236,13 +238,20 @@ def _root_of(inertia, masses: np.ndarray) -> tuple:
     return (lambda x: root @ x), (lambda x: root.T @ x)
 
 
-def _inputs(scene: Scene, equilibrium: Equilibrium | None) -> Inputs:
+def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict | None) -> Inputs:
     """Magnetization and values of the equilibrium; the scene's own, without a field, at rest."""
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if equilibrium is None:
-        return Inputs(scene, np.zeros(3) if scene.fields else None, uniform)
+        replaced = requested(scene, None, values, moving=True)
+        magnetized = any("remanent_magnetization" in replaced.get(body, {}) for body in scene.bodies)
+        idle = np.zeros(3) if scene.fields and not magnetized else None
+        return Inputs(scene, idle, uniform, replaced=replaced)
+    if values is not None:
+        raise ValueError(
+            "values are those of the equilibrium: give them to ms.equilibrium, or give no equilibrium"
+        )
     if not isinstance(equilibrium, Equilibrium):
         raise ValueError(f"equilibrium must be an Equilibrium, got {type(equilibrium).__name__}")
     if equilibrium.scene is not scene:

@@ -11,8 +11,8 @@ from .._checks.quantity import quantity
 
 STEP = 1e-4  # s, between the times that derivatives are taken from
 # Fourth-order derivatives: from both sides, and from one side near time 0, before which nobody asked for the motion.
-_CENTRAL = {-2: 1 / 12, -1: -2 / 3, 1: 2 / 3, 2: -1 / 12}
-_FORWARD = {0: -25 / 12, 1: 4.0, 2: -3.0, 3: 4 / 3, 4: -1 / 4}
+CENTRAL = {-2: 1 / 12, -1: -2 / 3, 1: 2 / 3, 2: -1 / 12}
+FORWARD = {0: -25 / 12, 1: 4.0, 2: -3.0, 3: 4 / 3, 4: -1 / 4}
 
 _RETURNS = "a displacement (3,) [m], or a pair of it and a rotation vector (3,) [rad]"
 
@@ -48,7 +48,7 @@ def rates(motion: Callable | None, time: float) -> tuple[np.ndarray, np.ndarray]
     """Velocity (3,) m/s and spin omega (3,) rad/s in world axes, with dR/dt = [omega] R, at a time [s]."""
     if motion is None:
         return np.zeros(3), np.zeros(3)
-    weights = _FORWARD if 0 <= time < 2 * STEP else _CENTRAL
+    weights = FORWARD if 0 <= time < 2 * STEP else CENTRAL
     velocity, turning = np.zeros(3), np.zeros((3, 3))
     for steps, weight in weights.items():
         displacement, rotation = pose(motion, time + steps * STEP)

@@ -27,13 +27,14 @@ class Obstacle(Owner, ABC):
         rotation: rotation vector (3,) rad, about the center.
         motion: None, or a function of the time [s] that returns a displacement (3,) m, or (displacement (3,) m,
             rotation vector (3,) rad), in world axes. It must be smooth: its derivatives are taken from its values
-            within 2e-4 s before and after a time (4e-4 s after it at the start, never before time 0).
+            within 2e-4 s before and after a time (4e-4 s after it at the start, never before time 0). With gradients
+            by where it goes: center and rotation over time among the values of ms.simulate instead.
 
     `_core` is the shape in the C++ core; `_made_from` are the arguments a copy or another process makes it from again.
     """
 
     _core: core.Obstacle
-    _replaceable = ("center", "rotation")
+    _replaceable = _in_time = ("center", "rotation")
     _made_from: dict[str, Any]
 
     def __init__(
@@ -70,6 +71,12 @@ class Obstacle(Owner, ABC):
         Obstacle.__init__(
             other, **{"center": self.center, "rotation": self.rotation, **values}, motion=self.motion
         )
+        return other
+
+    def _on(self, path: Callable) -> Obstacle:
+        """The same body as its path has it: at a time, its center and its rotation."""
+        other = self.replaced(center=np.zeros(3), rotation=np.zeros(3))
+        other.motion = path
         return other
 
     def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:

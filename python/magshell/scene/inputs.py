@@ -17,7 +17,8 @@ from .values import Values
 
 
 class Leaf(NamedTuple):
-    """A tensor among the inputs that requires a gradient, and what it is: a value of `owner`, or the solve's own.
+    """A tensor among the inputs that requires a gradient, and what it is: a value of `owner`, or the solve's own; what has
+    `by_knots` is a value in time.
 
     refusal: why it gets none, which NoGradient says when it is asked for.
     """
@@ -86,9 +87,9 @@ class Inputs:
         """Those of the leaves."""
         return [leaf.tensor for leaf in self.leaves]
 
-    def take(self, name: str, value):
+    def take(self, name: str, value, owner=None):
         """The numbers of another input, which joins the leaves if it asks for a gradient."""
-        return self._numbers(name, value)
+        return self._numbers(name, value, owner)
 
     def refuse(self, name: str, tensor, why: str) -> None:
         """Where a tensor asks for a gradient that there is not, whoever takes gradients is told."""

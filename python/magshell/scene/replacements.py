@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from .._checks.quantity import quantity
+from .._machine.keywords import controls_of, nearest_first
 from ..bodies.shell import Shell
 from ..surroundings.loads import EdgeCouple
+from .courses import refuse_functions
 
 # Those of a scene's one body that have a keyword of their own.
 SHELL_NAMES = tuple(name for name in Shell._replaceable if name != "remanent_magnetization")
 
 
-def requested(scene, vertex_loads, values, moving: bool = False, **shell) -> dict[object, dict[str, object]]:
+def requested(
+    scene, vertex_loads, values, moving: bool = False, in_time: bool = False, **shell
+) -> dict[object, dict[str, object]]:
     """{object of the scene: {name: value}} from a solve's arguments. Raises ValueError on what has no place.
 
-    moving: the scene has inertia in this solve.
+    moving: the scene has inertia in this solve; in_time: values may change during it.
     """
     asked: dict[object, dict[str, object]] = {}
     if values is not None and not isinstance(values, dict):
@@ -22,6 +26,9 @@ def requested(scene, vertex_loads, values, moving: bool = False, **shell) -> dic
         )
     for owner, named in (values or {}).items():
         _check(scene, owner, named)
+        for name, value in named.items():
+            if not in_time:
+                refuse_functions(owner, name, value, in_time)
         asked[owner] = dict(named)
     for name, value in shell.items():
         if value is not None:
@@ -60,10 +67,12 @@ def _check(scene, owner, named) -> None:
         raise ValueError(f"values has a key that is not the scene, nor an object of it: {owner!r}")
     if not isinstance(named, dict):
         raise ValueError(f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}")
-    names = getattr(owner, "_replaceable", ())
+    names = (*getattr(owner, "_replaceable", ()), *controls_of(owner, scene))
     for name in named:
+        if name in controls_of(owner, scene):  # a solve that has it has taken it already
+            raise ValueError(f"{name} of the scene has no part in this solve: leave it out of values")
         if name not in names:
-            what = f"it has {', '.join(names)}" if names else "it has none that can be"
+            what = f"it has {nearest_first(name, names)}" if names else "it has none that can be"
             raise ValueError(
                 f"{type(owner).__name__} has no value {name!r} to be replaced in a solve: {what}"
             )

@@ -172,7 +172,7 @@ class Scene:
             loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
             contacts=contact_inputs(self.contacts, bodies),
-            obstacles=[{"shape": each._core, "moves": each.motion is not None} for each in self.obstacles],
+            obstacles=[each._core for each in self.obstacles],
             water=None if self.water is None else self.water._core,
         )
         self._value_layout = Layout(self._model.parameters)

@@ -123,6 +123,10 @@ class Values:
         """An object of the scene as it is in this solve."""
         return self._now.get(item, item)
 
+    def move(self, obstacle, path) -> None:
+        """Has an obstacle, whose own place is the origin in `numbers`, follow a path."""
+        self._now[obstacle] = obstacle._on(path)
+
     def _moved(self) -> Constraints:
         """The same constraints with other moves."""
         scene = self.scene
@@ -152,11 +156,19 @@ class Gradient:
     def value(self, owner: str, name: str) -> np.ndarray:
         return self._scene._value_layout.of(self._values, owner, name)
 
+    def control(self, owner: str, name: str) -> np.ndarray:
+        """By a control, (knots, rows, width) of a motion."""
+        return self._scene._control_layout.of(self._controls, owner, name)
+
+    def of_controls(self, place: slice) -> np.ndarray:
+        """By what stands there in the vectors of controls."""
+        return self._controls[..., place]
+
     def own(self, name: str) -> np.ndarray:
         """By what a solve itself was given: a control, or one of the others."""
         if name in self.others:
             return self.others[name]
         if name == "remanent_magnetization":
             return joined([self.value(f"body {k}", name) for k in range(len(self._scene.bodies))])
-        by_control = self._scene._control_layout.of(self._controls, "scene", name)
+        by_control = self.control("scene", name)
         return by_control[..., 0, :] if name == "applied_flux_density" else by_control[..., 0]

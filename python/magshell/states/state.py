@@ -104,7 +104,7 @@ def states_of(
     if is_result and not isinstance(what, Equilibria):
         own = _held_by(what)
         merged = {name: own.get(name) if value is None else value for name, value in given.items()}
-        merged = _with_own(merged, what.scene)
+        merged = _with_own(merged, what.scene, getattr(what, "_obstacles", None))
         states = _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
@@ -226,10 +226,11 @@ def _flux_densities(values, count: int) -> list[np.ndarray | None]:
     return list(np.broadcast_to(array, (count, 3)))
 
 
-def _with_own(given: dict[str, Any], scene: Scene) -> dict[str, Any]:
-    """With the scene's obstacles and its bodies' magnetization, unless others are given."""
+def _with_own(given: dict[str, Any], scene: Scene, obstacles=None) -> dict[str, Any]:
+    """With the scene's obstacles, as a solve has placed them, and its bodies' magnetization, unless others are given."""
     given = _magnetized(given, scene.bodies)
-    return {**given, "obstacles": scene.obstacles} if given["obstacles"] is None else given
+    placed = scene.obstacles if obstacles is None else obstacles
+    return {**given, "obstacles": placed} if given["obstacles"] is None else given
 
 
 def _magnetized(given: dict[str, Any], bodies) -> dict[str, Any]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .._checks.quantity import shape_of
+from .._machine.keywords import FACTORS
 from ..errors import DesignRejected, Interrupted, NotConverged
 from ..scene.scene import Scene
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
-from .search import FACTORS, Search, find
+from .search import Search, find
 
 _DIMENSIONS = {"applied_flux_density": 1, **dict.fromkeys(FACTORS, 0)}  # of one case
 

@@ -77,6 +77,11 @@ class Equilibrium:
         return self.positions - self.positions.new_tensor(np.array(rest))
 
     @property
+    def _obstacles(self) -> tuple:
+        """Of the scene, where they were."""
+        return tuple(self._values.current(each) for each in self.scene.obstacles)
+
+    @property
     def energy(self) -> float:
         """The potential energy, J."""
         return sum(self.energies.values())

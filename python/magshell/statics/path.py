@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,7 +21,9 @@ from ..errors import Interrupted, NotConverged
 from ..mesh.crossings import told
 from ..methods.solvers import MixedNewton, Newton
 from ..scene.inputs import Inputs
+from ..scene.replacements import requested
 from ..scene.scene import Scene
+from .along_path import AlongPath
 from .equilibrium import Equilibrium
 from .search import solve
 from .start import starting_point
@@ -68,6 +71,7 @@ class Path:
     reason: str
     _points: list = field(repr=False)
     _inputs: Inputs = field(repr=False)
+    _moving: AlongPath = field(repr=False)
     _from: Any = field(repr=False)
     _to: Any = field(repr=False)
 
@@ -78,7 +82,9 @@ class Path:
         options = MixedNewton()._options()
         options.require_stable = False
         point = self._points[index]
-        return solve(self._inputs, point.state, point.turns, controls, controls, options).equilibrium
+        inputs = copy.copy(self._inputs)
+        inputs.values = self._moving.values(self.parameters[index])
+        return solve(inputs, point.state, point.turns, controls, controls, options).equilibrium
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face at one of the points, by default the last."""
@@ -133,6 +139,7 @@ def follow(
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
+    values: dict | None = None,
     start: Equilibrium | None = None,
     until: Callable[[float, np.ndarray], bool] | None = None,
     first_step: float = 0.05,
@@ -148,6 +155,9 @@ def follow(
     The path parameter is 0 at the controls of `start` (an Equilibrium of this scene; by default the rest shape,
     unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
     parameter passes 1 or `lowest_parameter`, or where until(parameter, positions) says so. Controls as in ms.equilibrium.
+
+    values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, those
+        move along the path, on straight lines from the start's to these; everything else has to be the same.
 
     first_step: of the parameter. largest_step: root mean square displacement between points, over the mesh's size.
     locate_critical: find limit points and bifurcations between points whose numbers of unstable directions differ.
@@ -183,16 +193,14 @@ def follow(
         scene,
         remanent_magnetization,
         applied_flux_density,
+        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,
         motion_factor=motion_factor,
     )
-    state, turns, from_, at_rest = starting_point(scene, start, inputs)
-    if not at_rest:
-        raise ValueError(
-            "start must have the same remanent_magnetization, and the values of the scene, as the path"
-        )
+    state, turns, from_, _ = starting_point(scene, start, inputs)
+    moving = AlongPath(inputs, start)
     options = _core.PathOptions()
     options.newton = solver._newton_options()
     options.first_step, options.largest_step = first_step, largest_step
@@ -202,10 +210,18 @@ def follow(
     began = time.perf_counter()
     with inputs.in_core(), progress_bar("path", 1.0, shown=progress, delay=2.0, bar_format=_BAR) as bar:
         found = _core.follow_path(
-            scene._model, state, turns, from_, inputs.controls, options, until, _advance(bar)
+            scene._model,
+            state,
+            turns,
+            np.concatenate([from_, moving.before]),
+            np.concatenate([inputs.controls, moving.after]),
+            options,
+            moving.entries,
+            until,
+            _advance(bar),
         )
         bending = _bending_energies(scene, found, inputs.controls)
-    path = _path(inputs, found, from_, time.perf_counter() - began)
+    path = _path(inputs, moving, found, from_, time.perf_counter() - began)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {len(path)} points of the path", path)
     if found.outcome == _core.Outcome.failed:
@@ -242,7 +258,7 @@ def _advance(bar):
     return advance
 
 
-def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
+def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> Path:
     scene = inputs.scene
     model = scene._model
     points = found.points
@@ -266,6 +282,7 @@ def _path(inputs: Inputs, found, from_, wall_time: float) -> Path:
         reason=found.reason,
         _points=points,
         _inputs=inputs,
+        _moving=moving,
         _from=from_,
         _to=inputs.controls,
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import _core
 from .._checks.tensors import dtype_like, is_tensor, like
+from .._machine.keywords import FACTORS
 from ..adjoint.static import Adjoint
 from ..bodies.caps import warn_of_caps
 from ..bodies.strains import Largest, largest_of, warn_if_large
@@ -22,8 +23,6 @@ from ..scene.scene import Scene
 from .diagnosis import why_not
 from .equilibrium import Equilibrium
 from .start import starting_point
-
-FACTORS = ("load_factor", "gravity_factor", "field_factor", "motion_factor")
 
 
 class Solution(NamedTuple):

@@ -47,9 +47,10 @@ def equilibrium(
     vertex_loads: N, (n_v, 3): stand in for all forces of the scene's loads.
     values: {object of the scene: {name: value}}, stand in for what the objects were made with: the values of loads, the
         displacement, rotation and center of supports that move, positions and moments of Dipoles, the sizes,
-        magnetization, center and rotation of a magnet, the flux_density of a SampledField, the law of a Contact, the
-        center and rotation of an obstacle, the numbers of Water, and {scene: {"gravity": value}}. The scene is
-        not analysed again. `scene.objects` lists the objects.
+        magnetization, center and rotation of a magnet, the flux_density of a SampledField, the center and rotation of a
+        PlacedField, the law of a Contact, the center and rotation of an obstacle, the numbers of Water, and
+        {scene: {"gravity": value}}. Of applied_flux_density and the factors, the keywords are short forms of
+        {scene: {name: value}}. The scene is not analysed again. `scene.objects` lists the objects.
     start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
         (n_v, 3) m. By default the rest shape, unloaded. Load cases may have Equilibria, one each.
     require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.

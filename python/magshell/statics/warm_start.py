@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._checks.tensors import require_torch
+from .._machine.keywords import CONTROLS, as_keywords
 from ..errors import EquilibriumJumped, Interrupted, NotConverged
 from ..methods.solvers import MixedNewton, Newton
 from ..scene.scene import Scene
@@ -68,6 +69,7 @@ class WarmStart:
 
     def __call__(self, **design) -> Equilibrium | Equilibria:
         """The equilibrium, or equilibria, of a design: the arguments of ms.equilibrium."""
+        design = as_keywords(self.scene, design, CONTROLS)
         cases = split(design)
         self._check(cases)
         starts = starts_of(self._start, len(cases or [design]))

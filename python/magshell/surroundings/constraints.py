@@ -27,7 +27,7 @@ def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints
     """All supports of a scene as one. `free_directions` (k, 3) are appended to the directions, held and still."""
     moves: list[RigidMove] = []
     mesh, places = bodies.mesh, [(s, bodies.of(s)) for s in supports]
-    nodes, frames = _held_vertices(bodies, [h for s, span in places for h in _held(s, span, bodies)], moves)
+    nodes, frames = _held_vertices(bodies, [h for s, span in places for h in held_by(s, span, bodies)], moves)
     pairs, directions, direction_moves = _directed_edges(
         [d for s, span in places for d in _directed(s, span)], moves
     )
@@ -45,7 +45,16 @@ def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints
     )
 
 
-def _held(support, span: Span, bodies: Bodies) -> list[Held]:
+def check_shared(bodies: Bodies, supports, vertices: np.ndarray) -> None:
+    """Raises ValueError where supports disagree on where one of these vertices of the scene is."""
+    found = []
+    for held in (h for s in supports for h in held_by(s, bodies.of(s), bodies)):
+        some = np.isin(held.vertices, vertices)
+        found.append(held._replace(vertices=held.vertices[some], directions=held.directions[some]))
+    _held_vertices(bodies, found, [])
+
+
+def held_by(support, span: Span, bodies: Bodies) -> list[Held]:
     """With the scene's vertices."""
     return [
         held._replace(vertices=bodies.original[held.vertices + span.first_vertex])

@@ -28,15 +28,9 @@ def contact_inputs(contacts, bodies) -> list[dict]:
     return inputs
 
 
-def poses(obstacles, times: np.ndarray) -> np.ndarray:
-    """Displacements, rotation vectors, velocities and spins at these times, (len(times), n, 4, 3); empty if none moves."""
-    if all(each.motion is None for each in obstacles):
-        return np.zeros(0)
-    rows = np.empty((len(times), len(obstacles), 4, 3))
-    for k, time in enumerate(times):
-        for n, each in enumerate(obstacles):
-            rows[k, n, :2], rows[k, n, 2:] = each.pose(time), each.rates(time)
-    return rows
+def poses(obstacle, times: np.ndarray) -> np.ndarray:
+    """Displacements, rotation vectors, velocities and spins of a moving one at these times, (len(times), 4, 3)."""
+    return np.array([(*obstacle.pose(time), *obstacle.rates(time)) for time in times]).reshape(-1, 4, 3)
 
 
 LARGEST_SMOOTH_TURN = (

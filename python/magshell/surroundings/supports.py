@@ -91,7 +91,7 @@ class Pin(Support):
     Pin(2 vertices, components z, moved)
     """
 
-    _replaceable = ("displacement", "rotation", "center")
+    _replaceable = _in_time = ("displacement", "rotation", "center")
 
     def __init__(
         self,
@@ -144,7 +144,7 @@ class Clamp(Support):
     Clamp(2 edges)
     """
 
-    _replaceable = ("displacement", "rotation", "center")
+    _replaceable = _in_time = ("displacement", "rotation", "center")
 
     def __init__(self, edges, *, displacement=None, rotation=None, center=None, body: Shell | None = None):
         self.body = checked_body(body)

@@ -1,0 +1,43 @@
+// A field that was put somewhere: it is given in a frame of its own, x = center + R(rotation) y.
+//
+//   B(x) = R B_own(R^T (x - center))
+//
+// The samples of the field itself say how that changes with its place, whatever kind it is.
+#pragma once
+
+#include "magshell/field/applied_field.h"
+
+namespace magshell {
+
+class PlacedField final : public AppliedField {
+  public:
+    PlacedField(std::shared_ptr<const AppliedField> field, const Vec3& center, const Vec3& rotation);
+
+    std::string_view name() const override { return field_->name(); }
+    void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
+                     FieldSamples& out) const override;
+
+    /// The field's own, and then center and rotation.
+    std::vector<FieldParameter> parameters() const override;
+    std::shared_ptr<AppliedField> clone() const override;
+    void set_values(std::span<const double> values) override;
+    void add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
+                 std::span<double> out) const override;
+
+    bool needs_gil() const override { return field_->needs_gil(); }
+
+  private:
+    void place(const Vec3& center, const Vec3& rotation);
+    std::vector<Vec3> own_points(std::span<const Vec3> points) const;
+    std::vector<Vec3> own_axes(std::span<const Vec3> vectors) const;
+
+    std::shared_ptr<const AppliedField> field_;
+    std::shared_ptr<AppliedField> own_;  // the same one, where it has values that are this one's
+    std::size_t n_own_ = 0;              // how many numbers those are
+    std::vector<double> last_;           // those that it has; splines through a grid cost more than a place
+    Vec3 center_, rotation_;
+    Mat3 turn_;
+    bool moved_ = false;
+};
+
+}  // namespace magshell

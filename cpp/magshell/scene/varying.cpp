@@ -1,0 +1,42 @@
+#include "magshell/scene/varying.h"
+
+#include "magshell/core/errors.h"
+
+namespace magshell {
+
+Varying::Varying(const Registry& registry, const std::vector<Index>& entries)
+    : first_(registry.controls.size()) {
+    for (const Index k : entries) {
+        if (k < 0 || k >= static_cast<Index>(registry.values.entries().size()))
+            throw InvalidInput("the scene has no value of number " + std::to_string(k));
+        const Parameters::Entry& entry = registry.values.entries()[k];
+        if (entry.order) throw InvalidInput(entry.name + " of " + entry.owner + " cannot vary in a solve");
+        slots_.push_back(entry.slot);
+        size_ += entry.slot.size();
+    }
+}
+
+bool Varying::take(const Controls& controls, VectorXd& values) const {
+    bool changed = false;
+    Index from = first_;
+    for (const Slot& slot : slots_) {
+        const auto now = controls.segment(from, slot.size());
+        if (values.segment(slot.first, slot.size()) != now) {
+            values.segment(slot.first, slot.size()) = now;
+            changed = true;
+        }
+        from += slot.size();
+    }
+    return changed;
+}
+
+void Varying::move_gradient(Gradient& gradient) const {
+    Index to = first_;
+    for (const Slot& slot : slots_) {
+        gradient.controls.segment(to, slot.size()) += gradient.values.segment(slot.first, slot.size());
+        gradient.values.segment(slot.first, slot.size()).setZero();
+        to += slot.size();
+    }
+}
+
+}  // namespace magshell

@@ -1,0 +1,59 @@
+"""What `values` may say of a solve itself, and the keywords that are short forms of it: controls, damping."""
+
+from __future__ import annotations
+
+from difflib import SequenceMatcher
+
+FLUX_DENSITY = "applied_flux_density"
+FACTORS = ("load_factor", "gravity_factor", "field_factor", "motion_factor")
+CONTROLS = (FLUX_DENSITY, *FACTORS)
+OF_MOTION = (
+    "damping",
+    "stiffness_damping",
+    "maxwell_modulus",
+    "maxwell_time",
+)  # which ms.simulate has beside them
+
+
+def controls_of(owner, scene) -> tuple[str, ...]:
+    """What an object has that is no value in the core: all belongs to the scene, its uniform field's to that as well."""
+    if owner is scene:
+        return (*CONTROLS, *OF_MOTION)
+    return (FLUX_DENSITY,) if getattr(owner, "_is_uniform", False) else ()
+
+
+def as_keywords(scene, named: dict, known) -> dict:
+    """The keywords of a solve with what `values` say of it among them, as far as it has such a keyword (`known`).
+
+    Raises ValueError where one is given twice. What else is wrong with `values` is told where they are checked.
+    """
+    values = named.get("values")
+    if not isinstance(values, dict):
+        return named
+    kept, controls = {}, {}
+    for owner, of_owner in values.items():
+        its_own = controls_of(owner, scene) if any(owner is each for each in (scene, *_fields(scene))) else ()
+        if not isinstance(of_owner, dict) or not its_own:
+            kept[owner] = of_owner
+            continue
+        rest = dict(of_owner)
+        for name in its_own:
+            if name not in of_owner or name not in known:
+                continue
+            if named.get(name) is not None:
+                raise ValueError(f"{name} was given twice: as an argument and in values")
+            if name in controls:
+                raise ValueError(f"{name} was given twice in values: of the scene and of its UniformField")
+            controls[name] = rest.pop(name)
+        if rest or not of_owner:
+            kept[owner] = rest
+    return {**named, **controls, "values": kept or None}
+
+
+def nearest_first(name, names) -> str:
+    """The names that there are, the one most like `name` in front."""
+    return ", ".join(sorted(names, key=lambda each: -SequenceMatcher(None, str(name), each).ratio()))
+
+
+def _fields(scene) -> tuple:
+    return tuple(getattr(scene, "fields", ()))

@@ -1,0 +1,105 @@
+"""Values of a scene's objects over the time of a motion: arrays at the ends of steps, and functions of the time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._checks.quantity import shape_of
+from .._machine.keywords import nearest_first
+from ..fields.field import AppliedField
+from ..obstacles import Obstacle
+
+
+@dataclass(frozen=True)
+class Course:
+    """A value as a caller gives it over time. row: its shape at one time."""
+
+    owner: Any
+    name: str
+    unit: str
+    value: Any
+    row: tuple[int, ...]
+
+    def check(self, steps: int) -> None:
+        """Raises ValueError unless it is a function, or numbers for every end of a step; fields may change at once."""
+        if callable(self.value):
+            return
+        shape = shape_of(self._label, self.value)
+        if shape == self.row:
+            return
+        allowed = {"(steps + 1, ...)": (steps + 1, *self.row)}
+        if isinstance(self.owner, AppliedField):
+            allowed["(steps, ...)"] = (steps, *self.row)
+        if shape not in allowed.values():
+            wanted = " or ".join(f"{name} = {each}" for name, each in allowed.items())
+            why = ", as one a step would have it jump" if shape == (steps, *self.row) else ""
+            raise ValueError(
+                f"{self._label} must have shape {self.row}, or {wanted} to move in time{why}, or be a function of the "
+                f"time; got {shape}"
+            )
+
+    @property
+    def _label(self) -> str:
+        return f"{self.name} [{self.unit}] of {type(self.owner).__name__}"
+
+
+_UNITS = {
+    "positions": "m",
+    "moments": "A m^2",
+    "remanent_magnetization": "A/m",
+    "center": "m",
+    "rotation": "rad",
+    "displacement": "m",
+}
+
+
+def over_time(scene, replaced: dict[object, dict]) -> tuple[dict[object, dict], list[Course]]:
+    """What of the values of a solve is the same all the time, and what is not. Raises ValueError on what cannot change."""
+    still: dict[object, dict] = {}
+    courses: list[Course] = []
+    for owner, named in replaced.items():
+        for name, value in named.items():
+            row = _row(owner, name)
+            if row is not None and (callable(value) or len(shape_of(name, value)) == len(row) + 1):
+                courses.append(Course(owner, name, _UNITS[name], value, row))
+                continue
+            refuse_functions(owner, name, value, in_time=True)
+            still.setdefault(owner, {})[name] = value
+    for owner in [each for each in scene.objects if any(course.owner is each for course in courses)]:
+        if getattr(owner, "motion", None) is not None:
+            raise ValueError(
+                f"{owner!r} moves by its motion: give its center and rotation over time, or a motion, not both"
+            )
+        if isinstance(owner, AppliedField):
+            continue
+        constant = still.pop(owner, {})  # of its place: the same all the time
+        courses += [Course(owner, name, _UNITS[name], value, (3,)) for name, value in constant.items()]
+        if isinstance(owner, Obstacle):
+            still[owner] = {"center": np.zeros(3), "rotation": np.zeros(3)}  # all of its place is on its path
+    return still, courses
+
+
+def refuse_functions(owner, name: str, value, in_time: bool) -> None:
+    """Raises ValueError on a function where there must be numbers."""
+    if not callable(value):
+        return
+    kind, can = type(owner).__name__, names_in_time(owner)
+    if not in_time:
+        raise ValueError(
+            f"{name} of {kind} is a function; only ms.simulate takes functions, of the time: give numbers"
+        )
+    what = f"{nearest_first(name, can)} can" if can else "nothing of it can"
+    raise ValueError(f"{name} of {kind} cannot change during a motion ({what}): give numbers")
+
+
+def _row(owner, name: str) -> tuple[int, ...] | None:
+    """The shape of a value that may change during a motion, at one time."""
+    return np.shape(getattr(owner, name, np.zeros(3))) if name in names_in_time(owner) else None
+
+
+def names_in_time(owner) -> tuple[str, ...]:
+    """The values of an object that may change during a motion."""
+    return getattr(owner, "_in_time", ())

@@ -1,0 +1,80 @@
+"""Values that move along a path of equilibria: on straight lines from those of its start to those that were asked for."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+
+from ..scene.courses import names_in_time
+from ..scene.inputs import Inputs
+from ..scene.values import Values
+from ..surroundings.supports import Support
+
+
+class AlongPath:
+    """What of the values at `start` (an Equilibrium, or None: nothing) is elsewhere at the end of the path.
+
+    entries: of the core's values, those that vary; before, after: their numbers, which follow the other controls.
+    Raises ValueError where anything differs that cannot move.
+    """
+
+    def __init__(self, inputs: Inputs, start):
+        self._layout = inputs.scene._value_layout
+        self._after = inputs.values
+        self._before = inputs.values if start is None else start._values
+        differ = [
+            key
+            for key in self._layout
+            if not np.array_equal(self._part(self._before, key), self._part(self._after, key))
+        ]
+        can = _keys_that_move(inputs)
+        if fixed := [name for owner, name in differ if (owner, name) not in can]:
+            raise ValueError(
+                f"start has another {fixed[0]} than the path, which cannot change on its way; what can is the place of "
+                "field sources, obstacles and supports"
+            )
+        every = list(self._layout)
+        self.entries = [every.index(key) for key in differ]
+        self._owners = {id(can[key]): can[key] for key in differ}
+        self.before, self.after = (
+            np.concatenate([np.zeros(0), *(self._part(values, key).ravel() for key in differ)])
+            for values in (self._before, self._after)
+        )
+
+    def values(self, parameter: float) -> Values:
+        """Those of the scene there."""
+        if not self.entries or parameter == 1.0:
+            return self._after
+        there = copy.copy(self._after)
+        there.numbers = (1.0 - parameter) * self._before.numbers + parameter * self._after.numbers
+        there._now = dict(self._after._now)
+        for owner in self._owners.values():
+            ends = [values.current(owner) for values in (self._before, self._after)]
+            there._now[owner] = _between(*ends, parameter)
+        if any(isinstance(owner, Support) for owner in self._owners.values()):
+            there.constraints = there._moved()
+        return there
+
+    def _part(self, values: Values, key: tuple[str, str]) -> np.ndarray:
+        return self._layout.of(values.numbers, *key)
+
+
+def _keys_that_move(inputs: Inputs) -> dict[tuple[str, str], object]:
+    """{(the core's name for an object, name of a value): the object} of all that can move."""
+    scene = inputs.scene
+    can = {(label, name): each for each, label in scene._labels for name in names_in_time(each)}
+    for k, move in enumerate(scene._constraints.moves):
+        can |= {(f"move {k}", name): move.support for name in names_in_time(move.support)}
+    return can
+
+
+def _between(before, after, parameter: float):
+    """The object with its place between two."""
+    at = [each._move.as_arguments() if isinstance(each, Support) else vars(each) for each in (before, after)]
+    named = {}
+    for name in names_in_time(after):
+        ends = [np.zeros(3) if each[name] is None and name != "center" else each[name] for each in at]
+        if all(end is not None for end in ends):
+            named[name] = (1.0 - parameter) * ends[0] + parameter * ends[1]
+    return after.replaced(**named)
