@@ -3,83 +3,33 @@
 from functools import cache
 
 import numpy as np
-import pytest
+from gradient_kinds_bodies import (
+    rigid_at_rest,
+    rigid_in_motion,
+    tied,
+    two_sheets_at_rest,
+    two_sheets_in_motion,
+)
 from gradient_scenes import Kind
+from gradient_world import (
+    BEGIN,
+    EXACT,
+    FACTORS,
+    IN_TIME,
+    MIDDLE,
+    REACH,
+    RNG,
+    STEPS,
+    UNDER,
+    VISCOUS,
+    torch,
+    under,
+)
 from test_adjoint import BENDINGS, DEFAULTS, DIPOLES, MAGNETIZATION, MESH, N_V, everything
 
 import magshell as ms
 from magshell import obstacles as ob
 from magshell.surroundings.supports import rotation_matrix
-
-torch = pytest.importorskip("torch")
-
-RNG = np.random.default_rng(17)
-EXACT = {"solver": ms.MixedNewton(tolerance=1e-13)}
-STEPS = 4
-FACTORS = {"load_factor": 0.9, "gravity_factor": 0.8, "field_factor": 1.1, "motion_factor": 0.7}
-# Of values that may be zero: m, rad, m/s.
-REACH = {
-    "center": 1e-3,
-    "rotation": 0.3,
-    "displacement": 1e-3,
-    "velocity": 0.1,
-    "velocities": 0.1,
-    "start": 1e-3,
-}
-VISCOUS = {
-    "damping": RNG.uniform(1e-3, 2e-3, N_V),
-    "stiffness_damping": 2e-3,
-    "maxwell_modulus": 0.5,
-    "maxwell_time": 4e-3,
-}
-IN_TIME = {
-    "applied_flux_density": np.array((1e-3, -2e-3, 3e-3)) * RNG.uniform(0.5, 1.5, (STEPS + 1, 3)),
-    "load_factor": RNG.uniform(0, 1, STEPS),
-    "field_factor": RNG.uniform(0.5, 1, STEPS + 1),
-    "motion_factor": np.linspace(0, 0.7, STEPS + 1),
-    "gravity_factor": 0.8,
-    "remanent_magnetization": MAGNETIZATION,
-}
-BEGIN = {
-    "start": MESH.rest_positions + 1e-4 * RNG.standard_normal((N_V, 3)),
-    "velocities": 0.1 * RNG.standard_normal((N_V, 3)),
-    "time_step": 3e-3,
-}
-MIDDLE = np.array([0.07, 0.03, 0.0])
-CURVE = np.linspace(-0.06, 0.06, 5)[:, None] * (0, 1, 0) + 4e-3 * np.linspace(-1, 1, 5)[:, None] ** 2 * (
-    1,
-    0,
-    0,
-)
-GRID = np.linspace(-0.1, 0.1, 9)
-UNDER = {  # every obstacle, its highest point at the middle of its own frame
-    ob.Plane: lambda **place: ob.Plane((-0.02, 0.01, 1.0), **place),
-    ob.Sphere: lambda **place: ob.Sphere(0.06, **_lowered(place, 0.06)),
-    ob.Box: lambda **place: ob.Box((0.06, 0.09, 0.04), rounding=0.015, **_lowered(place, 0.02)),
-    ob.Capsule: lambda **place: ob.Capsule(
-        [[0.0, -0.03, 0.0], [0.01, 0.03, 0.0]], 0.04, **_lowered(place, 0.04)
-    ),
-    ob.Tube: lambda **place: ob.Tube(CURVE, 0.03, inside=False, **_lowered(place, 0.03)),
-    ob.HeightField: lambda **place: ob.HeightField(
-        GRID, GRID, 1e-3 * np.sin(40 * GRID)[:, None] * np.cos(30 * GRID), **place
-    ),
-    ob.MeshObstacle: lambda **place: ob.MeshObstacle(_ball(), resolution=16, **_lowered(place, 0.06)),
-}
-
-
-def _lowered(place: dict, by: float) -> dict:
-    return {**place, "center": np.array(place["center"]) - np.array([0, 0, by])}
-
-
-@cache
-def _ball():
-    return ms.meshes.spherical_cap(0.06, 0.0, np.pi, cells=(24, 12))
-
-
-def under(shape, height: float, **place):
-    """An obstacle of this class, its highest point so far above the sheet's rest plane."""
-    center = MIDDLE + np.array([0, 0, height])
-    return UNDER[shape](**{"center": center, "rotation": (0.01, -0.02, 0.1), **place})
 
 
 def resting_on(shape, bending="midedge", step=1e-5, **contact) -> Kind:
@@ -248,51 +198,6 @@ def in_a_corner() -> Kind:
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)
 
 
-CORNER = np.flatnonzero(MESH.rest_positions[:, 0] > 0.05)[[1, 3, 4]]  # a triangle: one inside, two at the end
-
-
-def with_rigid_parts(free: bool, **own):
-    """A clamped sheet that carries a magnet, and a magnetized top beside it. own: of the magnet."""
-    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
-    carried = {
-        "mass": 3e-3,
-        "inertia": np.array([1.2e-6, 0.9e-6, 1.5e-6]),
-        "center": MESH.rest_positions[CORNER].mean(axis=0) + np.array([1e-3, 2e-3, 4e-3]),
-        "magnetic_moment": (4e-3, 2e-3, 1e-2),
-    }
-    parts = [ms.Rigid(CORNER, **{**carried, **own})]
-    if free:
-        spin = {"velocity": (0.01, -0.02, 0.1), "angular_velocity": (3.0, 40.0, -5.0)}
-        place = {"center": (0.05, 0.03, 0.04), "magnetic_moment": (2e-3, 1e-3, -1e-3)}
-        parts.append(ms.Rigid(mass=2e-3, inertia=(0.7e-6, 1.0e-6, 1.4e-6), **place, **spin))
-    return ms.Scene(
-        [sheet, *parts],
-        supports=[ms.Clamp(MESH.edges_at(x=0.0))],
-        loads=[ms.PointLoad(MESH.vertices_at(x=0.1), (0.0, 1e-3, 2e-3))],
-        field=[ms.UniformField(), DIPOLES],
-        gravity=(0.1, 0.2, -2.0),
-        allow_rigid_motions=free,
-    )
-
-
-def rigid_at_rest() -> Kind:
-    scene = with_rigid_parts(False)
-    return Kind(scene, {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=REACH)
-
-
-def rigid_in_motion(integrator, own=None, **options) -> Kind:
-    scene = with_rigid_parts(True, **(own or {}))
-    turning = np.cross([2.0, 5.0, -1.0], MESH.rest_positions - MIDDLE)
-    moves = np.array([0.02, 0.01, -0.1]) + turning + 0.05 * RNG.standard_normal((N_V, 3))
-    moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
-    begin = MESH.rest_positions + 1e-4 * RNG.standard_normal((N_V, 3))
-    begin[CORNER] = MESH.rest_positions[CORNER] + (1e-4, 2e-4, 1e-4)
-    controls = {**IN_TIME, "start": begin, "velocities": moves, "time_step": 3e-3}
-    fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
-    reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
-
-
 def swaying(t):
     return np.array([0.02 * t, 0.04 * t, 2e-4 * np.sin(40 * t)]), np.array([0.3 * t, 0.2 * t, 0.5 * t])
 
@@ -309,138 +214,6 @@ def let_go() -> Kind:
     controls = {name: IN_TIME[name] for name in ("remanent_magnetization", "applied_flux_density")}
     fixed = {**EXACT, "steps": STEPS, "time_step": 2e-3, "progress": False}
     return Kind(everything(), controls, ms.simulate, from_an_equilibrium, fixed, 1e-5, REACH)
-
-
-def two_sheets():
-    """Of different bending, each with its own magnetization."""
-    mesh = MESH.transformed(translation=(0.01, 0.09, 4e-4))
-    sheet = ms.Shell(
-        MESH,
-        thickness=1e-3,
-        young_modulus=1e6,
-        poisson_ratio=0.4,
-        mass_density=1e3,
-        remanent_magnetization=RNG.uniform(-2e4, 2e4, (MESH.n_faces, 3)),
-    )
-    other = ms.Shell(
-        mesh,
-        thickness=RNG.uniform(1.1e-3, 1.4e-3, mesh.n_faces),
-        young_modulus=2e6,
-        poisson_ratio=0.3,
-        mass_density=600.0,
-        bending="hinge",
-        remanent_magnetization=(1e4, 3e3, -1e4),
-    )
-    return sheet, other
-
-
-def two_sheets_at_rest() -> Kind:
-    """One floor under both, and loads on each."""
-    sheet, other = two_sheets()
-    mesh = other.mesh
-    supports = [
-        ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0), body=sheet),
-        ms.Clamp(mesh.edges_at(x=0.01), displacement=(1e-4, 0, 5e-4), rotation=(0, 0.1, 0.05), body=other),
-    ]
-    loads = [
-        ms.EdgeCouple(mesh.edges_at(x=0.11), 2e-4, body=other),
-        ms.EdgeCouple(MESH.edges_at(x=0.1), (0, 3e-4, 0), body=sheet),
-        ms.PointLoad(mesh.vertices_at(x=0.11), (1e-4, 2e-4, -2e-4), body=other),
-        ms.EdgeLoad(MESH.edges_at(x=0.1), (0, 1e-2, -1e-2), body=sheet),
-        ms.AreaLoad((0.1, 0, 0.2)),
-        ms.SurfaceTension(RNG.uniform(0.1, 0.2, 3), faces=[1, 4, 7], body=other),
-    ]
-    floor = ms.Contact(under(ob.Plane, -3e-3, rotation=(0.02, 0.01, 0)), contact_stiffness=5.0, offset=1e-3)
-    scene = ms.Scene(
-        [sheet, other],
-        supports=supports,
-        loads=loads,
-        contacts=[floor],
-        field=[ms.UniformField(), DIPOLES],
-        gravity=(0.2, 0.1, -9.81),
-    )
-    controls = {**FACTORS, "applied_flux_density": (1e-3, -5e-4, 2e-3)}
-    return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
-
-
-def two_sheets_in_motion() -> Kind:
-    """In water, and one of them onto a ball on which it rubs."""
-    sheet, other = two_sheets()
-    ball = under(ob.Sphere, -1e-3)
-    rubbing = ms.Contact(ball, contact_stiffness=50.0, offset=1e-4, friction_coefficient=0.4, body=sheet)
-    scene = ms.Scene(
-        [sheet, other],
-        supports=[ms.Clamp(other.mesh.edges_at(x=0.01), rotation=(0, 0.1, 0), body=other)],
-        loads=[ms.SurfaceTension(0.3, body=sheet)],
-        contacts=[rubbing],
-        field=ms.UniformField(),
-        gravity=(0, 0.3, -9.81),
-        water=ms.Water(800.0, (0.05, -0.02, 0.01), added_mass=0.6),
-        allow_rigid_motions=True,
-    )
-    n_v = scene.mesh.n_vertices
-    controls = {
-        "applied_flux_density": (1e-3, 0.0, 4e-3),
-        "motion_factor": np.linspace(0, 0.7, 7),
-        "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * RNG.standard_normal((n_v, 3)),
-        "damping": RNG.uniform(1e-4, 2e-4, n_v),
-        "stiffness_damping": 1e-3,
-        "time_step": 2e-3,
-    }
-    reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
-    fixed = {**EXACT, "steps": 6, "integrator": ms.SDIRK2(), "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
-
-
-def tied(moves: bool) -> Kind:
-    """A patch on a sheet, of two bendings and magnetizations, in a field; loads and supports on both."""
-    sheet = two_sheets()[0]
-    patch = ms.Shell(
-        sheet.mesh,
-        thickness=3e-4,
-        young_modulus=1e6,
-        poisson_ratio=0.3,
-        mass_density=2e3,
-        bending="hinge",
-        remanent_magnetization=(1e4, -5e3, 2e4),
-    )
-    tail = ms.Shell(
-        sheet.mesh.transformed(translation=(0.1, 0, 0)),
-        thickness=1e-3,
-        young_modulus=4e6,
-        poisson_ratio=0.4,
-        mass_density=1e3,
-        remanent_magnetization=(1e3, 0, 0),
-    )
-    scene = ms.Scene(
-        [patch, sheet, tail],
-        ties=[ms.Tie(sheet, patch), ms.Tie(tail, sheet)],
-        supports=[
-            ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0), body=sheet),
-            ms.Pin(tail.mesh.vertices_at(x=0.2), body=tail),
-        ],
-        loads=[
-            ms.PointLoad(MESH.vertices_at(x=0.1), (1e-4, 2e-4, -2e-4), body=patch),
-            ms.AreaLoad((0.1, 0, 0.2)),
-        ],
-        contacts=[
-            ms.Contact(ob.Plane((-0.01, 0, 1), center=(0.2, 0, -2e-3)), contact_stiffness=5.0, offset=1e-3)
-        ],
-        field=[ms.UniformField(), DIPOLES],
-        gravity=(0.2, 0.1, -9.81),
-    )
-    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "motion_factor": 0.7, "gravity_factor": 0.8}
-    if not moves:
-        return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
-    controls |= {
-        "velocities": (0.01, 0.02, -0.05),
-        "damping": RNG.uniform(1e-3, 2e-3, scene.mesh.n_vertices),
-        "stiffness_damping": 1e-3,
-        "time_step": 2e-3,
-    }
-    reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
-    fixed = {**EXACT, "steps": 4, "integrator": ms.TRBDF2(), "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-3, reach=reach)
 
 
 RUBS = {"friction_coefficient": 0.4}

@@ -1,0 +1,185 @@
+"""Kinds of scene with several bodies, for gradient_kinds.py."""
+
+import numpy as np
+from gradient_scenes import Kind
+from gradient_world import EXACT, FACTORS, IN_TIME, MIDDLE, REACH, RNG, STEPS, under
+from test_adjoint import DEFAULTS, DIPOLES, MESH, N_V
+
+import magshell as ms
+from magshell import obstacles as ob
+
+CORNER = np.flatnonzero(MESH.rest_positions[:, 0] > 0.05)[[1, 3, 4]]  # a triangle: one inside, two at the end
+
+
+def with_rigid_parts(free: bool, **own):
+    """A clamped sheet that carries a magnet, and a magnetized top beside it. own: of the magnet."""
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    carried = {
+        "mass": 3e-3,
+        "inertia": np.array([1.2e-6, 0.9e-6, 1.5e-6]),
+        "center": MESH.rest_positions[CORNER].mean(axis=0) + np.array([1e-3, 2e-3, 4e-3]),
+        "magnetic_moment": (4e-3, 2e-3, 1e-2),
+    }
+    parts = [ms.Rigid(CORNER, **{**carried, **own})]
+    if free:
+        spin = {"velocity": (0.01, -0.02, 0.1), "angular_velocity": (3.0, 40.0, -5.0)}
+        place = {"center": (0.05, 0.03, 0.04), "magnetic_moment": (2e-3, 1e-3, -1e-3)}
+        parts.append(ms.Rigid(mass=2e-3, inertia=(0.7e-6, 1.0e-6, 1.4e-6), **place, **spin))
+    return ms.Scene(
+        [sheet, *parts],
+        supports=[ms.Clamp(MESH.edges_at(x=0.0))],
+        loads=[ms.PointLoad(MESH.vertices_at(x=0.1), (0.0, 1e-3, 2e-3))],
+        field=[ms.UniformField(), DIPOLES],
+        gravity=(0.1, 0.2, -2.0),
+        allow_rigid_motions=free,
+    )
+
+
+def rigid_at_rest() -> Kind:
+    scene = with_rigid_parts(False)
+    return Kind(scene, {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=REACH)
+
+
+def rigid_in_motion(integrator, own=None, **options) -> Kind:
+    scene = with_rigid_parts(True, **(own or {}))
+    turning = np.cross([2.0, 5.0, -1.0], MESH.rest_positions - MIDDLE)
+    moves = np.array([0.02, 0.01, -0.1]) + turning + 0.05 * RNG.standard_normal((N_V, 3))
+    moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
+    begin = MESH.rest_positions + 1e-4 * RNG.standard_normal((N_V, 3))
+    begin[CORNER] = MESH.rest_positions[CORNER] + (1e-4, 2e-4, 1e-4)
+    controls = {**IN_TIME, "start": begin, "velocities": moves, "time_step": 3e-3}
+    fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
+    reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+
+
+def two_sheets():
+    """Of different bending, each with its own magnetization."""
+    mesh = MESH.transformed(translation=(0.01, 0.09, 4e-4))
+    sheet = ms.Shell(
+        MESH,
+        thickness=1e-3,
+        young_modulus=1e6,
+        poisson_ratio=0.4,
+        mass_density=1e3,
+        remanent_magnetization=RNG.uniform(-2e4, 2e4, (MESH.n_faces, 3)),
+    )
+    other = ms.Shell(
+        mesh,
+        thickness=RNG.uniform(1.1e-3, 1.4e-3, mesh.n_faces),
+        young_modulus=2e6,
+        poisson_ratio=0.3,
+        mass_density=600.0,
+        bending="hinge",
+        remanent_magnetization=(1e4, 3e3, -1e4),
+    )
+    return sheet, other
+
+
+def two_sheets_at_rest() -> Kind:
+    """One floor under both, and loads on each."""
+    sheet, other = two_sheets()
+    mesh = other.mesh
+    supports = [
+        ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0), body=sheet),
+        ms.Clamp(mesh.edges_at(x=0.01), displacement=(1e-4, 0, 5e-4), rotation=(0, 0.1, 0.05), body=other),
+    ]
+    loads = [
+        ms.EdgeCouple(mesh.edges_at(x=0.11), 2e-4, body=other),
+        ms.EdgeCouple(MESH.edges_at(x=0.1), (0, 3e-4, 0), body=sheet),
+        ms.PointLoad(mesh.vertices_at(x=0.11), (1e-4, 2e-4, -2e-4), body=other),
+        ms.EdgeLoad(MESH.edges_at(x=0.1), (0, 1e-2, -1e-2), body=sheet),
+        ms.AreaLoad((0.1, 0, 0.2)),
+        ms.SurfaceTension(RNG.uniform(0.1, 0.2, 3), faces=[1, 4, 7], body=other),
+    ]
+    floor = ms.Contact(under(ob.Plane, -3e-3, rotation=(0.02, 0.01, 0)), contact_stiffness=5.0, offset=1e-3)
+    scene = ms.Scene(
+        [sheet, other],
+        supports=supports,
+        loads=loads,
+        contacts=[floor],
+        field=[ms.UniformField(), DIPOLES],
+        gravity=(0.2, 0.1, -9.81),
+    )
+    controls = {**FACTORS, "applied_flux_density": (1e-3, -5e-4, 2e-3)}
+    return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
+
+
+def two_sheets_in_motion() -> Kind:
+    """In water, and one of them onto a ball on which it rubs."""
+    sheet, other = two_sheets()
+    ball = under(ob.Sphere, -1e-3)
+    rubbing = ms.Contact(ball, contact_stiffness=50.0, offset=1e-4, friction_coefficient=0.4, body=sheet)
+    scene = ms.Scene(
+        [sheet, other],
+        supports=[ms.Clamp(other.mesh.edges_at(x=0.01), rotation=(0, 0.1, 0), body=other)],
+        loads=[ms.SurfaceTension(0.3, body=sheet)],
+        contacts=[rubbing],
+        field=ms.UniformField(),
+        gravity=(0, 0.3, -9.81),
+        water=ms.Water(800.0, (0.05, -0.02, 0.01), added_mass=0.6),
+        allow_rigid_motions=True,
+    )
+    n_v = scene.mesh.n_vertices
+    controls = {
+        "applied_flux_density": (1e-3, 0.0, 4e-3),
+        "motion_factor": np.linspace(0, 0.7, 7),
+        "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * RNG.standard_normal((n_v, 3)),
+        "damping": RNG.uniform(1e-4, 2e-4, n_v),
+        "stiffness_damping": 1e-3,
+        "time_step": 2e-3,
+    }
+    reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
+    fixed = {**EXACT, "steps": 6, "integrator": ms.SDIRK2(), "progress": False}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+
+
+def tied(moves: bool) -> Kind:
+    """A patch on a sheet, of two bendings and magnetizations, in a field; loads and supports on both."""
+    sheet = two_sheets()[0]
+    patch = ms.Shell(
+        sheet.mesh,
+        thickness=3e-4,
+        young_modulus=1e6,
+        poisson_ratio=0.3,
+        mass_density=2e3,
+        bending="hinge",
+        remanent_magnetization=(1e4, -5e3, 2e4),
+    )
+    tail = ms.Shell(
+        sheet.mesh.transformed(translation=(0.1, 0, 0)),
+        thickness=1e-3,
+        young_modulus=4e6,
+        poisson_ratio=0.4,
+        mass_density=1e3,
+        remanent_magnetization=(1e3, 0, 0),
+    )
+    scene = ms.Scene(
+        [patch, sheet, tail],
+        ties=[ms.Tie(sheet, patch), ms.Tie(tail, sheet)],
+        supports=[
+            ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0), body=sheet),
+            ms.Pin(tail.mesh.vertices_at(x=0.2), body=tail),
+        ],
+        loads=[
+            ms.PointLoad(MESH.vertices_at(x=0.1), (1e-4, 2e-4, -2e-4), body=patch),
+            ms.AreaLoad((0.1, 0, 0.2)),
+        ],
+        contacts=[
+            ms.Contact(ob.Plane((-0.01, 0, 1), center=(0.2, 0, -2e-3)), contact_stiffness=5.0, offset=1e-3)
+        ],
+        field=[ms.UniformField(), DIPOLES],
+        gravity=(0.2, 0.1, -9.81),
+    )
+    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "motion_factor": 0.7, "gravity_factor": 0.8}
+    if not moves:
+        return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
+    controls |= {
+        "velocities": (0.01, 0.02, -0.05),
+        "damping": RNG.uniform(1e-3, 2e-3, scene.mesh.n_vertices),
+        "stiffness_damping": 1e-3,
+        "time_step": 2e-3,
+    }
+    reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
+    fixed = {**EXACT, "steps": 4, "integrator": ms.TRBDF2(), "progress": False}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-3, reach=reach)
