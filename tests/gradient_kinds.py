@@ -6,6 +6,8 @@ import numpy as np
 from gradient_kinds_bodies import (
     rigid_at_rest,
     rigid_in_motion,
+    solid_at_rest,
+    solid_in_motion,
     tied,
     two_sheets_at_rest,
     two_sheets_in_motion,
@@ -235,6 +237,8 @@ MAKERS = {
     "at rest on a Plane, its law given": lambda: resting_on(
         ob.Plane, step=1e-4, smoothing=4e-4, offset=5e-4, face_samples=3
     ),
+    "a solid at rest": solid_at_rest,
+    "a solid in motion": solid_in_motion,
     "in motion, euler": lambda: moving(ms.ImplicitEuler(), "hinge"),
     "in motion, tr_bdf2": lambda: moving(ms.TRBDF2()),
     "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 from gradient_scenes import Kind
-from gradient_world import EXACT, FACTORS, IN_TIME, MIDDLE, REACH, RNG, STEPS, under
+from gradient_world import EXACT, FACTORS, IN_TIME, MIDDLE, REACH, RNG, STEPS, VISCOUS, under
 from test_adjoint import DEFAULTS, DIPOLES, MESH, N_V
 
 import magshell as ms
@@ -183,3 +183,31 @@ def tied(moves: bool) -> Kind:
     reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
     fixed = {**EXACT, "steps": 4, "integrator": ms.TRBDF2(), "progress": False}
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-3, reach=reach)
+
+
+def solid_at_rest(material=None, element="quadratic", **more) -> Kind:
+    """Tetrahedra between pins, one of which moves, under their weight and a force."""
+    mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(2, 1, 1))
+    muscle = ms.Guccione(
+        stiffness=1e4,
+        fibre_exponent=8.0,
+        cross_fibre_exponent=2.0,
+        fibre_shear_exponent=4.0,
+        bulk_modulus=1e5,
+        fibres=(1.0, 0.3, 0.1),
+    )
+    body = ms.Solid(mesh, material=material or muscle, mass_density=1e3, element=element)
+    x = body.mesh.rest_positions
+    left, right = (np.flatnonzero(np.abs(x[:, 0] - at) < 1e-9) for at in (0.0, 0.1))
+    turned = ms.Pin(left, displacement=(1e-3, 0, 2e-4), rotation=(0.0, 0.1, 0.05))
+    load = ms.PointLoad(right, force=(0.01, 0.002, -0.01))
+    scene = ms.Scene(body, supports=[turned], loads=[load], gravity=(0.2, 0.1, -9.81), **more)
+    factors = {"load_factor": 0.9, "motion_factor": 0.8, "gravity_factor": 1.1}
+    return Kind(scene, factors, fixed=EXACT, reach=REACH)
+
+
+def solid_in_motion() -> Kind:
+    still = solid_at_rest(ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.45), "linear")
+    fixed = {"steps": 3, "integrator": ms.TRBDF2(), **EXACT}
+    controls = {"time_step": 2e-3, "gravity_factor": 1.1, **VISCOUS}
+    return Kind(still.scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)

@@ -13,6 +13,7 @@ from functools import cache, cached_property
 import numpy as np
 
 import magshell as ms
+from magshell.bodies.materials import SolidMaterial
 
 IN_TIME = ", in time"
 # Keywords of a solve that are no numbers to differentiate by.
@@ -161,11 +162,21 @@ def subjects() -> set[tuple]:
         for each in classes
         if not inspect.isabstract(each)
         for name in (
-            *getattr(each, "_replaceable", ()),
+            *_names_of(each),
             *(name + IN_TIME for name in getattr(each, "_in_time", ())),
         )
     }
     return of_classes | {(solve, name) for solve in SETTINGS_OF for name in continuous(solve)}
+
+
+def _names_of(kind: type) -> tuple[str, ...]:
+    """Of the values of a class; a solid's are its materials'."""
+    if kind is not ms.Solid:
+        return getattr(kind, "_replaceable", ())
+    materials = [
+        each for each in vars(ms).values() if isinstance(each, type) and issubclass(each, SolidMaterial)
+    ]
+    return tuple({name for each in materials for name in each._ranges} | {"mass_density"})
 
 
 def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:

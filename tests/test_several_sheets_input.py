@@ -19,7 +19,7 @@ HEAVY = ms.Scene([A, B], supports=HELD, gravity=(0, 0, -1))
     [
         (lambda: ms.Scene([A, A]), "bodies 0 and 1 are one Shell"),
         (lambda: ms.Scene([]), "at least one Shell"),
-        (lambda: ms.Scene([A, A.mesh]), "bodies must hold Shell objects, got TriangleMesh"),
+        (lambda: ms.Scene([A, A.mesh]), "bodies must hold Shell, Solid objects, got TriangleMesh"),
         (lambda: ms.Scene([A, B], supports=[ms.Pin([0])]), r"2 bodies, so a Pin must say.*body="),
         (lambda: ms.Scene([A, B], supports=HELD, loads=[ms.PointLoad([0], M)]), "a PointLoad must say"),
         (
@@ -35,8 +35,8 @@ HEAVY = ms.Scene([A, B], supports=HELD, gravity=(0, 0, -1))
         ),
         (lambda: ms.Scene(A, supports=[ms.Pin([0], body=B)]), "about a body that is not in the scene"),
         (lambda: ms.Scene([A, B], supports=[ms.Pin([99], body=A)]), r"Pin vertices must be in \[0, 27\)"),
-        (lambda: ms.Pin([0], body=A.mesh), "body must be a Shell of the scene, got TriangleMesh"),
-        (lambda: ms.Clamp([0], body=0), "body must be a Shell of the scene, got 0"),
+        (lambda: ms.Pin([0], body=A.mesh), "body must be a Shell or Solid of the scene, got TriangleMesh"),
+        (lambda: ms.Clamp([0], body=0), "body must be a Shell or Solid of the scene, got 0"),
         (lambda: IN_FIELD.shell, r"2 bodies: say which"),
         (lambda: ms.equilibrium(HEAVY, thickness=1e-3), r"2 bodies: say whose.*values=\{body"),
         (

@@ -18,6 +18,16 @@ py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, co
     return py::make_tuple(values_to_user(model, gradient.values), gradient.controls);
 }
 
+// lambda . dg/dk at a state, by all values in the caller's order.
+VectorXd by_values(Model& model, const VectorXd& q, const Controls& controls, const VectorXd& lambda) {
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard lock(model.in_use());
+    Gradient gradient(model.registry());
+    model.evaluate(q, controls);
+    model.vjp(q, controls, lambda, gradient);
+    return model.registry().values.to_user(gradient.values);
+}
+
 }  // namespace
 
 void register_adjoint(py::module_& module) {
@@ -26,6 +36,8 @@ void register_adjoint(py::module_& module) {
         py::arg("by_edge_rotations"),
         "The gradients by everything a solve takes, of a function of positions (n_v, 3) and edge rotations "
         "(n_e,) with these gradients. The model must hold the values of that solve.");
+    module.def("vjp", &by_values, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
+               "adjoint . dg/dk at a state q, g the gradient of the energy and k every value, (n,).");
 }
 
 }  // namespace magshell::bindings

@@ -38,7 +38,7 @@ Knots rows_of(const std::vector<Controls>& controls) {
     return rows;
 }
 
-// Three numbers an element and elastic term, in our order; empty without a Maxwell branch.
+// The numbers of each element and elastic term, in our order; empty without a Maxwell branch.
 StrainSet strains_of(Model& model, const Array& numbers) {
     StrainSet strains;
     if (numbers.size() == 0) return strains;
@@ -49,7 +49,7 @@ StrainSet strains_of(Model& model, const Array& numbers) {
     strains = model.no_strains();
     for (Strains& part : strains.of_terms)
         for (Index element = 0; element < part.elements; ++element)
-            for (int i = 0; i < 3; ++i) part.set(element, i, *from++);
+            for (int i = 0; i < part.width; ++i) part.set(element, i, *from++);
     return strains;
 }
 
@@ -58,7 +58,7 @@ VectorXd numbers_of(const Model& model, const StrainSet& strains) {
     double* to = numbers.data();
     for (const Strains& part : strains.of_terms)
         for (Index element = 0; element < part.elements; ++element)
-            for (int i = 0; i < 3; ++i) *to++ = part.number(element, i);
+            for (int i = 0; i < part.width; ++i) *to++ = part.number(element, i);
     return numbers;
 }
 

@@ -4,9 +4,11 @@ from . import control, meshes, objectives, obstacles, optim, parametrize, shapes
 from ._core import __version__
 from ._machine.threads import num_threads, set_num_threads, show_config
 from .bodies.body_result import BodyResult
+from .bodies.materials import Corotated, Guccione, NeoHookean, StableNeoHookean, StVenantKirchhoff
 from .bodies.rigid import Rigid
 from .bodies.rigid_result import RigidResult
 from .bodies.shell import Shell
+from .bodies.solid import Solid
 from .bodies.strains import Strains
 from .bodies.ties import Tie
 from .design.minimize import minimize
@@ -64,6 +66,7 @@ __all__ = [
     "Buckling",
     "Clamp",
     "Contact",
+    "Corotated",
     "CriticalPoint",
     "CuboidMagnet",
     "CustomField",
@@ -75,6 +78,7 @@ __all__ = [
     "Equilibria",
     "Equilibrium",
     "EquilibriumJumped",
+    "Guccione",
     "ImplicitEuler",
     "Interrupted",
     "LargeStrainWarning",
@@ -86,6 +90,7 @@ __all__ = [
     "MotionState",
     "Multistart",
     "MultistartFailed",
+    "NeoHookean",
     "Newton",
     "NoGradient",
     "NotConverged",
@@ -100,6 +105,9 @@ __all__ = [
     "SampledField",
     "Scene",
     "Shell",
+    "Solid",
+    "StVenantKirchhoff",
+    "StableNeoHookean",
     "Strains",
     "SurfaceTension",
     "SymmetryPlane",

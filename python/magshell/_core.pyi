@@ -56,7 +56,9 @@ __all__: list[str] = [
     "sample_fields",
     "set_num_threads",
     "simulate",
+    "solid_point_states",
     "vacuum_permeability",
+    "vjp",
 ]
 
 class FactorReport:
@@ -195,6 +197,9 @@ class SampledField(AppliedField):
     ) -> None: ...
     def contains(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> list[bool]: ...
 
+class PythonField(AppliedField):
+    def __init__(self, sampler: collections.abc.Callable) -> None: ...
+
 class PlacedField(AppliedField):
     def __init__(
         self,
@@ -206,9 +211,6 @@ class PlacedField(AppliedField):
             collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
         ],
     ) -> None: ...
-
-class PythonField(AppliedField):
-    def __init__(self, sampler: collections.abc.Callable) -> None: ...
 
 class Obstacle:
     @staticmethod
@@ -328,17 +330,17 @@ class Model:
     def expand(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    def free_weights(
-        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
-        """
-        Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.
-        """
     def free_weight_values(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
         The same as a matrix, in the places of hessian(): with rigid parts it is no diagonal. At the state that was evaluated last.
+        """
+    def free_weights(
+        self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.
         """
     def full_vector(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
@@ -848,6 +850,24 @@ def simulate(
     keep: Keep,
     progress: typing.Any = None,
 ) -> MotionResult: ...
+def solid_point_states(
+    model: Model,
+    solid: typing.SupportsInt | typing.SupportsIndex,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> tuple:
+    """
+    (F, Cauchy stress [Pa], rest volumes [m3]) at the points of integration of a solid's elements: (n_t, p, 3, 3) twice and (n_t, p).
+    """
+
+def vjp(
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    adjoint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    adjoint . dg/dk at a state q, g the gradient of the energy and k every value, (n,).
+    """
 
 __version__: str = "0+dev"
 vacuum_permeability: float = 1.25663706127e-06

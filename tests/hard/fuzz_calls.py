@@ -145,12 +145,14 @@ def _scenes(s: Sample) -> Iterator[Call]:
     }
     yield Call(
         "Rigid",
-        lambda **a: ms.Scene([s.shell, ms.Rigid(**a)], allow_rigid_motions=True),
+        lambda **a: ms.Scene([s.shell, ms.Rigid(**a)], field=s.dipoles, allow_rigid_motions=True),
         {"vertices": mesh.vertices_where(lambda x: x[:, 0] > 0.05), "body": s.shell, **rigid},
     )
     spin = {"velocity": (0, 0, 1.0), "angular_velocity": (1.0, 0, 0)}
     yield Call(
-        "Rigid, free", lambda **a: ms.Scene(ms.Rigid(**a), allow_rigid_motions=True), {**rigid, **spin}
+        "Rigid, free",
+        lambda **a: ms.Scene(ms.Rigid(**a), field=s.dipoles, allow_rigid_motions=True),
+        {**rigid, **spin},
     )
 
     def loaded(kind):

@@ -16,6 +16,7 @@ POINT = (0.1, 0.0, 0.0)
 def solid_calls(s: Sample) -> Iterator[Call]:
     yield from _generators(s)
     yield from _shapes()
+    yield from _solids()
     block = meshes.box((1.0, 1.0, 1.0), cells=(2, 1, 1))
     parts = np.arange(block.n_tetrahedra) % 2
     given = {"rest_positions": block.rest_positions, "tetrahedra": block.tetrahedra, "parts": parts}
@@ -114,3 +115,17 @@ def _shapes() -> Iterator[Call]:
     yield Call("Shape.scaled", probed(ball.scaled), {"factor": 2.0})
     yield Call("Shape.offset", probed(ball.offset), {"distance": 0.1})
     yield Call("Shape.hollow", probed(ball.hollow), {"thickness": 0.1})
+
+
+def _solids() -> Iterator[Call]:
+    mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1))
+    moduli = {"young_modulus": 1e5, "poisson_ratio": 0.45}
+    solid = {"mesh": mesh, "mass_density": 1e3, "element": "quadratic", "mean_volume": True}
+    yield Call("Solid", ms.Solid, {**solid, "material": ms.NeoHookean(**moduli)})
+    yield Call("NeoHookean", ms.NeoHookean, {"volume": "J", **moduli})
+    yield Call("StableNeoHookean", ms.StableNeoHookean, {"log_barrier": True, **moduli})
+    yield Call("StVenantKirchhoff", ms.StVenantKirchhoff, moduli)
+    yield Call("Corotated", ms.Corotated, moduli)
+    exponents = dict.fromkeys(("fibre_exponent", "cross_fibre_exponent", "fibre_shear_exponent"), 2.0)
+    fibres = {"stiffness": 1e3, "bulk_modulus": 1e5, "fibres": (1.0, 0.0, 0.0)}
+    yield Call("Guccione", ms.Guccione, {**exponents, **fibres})

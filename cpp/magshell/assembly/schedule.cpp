@@ -8,40 +8,39 @@
 namespace magshell {
 namespace {
 
-// Faces of a chunk: 512 are about 600 kB of Hessian, slots and element data; small sheets are to have a few
-// chunks of each colour, too. Whole packs.
-Index part_length(Index faces) {
+// Elements of a chunk: 512 faces are about 600 kB of Hessian, slots and element data, tetrahedra of four nodes
+// less; small bodies are to have a few chunks of each colour, too. Whole packs.
+Index part_length(Index elements) {
     constexpr Index shortest = 128, longest = 512, chunks = 8;
-    return std::clamp(faces / chunks / Pack::width * Pack::width, shortest, longest);
+    return std::clamp(elements / chunks / Pack::width * Pack::width, shortest, longest);
 }
 
 }  // namespace
 
-Schedule::Schedule(Index nodes, const std::vector<const Sheet*>& bodies) : loops_(bodies.size()) {
+Schedule::Schedule(Index nodes, const std::vector<const Body*>& bodies) : loops_(bodies.size()) {
     for (Index body = 0; body < static_cast<Index>(bodies.size()); ++body) cut(*bodies[body], body);
     colour(nodes, bodies);
 }
 
-void Schedule::cut(const Sheet& sheet, Index body) {
+void Schedule::cut(const Body& of, Index body) {
     Index fold = 0;
-    const Index folds = static_cast<Index>(sheet.folds.size());
-    const Index length = part_length(sheet.n_faces());
-    for (Index first = 0; first < sheet.n_faces(); first += length) {
-        const Index last = std::min(sheet.n_faces(), first + length);
+    const Index elements = of.n_elements(), folds = of.n_folds(), length = part_length(elements);
+    for (Index first = 0; first < elements; first += length) {
+        const Index last = std::min(elements, first + length);
         const Index first_fold = fold;
-        while (fold < folds && sheet.folds[fold].first_face() < last) ++fold;
+        while (fold < folds && of.element_of_fold(fold) < last) ++fold;
         const Chunk chunk{static_cast<Index>(all_.chunks_.size()), body, first, last, first_fold, fold};
         all_.chunks_.push_back(chunk);
         loops_[body].chunks_.push_back(chunk);
     }
 }
 
-void Schedule::colour(Index nodes, const std::vector<const Sheet*>& bodies) {
+void Schedule::colour(Index nodes, const std::vector<const Body*>& bodies) {
     const Index count = static_cast<Index>(all_.chunks_.size());
     std::vector<std::vector<Index>> chunks_at(nodes), nodes_in(count);
     for (const Chunk& chunk : all_.chunks_)
         for (Index element = chunk.first; element < chunk.last; ++element)
-            for (const Index node : bodies[chunk.body]->stencils[element].nodes)
+            for (const Index node : bodies[chunk.body]->nodes_of(element))
                 if (node >= 0 && (chunks_at[node].empty() || chunks_at[node].back() != chunk.number)) {
                     chunks_at[node].push_back(chunk.number);
                     nodes_in[chunk.number].push_back(node);

@@ -10,7 +10,7 @@
 #include <functional>
 #include <vector>
 
-#include "magshell/body/sheet.h"
+#include "magshell/body/body.h"
 
 namespace magshell {
 
@@ -41,7 +41,7 @@ class ChunkLoop {
 
 class Schedule {
   public:
-    Schedule(Index nodes, const std::vector<const Sheet*>& bodies);
+    Schedule(Index nodes, const std::vector<const Body*>& bodies);
     Schedule(const Schedule&) = delete;
     Schedule& operator=(const Schedule&) = delete;
 
@@ -55,8 +55,8 @@ class Schedule {
     std::size_t bytes() const;
 
   private:
-    void cut(const Sheet& sheet, Index body);
-    void colour(Index nodes, const std::vector<const Sheet*>& bodies);
+    void cut(const Body& of, Index body);
+    void colour(Index nodes, const std::vector<const Body*>& bodies);
 
     ChunkLoop all_;
     std::vector<ChunkLoop> loops_;

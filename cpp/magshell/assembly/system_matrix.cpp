@@ -19,6 +19,15 @@ std::vector<std::vector<Index>> holders(Index count, const std::vector<Stencil>&
     return of;
 }
 
+// For every node, the cliques that hold it.
+std::vector<std::vector<Index>> holders(Index count, const std::vector<std::span<const Index>>& cliques) {
+    if (cliques.empty()) return {};
+    std::vector<std::vector<Index>> of(count);
+    for (Index c = 0; c < static_cast<Index>(cliques.size()); ++c)
+        for (const Index node : cliques[c]) of[node].push_back(c);
+    return of;
+}
+
 // Collects distinct numbers, cheaply emptied.
 class Marks {
   public:
@@ -35,11 +44,13 @@ class Marks {
 
 }  // namespace
 
-SystemMatrix::SystemMatrix(Index nodes, Index rotations, const std::vector<Stencil>& stencils)
+SystemMatrix::SystemMatrix(Index nodes, Index rotations, const std::vector<Stencil>& stencils,
+                           const std::vector<std::span<const Index>>& cliques)
     : nodes_(nodes), rotations_(rotations) {
     const std::vector<std::vector<Index>> node_holders = holders(nodes, stencils, &Stencil::nodes);
     const std::vector<std::vector<Index>> rotation_holders =
         holders(rotations, stencils, &Stencil::rotations);
+    const std::vector<std::vector<Index>> clique_holders = holders(nodes, cliques);
 
     column_starts_.reserve(size() + 1);
     column_starts_.push_back(0);
@@ -59,6 +70,10 @@ SystemMatrix::SystemMatrix(Index nodes, Index rotations, const std::vector<Stenc
             for (const Index r : stencils[s].rotations)
                 if (r >= 0) rotation_marks.collect(j, r, beside_rotations);
         }
+        if (!cliques.empty())
+            for (const Index c : clique_holders[j])
+                for (const Index i : cliques[c])
+                    if (i > j) node_marks.collect(j, i, beside);
         std::sort(beside.begin(), beside.end());
         std::sort(beside_rotations.begin(), beside_rotations.end());
         for (Index column = 0; column < 3; ++column) {

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "magshell/body/stencil.h"
@@ -23,7 +24,9 @@ class SystemMatrix {
     using Slot = Index;
 
     SystemMatrix() = default;
-    SystemMatrix(Index nodes, Index rotations, const std::vector<Stencil>& stencils);
+    /// `cliques`: nodes that couple all with each other, beside those of the stencils.
+    SystemMatrix(Index nodes, Index rotations, const std::vector<Stencil>& stencils,
+                 const std::vector<std::span<const Index>>& cliques = {});
 
     Index nodes() const { return nodes_; }
     Index rotations() const { return rotations_; }

@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "magshell/body/body.h"
 #include "magshell/body/stencil.h"
 #include "magshell/body/surface.h"
 
@@ -39,9 +40,15 @@ struct FaceSide {
     bool on_left = true;
 };
 
-class Sheet : public Surface {
+class Sheet : public Surface, public Body {
   public:
     using Surface::Surface;
+
+    Index n_elements() const override { return n_faces(); }
+    std::span<const Index> nodes_of(Index face) const override { return stencils[face].nodes; }
+    std::span<const Index> scalars_of(Index face) const override { return stencils[face].rotations; }
+    Index n_folds() const override { return static_cast<Index>(folds.size()); }
+    Index element_of_fold(Index fold) const override { return folds[fold].first_face(); }
 
     /// Once all nodes are numbered. `directors` gives every edge that is not directed a rotation of its own
     /// (midedge), numbered on from the scalars that there are.

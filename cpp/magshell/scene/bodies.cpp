@@ -7,10 +7,14 @@
 namespace magshell {
 
 Bodies::Bodies(const SceneInput& input) {
-    n_sheet_vertices_ = input.n_vertices;
+    n_body_vertices_ = input.n_vertices;
     NodeNumbering numbering(input.n_vertices + RigidInput::own * static_cast<Index>(input.rigid.size()));
     for (const SheetInput& sheet : input.sheets)
         owned_.push_back(std::make_unique<Sheet>(sheet.owner, *sheet.mesh, sheet.vertices, numbering));
+    for (const SolidInput& solid : input.solids)
+        owned_solids_.push_back(std::make_unique<Solid>(solid.owner, solid.rest_positions, solid.elements,
+                                                        solid.nodes_per_element, solid.vertices,
+                                                        solid.surface, numbering));
     add_rigid(input.rigid, numbering);
     nodes_ = numbering.finish(input.directions, input.original);
     for (Index user = 0; user < nodes_.n_user_vertices(); ++user)
@@ -20,11 +24,16 @@ Bodies::Bodies(const SceneInput& input) {
         owned_[k]->add_folds(*given.mesh, given.directed_edges, given.directors, nodes_);
         n_edges_ += owned_[k]->n_edges();
         sheets_.push_back(owned_[k].get());
+        all_.push_back(owned_[k].get());
+    }
+    for (const std::unique_ptr<Solid>& solid : owned_solids_) {
+        solids_.push_back(solid.get());
+        all_.push_back(solid.get());
     }
 }
 
 void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering) {
-    Index user = n_sheet_vertices_;
+    Index user = n_body_vertices_;
     for (const RigidInput& part : rigid) {
         std::vector<Index>& nodes = rigid_nodes_.emplace_back();
         for (Index k = 0; k < RigidInput::own; ++k)
@@ -48,6 +57,14 @@ std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
     for (std::size_t k = 0; k < input.rigid.size(); ++k)
         if (input.rigid[k].magnetic)
             std::copy_n(rigid_nodes_[k].begin(), 4, all.emplace_back().nodes.begin());
+    return all;
+}
+
+std::vector<std::span<const Index>> Bodies::cliques() const {
+    std::vector<std::span<const Index>> all;
+    for (const Solid* solid : solids_)
+        for (Index element = 0; element < solid->n_elements(); ++element)
+            all.push_back(solid->nodes_of(element));
     return all;
 }
 
@@ -141,6 +158,7 @@ double Bodies::extent() const {
     for (const Sheet* sheet : sheets_) largest = std::max(largest, sheet->extent());
     for (const Rows3& points : rigid_points_)
         largest = std::max(largest, (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm());
+    for (const Solid* solid : solids_) largest = std::max(largest, solid->extent());
     return largest;
 }
 
@@ -166,6 +184,11 @@ VectorXd Bodies::area_metric() const {
             for (const Index node : sheet->corners[f])
                 metric.segment<3>(3 * node).array() += (b - a).cross(c - a).norm() / 6.0;
         }
+    for (const Solid* solid : solids_) {
+        VectorXd volumes = VectorXd::Zero(nodes_.n_unknowns());
+        solid->add_volumes(volumes);
+        metric += volumes / std::cbrt(solid->volume());
+    }
     // As large as the faces of its tetrahedron: what moves a rigid part by itself needs a measure too.
     for (const std::vector<Index>& part : rigid_nodes_)
         for (Index k = 0; k < 4; ++k)

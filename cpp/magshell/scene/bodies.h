@@ -14,28 +14,34 @@ class Bodies {
 
     const Nodes& nodes() const { return nodes_; }
     const std::vector<const Sheet*>& sheets() const { return sheets_; }
+    const std::vector<const Solid*>& solids() const { return solids_; }
+    /// Sheets, then solids.
+    const std::vector<const Body*>& all() const { return all_; }
     /// The nodes of each rigid part, its own first.
     const std::vector<std::vector<Index>>& rigid_nodes() const { return rigid_nodes_; }
     /// Of the smallest rigid part, half the edge of the cube around its tetrahedron [m]; infinite without.
     double rigid_length() const;
-    /// How many vertices the caller's sheets have; those of rigid parts follow.
-    Index n_sheet_vertices() const { return n_sheet_vertices_; }
+    /// How many vertices the caller's sheets and solids have; those of rigid parts follow.
+    Index n_body_vertices() const { return n_body_vertices_; }
     /// Of all sheets, one after another, in the caller's numbers.
     Index n_edges() const { return n_edges_; }
-    /// What each element couples, and each couple.
+    /// What each element of a sheet couples, and each couple.
     std::vector<Stencil> stencils(const SceneInput& input) const;
+
+    /// The nodes of each element of a solid.
+    std::vector<std::span<const Index>> cliques() const;
 
     VectorXd rest_state() const;
     /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,); a rigid part's own points at rest.
     VectorXd state(const Rows3& positions, const VectorXd& edge_rotations) const;
     /// Vectors of the caller's vertices among all unknowns, zero elsewhere; welded ones have one. Rows of the
-    /// sheets' vertices, or of points() too.
+    /// bodies' vertices, or of points() too.
     VectorXd vectors(const Rows3& of_vertices) const;
     /// A gradient by the caller's positions and edge rotations as one by all unknowns: the transpose of positions(),
     /// or of points().
     VectorXd gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const;
-    /// Of the sheets' vertices; and of the points of rigid parts too.
-    Rows3 positions(const VectorXd& q) const { return rows(q, n_sheet_vertices_); }
+    /// Of the bodies' vertices; and of the points of rigid parts too.
+    Rows3 positions(const VectorXd& q) const { return rows(q, n_body_vertices_); }
     Rows3 points(const VectorXd& q) const { return rows(q, nodes_.n_user_vertices()); }
     /// A gradient by unknowns as one by the caller's positions: the transpose of vectors().
     Rows3 gradient_by_vectors(const VectorXd& by_q) const;
@@ -50,7 +56,7 @@ class Bodies {
     double extent() const;
     /// The largest coordinate at rest [m].
     double reach() const;
-    /// Area at each unknown of a vertex, zero for all others.
+    /// Area at each unknown of a vertex, zero for all others; of a solid, its volume over the root of the whole [m2].
     VectorXd area_metric() const;
 
   private:
@@ -59,10 +65,13 @@ class Bodies {
     void add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering);
 
     std::vector<std::unique_ptr<Sheet>> owned_;
+    std::vector<std::unique_ptr<Solid>> owned_solids_;
     std::vector<const Sheet*> sheets_;
+    std::vector<const Solid*> solids_;
+    std::vector<const Body*> all_;
     Nodes nodes_;
     std::vector<Index> copies_;  // the caller's vertices that are welded to an earlier one
-    Index n_edges_ = 0, n_sheet_vertices_ = 0;
+    Index n_edges_ = 0, n_body_vertices_ = 0;
     std::vector<std::vector<Index>> rigid_nodes_;
     std::vector<Rows3> rigid_points_;
 };

@@ -6,15 +6,6 @@
 
 #include "magshell/assembly/rigid_carrier.h"
 #include "magshell/core/errors.h"
-#include "magshell/strain/fold_angle.h"
-#include "magshell/term/bending_term.h"
-#include "magshell/term/couple_term.h"
-#include "magshell/term/friction_term.h"
-#include "magshell/term/load_term.h"
-#include "magshell/term/magnetic_term.h"
-#include "magshell/term/membrane_term.h"
-#include "magshell/term/moment_term.h"
-#include "magshell/term/water_term.h"
 
 namespace magshell {
 namespace {
@@ -23,9 +14,8 @@ namespace {
 std::vector<HeldNode> renumbered(std::vector<HeldNode> held, const Bodies& bodies) {
     const Nodes& nodes = bodies.nodes();
     for (HeldNode& h : held)
-        h.node = h.node < bodies.n_sheet_vertices()
-                     ? nodes.vertices.core[h.node]
-                     : nodes.direction_node(h.node - bodies.n_sheet_vertices());
+        h.node = h.node < bodies.n_body_vertices() ? nodes.vertices.core[h.node]
+                                                   : nodes.direction_node(h.node - bodies.n_body_vertices());
     return held;
 }
 
@@ -36,30 +26,16 @@ Carriers carriers_of(const Bodies& bodies) {
     return carriers;
 }
 
-CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& mesh, const Sheet& sheet,
-                             const Nodes& at) {
-    const bool forward = mesh.edge_faces()(given.edge, 0) != TriangleMesh::none;
-    const Index f = sheet.faces.core[mesh.edge_faces()(given.edge, forward ? 0 : 1)];
-    int i = 0;
-    while (sheet.edges[f][i] != given.edge) ++i;
-    const std::array<Index, 3>& c = sheet.corners[f];
-    const std::array<Index, 4> nodes = {c[(i + 1) % 3], c[(i + 2) % 3], c[i],
-                                        at.direction_node(given.direction)};
-    const Fold fold(broadcast(at.rest[nodes[0]]), broadcast(at.rest[nodes[1]]), broadcast(at.rest[nodes[2]]),
-                    broadcast(at.rest[nodes[3]]), Pack(0.0));
-    return {nodes, fold.angle()[0], sheet.rotation_of_edge[given.edge], forward ? 1.0 : -1.0, 0.0};
-}
-
 }  // namespace
 
 Model::Model(const SceneInput& input)
     : bodies_(input),
-      matrix_(nodes().n_nodes(), nodes().scalars, bodies_.stencils(input)),
+      matrix_(nodes().n_nodes(), nodes().scalars, bodies_.stencils(input), bodies_.cliques()),
       reduction_(matrix_, renumbered(input.held, bodies_), nodes(), input.moves, registry_,
                  carriers_of(bodies_)),
-      schedule_(nodes().n_nodes(), bodies_.sheets()),
+      schedule_(nodes().n_nodes(), bodies_.all()),
       sources_(input.field_sources, registry_),
-      of_body_(bodies_.sheets().size()),
+      of_body_(bodies_.all().size()),
       metric_(bodies_.area_metric()),
       extent_(bodies_.extent()),
       rest_reach_(bodies_.reach()) {
@@ -70,85 +46,11 @@ Model::Model(const SceneInput& input)
     for (Index body = 0; body < static_cast<Index>(bodies_.sheets().size()); ++body)
         add_loops(body, input.sheets[body].curvature_scale);
     add_terms(input);
-    for (const std::unique_ptr<Term>& term : terms_)
+    for (const std::unique_ptr<Term>& term : terms_) {
         if (term->body() >= 0) of_body_[term->body()].push_back(term.get());
+        if (term->refuses_states()) refusing_.push_back(term.get());
+    }
     share_out_columns();
-}
-
-void Model::add_loops(Index body, const VectorXd& curvature_scale) {
-    const Sheet& sheet = *bodies_.sheets()[body];
-    const ChunkLoop& chunks = schedule_.of(body);
-    loops_.push_back(std::make_unique<FaceLoop>(sheet.corners, chunks, matrix_));
-    membrane_faces_.push_back(std::make_unique<MembraneFaces>(sheet, nodes(), curvature_scale));
-    const MembraneFaces& faces = *membrane_faces_.back();
-    membrane_loops_.push_back(faces.own() ? nullptr
-                                          : std::make_unique<FaceLoop>(faces.corners(), chunks, matrix_));
-}
-
-void Model::add_terms(const SceneInput& input) {
-    const Index count = static_cast<Index>(bodies_.sheets().size());
-    for (Index body = 0; body < count; ++body) {
-        std::unique_ptr<MembraneTerm> term = std::make_unique<MembraneTerm>(
-            *bodies_.sheets()[body], body, *membrane_faces_[body],
-            membrane_loops_[body] ? *membrane_loops_[body] : *loops_[body], nodes(), registry_);
-        elastic_.push_back(term.get());
-        terms_.push_back(std::move(term));
-    }
-    for (Index body = 0; body < count; ++body) {
-        std::unique_ptr<BendingTerm> term = std::make_unique<BendingTerm>(
-            *bodies_.sheets()[body], body, schedule_.of(body), nodes(), matrix_, registry_);
-        elastic_.push_back(term.get());
-        terms_.push_back(std::move(term));
-    }
-    for (Index body = 0; body < count; ++body)
-        if (input.sheets[body].magnetic)
-            terms_.push_back(std::make_unique<MagneticTerm>(*bodies_.sheets()[body], body, *loops_[body],
-                                                            sources_, registry_));
-    for (const FaceEnergyInput& given : input.face_energies)
-        terms_.push_back(given.energy->term(given.owner, given.body, *bodies_.sheets()[given.body],
-                                            *loops_[given.body], registry_));
-    add_moments(input);
-    if (input.gravity)
-        terms_.push_back(std::make_unique<LoadTerm>("gravity", "gravity_factor", nodes(), registry_));
-    if (input.loads) terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));
-    if (!input.couples.empty()) add_couples(input);
-    if (!input.contacts.empty()) add_contacts(input);
-    if (input.water)
-        for (Index body = 0; body < count; ++body)
-            forces_.push_back(
-                std::make_unique<WaterTerm>(*bodies_.sheets()[body], *loops_[body], *input.water, registry_));
-}
-
-void Model::add_moments(const SceneInput& input) {
-    std::vector<MomentTerm::Magnet> magnets;
-    for (std::size_t k = 0; k < input.rigid.size(); ++k)
-        if (input.rigid[k].magnetic)
-            std::copy_n(bodies_.rigid_nodes()[k].begin(), 4,
-                        magnets.emplace_back(MomentTerm::Magnet{input.rigid[k].owner, {}}).corners.begin());
-    if (!magnets.empty())
-        terms_.push_back(std::make_unique<MomentTerm>(magnets, nodes(), sources_, matrix_, registry_));
-}
-
-void Model::add_couples(const SceneInput& input) {
-    std::vector<CoupleTerm::Couple> couples;
-    for (const EdgeCoupleInput& given : input.couples)
-        couples.push_back(
-            couple_of(given, *input.sheets[given.sheet].mesh, *bodies_.sheets()[given.sheet], nodes()));
-    terms_.push_back(std::make_unique<CoupleTerm>(nodes(), matrix_, std::move(couples), registry_));
-}
-
-void Model::add_contacts(const SceneInput& input) {
-    std::unique_ptr<ContactTerm> contact =
-        std::make_unique<ContactTerm>(nodes(), matrix_, input.contacts, input.obstacles, registry_);
-    contact_ = contact.get();
-    terms_.push_back(std::move(contact));
-    std::vector<bool> rubs, lagged;
-    for (const ContactInput& each : input.contacts) {
-        rubs.push_back(each.rubs);
-        lagged.push_back(each.lagged);
-    }
-    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
-        forces_.push_back(std::make_unique<FrictionTerm>(*contact_, std::move(rubs), std::move(lagged)));
 }
 
 void Model::set_values(const VectorXd& in_user_order) {
@@ -279,6 +181,7 @@ void Model::evaluate(const VectorXd& q, const Controls& controls) {
 }
 
 std::string Model::not_finite(const VectorXd& q, const Controls& controls) {
+    if (std::string reason = refusal(q); !reason.empty()) return reason;
     Residual residual;
     for (const std::unique_ptr<Term>& term : terms_) {
         residual.reset(size());
@@ -321,11 +224,25 @@ void Model::share_out_columns() {
     };
     for (const Chunk& chunk : chunks)
         for (Index element = chunk.first; element < chunk.last; ++element) {
-            const Stencil& stencil = bodies_.sheets()[chunk.body]->stencils[element];
-            for (const Index node : stencil.nodes) take(node_taken, node, first_nodes_[chunk.number]);
-            for (const Index r : stencil.rotations) take(rotation_taken, r, first_rotations_[chunk.number]);
+            const Body& body = *bodies_.all()[chunk.body];
+            for (const Index node : body.nodes_of(element))
+                take(node_taken, node, first_nodes_[chunk.number]);
+            for (const Index r : body.scalars_of(element))
+                take(rotation_taken, r, first_rotations_[chunk.number]);
         }
     for (Index node = 0; node < nodes().n_nodes(); ++node) take(node_taken, node, first_nodes_.back());
+}
+
+double Model::largest_share(const VectorXd& q, const VectorXd& p) const {
+    double share = 1.0;
+    for (const Term* term : refusing_) share = std::min(share, term->largest_share(q.data(), p.data()));
+    return share;
+}
+
+std::string Model::refusal(const VectorXd& q) const {
+    for (const Term* term : refusing_)
+        if (std::string reason = term->refusal(q.data()); !reason.empty()) return reason;
+    return {};
 }
 
 void Model::extrapolate(const VectorXd& p) {
@@ -349,13 +266,14 @@ void Model::set_turns(const Turns& turns) {
 
 StrainSet Model::no_strains() const {
     StrainSet strains;
-    for (const ElasticTerm* term : elastic_) strains.of_terms.emplace_back(term->elements());
+    for (const ElasticTerm* term : elastic_)
+        strains.of_terms.emplace_back(term->elements(), term->strains_per_element());
     return strains;
 }
 
 Index Model::n_strains() const {
     Index count = 0;
-    for (const ElasticTerm* term : elastic_) count += 3 * term->elements();
+    for (const ElasticTerm* term : elastic_) count += term->strains_per_element() * term->elements();
     return count;
 }
 

@@ -105,6 +105,15 @@ class Model {
     StrainSet strain_rates(const VectorXd& p);
     VectorXd strain_forces(const StrainSet& stresses);
     StrainSet stresses(const StrainSet& strains) const;
+    /// Whether some states have no energy, as of solids turned inside out; then, of a step p from q, the largest
+    /// share up to which there is one, and what is wrong with a state, in words.
+    bool refuses_states() const { return !refusing_.empty(); }
+    double largest_share(const VectorXd& q, const VectorXd& p) const;
+    std::string refusal(const VectorXd& q) const;
+
+    /// The elastic term of a solid.
+    const SolidTerm& solid_term(Index solid) const { return *solid_terms_[solid]; }
+
     /// How many numbers a set of strains has.
     Index n_strains() const;
 
@@ -131,6 +140,7 @@ class Model {
     void add_loops(Index body, const VectorXd& curvature_scale);
     void add_terms(const SceneInput& input);
     void add_moments(const SceneInput& input);
+    void add_solids(const SceneInput& input);
     void add_couples(const SceneInput& input);
     void add_contacts(const SceneInput& input);
     void share_out_columns();
@@ -150,6 +160,8 @@ class Model {
     std::vector<std::unique_ptr<Term>> terms_;
     std::vector<std::vector<const Term*>> of_body_;  // those assembled by its chunks
     std::vector<ElasticTerm*> elastic_;
+    std::vector<const SolidTerm*> solid_terms_;
+    std::vector<const Term*> refusing_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
     const ContactTerm* contact_ = nullptr;
     // By chunk: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.

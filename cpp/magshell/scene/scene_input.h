@@ -7,10 +7,12 @@
 
 #include "magshell/assembly/reduction.h"
 #include "magshell/body/sheet.h"
+#include "magshell/body/solid.h"
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
 #include "magshell/term/contact_term.h"
 #include "magshell/term/face_energy.h"
+#include "magshell/term/solid_term.h"
 
 namespace magshell {
 
@@ -29,10 +31,20 @@ struct SheetInput {
     std::vector<DirectedEdge> directed_edges;  // directions are rows of SceneInput::directions
 };
 
+struct SolidInput {
+    std::string owner;     // under which its parameters are registered
+    Rows3 rest_positions;  // (n, 3) [m]
+    std::vector<Index> elements;
+    int nodes_per_element = 4;    // or 10
+    std::vector<Index> vertices;  // the scene's vertex of each row
+    SolidSurface surface;
+    SolidResponse response;
+};
+
 /// An energy of a body's faces beside its elastic and magnetic ones.
 struct FaceEnergyInput {
     std::string owner;  // under which its inputs are registered
-    Index body;
+    Index sheet;
     std::shared_ptr<const FaceEnergy> energy;
 };
 
@@ -49,9 +61,10 @@ struct RigidInput {
 
 /// Held nodes count the scene's vertices first, then directions.
 struct SceneInput {
-    Index n_vertices = 0;         // of the sheets
+    Index n_vertices = 0;         // of sheets and solids
     std::vector<Index> original;  // of each vertex: itself, or the one that it is welded to; empty if none is
     std::vector<SheetInput> sheets;
+    std::vector<SolidInput> solids;  // numbered on after the sheets
     std::vector<RigidInput> rigid;
     Rows3 directions;  // (n_d, 3), of directed edges and of couples
     std::vector<HeldNode> held;

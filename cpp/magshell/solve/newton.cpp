@@ -32,6 +32,10 @@ constexpr double shrinking = 0.7;
 // A residual that shrinks less makes the next step a cautious one.
 constexpr double contracting = 0.5;
 
+// So far towards the first element that would be turned inside out a step goes at most; a shorter one than that
+// leads nowhere.
+constexpr double of_way_to_inversion = 0.8, shortest_share = 1e-4;
+
 // How exactly to solve for a Newton step with an unsymmetric matrix: what its quadratic convergence deserves,
 // and no more than the end needs.
 double deserved(double residual, double tolerance) {
@@ -323,6 +327,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         report.reason = std::move(reason);
         return report;
     };
+    if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
     evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);
@@ -354,9 +359,18 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             moved = last_step <= small_move * model_.length_scale() ? 0.0
                                                                     : std::numeric_limits<double>::infinity();
         }
-        const VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
-                                                       deserved(report.residual, options_.tolerance));
-        move.setZero();
+        VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
+                                                 deserved(report.residual, options_.tolerance));
+        if (model_.refuses_states()) {
+            const double share = model_.largest_share(q, step / of_way_to_inversion);
+            if (share < shortest_share)
+                return fail("elements cannot follow: " +
+                            model_.refusal(q + 1.01 / of_way_to_inversion * share * step));
+            step *= share;
+            move *= 1.0 - share;
+        } else {
+            move.setZero();
+        }
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())

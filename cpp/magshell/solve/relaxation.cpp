@@ -24,6 +24,8 @@ class Relaxation {
     }
 
     RelaxationReport run(int max_steps) {
+        report_.reason = model_.refusal(q_);
+        if (!report_.reason.empty()) return report_;
         for (; report_.steps < max_steps; ++report_.steps) {
             if (!prepare()) return report_;
             while (!step()) {

@@ -21,7 +21,8 @@ class Statics {
         : newton_(newton), from_(from), to_(to), options_(options), result_(result) {}
 
     bool run() {
-        if (!load()) return false;
+        result_.reason = newton_.model().refusal(result_.state);
+        if (!result_.reason.empty() || !load()) return false;
         return result_.stable || !options_.require_stable || descend(1.0);
     }
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
+#include "magshell/body/sheet.h"
 #include "magshell/energy/bending.h"
 #include "magshell/strain/fold_angle.h"
 #include "magshell/term/elastic_term.h"

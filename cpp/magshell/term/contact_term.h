@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "magshell/assembly/lanes.h"
+#include "magshell/body/nodes.h"
 #include "magshell/energy/contact.h"
 #include "magshell/obstacle/placed_obstacle.h"
 #include "magshell/term/term.h"

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "magshell/assembly/lanes.h"
+#include "magshell/body/nodes.h"
 #include "magshell/term/term.h"
 
 namespace magshell {

@@ -1,4 +1,4 @@
-// Elastic energies 1/2 d^T C d of three strains an element: what they share, written once.
+// Elastic energies of some strains an element, 1/2 d^T C d of a sheet's three: what they share, written once.
 #pragma once
 
 #include "magshell/term/strains.h"
@@ -13,13 +13,14 @@ class ElasticTerm : public Term {
     /// From now on; an empty history makes the term elastic again.
     void set_history(const StrainHistory& history) { history_ = history; }
 
-    /// How many there are, each with three strains.
+    /// How many there are, each with so many strains.
     virtual Index elements() const = 0;
+    virtual int strains_per_element() const { return 3; }
     /// d at q.
     virtual Strains strains(const double* q) = 0;
     /// J p at the last evaluated state.
     virtual Strains strain_rates(const double* p) = 0;
-    /// C d, without history.
+    /// C d, without history; of a solid, with its stiffness at rest.
     virtual Strains stresses(const Strains& strains) const = 0;
     /// Adds J^T s at the last evaluated state.
     virtual void add_forces(const Strains& stresses, Residual& out) = 0;

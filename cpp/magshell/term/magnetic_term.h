@@ -5,6 +5,7 @@
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
+#include "magshell/body/surface.h"
 #include "magshell/energy/magnetic.h"
 #include "magshell/term/field_sources.h"
 #include "magshell/term/term.h"

@@ -12,19 +12,22 @@
 
 namespace magshell {
 
-/// Three numbers an element, in the layout of packs: strain i of pack p at 3 p + i, one lane an element.
+/// `width` numbers an element, three of a sheet's, in the layout of packs: strain i of pack p at width p + i, one
+/// lane an element.
 struct Strains {
     std::vector<Pack> packs;
     Index elements = 0;
+    int width = 3;
 
-    explicit Strains(Index elements_ = 0) : packs(3 * packs_for(elements_), Pack(0.0)), elements(elements_) {}
-    Pack* at(Index pack) { return packs.data() + 3 * pack; }
-    const Pack* at(Index pack) const { return packs.data() + 3 * pack; }
-    double number(Index element, int i) const {
-        return packs[3 * (element / Pack::width) + i][element % Pack::width];
-    }
+    explicit Strains(Index elements_ = 0, int width_ = 3)
+        : packs(static_cast<std::size_t>(width_) * packs_for(elements_), Pack(0.0)),
+          elements(elements_),
+          width(width_) {}
+    Pack* at(Index pack) { return packs.data() + static_cast<std::size_t>(width) * pack; }
+    const Pack* at(Index pack) const { return packs.data() + static_cast<std::size_t>(width) * pack; }
+    double number(Index element, int i) const { return at(element / Pack::width)[i][element % Pack::width]; }
     void set(Index element, int i, double value) {
-        packs[3 * (element / Pack::width) + i].set(element % Pack::width, value);
+        at(element / Pack::width)[i].set(element % Pack::width, value);
     }
 };
 

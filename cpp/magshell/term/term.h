@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -28,6 +29,13 @@ class Term {
 
     /// A displacement [m] that matters to its Hessian: a sheet's thickness.
     virtual double length_scale() const { return std::numeric_limits<double>::infinity(); }
+
+    /// Whether it has no energy in some states, as of elements turned inside out.
+    virtual bool refuses_states() const { return false; }
+    /// The largest share of a step p from q, at most all of it, up to which it has an energy.
+    virtual double largest_share(const double* /*q*/, const double* /*p*/) const { return 1.0; }
+    /// What is wrong with q, in words; empty where nothing is.
+    virtual std::string refusal(const double* /*q*/) const { return {}; }
 
     /// Whether the controls drive it. Every term that they do is linear in them; poses move in time steps only.
     virtual bool driven() const { return true; }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
+#include "magshell/body/surface.h"
 #include "magshell/force/drag.h"
 #include "magshell/term/force_term.h"
 

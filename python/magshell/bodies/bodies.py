@@ -10,10 +10,14 @@ import numpy as np
 from .._checks.checked_list import checked_list
 from ..mesh.quality import MeshQuality
 from ..mesh.triangle_mesh import TriangleMesh
+from .joined_mesh import JoinedMesh
 from .no_mesh import NoMesh
 from .rigid import Rigid
 from .shell import Shell
+from .solid import Solid
 from .ties import Tie, joined_components, originals
+
+BODIES = (Shell, Solid)
 
 
 class Span(NamedTuple):
@@ -34,26 +38,32 @@ class Span(NamedTuple):
 
     @property
     def edges(self) -> slice:
-        return slice(self.first_edge, self.first_edge + self.mesh.n_edges)
+        """Those that may turn: a solid has none."""
+        return slice(self.first_edge, self.first_edge + turning_edges(self.mesh))
 
     @property
     def faces(self) -> slice:
         return slice(self.first_face, self.first_face + self.mesh.n_faces)
 
 
-class Bodies:
-    """Raises ValueError where one is no Shell and no Rigid, or is there twice, or where a tie cannot be.
+def turning_edges(mesh) -> int:
+    """How many edges the core has for a mesh: of a solid, none."""
+    return mesh.n_edges if isinstance(mesh, TriangleMesh) else 0
 
-    shells, rigid: those of a kind. The points of rigid parts come after all vertices.
+
+class Bodies:
+    """Raises ValueError where one is no Shell, Solid or Rigid, or is there twice, or where a tie cannot be.
+
+    shells: all Shells and Solids. rigid: the Rigid parts, whose points come after all vertices.
     original: (n_v of all,), the first of the vertices that each is welded to, or itself.
     """
 
     def __init__(self, bodies, ties=()):
-        listed = checked_list("bodies", bodies, (Shell, Rigid))
-        self.shells: tuple[Shell, ...] = tuple(body for body in listed if isinstance(body, Shell))
+        listed = checked_list("bodies", bodies, (*BODIES, Rigid))
+        self.shells: tuple[Shell | Solid, ...] = tuple(body for body in listed if isinstance(body, BODIES))
         self.rigid: tuple[Rigid, ...] = tuple(body for body in listed if isinstance(body, Rigid))
         if not listed:
-            raise ValueError("bodies must hold at least one Shell or Rigid")
+            raise ValueError("bodies must hold at least one Shell, Solid or Rigid")
         for k, part in enumerate(self.rigid):
             if self.rigid_number(part) < k:
                 raise ValueError(
@@ -62,14 +72,15 @@ class Bodies:
         for k, shell in enumerate(self.shells):
             if (before := self.number(shell)) < k:
                 raise ValueError(
-                    f"bodies must differ, but bodies {before} and {k} are one Shell: make another of its mesh"
+                    f"bodies must differ, but bodies {before} and {k} are one {type(shell).__name__}: make another of "
+                    "its mesh"
                 )
         self.spans: list[Span] = []
         vertex = edge = face = 0
         for k, shell in enumerate(self.shells):
             mesh = shell.mesh
             self.spans.append(Span(mesh, slice(k, k + 1), vertex, edge, face))
-            vertex, edge, face = vertex + mesh.n_vertices, edge + mesh.n_edges, face + mesh.n_faces
+            vertex, edge, face = vertex + mesh.n_vertices, edge + turning_edges(mesh), face + mesh.n_faces
         self.ties: tuple[Tie, ...] = checked_list("ties", ties, (Tie,))
         self._welded = np.concatenate([np.zeros((0, 2), dtype=np.int64), *map(self._pairs, self.ties)])
         self.original = originals(vertex, self._welded)
@@ -131,10 +142,20 @@ class Bodies:
             return self.shells[0].mesh
         if not self.shells:
             return NoMesh()
+        if self.solids:
+            return JoinedMesh(self.meshes)
         faces = [span.mesh.faces + span.first_vertex for span in self.spans]
         return TriangleMesh(
             np.concatenate([mesh.rest_positions for mesh in self.meshes]), np.concatenate(faces)
         )
+
+    @property
+    def sheets(self) -> tuple[Shell, ...]:
+        return tuple(body for body in self.shells if isinstance(body, Shell))
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        return tuple(body for body in self.shells if isinstance(body, Solid))
 
     @property
     def size(self) -> float:
@@ -151,7 +172,9 @@ class Bodies:
         for k, each in enumerate(self.shells):
             if each is shell:
                 return k
-        what = "a Shell that is not in it" if isinstance(shell, Shell) else f"{shell!r:.60}"
+        what = (
+            f"a {type(shell).__name__} that is not in it" if isinstance(shell, BODIES) else f"{shell!r:.60}"
+        )
         raise ValueError(f"a body of the scene is one of scene.bodies, got {what}")
 
     def rigid_number(self, part) -> int:
@@ -203,14 +226,24 @@ class Bodies:
         of = np.searchsorted(first, edges, side="right") - 1
         return of, edges - first[of]
 
+    def sheet_number(self, span: Span) -> int:
+        """Of one body, among the sheets."""
+        return sum(isinstance(body, Shell) for body in self.shells[: span.bodies.start or 0])
+
+    def sheets_of(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `split`, with the number of the body among the sheets."""
+        of, own = self.split(edges)
+        before = np.cumsum([0, *(isinstance(body, Shell) for body in self.shells)])
+        return before[of], own
+
 
 class Whole:
-    """What faces of several sheets are made of, one sheet after another."""
+    """What faces of several sheets, or of none, are made of, one sheet after another."""
 
     def __init__(self, mesh: TriangleMesh, sheets: tuple[Shell, ...]):
         self.mesh = mesh
-        self.thickness = joined([sheet.thickness for sheet in sheets])
-        self.young_modulus = joined([sheet.young_modulus for sheet in sheets])
+        self.thickness = joined([sheet.thickness for sheet in sheets] or [np.zeros(0)])
+        self.young_modulus = joined([sheet.young_modulus for sheet in sheets] or [np.zeros(0)])
 
     @cached_property
     def quality(self) -> MeshQuality:
@@ -219,8 +252,8 @@ class Whole:
 
 def checked_body(body) -> Shell | None:
     """The body that something is about, as it was given."""
-    if body is not None and not isinstance(body, Shell):
-        raise ValueError(f"body must be a Shell of the scene, got {body!r:.60}")
+    if body is not None and not isinstance(body, BODIES):
+        raise ValueError(f"body must be a Shell or Solid of the scene, got {body!r:.60}")
     return body
 
 

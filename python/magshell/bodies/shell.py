@@ -132,6 +132,11 @@ class Shell(Owner):
         np.add.at(masses, self.mesh.faces, (self.face_volumes * self.mass_density / 3.0)[:, None])
         return masses
 
+    @property
+    def weighed_masses(self) -> np.ndarray:
+        """What gravity pulls at each vertex by, (n_v,), kg."""
+        return self.vertex_masses
+
     def __repr__(self) -> str:
         parts = [f"{self.mesh.n_faces} faces"]
         for name, unit in (

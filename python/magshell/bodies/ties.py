@@ -11,6 +11,7 @@ from .._checks.quantity import quantity
 from .._checks.selections import indices, selection
 from ..mesh.selection import RELATIVE_TOLERANCE
 from .shell import Shell
+from .solid import Solid
 
 
 class Tie:
@@ -19,7 +20,7 @@ class Tie:
     Results have it among those of each body, at the same place. Masses, loads and damping of both add up there; what holds
     one, holds the other. A seam is a hinge: bodies that share no more than a line turn freely about it, and bodies that
     share faces (a patch on a sheet) bend together. A seam that carries moments is one mesh: `ms.weld(mesh, mesh)`, with
-    thickness and modulus by face.
+    thickness and modulus by face. A sheet on a solid's face moves with it; one that is held by an edge alone turns.
 
     a, b: two bodies of the scene.
     vertices: those of `a` that are welded, each to one of `b`; by default all that have one.
@@ -35,10 +36,10 @@ class Tie:
     15
     """
 
-    def __init__(self, a: Shell, b: Shell, *, vertices=None, tolerance: float | None = None):
+    def __init__(self, a: Shell | Solid, b: Shell | Solid, *, vertices=None, tolerance: float | None = None):
         for name, body in (("a", a), ("b", b)):
-            if not isinstance(body, Shell):
-                raise ValueError(f"Tie {name} must be a Shell of the scene, got {body!r:.60}")
+            if not isinstance(body, Shell | Solid):
+                raise ValueError(f"Tie {name} must be a Shell or a Solid of the scene, got {body!r:.60}")
         if a is b:
             raise ValueError(
                 "a Tie joins two bodies, but a and b are one: to join a mesh to itself use ms.weld"

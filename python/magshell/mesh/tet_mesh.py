@@ -270,6 +270,10 @@ class TetMesh(TetSelection):
         """The shapes of its tetrahedra: dihedral angles, radius ratios, aspects, Jacobians."""
         return TetQuality(self)
 
+    def self_intersections(self, positions) -> np.ndarray:
+        """The faces of the surface that pass through each other at positions (n_v, 3) m, (k, 2)."""
+        return self.surface.self_intersections(np.asarray(positions)[self.surface_vertices])
+
     # Other meshes from this one
 
     def with_parts(self, parts, names=None) -> TetMesh:

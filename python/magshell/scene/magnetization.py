@@ -19,6 +19,10 @@ def check_given_once(scene, given, replaced: dict[object, dict]) -> None:
                 "remanent_magnetization was given, but the scene has no field: Scene(..., field=...)"
             )
         return
+    if given is not None and scene._bodies.solids:
+        raise ValueError(
+            "remanent_magnetization was given for all bodies, but a Solid has none: values={shell: {...}}"
+        )
     if given is not None and replacing:
         raise ValueError("remanent_magnetization was given twice: as an argument and in values")
     for k, body in enumerate(scene.bodies):

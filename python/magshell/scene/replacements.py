@@ -32,7 +32,10 @@ def requested(
         asked[owner] = dict(named)
     for name, value in shell.items():
         if value is not None:
-            _add(asked, _one_body(scene, name), name, value)
+            body = _one_body(scene, name)
+            if name not in body._replaceable:
+                raise ValueError(f"{name} was given, but a {type(body).__name__} has none: {body!r}")
+            _add(asked, body, name, value)
     if vertex_loads is not None:
         _add(asked, scene, "vertex_loads", vertex_loads)
     _check_against_scene(scene, asked, moving)

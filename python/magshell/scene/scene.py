@@ -17,6 +17,7 @@ from ..bodies.caps import Caps
 from ..bodies.rigid import Rigid
 from ..bodies.rigid_place import places
 from ..bodies.shell import Shell
+from ..bodies.solid import Solid
 from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
@@ -38,8 +39,8 @@ class Scene:
     """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
     needs and, up to 256 MB, the memory of its last factorization.
 
-    bodies: a Shell, or several, which do not feel each other but through ties, and Rigid parts. Positions and faces of a
-        result are those of one Shell after another, and `result[body]` has those of one; each may have its own `bending`.
+    bodies: a Shell or a Solid, or several, which do not feel each other but through ties, and Rigid parts. Positions and
+        faces of a result are those of one body after another, and `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple and SurfaceTension objects; likewise.
@@ -71,7 +72,7 @@ class Scene:
 
     def __init__(
         self,
-        bodies: Shell | Rigid | Iterable[Shell | Rigid],
+        bodies: Shell | Solid | Rigid | Iterable[Shell | Solid | Rigid],
         *,
         ties=(),
         supports=(),
@@ -91,6 +92,7 @@ class Scene:
         if water is not None and not isinstance(water, Water):
             raise ValueError(f"water must be a Water, got {type(water).__name__}")
         self.water = water
+        _refuse_around_solids(self)
         self.gravity = np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
         if any(f._core is None and not isinstance(f, UniformField) for f in self.fields):
             raise ValueError("field holds an AppliedField without a value: use a CustomField")
@@ -156,6 +158,7 @@ class Scene:
             n_vertices=mesh.n_vertices,
             original=bodies.original if bodies.ties else [],
             sheets=self._sheets(constraints),
+            solids=self._solids(),
             rigid=[
                 place.as_input(f"rigid {k}", bool(self.fields) and part.magnetic_moment is not None)
                 for k, (part, place) in enumerate(zip(self.rigid_parts, self._rigid, strict=True))
@@ -165,7 +168,7 @@ class Scene:
             held_frames=constraints.held_frames,
             moves=len(constraints.moves),
             couples=np.stack(
-                [*bodies.split(edges), n_directions - n_couples + np.arange(n_couples)], axis=1
+                [*bodies.sheets_of(edges), n_directions - n_couples + np.arange(n_couples)], axis=1
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
             face_energies=self._face_energies(),
@@ -196,12 +199,21 @@ class Scene:
                 "directed_edges": pairs[of == k],
             }
             for k, (shell, span) in enumerate(zip(self.bodies, self._bodies.spans, strict=True))
+            if isinstance(shell, Shell)
+        ]
+
+    def _solids(self) -> list[dict]:
+        """The solids as the core takes them."""
+        return [
+            body._core_input(f"body {k}", self._bodies.original[span.vertices])
+            for k, (body, span) in enumerate(zip(self.bodies, self._bodies.spans, strict=True))
+            if isinstance(body, Solid)
         ]
 
     def _face_energies(self) -> list[dict]:
         """As the core takes them."""
         return [
-            {"owner": label, "body": self._bodies.of(load).bodies.start or 0, "energy": load._core}
+            {"owner": label, "sheet": self._bodies.sheet_number(self._bodies.of(load)), "energy": load._core}
             for load, label in self._labels
             if isinstance(load, FaceEnergy)
         ]
@@ -242,7 +254,7 @@ class Scene:
         return Caps(self._values.whole, self._model.recut_faces)
 
     @property
-    def bodies(self) -> tuple[Shell, ...]:
+    def bodies(self) -> tuple[Shell | Solid, ...]:
         return self._bodies.shells
 
     @property
@@ -332,6 +344,21 @@ def _refuse_support(parts, held: np.ndarray) -> None:
                 f"a support holds vertex {both[0]}, which rigid part {k} carries: leave it out of the part's vertices; what "
                 "is to stand still altogether needs no Rigid"
             )
+
+
+def _refuse_around_solids(scene: Scene) -> None:
+    """What acts on shells only must not pass over solids in silence."""
+    solids = scene._bodies.solids
+    if not solids:
+        return
+    if scene.water is not None:
+        raise ValueError("water acts on shells, but the scene has a Solid")
+    for load in scene.loads:
+        if isinstance(load, FaceEnergy) and scene.bodies[scene._bodies.of(load).bodies][0] in solids:
+            raise ValueError(f"{load!r} is about a Solid: it acts on shells")
+    for contact in scene.contacts:
+        if any(body in solids for body in scene.bodies[scene._bodies.of(contact).bodies]):
+            raise ValueError(f"{contact!r} is about a Solid: contacts are about shells")
 
 
 def _couple_edges(bodies: Bodies, loads) -> np.ndarray:

@@ -39,7 +39,7 @@ class Values:
         for owner, label in scene._labels:
             self.current(owner).add_numbers(label, self, numbers)
         if ("gravity", "forces") in scene._value_layout:
-            numbers["gravity", "forces"] = self.masses[:, None] * self.gravity
+            numbers["gravity", "forces"] = self.weighed_masses[:, None] * self.gravity
         if "vertex_loads" in own:
             numbers["loads", "forces"] = own["vertex_loads"]
         if ("loads", "forces") in numbers:
@@ -47,7 +47,8 @@ class Values:
             numbers["loads", "forces"] = joined([numbers["loads", "forces"], *own_points])
         if magnetization is not None:
             for k, span in enumerate(scene._bodies.spans):
-                numbers[f"body {k}", "remanent_magnetization"] = magnetization[span.faces]
+                if (f"body {k}", "remanent_magnetization") in scene._value_layout:
+                    numbers[f"body {k}", "remanent_magnetization"] = magnetization[span.faces]
         self.numbers = scene._value_layout.packed(numbers)
 
     def same_as(self, other: Values) -> bool:
@@ -62,7 +63,7 @@ class Values:
         if ("loads", "forces") in self.scene._value_layout:
             found["vertex_loads"] = gradient.value("loads", "forces")[: self.scene.mesh.n_vertices]
         if (by_weights := self.by_weights(gradient)) is not None:
-            found["gravity"] = self.masses @ by_weights
+            found["gravity"] = self.weighed_masses @ by_weights
         return found
 
     @property
@@ -73,8 +74,11 @@ class Values:
 
     @property
     def whole(self) -> Shell | Whole:
-        """All sheets as one, for what looks at their faces."""
-        return self.sheets[0] if len(self.sheets) == 1 else Whole(self.scene.mesh, self.sheets)
+        """All sheets as one, for what looks at their faces; with solids beside them, without their mesh."""
+        sheets = tuple(body for body in self.sheets if isinstance(body, Shell))
+        if len(sheets) == len(self.sheets) == 1:
+            return sheets[0]
+        return Whole(self.scene.mesh if len(sheets) == len(self.sheets) else None, sheets)
 
     def touching(self, contact) -> tuple:
         """The sheets that a contact is about, as they are in this solve."""
@@ -96,22 +100,33 @@ class Values:
 
     @property
     def masses(self) -> np.ndarray:
-        """Of all vertices and of the points of rigid parts, kg."""
-        if not self.rigid:
-            return self.vertex_masses
-        places = zip(self.scene._rigid, self.rigid, strict=True)
-        return np.concatenate([self.vertex_masses, *(place.masses(span) for place, span in places)])
+        """Of all vertices and of the points of rigid parts, kg: for inertia."""
+        return joined([self.vertex_masses, *self._masses_of_rigid()])
 
-    def rigid_place(self, span):
+    @property
+    def weighed_masses(self) -> np.ndarray:
+        """What gravity pulls at each of them by, kg: of sheets and rigid parts, their masses."""
+        self.vertex_masses  # noqa: B018 - says which body has no density
+        return joined([*(body.weighed_masses for body in self.sheets), *self._masses_of_rigid()])
+
+    def _masses_of_rigid(self) -> list[np.ndarray]:
+        return [place.masses(part) for place, part in zip(self.scene._rigid, self.rigid, strict=True)]
+
+    def rigid_place(self, part):
         """Where one of `rigid` is."""
-        return next(place for place, each in zip(self.scene._rigid, self.rigid, strict=True) if each is span)
+        return next(place for place, each in zip(self.scene._rigid, self.rigid, strict=True) if each is part)
+
+    def by_inertia_and_weight(self, gradient: Gradient) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """By `masses`, and by `weighed_masses`; None where they have no part."""
+        by_weights = self.by_weights(gradient)
+        return gradient.others.get("mass"), None if by_weights is None else by_weights @ self.gravity
 
     def by_masses(self, gradient: Gradient) -> np.ndarray | None:
-        """By `masses`, of gravity and of inertia; None where they have no part."""
-        by_masses, by_weights = gradient.others.get("mass"), self.by_weights(gradient)
-        if by_weights is None:
+        """By `masses`, of gravity and of inertia, where they are the same; None where they have no part."""
+        by_masses, by_weighed = self.by_inertia_and_weight(gradient)
+        if by_weighed is None:
             return by_masses
-        return by_weights @ self.gravity + (0.0 if by_masses is None else by_masses)
+        return by_weighed + (0.0 if by_masses is None else by_masses)
 
     def by_weights(self, gradient: Gradient) -> np.ndarray | None:
         """By the weights of `masses`, (n, 3); None where nothing is heavy."""
@@ -169,6 +184,7 @@ class Gradient:
         if name in self.others:
             return self.others[name]
         if name == "remanent_magnetization":
-            return joined([self.value(f"body {k}", name) for k in range(len(self._scene.bodies))])
+            owners = [f"body {k}" for k in range(len(self._scene.bodies))]
+            return joined([self.value(owner, name) for owner in owners if self.has(owner, name)])
         by_control = self.control("scene", name)
         return by_control[..., 0, :] if name == "applied_flux_density" else by_control[..., 0]

@@ -91,6 +91,13 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
         )
     if not scene.bodies:
         return "Start from a nearby equilibrium."
+    if "inside out" in found.reason:
+        return (
+            "Start from positions where no element is so, take smaller steps there, or a material that has an energy "
+            "there (StableNeoHookean)."
+        )
+    if scene._bodies.solids:
+        return _advice_of_any(inputs, found, at_rest)
     mesh, quality = scene.mesh, shell.quality
     tiny = np.flatnonzero(quality.heights < SHORTEST_HEIGHT * np.median(mesh.edge_lengths))
     if tiny.size:
@@ -99,11 +106,8 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
             "beside their stiffness, that of the rest is lost in round-off. Merge their vertices, or leave such faces "
             "out of the mesh; `mesh.quality` has the shapes of all."
         )
-    free = free_rigid_motions(scene._bodies, scene._constraints) if "singular" in found.reason else []
-    if free:
-        return (
-            f"The supports leave the sheet free ({'; '.join(free)}): hold it, unless a field or gravity does."
-        )
+    if free := _free(inputs, found):
+        return free
     beside = np.flatnonzero(np.isin(mesh.faces, near).any(axis=1))
     flat = beside[quality.largest_angles[beside] > NEARLY_FLAT]
     if flat.size:
@@ -111,6 +115,22 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
             f"{describe_faces(shell, flat[np.argsort(-quality.largest_angles[flat], kind='stable')])} beside that, and "
             "almost flat: mend the mesh there first."
         )
+    return _advice_of_any(inputs, found, at_rest)
+
+
+def _free(inputs, found) -> str:
+    scene = inputs.scene
+    free = free_rigid_motions(scene._bodies, scene._constraints) if "singular" in found.reason else []
+    if not free:
+        return ""
+    return f"The supports leave the sheet free ({'; '.join(free)}): hold it, unless a field or gravity does."
+
+
+def _advice_of_any(inputs, found, at_rest: bool) -> str:
+    """Whatever the bodies are."""
+    scene = inputs.scene
+    if free := _free(inputs, found):
+        return free
     if _still_moves(found.failed, scene._bodies.size):
         return "Allow it more steps (max_relaxation_steps of the solver), or start from a nearby equilibrium."
     if not at_rest:

@@ -244,7 +244,7 @@ def _bending_energies(scene: Scene, found, controls) -> list[float]:
     """Of its points, where faces are to be looked at for which that matters."""
     if not scene._caps.faces.size:
         return []
-    return [scene._model.energies(point.state, controls)["bending"] for point in found.points]
+    return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]
 
 
 _BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}{postfix}"

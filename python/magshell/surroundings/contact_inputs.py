@@ -59,6 +59,8 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
 
 def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
     """A body that starts deeper in an obstacle than half its thickness would be shot out of it."""
+    if not scene.contacts:
+        return
     allowed = np.empty(scene.mesh.n_vertices)
     for span, sheet in zip(scene._bodies.spans, values.sheets, strict=True):
         allowed[span.vertices] = 0.5 * np.max(sheet.thickness)

@@ -152,6 +152,8 @@ class Clamp(Support):
         self._move = _Move(displacement, rotation, center)
 
     def held(self, mesh: TriangleMesh) -> list[Held]:
+        if not isinstance(mesh, TriangleMesh):
+            raise ValueError("a Clamp holds edges of a shell: a Pin of the vertices of a face clamps a solid")
         vertices = np.unique(mesh.edges[self._checked(mesh)])
         return [Held(vertices, np.broadcast_to(np.eye(3), (len(vertices), 3, 3)), self._move_on(mesh))]
 
@@ -221,6 +223,8 @@ class SymmetryPlane(Support):
         return [Held(vertices, np.broadcast_to(self.normal, (len(vertices), 1, 3)), None)]
 
     def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
+        if not isinstance(mesh, TriangleMesh):
+            return []  # a solid has no angle across the plane
         on_plane = np.zeros(mesh.n_vertices, dtype=bool)
         on_plane[self._vertices(mesh)] = True
         boundary = mesh.boundary_edges

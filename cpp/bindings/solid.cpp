@@ -1,0 +1,60 @@
+#include "bindings/solid.h"
+
+#include "bindings/arrays.h"
+#include "magshell/scene/model.h"
+
+namespace magshell::bindings {
+namespace {
+
+py::array_t<double> matrices(const std::vector<Mat3>& given, Index elements, int points) {
+    py::array_t<double> out({static_cast<py::ssize_t>(elements), static_cast<py::ssize_t>(points),
+                             py::ssize_t{3}, py::ssize_t{3}});
+    double* to = out.mutable_data();
+    for (const Mat3& each : given)
+        for (int r = 0; r < 3; ++r)
+            for (int c = 0; c < 3; ++c) *to++ = each(r, c);
+    return out;
+}
+
+// (F, Cauchy stress, volumes) at the points of integration: (n_t, p, 3, 3) twice and (n_t, p).
+py::tuple point_states(const Model& model, Index solid, const VectorXd& q) {
+    PointStates states;
+    {
+        const py::gil_scoped_release unlocked;
+        states = model.solid_term(solid).point_states(q.data());
+    }
+    const Index elements = model.bodies().solids()[solid]->n_elements();
+    py::array_t<double> volumes(
+        {static_cast<py::ssize_t>(elements), static_cast<py::ssize_t>(states.points)});
+    std::copy(states.volumes.begin(), states.volumes.end(), volumes.mutable_data());
+    return py::make_tuple(matrices(states.deformation_gradients, elements, states.points),
+                          matrices(states.cauchy_stresses, elements, states.points), volumes);
+}
+
+}  // namespace
+
+std::vector<SolidInput> solids_of(const py::list& given) {
+    std::vector<SolidInput> solids;
+    for (const py::handle each : given) {
+        SolidInput& solid = solids.emplace_back();
+        solid.owner = each["owner"].cast<std::string>();
+        solid.rest_positions = to_rows3(each["rest_positions"].cast<Array>());
+        const IndexArray elements = each["elements"].cast<IndexArray>();
+        solid.elements.assign(elements.data(), elements.data() + elements.size());
+        solid.nodes_per_element = static_cast<int>(elements.shape(1));
+        solid.vertices = each["vertices"].cast<std::vector<Index>>();
+        solid.surface.mesh = each["surface"].cast<std::shared_ptr<TriangleMesh>>();
+        solid.surface.vertices = each["surface_vertices"].cast<std::vector<Index>>();
+        solid.response = {each["material"].cast<std::string>(), each["mean_volume"].cast<bool>()};
+    }
+    return solids;
+}
+
+void register_solid(py::module_& module) {
+    module.def(
+        "solid_point_states", &point_states, py::arg("model"), py::arg("solid"), py::arg("q"),
+        "(F, Cauchy stress [Pa], rest volumes [m3]) at the points of integration of a solid's elements: "
+        "(n_t, p, 3, 3) twice and (n_t, p).");
+}
+
+}  // namespace magshell::bindings

@@ -1,0 +1,64 @@
+// A solid as the core sees it: tetrahedra of four or of ten nodes, numbered along a curve, and the surface around them.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "magshell/body/body.h"
+#include "magshell/body/surface.h"
+
+namespace magshell {
+
+/// The skin of a solid in a mesh of its own: of ten-node tetrahedra, four flat triangles a face.
+struct SolidSurface {
+    std::shared_ptr<const TriangleMesh> mesh;
+    std::vector<Index> vertices;  // the scene's vertex of each vertex of the mesh
+};
+
+class Solid final : public Body {
+  public:
+    /// elements (n_t, 4 or 10): rows of rest_positions (n, 3), middle nodes in the order of
+    /// strain/tetrahedron.h. `vertices`: the scene's vertex of each row. Throws InvalidInput, naming the
+    /// first offender, on elements whose volume at a point of integration is not positive.
+    Solid(std::string owner, const Rows3& rest_positions, const std::vector<Index>& elements,
+          int nodes_per_element, const std::vector<Index>& vertices, const SolidSurface& surface,
+          NodeNumbering& numbering);
+    Solid(const Solid&) = delete;
+    Solid& operator=(const Solid&) = delete;
+
+    Index n_elements() const override { return elements.size(); }
+    std::span<const Index> nodes_of(Index element) const override {
+        if (quadratic()) return quadratic_nodes[element];
+        return linear_nodes[element];
+    }
+
+    bool quadratic() const { return linear_nodes.empty(); }
+    const Surface* surface() const { return surface_.get(); }
+    /// Of the bounding box at rest: its diagonal [m].
+    double extent() const;
+    /// The smallest height of an element at rest, between its corners [m].
+    double smallest_height() const;
+    /// Adds the volume of each element to its nodes, in equal shares, among all unknowns [m3].
+    void add_volumes(VectorXd& metric) const;
+    double volume() const;
+    /// The nodes of an element at rest [m].
+    Vec3 rest(Index element, int k) const { return rest_[element * width_ + k]; }
+
+    const std::string owner;
+    Renumbering elements;                            // the caller's <-> ours
+    std::vector<std::array<Index, 4>> linear_nodes;  // per element, our nodes; one of the two is empty
+    std::vector<std::array<Index, 10>> quadratic_nodes;
+
+  private:
+    template <class Element>
+    void check_volumes() const;
+    double volume_of(Index element) const;
+
+    int width_;
+    std::vector<Vec3> rest_;
+    std::unique_ptr<Surface> surface_;
+};
+
+}  // namespace magshell

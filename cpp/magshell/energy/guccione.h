@@ -1,0 +1,173 @@
+// The transversely isotropic solid of Guccione et al. 1995, for muscle. One point a lane.
+//
+//   W = C/2 (e^Q - 1) + K/2 (J - 1)^2                                             [J/m3]
+//   Q = bf E_ff^2 + bt (E_ss^2 + E_nn^2 + 2 E_sn^2) + 2 bfs (E_fs^2 + E_fn^2)
+//
+// in Green's strain E. With e = m . E m and q = |E m|^2, m the unit fibre at rest,
+//
+//   Q = bf e^2 + bt (tr E^2 - 2 q + e^2) + 2 bfs (q - e^2)
+//   D = dQ/dE = 2 (bf + bt - 2 bfs) e m (x) m + 2 bt E + 2 (bfs - bt) (m (x) E m + E m (x) m)
+//   P = F S + p cof F,   S = C/2 e^Q D,   p = K (J - 1)                           [Pa]
+#pragma once
+
+#include "magshell/core/pack_functions.h"
+#include "magshell/energy/st_venant_kirchhoff.h"
+
+namespace magshell {
+
+struct Guccione {
+    static constexpr int constants = 8;  // C [Pa], bf, bt, bfs, K [Pa], m
+    static constexpr int stresses = 7;   // S, p
+    static constexpr bool refuses_inversion = false;
+    static constexpr bool keeps_measures = false;
+
+    Pack33 f, cof;
+    Pack e[6], j;
+
+    explicit Guccione(const Pack33& gradient) : f(gradient), cof(cofactor(f)), j(determinant(f, cof)) {
+        Green::strain(f, e);
+    }
+
+    /// Across the fibres.
+    static RestModuli rest_moduli(const Pack c[]) { return {Pack(0.0), Pack(0.5) * c[0] * c[2]}; }
+    static void rest_moduli_vjp(const Pack c[], const RestModuli& by, Pack out[]) {
+        out[0] += Pack(0.5) * c[2] * by.mu;
+        out[2] += Pack(0.5) * c[0] * by.mu;
+    }
+
+    static Volumetric volumetric(const Pack c[], const Pack& v) { return quadratic_volume(c[4], v); }
+
+    Pack volume_measure() const { return j; }
+    Pack volume_rate(const Pack33& d) const { return double_dot(cof, d); }
+    Pack3 volume_gradient(const Pack3& g) const { return multiply(cof, g); }
+    Pack33 volume_piola() const { return cof; }
+
+    Pack energy(const Pack c[]) const { return Pack(0.5) * c[0] * (exp(exponent(c)) - Pack(1.0)); }
+
+    void stress(const Pack c[], const Pack& pressure, Pack s[]) const {
+        Pack d[6];
+        linear(c, e, d);
+        const Pack scale = growth(c);
+        for (int i = 0; i < 6; ++i) s[i] = scale * d[i];
+        s[6] = pressure;
+    }
+
+    void stress_rate(const Pack c[], const Pack33& along, Pack pressure_rate, Pack s[]) const {
+        Pack rate[6], d[6], change[6];
+        Green::rate(f, along, rate);
+        linear(c, e, d);
+        linear(c, rate, change);
+        const Pack scale = growth(c), grows = Green::double_dot(d, rate);
+        for (int i = 0; i < 6; ++i) s[i] = scale * (change[i] + grows * d[i]);
+        s[6] = pressure_rate;
+    }
+
+    Pack33 piola(const Pack[], const Pack s[]) const { return multiply(f, Green::matrix(s)) + s[6] * cof; }
+
+    void work_by_constants(const Pack c[], const Pack33& along, Pack work[]) const {
+        Pack rate[6], d[6];
+        Green::rate(f, along, rate);
+        linear(c, e, d);
+        const Pack scale = growth(c), total = Green::double_dot(d, rate);
+        work[0] = Pack(0.5) * exp(exponent(c)) * total;
+        work[4] = Pack(0.0);
+        for (int k = 1; k < 4; ++k) {  // Q and D are linear in each exponent
+            const Pack unit[8] = {c[0],
+                                  Pack(k == 1 ? 1.0 : 0.0),
+                                  Pack(k == 2 ? 1.0 : 0.0),
+                                  Pack(k == 3 ? 1.0 : 0.0),
+                                  c[4],
+                                  c[5],
+                                  c[6],
+                                  c[7]};
+            linear(unit, e, d);
+            work[k] = scale * (Green::double_dot(d, rate) + exponent(unit) * total);
+        }
+        // By the fibre: D:rate = 2 a e (m . L m) + 2 bt E:L + 2 b (E m) . (L m), dQ/dm = 4 a e E m + 2 b E^2 m.
+        const Pack a = c[1] + c[2] - Pack(2.0) * c[3], b = Pack(2.0) * (c[3] - c[2]);
+        const Pack33 strain = Green::matrix(e), l = Green::matrix(rate);
+        const Pack3 m{c[5], c[6], c[7]}, em = multiply(strain, m), lm = multiply(l, m);
+        const Pack eff = dot(m, em), lff = dot(m, lm);
+        const Pack3 by_m = (Pack(4.0) * a * lff) * em + (Pack(4.0) * a * eff) * lm +
+                           (Pack(2.0) * b) * (multiply(strain, lm) + multiply(l, em)) +
+                           total * ((Pack(4.0) * a * eff) * em + (Pack(2.0) * b) * multiply(strain, em));
+        work[5] = scale * by_m.x;
+        work[6] = scale * by_m.y;
+        work[7] = scale * by_m.z;
+    }
+    static void pressure_by_constants(const Pack[], const Pack& v, Pack by[]) {
+        for (int k = 0; k < constants; ++k) by[k] = k == 4 ? v - Pack(1.0) : Pack(0.0);
+    }
+
+    template <int N>
+    class Tangent {
+      public:
+        Tangent(const Guccione& at, const Pack c[], const Pack s[], const Pack& bulk, const Pack& volume,
+                const Pack3* gradients)
+            : g_(gradients),
+              pressed_((volume * s[6]) * at.f),
+              scale_(volume * at.growth(c)),
+              bt_(c[2]),
+              b_(Pack(0.5) * (Pack(2.0) * (c[3] - c[2]))),
+              a_(Pack(2.0) * (c[1] + c[2] - Pack(2.0) * c[3])),
+              left_(multiply(at.f, transpose(at.f))) {
+            const Pack3 m{c[5], c[6], c[7]};
+            Pack d[6];
+            at.linear(c, at.e, d);
+            const Pack33 to_strain = multiply(at.f, Green::matrix(d)), stress = volume * Green::matrix(s);
+            fm_ = multiply(at.f, m);
+            for (int k = 0; k < N; ++k) {
+                along_[k] = dot(m, g_[k]);
+                f_[k] = multiply(at.f, g_[k]);
+                d_[k] = multiply(to_strain, g_[k]);
+                s_[k] = multiply(stress, g_[k]);
+                c_[k] = multiply(at.cof, g_[k]);
+                to_c_[k] = (volume * bulk) * c_[k];
+            }
+        }
+
+        // With m_k = m . g_k and f_m = F m; the terms of a, bt and b (half of 2 (bfs - bt)) in this order.
+        Pack33 block(int k, int l) const {
+            const Pack gg = dot(g_[k], g_[l]), mm = along_[k] * along_[l];
+            Pack33 h = outer(d_[k], d_[l]);
+            h += outer((a_ * mm + b_ * gg) * fm_, fm_);
+            h += (bt_ * gg + b_ * mm) * left_;
+            h += outer(bt_ * f_[l], f_[k]);
+            h += outer((b_ * along_[l]) * fm_, f_[k]) + outer((b_ * along_[k]) * f_[l], fm_);
+            h = scale_ * h;
+            h += outer(to_c_[k], c_[l]);
+            add_to_diagonal(h, dot(g_[k], s_[l]));
+            if (k != l) h += cross_matrix(multiply(pressed_, cross(g_[l], g_[k])));
+            return h;
+        }
+
+      private:
+        const Pack3* g_;
+        Pack33 pressed_;
+        Pack scale_, bt_, b_, a_;
+        Pack33 left_;
+        Pack3 fm_, f_[N], d_[N], s_[N], c_[N], to_c_[N];
+        Pack along_[N];
+    };
+
+  private:
+    // D of a strain.
+    static void linear(const Pack c[], const Pack strain[6], Pack d[6]) {
+        const Pack3 m{c[5], c[6], c[7]}, em = multiply(Green::matrix(strain), m);
+        const Pack along = Pack(2.0) * (c[1] + c[2] - Pack(2.0) * c[3]) * dot(m, em);
+        const Pack both = Pack(2.0) * (c[3] - c[2]);
+        const Pack33 fibre = outer(along * m, m) + symmetric_outer(both * m, em);
+        for (int i = 0; i < 3; ++i)
+            for (int k = i; k < 3; ++k)
+                d[Green::at[i][k]] = Pack(2.0) * c[2] * strain[Green::at[i][k]] + fibre.at[3 * i + k];
+    }
+
+    Pack exponent(const Pack c[]) const {  // Q = D : E / 2
+        Pack d[6];
+        linear(c, e, d);
+        return Pack(0.5) * Green::double_dot(d, e);
+    }
+    Pack growth(const Pack c[]) const { return Pack(0.5) * c[0] * exp(exponent(c)); }
+};
+
+}  // namespace magshell

@@ -1,0 +1,162 @@
+// Energies of a solid, a volume, that depend on I1 = |F|^2 and J = det F. One point a lane.
+//
+//   W = w(I1, J) + U(J)                                                           [J/m3]
+//   P = s F + p cof F,   s = 2 dw/dI1,   p = dw/dJ + U'                           [Pa]
+//
+// U is what may act on the mean J of an element. s and p are the stresses that mixed Newton keeps: beside them
+// F enters its own derivative linearly, so nothing else of a trial step is spoiled by the turns in it. Where w
+// grows without bound towards J = 0 it keeps I1 and J instead, and takes the law's derivatives there, by J as a secant to
+// the J of the trial step: that one the turns have made larger, its own stiffness is too small for the stress, and K
+// would lose its sign.
+//
+// A law has
+//     constants, refuses_inversion, constant_shear (s does not depend on the state)
+//     derivatives(c, I1, J)           w and its derivatives
+//     volumetric(c, J)                U, U', U''
+#pragma once
+
+#include "magshell/core/pack_functions.h"
+#include "magshell/energy/rest_moduli.h"
+#include "magshell/strain/deformation.h"
+
+namespace magshell {
+
+/// w, and its derivatives by I1 and J.
+struct InvariantDerivatives {
+    Pack w, by_i, by_j, by_ii, by_ij, by_jj;
+};
+
+/// Of the part of the energy that depends on the measure of volume only.
+struct Volumetric {
+    Pack energy, pressure, bulk;
+};
+
+template <class Law>
+struct InvariantSolid : LameSolid {
+    static constexpr int stresses = Law::constant_shear ? 1 : 2;
+    static constexpr bool refuses_inversion = Law::refuses_inversion;
+    static constexpr bool keeps_measures = Law::refuses_inversion;
+
+    Pack33 f, cof;
+    Pack i1, j, trial;  // trial: det F, whatever j is taken at
+
+    explicit InvariantSolid(const Pack33& gradient)
+        : f(gradient), cof(cofactor(f)), i1(double_dot(f, f)), j(determinant(f, cof)), trial(j) {}
+
+    static Volumetric volumetric(const Pack c[], const Pack& measure) { return Law::volumetric(c, measure); }
+
+    /// U'' as a secant of U' between two volumes.
+    static Pack bulk_between(const Pack c[], const Pack& now, const Pack& before) {
+        const Pack change = before - now, middle = Pack(0.5) * (now + before);
+        const Pack secant = (Law::volumetric(c, before).pressure - Law::volumetric(c, now).pressure) / change;
+        return where_negative(abs(change) - Pack(1e-3), Law::volumetric(c, middle).bulk, secant);
+    }
+
+    Pack volume_measure() const { return j; }
+    Pack volume_rate(const Pack33& d) const { return double_dot(cof, d); }
+    Pack3 volume_gradient(const Pack3& g) const { return multiply(cof, g); }
+    Pack33 volume_piola() const { return cof; }
+
+    Pack energy(const Pack c[]) const { return Law::derivatives(c, i1, j).w; }
+
+    void stress(const Pack c[], const Pack& pressure, Pack s[]) const {
+        const InvariantDerivatives w = Law::derivatives(c, i1, j);
+        s[0] = w.by_j + pressure;
+        if constexpr (stresses == 2) s[1] = Pack(2.0) * w.by_i;
+    }
+
+    void stress_rate(const Pack c[], const Pack33& d, Pack pressure_rate, Pack s[]) const {
+        const InvariantDerivatives w = Law::derivatives(c, i1, j);
+        const Pack di = Pack(2.0) * double_dot(f, d), dj = double_dot(cof, d);
+        s[0] = w.by_jj * dj + pressure_rate;
+        if constexpr (stresses == 2) {
+            s[0] += w.by_ij * di;
+            s[1] = Pack(2.0) * (w.by_ii * di + w.by_ij * dj);
+        }
+    }
+
+    Pack33 piola(const Pack c[], const Pack s[]) const { return shear(c, s) * f + s[0] * cof; }
+
+    /// J and I1 at the end of a linearized step; no less than a tenth of what they are.
+    void measures_after(const Pack33& d, Pack out[2]) const {
+        out[0] = max(j + double_dot(cof, d), Pack(0.1) * j);
+        out[1] = max(i1 + Pack(2.0) * double_dot(f, d), Pack(0.1) * i1);
+    }
+    /// From now on the law is taken at these.
+    void take_measures(const Pack given[2]) {
+        j = given[0];
+        i1 = given[1];
+    }
+
+    /// dP/dc : d of w, for each constant: these energies are linear in them.
+    void work_by_constants(const Pack[], const Pack33& d, Pack work[]) const {
+        for (int k = 0; k < constants; ++k) {
+            const Pack unit[2] = {Pack(k == 0 ? 1.0 : 0.0), Pack(k == 1 ? 1.0 : 0.0)};
+            const InvariantDerivatives w = Law::derivatives(unit, i1, j);
+            work[k] = Pack(2.0) * w.by_i * double_dot(f, d) + w.by_j * double_dot(cof, d);
+        }
+    }
+    static void pressure_by_constants(const Pack[], const Pack& measure, Pack by[]) {
+        for (int k = 0; k < constants; ++k) {
+            const Pack unit[2] = {Pack(k == 0 ? 1.0 : 0.0), Pack(k == 1 ? 1.0 : 0.0)};
+            by[k] = Law::volumetric(unit, measure).pressure;
+        }
+    }
+
+    /// The blocks of the Hessian at one point, for nodes with these gradients and with this much volume.
+    template <int N>
+    class Tangent {
+      public:
+        Tangent(const InvariantSolid& at, const Pack c[], const Pack s[], const Pack& bulk,
+                const Pack& volume, const Pack3* gradients)
+            : g_(gradients), f_(volume * (s[0] * at.f)), shear_(volume * at.shear(c, s)) {
+            const InvariantDerivatives w = Law::derivatives(c, at.i1, at.j);
+            // The secant of -mu/J, where that is the whole of it.
+            const Pack own = stresses == 1 && keeps_measures ? w.by_jj * (at.j / at.trial) : w.by_jj;
+            const Pack jj = volume * (own + bulk);
+            for (int k = 0; k < N; ++k) {
+                c_[k] = multiply(at.cof, g_[k]);
+                to_c_[k] = jj * c_[k];
+            }
+            if constexpr (stresses == 2) {
+                const Pack ii = Pack(4.0) * volume * w.by_ii, ij = Pack(2.0) * volume * w.by_ij;
+                for (int k = 0; k < N; ++k) {
+                    i_[k] = multiply(at.f, g_[k]);
+                    to_i_[k] = ii * i_[k] + ij * c_[k];
+                    to_c_[k] += ij * i_[k];
+                }
+            }
+        }
+
+        Pack33 block(int k, int l) const {
+            Pack33 h = outer(to_c_[k], c_[l]);
+            if constexpr (stresses == 2) h += outer(to_i_[k], i_[l]);
+            add_to_diagonal(h, shear_ * dot(g_[k], g_[l]));
+            if (k != l) add_cross_matrix(h, multiply(f_, cross(g_[l], g_[k])));
+            return h;
+        }
+
+      private:
+        static void add_cross_matrix(Pack33& h, const Pack3& v) {
+            h.at[1] -= v.z;
+            h.at[2] += v.y;
+            h.at[3] += v.z;
+            h.at[5] -= v.x;
+            h.at[6] -= v.y;
+            h.at[7] += v.x;
+        }
+
+        const Pack3* g_;
+        Pack33 f_;
+        Pack shear_;
+        Pack3 c_[N], to_c_[N], i_[stresses == 2 ? N : 1], to_i_[stresses == 2 ? N : 1];
+    };
+
+  private:
+    static Pack shear(const Pack c[], const Pack s[]) {
+        if constexpr (stresses == 2) return s[1];
+        return c[1];
+    }
+};
+
+}  // namespace magshell

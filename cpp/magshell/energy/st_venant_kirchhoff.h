@@ -1,0 +1,131 @@
+// St. Venant-Kirchhoff solid, and what all energies in Green's strain E = (F^T F - I)/2 share. One point a lane.
+//
+//   W = mu tr(E^2) + lam/2 (tr E)^2                                               [J/m3]
+//   P = F S,   S = 2 mu E + p I,   p = lam tr E                                   [Pa]
+//
+// The measure of volume is 1 + tr E. S are the stresses that mixed Newton keeps, as a sheet's.
+#pragma once
+
+#include "magshell/energy/invariant_solid.h"
+#include "magshell/energy/neo_hookean.h"
+
+namespace magshell {
+
+// Symmetric matrices as six numbers: 00 11 22 12 02 01.
+struct Green {
+    static constexpr int at[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
+
+    static void strain(const Pack33& f, Pack e[6]) {
+        const Pack33 c = transposed_times(f, f);
+        for (int i = 0; i < 3; ++i) e[i] = Pack(0.5) * (c.at[4 * i] - Pack(1.0));
+        shear(c, Pack(0.5), e);
+    }
+    /// The symmetric part of F^T D.
+    static void rate(const Pack33& f, const Pack33& d, Pack e[6]) {
+        const Pack33 a = transposed_times(f, d);
+        for (int i = 0; i < 3; ++i) e[i] = a.at[4 * i];
+        shear(a + transpose(a), Pack(0.5), e);
+    }
+    static Pack33 matrix(const Pack s[6]) { return {{s[0], s[5], s[4], s[5], s[1], s[3], s[4], s[3], s[2]}}; }
+    static Pack trace(const Pack e[6]) { return e[0] + e[1] + e[2]; }
+    static Pack double_dot(const Pack a[6], const Pack b[6]) {
+        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] +
+               Pack(2.0) * (a[3] * b[3] + a[4] * b[4] + a[5] * b[5]);
+    }
+
+  private:
+    static void shear(const Pack33& a, const Pack& factor, Pack e[6]) {
+        e[3] = factor * a.at[5];
+        e[4] = factor * a.at[2];
+        e[5] = factor * a.at[1];
+    }
+};
+
+/// The blocks of the Hessian of an energy quadratic in E:
+///   (g_k . S g_l) I + lam F g_k (x) F g_l + mu (F g_l (x) F g_k + (g_k . g_l) F F^T)
+template <int N>
+class QuadraticTangent {
+  public:
+    QuadraticTangent(const Pack33& f, const Pack s[6], const Pack& lam, const Pack& mu, const Pack& volume,
+                     const Pack3* gradients)
+        : g_(gradients),
+          left_(volume * mu * multiply(f, transpose(f))),
+          lam_(volume * lam),
+          mu_(volume * mu) {
+        const Pack33 stress = volume * Green::matrix(s);
+        for (int k = 0; k < N; ++k) {
+            f_[k] = multiply(f, g_[k]);
+            s_[k] = multiply(stress, g_[k]);
+        }
+    }
+
+    Pack33 block(int k, int l) const {
+        Pack33 h = dot(g_[k], g_[l]) * left_;
+        h += outer(lam_ * f_[k], f_[l]);
+        h += outer(mu_ * f_[l], f_[k]);
+        add_to_diagonal(h, dot(g_[k], s_[l]));
+        return h;
+    }
+
+  private:
+    const Pack3* g_;
+    Pack33 left_;
+    Pack lam_, mu_;
+    Pack3 f_[N], s_[N];
+};
+
+struct StVenantKirchhoff : LameSolid {
+    static constexpr int stresses = 6;
+    static constexpr bool refuses_inversion = false;
+    static constexpr bool keeps_measures = false;
+
+    Pack33 f;
+    Pack e[6];
+
+    explicit StVenantKirchhoff(const Pack33& gradient) : f(gradient) { Green::strain(f, e); }
+
+    static Volumetric volumetric(const Pack c[], const Pack& v) { return quadratic_volume(c[0], v); }
+
+    Pack volume_measure() const { return Pack(1.0) + Green::trace(e); }
+    Pack volume_rate(const Pack33& d) const { return double_dot(f, d); }
+    Pack3 volume_gradient(const Pack3& g) const { return multiply(f, g); }
+    Pack33 volume_piola() const { return f; }
+
+    Pack energy(const Pack c[]) const { return c[1] * Green::double_dot(e, e); }
+
+    void stress(const Pack c[], const Pack& pressure, Pack s[]) const { respond(c, e, pressure, s); }
+
+    void stress_rate(const Pack c[], const Pack33& d, Pack pressure_rate, Pack s[]) const {
+        Pack rate[6];
+        Green::rate(f, d, rate);
+        respond(c, rate, pressure_rate, s);
+    }
+
+    Pack33 piola(const Pack[], const Pack s[]) const { return multiply(f, Green::matrix(s)); }
+
+    void work_by_constants(const Pack[], const Pack33& d, Pack work[]) const {
+        Pack rate[6];
+        Green::rate(f, d, rate);
+        work[0] = Pack(0.0);
+        work[1] = Pack(2.0) * Green::double_dot(e, rate);
+    }
+    static void pressure_by_constants(const Pack[], const Pack& v, Pack by[]) {
+        by[0] = v - Pack(1.0);
+        by[1] = Pack(0.0);
+    }
+
+    template <int N>
+    struct Tangent : QuadraticTangent<N> {
+        Tangent(const StVenantKirchhoff& at, const Pack c[], const Pack s[], const Pack& bulk,
+                const Pack& volume, const Pack3* gradients)
+            : QuadraticTangent<N>(at.f, s, bulk, c[1], volume, gradients) {}
+    };
+
+  private:
+    static void respond(const Pack c[], const Pack strain[6], const Pack& pressure, Pack s[6]) {
+        for (int i = 0; i < 6; ++i) s[i] = Pack(2.0) * c[1] * strain[i];
+        for (int i = 0; i < 3; ++i) s[i] += pressure;
+    }
+};
+
+}  // namespace magshell

@@ -1,0 +1,124 @@
+// The terms of a scene: which, in which order.
+#include <algorithm>
+#include <utility>
+
+#include "magshell/scene/model.h"
+#include "magshell/strain/fold_angle.h"
+#include "magshell/term/bending_term.h"
+#include "magshell/term/couple_term.h"
+#include "magshell/term/friction_term.h"
+#include "magshell/term/load_term.h"
+#include "magshell/term/magnetic_term.h"
+#include "magshell/term/membrane_term.h"
+#include "magshell/term/moment_term.h"
+#include "magshell/term/water_term.h"
+
+namespace magshell {
+namespace {
+
+CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& mesh, const Sheet& sheet,
+                             const Nodes& at) {
+    const bool forward = mesh.edge_faces()(given.edge, 0) != TriangleMesh::none;
+    const Index f = sheet.faces.core[mesh.edge_faces()(given.edge, forward ? 0 : 1)];
+    int i = 0;
+    while (sheet.edges[f][i] != given.edge) ++i;
+    const std::array<Index, 3>& c = sheet.corners[f];
+    const std::array<Index, 4> nodes = {c[(i + 1) % 3], c[(i + 2) % 3], c[i],
+                                        at.direction_node(given.direction)};
+    const Fold fold(broadcast(at.rest[nodes[0]]), broadcast(at.rest[nodes[1]]), broadcast(at.rest[nodes[2]]),
+                    broadcast(at.rest[nodes[3]]), Pack(0.0));
+    return {nodes, fold.angle()[0], sheet.rotation_of_edge[given.edge], forward ? 1.0 : -1.0, 0.0};
+}
+
+}  // namespace
+
+void Model::add_loops(Index body, const VectorXd& curvature_scale) {
+    const Sheet& sheet = *bodies_.sheets()[body];
+    const ChunkLoop& chunks = schedule_.of(body);
+    loops_.push_back(std::make_unique<FaceLoop>(sheet.corners, chunks, matrix_));
+    membrane_faces_.push_back(std::make_unique<MembraneFaces>(sheet, nodes(), curvature_scale));
+    const MembraneFaces& faces = *membrane_faces_.back();
+    membrane_loops_.push_back(faces.own() ? nullptr
+                                          : std::make_unique<FaceLoop>(faces.corners(), chunks, matrix_));
+}
+
+void Model::add_terms(const SceneInput& input) {
+    const Index count = static_cast<Index>(bodies_.sheets().size());
+    for (Index body = 0; body < count; ++body) {
+        std::unique_ptr<MembraneTerm> term = std::make_unique<MembraneTerm>(
+            *bodies_.sheets()[body], body, *membrane_faces_[body],
+            membrane_loops_[body] ? *membrane_loops_[body] : *loops_[body], nodes(), registry_);
+        elastic_.push_back(term.get());
+        terms_.push_back(std::move(term));
+    }
+    for (Index body = 0; body < count; ++body) {
+        std::unique_ptr<BendingTerm> term = std::make_unique<BendingTerm>(
+            *bodies_.sheets()[body], body, schedule_.of(body), nodes(), matrix_, registry_);
+        elastic_.push_back(term.get());
+        terms_.push_back(std::move(term));
+    }
+    for (Index body = 0; body < count; ++body)
+        if (input.sheets[body].magnetic)
+            terms_.push_back(std::make_unique<MagneticTerm>(*bodies_.sheets()[body], body, *loops_[body],
+                                                            sources_, registry_));
+    add_solids(input);
+    for (const FaceEnergyInput& given : input.face_energies)
+        terms_.push_back(given.energy->term(given.owner, given.sheet, *bodies_.sheets()[given.sheet],
+                                            *loops_[given.sheet], registry_));
+    add_moments(input);
+    if (input.gravity)
+        terms_.push_back(std::make_unique<LoadTerm>("gravity", "gravity_factor", nodes(), registry_));
+    if (input.loads) terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));
+    if (!input.couples.empty()) add_couples(input);
+    if (!input.contacts.empty()) add_contacts(input);
+    if (input.water)
+        for (Index body = 0; body < count; ++body)
+            forces_.push_back(
+                std::make_unique<WaterTerm>(*bodies_.sheets()[body], *loops_[body], *input.water, registry_));
+}
+
+void Model::add_moments(const SceneInput& input) {
+    std::vector<MomentTerm::Magnet> magnets;
+    for (std::size_t k = 0; k < input.rigid.size(); ++k)
+        if (input.rigid[k].magnetic)
+            std::copy_n(bodies_.rigid_nodes()[k].begin(), 4,
+                        magnets.emplace_back(MomentTerm::Magnet{input.rigid[k].owner, {}}).corners.begin());
+    if (!magnets.empty())
+        terms_.push_back(std::make_unique<MomentTerm>(magnets, nodes(), sources_, matrix_, registry_));
+}
+
+void Model::add_solids(const SceneInput& input) {
+    for (std::size_t k = 0; k < input.solids.size(); ++k) {
+        const Index body = static_cast<Index>(bodies_.sheets().size() + k);
+        std::unique_ptr<SolidTerm> term =
+            make_solid_term(input.solids[k].response, *bodies_.solids()[k], body, schedule_.of(body), matrix_,
+                            nodes(), registry_);
+        elastic_.push_back(term.get());
+        solid_terms_.push_back(term.get());
+        terms_.push_back(std::move(term));
+    }
+}
+
+void Model::add_couples(const SceneInput& input) {
+    std::vector<CoupleTerm::Couple> couples;
+    for (const EdgeCoupleInput& given : input.couples)
+        couples.push_back(
+            couple_of(given, *input.sheets[given.sheet].mesh, *bodies_.sheets()[given.sheet], nodes()));
+    terms_.push_back(std::make_unique<CoupleTerm>(nodes(), matrix_, std::move(couples), registry_));
+}
+
+void Model::add_contacts(const SceneInput& input) {
+    std::unique_ptr<ContactTerm> contact =
+        std::make_unique<ContactTerm>(nodes(), matrix_, input.contacts, input.obstacles, registry_);
+    contact_ = contact.get();
+    terms_.push_back(std::move(contact));
+    std::vector<bool> rubs, lagged;
+    for (const ContactInput& each : input.contacts) {
+        rubs.push_back(each.rubs);
+        lagged.push_back(each.lagged);
+    }
+    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
+        forces_.push_back(std::make_unique<FrictionTerm>(*contact_, std::move(rubs), std::move(lagged)));
+}
+
+}  // namespace magshell

@@ -1,0 +1,85 @@
+// The rotation nearest to F, with the signed stretches: F = U diag(s) V^T, R = U V^T, both proper rotations,
+// so that of an inverted element the smallest stretch is negative. One point a lane.
+//
+// One-sided Jacobi: the columns of F are turned among each other until they are orthogonal, which keeps small
+// stretches accurate. The direction of the smallest is the cross product of the two others, so R exists for a
+// flat element too; for one that is a line or a point, any that fits.
+#pragma once
+
+#include "magshell/core/pack_functions.h"
+#include "magshell/strain/deformation.h"
+
+namespace magshell {
+
+struct Polar {
+    Pack stretch[3];  // signed, the third of smallest size
+    Pack3 u[3];       // current principal directions
+    Pack33 rotation;  // R
+
+    explicit Polar(const Pack33& f) {
+        Pack3 b[3] = {{f.at[0], f.at[3], f.at[6]}, {f.at[1], f.at[4], f.at[7]}, {f.at[2], f.at[5], f.at[8]}};
+        const Pack one(1.0), zero(0.0);
+        Pack3 v[3] = {{one, zero, zero}, {zero, one, zero}, {zero, zero, one}};
+        for (int sweep = 0; sweep < sweeps; ++sweep)
+            for (const auto& [i, j] : {std::pair{0, 1}, std::pair{0, 2}, std::pair{1, 2}})
+                turn(b[i], b[j], v[i], v[j]);
+        Pack squared[3] = {squared_norm(b[0]), squared_norm(b[1]), squared_norm(b[2])};
+        for (const auto& [i, j] : {std::pair{0, 2}, std::pair{1, 2}, std::pair{0, 1}})
+            larger_first(squared[i], squared[j], b[i], b[j], v[i], v[j]);
+        directions(b);
+        stretch[0] = dot(u[0], b[0]);
+        stretch[1] = dot(u[1], b[1]);
+        stretch[2] = dot(u[2], b[2]);
+        rotation = outer(u[0], v[0]) + outer(u[1], v[1]) + outer(u[2], v[2]);
+    }
+
+    Pack trace() const { return stretch[0] + stretch[1] + stretch[2]; }
+
+  private:
+    static constexpr int sweeps = 6;
+
+    static void turn(Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
+        const Pack gamma = Pack(2.0) * dot(a, b), delta = squared_norm(b) - squared_norm(a);
+        const Pack root = sqrt(delta * delta + gamma * gamma) + Pack(1e-300);
+        const Pack tangent = where_negative(delta, Pack(-1.0) * gamma, gamma) / (abs(delta) + root);
+        const Pack c = Pack(1.0) / sqrt(Pack(1.0) + tangent * tangent), s = c * tangent;
+        rotate(c, s, a, b);
+        rotate(c, s, va, vb);
+    }
+
+    static void rotate(const Pack& c, const Pack& s, Pack3& a, Pack3& b) {
+        const Pack3 turned = c * a - s * b;
+        b = s * a + c * b;
+        a = turned;
+    }
+
+    // Where a is smaller: a quarter turn, which keeps V a rotation.
+    static void larger_first(Pack& sa, Pack& sb, Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
+        const Pack swap = where_negative(sa - sb, Pack(1.0), Pack(0.0)), stay = Pack(1.0) - swap;
+        const Pack larger = max(sa, sb);
+        sb = sa + sb - larger;
+        sa = larger;
+        rotate(stay, -swap, a, b);
+        rotate(stay, -swap, va, vb);
+    }
+
+    void directions(const Pack3 b[3]) {
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            Vec3 first(b[0].x[lane], b[0].y[lane], b[0].z[lane]),
+                second(b[1].x[lane], b[1].y[lane], b[1].z[lane]);
+            const double length = first.norm();
+            first = length > 0.0 ? Vec3(first / length) : Vec3(Vec3::UnitX());
+            second -= first.dot(second) * first;
+            const double across = second.norm();
+            second = across > 1e-15 * length && across > 0.0 ? Vec3(second / across) : first.unitOrthogonal();
+            const Vec3 all[3] = {first, second, first.cross(second)};
+            for (int k = 0; k < 3; ++k) {
+                u[k].x.set(lane, all[k].x());
+                u[k].y.set(lane, all[k].y());
+                u[k].z.set(lane, all[k].z());
+            }
+        }
+    }
+};
+
+}  // namespace magshell

@@ -1,0 +1,95 @@
+"""The meshes of several bodies as one, where some are of tetrahedra."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ..mesh.triangle_mesh import TriangleMesh
+
+
+class JoinedMesh:
+    """Vertices, edges and faces (of a solid, those of its surface) of one body after another."""
+
+    def __init__(self, meshes: list):
+        self._meshes = meshes
+        self._first = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
+
+    def _numbered(self, name: str) -> np.ndarray:
+        return np.concatenate(
+            [getattr(mesh, name) + first for mesh, first in zip(self._meshes, self._first, strict=False)]
+        )
+
+    def _together(self, name: str) -> np.ndarray:
+        return np.concatenate([getattr(mesh, name) for mesh in self._meshes])
+
+    @property
+    def n_vertices(self) -> int:
+        return int(self._first[-1])
+
+    @cached_property
+    def rest_positions(self) -> np.ndarray:
+        """(n_v, 3), m."""
+        return self._together("rest_positions")
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """(n_e, 2), of sheets alone: those that have rotations."""
+        sheets = [
+            mesh.edges + first
+            for mesh, first in zip(self._meshes, self._first, strict=False)
+            if isinstance(mesh, TriangleMesh)
+        ]
+        return np.concatenate(sheets) if sheets else np.zeros((0, 2), dtype=np.int32)
+
+    @property
+    def n_edges(self) -> int:
+        return len(self.edges)
+
+    @cached_property
+    def edge_lengths(self) -> np.ndarray:
+        """(k,) m, of all bodies, solids' inner ones as well."""
+        return self._together("edge_lengths")
+
+    @cached_property
+    def faces(self) -> np.ndarray:
+        """(n_f, 3)."""
+        return self._numbered("faces")
+
+    @property
+    def n_faces(self) -> int:
+        return len(self.faces)
+
+    @cached_property
+    def face_areas(self) -> np.ndarray:
+        """(n_f,), m2."""
+        return self._together("face_areas")
+
+    @property
+    def size(self) -> float:
+        """The diagonal of the bounding box, m."""
+        return float(np.linalg.norm(np.ptp(self.rest_positions, axis=0)))
+
+    @cached_property
+    def components(self) -> np.ndarray:
+        """(n_v,): the number of the connected piece each vertex belongs to."""
+        before = np.cumsum([0, *(mesh.n_components for mesh in self._meshes)])
+        return np.concatenate(
+            [mesh.components + first for mesh, first in zip(self._meshes, before, strict=False)]
+        )
+
+    @property
+    def n_components(self) -> int:
+        return sum(mesh.n_components for mesh in self._meshes)
+
+    def self_intersections(self, positions) -> np.ndarray:
+        """The faces that pass through each other, (k, 2)."""
+        return surface_intersections(self, positions)
+
+
+def surface_intersections(mesh, positions) -> np.ndarray:
+    """As TriangleMesh.self_intersections, of the surface of what has vertices inside too."""
+    vertices = np.unique(mesh.faces)
+    surface = TriangleMesh(mesh.rest_positions[vertices], np.searchsorted(vertices, mesh.faces))
+    return surface.self_intersections(np.asarray(positions)[vertices])

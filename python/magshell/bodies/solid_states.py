@@ -1,0 +1,53 @@
+"""Strain and stress of a solid's elements at a state."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .solid import Solid
+
+
+class SolidStates(NamedTuple):
+    """At the points of integration of each tetrahedron: one of linear ones, p = 4 of quadratic ones.
+
+    deformation_gradients: F, (n_t, p, 3, 3). cauchy_stresses: P F^T / J, (n_t, p, 3, 3), Pa, elastic.
+    volumes: at rest, (n_t, p), m3.
+    """
+
+    deformation_gradients: np.ndarray
+    cauchy_stresses: np.ndarray
+    volumes: np.ndarray
+
+    @property
+    def volume_ratios(self) -> np.ndarray:
+        """J = det F, (n_t, p)."""
+        return np.linalg.det(self.deformation_gradients)
+
+    @property
+    def green_strains(self) -> np.ndarray:
+        """(F^T F - I)/2, (n_t, p, 3, 3)."""
+        f = self.deformation_gradients
+        return 0.5 * (np.swapaxes(f, -1, -2) @ f - np.eye(3))
+
+    @property
+    def von_mises_stresses(self) -> np.ndarray:
+        """(n_t, p), Pa, of the Cauchy stress."""
+        pressure = np.trace(self.cauchy_stresses, axis1=-2, axis2=-1)[..., None, None] / 3.0
+        deviator = self.cauchy_stresses - pressure * np.eye(3)
+        return np.sqrt(1.5 * np.sum(deviator**2, axis=(-2, -1)))
+
+    def mean(self, of_points: np.ndarray) -> np.ndarray:
+        """Of each tetrahedron, (n_t, ...), weighed by the volumes: of (n_t, p, ...)."""
+        weights = self.volumes / self.volumes.sum(axis=1, keepdims=True)
+        return np.einsum("tp,tp...->t...", weights, of_points)
+
+
+def states_of(scene, body: Solid, state: np.ndarray) -> SolidStates:
+    """Of a state of the scene's core. Raises ValueError where the body is no solid of the scene."""
+    for k, each in enumerate(scene._bodies.solids):
+        if each is body:
+            return SolidStates(*_core.solid_point_states(scene._model, k, state))
+    raise ValueError(f"a solid of the scene has strains at its tetrahedra, got {body!r:.60}")
