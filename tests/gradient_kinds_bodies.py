@@ -211,3 +211,37 @@ def solid_in_motion() -> Kind:
     fixed = {"steps": 3, "integrator": ms.TRBDF2(), **EXACT}
     controls = {"time_step": 2e-3, "gravity_factor": 1.1, **VISCOUS}
     return Kind(still.scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)
+
+
+def solid_with_company(moves: bool) -> Kind:
+    """A bar with a magnetized sheet welded to its top and a magnet glued into its end."""
+    mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(3, 1, 1))
+    law = ms.StVenantKirchhoff(young_modulus=1e5, poisson_ratio=0.3)
+    bar = ms.Solid(mesh, material=law, mass_density=1e3, element="linear")
+    top = mesh.faces[mesh.faces_at(z=0.04)]
+    used = np.unique(top)
+    sheet = ms.Shell(
+        ms.TriangleMesh(mesh.rest_positions[used], np.searchsorted(used, top)),
+        thickness=1e-3,
+        young_modulus=1e6,
+        poisson_ratio=0.3,
+        mass_density=1e3,
+        remanent_magnetization=(2e4, 1e4, 5e3),
+    )
+    glued = mesh.vertices_where(lambda x: x[:, 0] > 0.06)
+    magnet = ms.Rigid(glued, mass=2e-2, inertia=(2e-6, 3e-6, 4e-6), magnetic_moment=(0.1, 0, 0.3), body=bar)
+    scene = ms.Scene(
+        [sheet, bar, magnet],
+        ties=[ms.Tie(bar, sheet)],
+        supports=[ms.Pin(mesh.vertices_at(x=0.0), body=bar)],
+        field=[ms.UniformField(), DIPOLES],
+        gravity=(0.2, 0.1, -9.81),
+    )
+    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "gravity_factor": 0.8}
+    if not moves:
+        return Kind(scene, controls, fixed=EXACT, step=1e-4, reach=REACH)
+    controls |= {"stiffness_damping": 1e-3, "time_step": 2e-3}
+    fixed = {**EXACT, "steps": 3, "integrator": ms.ImplicitEuler(), "progress": False}
+    return Kind(
+        scene, controls, ms.simulate, fixed=fixed, step=1e-3, reach={**REACH, "stiffness_damping": 1e-1}
+    )

@@ -306,3 +306,23 @@ def test_two_parts_with_common_faces_and_an_oblique_support():
         for sign in (1, -1)
     )
     assert (above - below) / (2 * step) == pytest.approx(1e-4 * float(mass.grad), rel=1e-6)
+
+
+def test_a_part_of_a_solid():
+    """The glued end keeps its shape, and its weight bends the bar as a force and a couple there do."""
+    mesh = ms.meshes.box((0.1, 0.01, 0.01), cells=(10, 2, 2))
+    bar = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.3), mass_density=1.0)
+    end = bar.mesh.vertices_where(lambda x: x[:, 0] > 0.0799)
+    weight = ms.Rigid(end, mass=1e-3, center=(0.09, 0.005, 0.005), body=bar)
+    held = ms.Pin(bar.mesh.vertices_at(x=0.0))
+    rest = ms.equilibrium(ms.Scene([bar, weight], supports=[held], gravity=(0, 0, -1.0)))
+    before, after = bar.mesh.rest_positions[end], rest[bar].positions[end]
+    assert np.allclose(pdist(after), pdist(before), rtol=0, atol=1e-15)
+    force, arm, stiffness = (
+        1e-3,
+        0.08,
+        1e6 * 0.01**4 / 12,
+    )  # a beam up to the part, whose center is 0.01 beyond its end
+    deflection = force * (arm**3 / 3 + 0.01 * arm**2 / 2) / stiffness
+    edge = bar.mesh.nearest_vertex((0.08, 0.005, 0.005))
+    assert -rest[bar].displacements[edge, 2] == pytest.approx(deflection, rel=0.04)

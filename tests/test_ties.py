@@ -173,3 +173,38 @@ def test_vertices_that_are_one_have_one_place_and_velocity(name):
     message = rf"{name} \[.*\] must be the same where bodies are tied, but those of vertices 3 and 30 differ by 0.001"
     with pytest.raises(ValueError, match=message):
         ms.simulate(scene, steps=1, time_step=1e-3, **{name: rows})
+
+
+@pytest.mark.parametrize("element", ["linear", "quadratic"])
+def test_a_sheet_on_a_solid_stretches_with_it(element):
+    """Both of St. Venant-Kirchhoff's law and one Poisson ratio: lateral strains agree, and second Piola forces add up."""
+    length, side, nu, strain = 0.02, 0.01, 0.3, 0.05  # strain: Green's, along the bar
+    bar = ms.Solid(
+        ms.meshes.box((length, side, side), cells=(3, 2, 2)),
+        material=ms.StVenantKirchhoff(young_modulus=1e6, poisson_ratio=nu),
+        element=element,
+    )
+    top = bar.mesh.surface.faces_at(z=side)
+    faces = bar.mesh.surface.faces[top]
+    used = np.unique(faces)
+    mesh = ms.TriangleMesh(bar.mesh.surface.rest_positions[used], np.searchsorted(used, faces))
+    sheet = ms.Shell(mesh, thickness=1e-4, young_modulus=1e8, poisson_ratio=nu)
+    stretch = np.sqrt(1 + 2 * strain)
+    x = bar.mesh.rest_positions
+    ends = [
+        ms.Pin(bar.mesh.vertices_at(x=0.0), components="x", body=bar),
+        ms.Pin(
+            bar.mesh.vertices_at(x=length),
+            components="x",
+            displacement=((stretch - 1) * length, 0, 0),
+            body=bar,
+        ),
+        ms.Pin(bar.mesh.vertices_at(y=0.0), components="y", body=bar),
+        ms.Pin(bar.mesh.vertices_at(z=0.0), components="z", body=bar),
+    ]
+    scene = ms.Scene([sheet, bar], ties=[ms.Tie(bar, sheet)], supports=ends)
+    rest = ms.equilibrium(scene)
+    thinner = np.sqrt(1 - 2 * nu * strain)
+    assert np.allclose(rest[bar].positions, x * (stretch, thinner, thinner), rtol=0, atol=1e-9 * length)
+    energy = 0.5 * strain**2 * length * (1e6 * side**2 + 1e8 * 1e-4 * side)
+    assert sum(rest.energies.values()) == pytest.approx(energy, rel=1e-8)

@@ -8,6 +8,7 @@ from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
 from .._checks.selections import selection
 from .shell import Shell
+from .solid import Solid
 
 _ROUNDING = 1e-9
 
@@ -24,7 +25,7 @@ class Rigid(Owner):
     magnetic_moment: (3,) A m2 at rest, in a scene with a field; it turns with the part.
     velocity, angular_velocity: (3,) m/s of the center, (3,) rad/s in the world's axes: of a free body, where a motion
         starts at rest positions. Vertices have theirs from the `velocities` of ms.simulate.
-    body: the Shell whose vertices they are, in a scene of several.
+    body: the Shell or Solid whose vertices they are, in a scene of several.
 
     Supports hold none of its vertices. `result[part]` has its center and rotation, and how fast it moves. ms.simulate
     takes it by TRBDF2, the first step in seven parts, or by ImplicitEuler; viscous damping acts on vertices only. Faces
@@ -52,10 +53,10 @@ class Rigid(Owner):
         magnetic_moment=None,
         velocity=None,
         angular_velocity=None,
-        body: Shell | None = None,
+        body: Shell | Solid | None = None,
     ):
-        if body is not None and not isinstance(body, Shell):
-            raise ValueError(f"body must be a Shell of the scene, got {body!r:.60}")
+        if body is not None and not isinstance(body, Shell | Solid):
+            raise ValueError(f"body must be a Shell or a Solid of the scene, got {body!r:.60}")
         if vertices is None and body is not None:
             raise ValueError("a Rigid of a body needs its vertices: Rigid(vertices=..., body=...)")
         self.vertices = None if vertices is None else selection("Rigid vertices", vertices)
