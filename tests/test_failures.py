@@ -263,3 +263,22 @@ def test_an_interrupted_motion_leaves_nothing_behind(monkeypatch, call):
         with pytest.raises(ms.Interrupted):
             slide(scene, solver=ms.Newton(max_iterations=1))
     np.testing.assert_array_equal(slide(scene), slide(slides_into_the_floor()))
+
+
+@pytest.mark.parametrize("field_factor", [-1e300, 1e300, -1e308])
+def test_fields_beyond_all_bounds_end_a_solve(field_factor):
+    mesh = ms.meshes.rectangle(0.1, 0.05, cells=(3, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(
+        sheet,
+        supports=[ms.Clamp(mesh.edges_at(x=0.0))],
+        field=[ms.UniformField(), ms.Dipoles([(0.05, 0, 0.1)], [(0, 0, 0.1)])],
+    )
+    with pytest.raises(ms.NotConverged):
+        ms.equilibrium(
+            scene,
+            remanent_magnetization=(1e4, 0, 2e3),
+            applied_flux_density=(0, 0, 1e-3),
+            field_factor=field_factor,
+            solver=ms.MixedNewton(max_iterations=10, max_relaxation_steps=5),
+        )

@@ -30,7 +30,8 @@ class Relaxation {
             if (!prepare()) return report_;
             while (!step()) {
                 rate_ *= rate_growth;
-                if (rate_ > rigid * largest_stiffness()) {
+                // Asked so that numbers beyond all bounds, and a rate of zero, which no doubling changes, end it too.
+                if (!(rate_ > 0.0 && rate_ <= rigid * largest_stiffness() && std::isfinite(rate_))) {
                     report_.reason = "no step lowers the energy, however short";
                     return report_;
                 }
