@@ -261,8 +261,8 @@ def _refuse_corners_alone(mesh, vertices: np.ndarray) -> None:
     if corners.any():
         raise ValueError(
             f"Pin vertices hold the corners of {np.count_nonzero(corners)} faces of a quadratic Solid, and none of the "
-            "nodes between them: select on the mesh of the solid, as in solid.mesh.vertices_at(x=0.0), which has ten nodes a "
-            "tetrahedron"
+            "nodes between them: select on the mesh of the solid, as in solid.mesh.vertices_at(x=0.0), which has "
+            "ten nodes a tetrahedron"
         )
 
 
