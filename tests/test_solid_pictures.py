@@ -84,7 +84,9 @@ def test_meshes_bodies_scenes_and_motions_are_drawn(scenes, tmp_path):
     for solid, rest, motion in scenes.values():
         for what in (solid, solid.mesh, rest.scene, [rest, rest], motion):
             ms.plot(what, **SMALL)
-        assert ms.animate(motion, tmp_path / "motion.gif", progress=False, **SMALL).stat().st_size > 1000
+        assert (
+            ms.animate(motion, tmp_path / "motion.gif", fps=1, progress=False, **SMALL).stat().st_size > 1000
+        )
 
 
 def test_stress_of_what_has_none_is_refused(scenes):

@@ -54,8 +54,8 @@ def plot(
     color: "magnetization" (the component of M_r along the axis that all of it shares, else its angle or
         magnitude), "displacement", "magnetic_energy" (a rest volume), of a
         result's solids "volume_ratio" (J) or "von_mises_stress" (the mean of the tetrahedron behind a face),
-        an array with a number a face or a vertex, a list of such arrays, one a state, or None for plain sheets. "auto": magnetization if it
-        varies, else displacement.
+        an array with a number a face or a vertex, a list of such arrays, one a state, or None for plain sheets.
+        "auto": magnetization if it varies, else displacement.
     color_label, color_range: the text, with the unit, and the ends of the colour bar.
     arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
     show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it.
