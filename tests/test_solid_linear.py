@@ -1,7 +1,9 @@
 """Linear theory and families of equilibria of solids: vibrations, buckling, small deflections, starts."""
 
 import copy
+import functools
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -162,3 +164,23 @@ def test_copies_and_pickles_vibrate_alike():
     expected = ms.vibration_modes(scene, count=2).squares
     for other in (copy.deepcopy(scene), pickle.loads(pickle.dumps(scene))):
         assert np.array_equal(ms.vibration_modes(other, count=2).squares, expected)
+
+
+def tip_height(scene, modulus):
+    rest = ms.equilibrium(scene, values={scene.bodies[0]: {"young_modulus": modulus}})
+    return float(rest.positions[:, 2].max())
+
+
+def test_multistart_runs_with_a_solid_in_its_scene_and_resumes(tmp_path):
+    scene = bent(bar(0.3, cells=(4, 1, 1)))
+    moduli = [E, 2 * E, 0.5 * E]
+    run = functools.partial(tip_height, scene)
+    with ThreadPoolExecutor(2) as executor:
+        given = {"executor": executor, "checkpoint": tmp_path / "runs", "progress": False}
+        found = ms.multistart(run, moduli, **given)
+        again = ms.multistart(run, moduli, resume=True, **given)
+        assert not found.failed and found.best.start == 2 * E
+        assert np.array_equal(again.objectives, found.objectives) and again.resumed == (0, 1, 2)
+        stiffer = functools.partial(tip_height, bent(bar(0.31, cells=(4, 1, 1))))
+        with pytest.raises(ValueError, match=r"another"):
+            ms.multistart(stiffer, moduli, resume=True, **given)
