@@ -149,3 +149,24 @@ def test_an_eighth_behind_symmetry_planes_is_the_whole():
     assert np.allclose(
         eighth[part].strains().von_mises_stresses, one[whole].strains().von_mises_stresses[0, 0]
     )
+
+
+def test_a_couple_on_an_edge_of_a_solid_is_refused():
+    solid = bar()
+    couple = ms.EdgeCouple(solid.mesh.boundary_edges[:2], 1.0)
+    with pytest.raises(ValueError, match="turns edges of a shell"):
+        ms.Scene(solid, supports=[ms.Pin(solid.mesh.vertices_at(x=0.0))], loads=[couple])
+
+
+def test_a_rigid_part_on_a_solid_leaves_its_strains_to_be_asked_for():
+    solid = bar(mass_density=1e3)
+    end = solid.mesh.vertices_at(x=0.1)
+    part = ms.Rigid(end, mass=0.01, inertia=1e-6 * np.eye(3), center=(0.1, 0.01, 0.01))
+    held = ms.Pin(solid.mesh.vertices_at(x=0.0))
+    scene = ms.Scene([solid, part], supports=[held], gravity=(0, 0, -9.81))
+    rest = ms.equilibrium(scene)
+    behind = np.flatnonzero(np.isin(solid.mesh.tetrahedra, end).sum(axis=1) == 6)  # a side of them is rigid
+    strains = rest[solid].strains()
+    assert len(behind) and strains.volume_ratios.min() < 1 < strains.volume_ratios.max()
+    motion = ms.simulate(scene, start=rest, steps=2, time_step=1e-3)
+    assert np.allclose(motion[solid].strains(0).volume_ratios, strains.volume_ratios, atol=1e-9)
