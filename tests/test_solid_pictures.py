@@ -8,6 +8,7 @@ import pytest
 
 import magshell as ms
 from magshell.plotting.colors import scalar_of
+from magshell.plotting.panels import _seen
 from magshell.plotting.surfaces import on_surfaces, scalar_on_surfaces
 from magshell.states.state import states_of
 from magshell.states.units import length_unit
@@ -78,6 +79,21 @@ def test_a_picture_has_the_solid_in_it(scenes, name, color):
     picture.figure.canvas.draw()
     pixels = np.asarray(picture.figure.canvas.buffer_rgba())[..., :3]
     assert (pixels.min(axis=2) < 250).mean() > 0.1
+
+
+def test_lines_behind_a_closed_surface_are_not_drawn():
+    """Whichever way its faces are turned; a sheet is seen from both sides."""
+    box = ms.meshes.box((1.0, 1.0, 1.0), cells=(1, 1, 1)).surface
+    inwards = ms.TriangleMesh(box.rest_positions, box.faces[:, ::-1])
+    for mesh in (box, inwards):
+        (state,) = states_of(mesh)
+        lines = mesh.edges[_seen(state, np.arange(mesh.n_edges), np.array([1.0, 1.0, 1.0]) / np.sqrt(3))]
+        middles = mesh.rest_positions[lines].mean(axis=1) - mesh.rest_positions.min(axis=0)
+        assert len(lines) == 9 + 3 and (np.abs(middles - 1.0) < 1e-9).any(axis=1).all()
+    sheet = ms.meshes.rectangle(1.0, 1.0, cells=(2, 2))
+    (state,) = states_of(sheet)
+    for side in (1.0, -1.0):
+        assert len(_seen(state, np.arange(sheet.n_edges), np.array([0.0, 0.0, side]))) == sheet.n_edges
 
 
 def test_meshes_bodies_scenes_and_motions_are_drawn(scenes, tmp_path):

@@ -149,7 +149,11 @@ def _seen(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
     """Those of the edges (k,) that are not behind a closed surface, where a line's lift would let them shine through."""
     mesh = state.mesh
     x0, x1, x2 = np.moveaxis(state.positions[mesh.faces], 1, 0)
-    towards = np.cross(x1 - x0, x2 - x0) @ eye > 0
+    piece = mesh.components[mesh.faces[:, 0]]
+    volumes = np.bincount(
+        piece, np.einsum("fi,fi->f", x0, np.cross(x1, x2))
+    )  # negative where normals point inwards
+    towards = np.cross(x1 - x0, x2 - x0) @ eye * np.sign(volumes)[piece] > 0
     hidden = _of_closed(mesh)[edges] & ~towards[mesh.edge_faces[edges]].any(axis=1)
     return edges[~hidden]
 
