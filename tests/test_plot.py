@@ -293,7 +293,8 @@ def test_of_many_states_some_are_drawn(mesh) -> None:
     [
         (
             {"color": "colour"},
-            "color must be None, 'auto', 'magnetization', 'displacement', 'magnetic_energy' or an array",
+            "color must be None, 'auto', 'magnetization', 'displacement', 'magnetic_energy', 'volume_ratio', "
+            "'von_mises_stress' or an array",
         ),
         ({"color": "magnetization"}, "needs a magnetized sheet"),
         ({"color": "magnetic_energy"}, "needs a magnetized sheet in a field"),

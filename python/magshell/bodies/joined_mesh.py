@@ -13,16 +13,16 @@ class JoinedMesh:
     """Vertices, edges and faces (of a solid, those of its surface) of one body after another."""
 
     def __init__(self, meshes: list):
-        self._meshes = meshes
+        self.meshes = meshes
         self._first = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
 
     def _numbered(self, name: str) -> np.ndarray:
         return np.concatenate(
-            [getattr(mesh, name) + first for mesh, first in zip(self._meshes, self._first, strict=False)]
+            [getattr(mesh, name) + first for mesh, first in zip(self.meshes, self._first, strict=False)]
         )
 
     def _together(self, name: str) -> np.ndarray:
-        return np.concatenate([getattr(mesh, name) for mesh in self._meshes])
+        return np.concatenate([getattr(mesh, name) for mesh in self.meshes])
 
     @property
     def n_vertices(self) -> int:
@@ -38,7 +38,7 @@ class JoinedMesh:
         """(n_e, 2), of sheets alone: those that have rotations."""
         sheets = [
             mesh.edges + first
-            for mesh, first in zip(self._meshes, self._first, strict=False)
+            for mesh, first in zip(self.meshes, self._first, strict=False)
             if isinstance(mesh, TriangleMesh)
         ]
         return np.concatenate(sheets) if sheets else np.zeros((0, 2), dtype=np.int32)
@@ -66,6 +66,17 @@ class JoinedMesh:
         """(n_f,), m2."""
         return self._together("face_areas")
 
+    @cached_property
+    def surface_vertices(self) -> np.ndarray:
+        """(n_s,): all of sheets, of solids those on the surface, ascending."""
+        return np.unique(self.faces)
+
+    @cached_property
+    def surface(self) -> TriangleMesh:
+        """The faces, as a mesh of its own: its vertices are `surface_vertices`."""
+        vertices = self.surface_vertices
+        return TriangleMesh(self.rest_positions[vertices], np.searchsorted(vertices, self.faces))
+
     @property
     def size(self) -> float:
         """The diagonal of the bounding box, m."""
@@ -74,22 +85,15 @@ class JoinedMesh:
     @cached_property
     def components(self) -> np.ndarray:
         """(n_v,): the number of the connected piece each vertex belongs to."""
-        before = np.cumsum([0, *(mesh.n_components for mesh in self._meshes)])
+        before = np.cumsum([0, *(mesh.n_components for mesh in self.meshes)])
         return np.concatenate(
-            [mesh.components + first for mesh, first in zip(self._meshes, before, strict=False)]
+            [mesh.components + first for mesh, first in zip(self.meshes, before, strict=False)]
         )
 
     @property
     def n_components(self) -> int:
-        return sum(mesh.n_components for mesh in self._meshes)
+        return sum(mesh.n_components for mesh in self.meshes)
 
     def self_intersections(self, positions) -> np.ndarray:
         """The faces that pass through each other, (k, 2)."""
-        return surface_intersections(self, positions)
-
-
-def surface_intersections(mesh, positions) -> np.ndarray:
-    """As TriangleMesh.self_intersections, of the surface of what has vertices inside too."""
-    vertices = np.unique(mesh.faces)
-    surface = TriangleMesh(mesh.rest_positions[vertices], np.searchsorted(vertices, mesh.faces))
-    return surface.self_intersections(np.asarray(positions)[vertices])
+        return self.surface.self_intersections(np.asarray(positions)[self.surface_vertices])

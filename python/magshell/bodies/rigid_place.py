@@ -105,7 +105,9 @@ def _vertices(part: Rigid, bodies) -> np.ndarray:
     if part.vertices is None:
         return np.zeros(0, dtype=np.int64)
     if not bodies.shells:
-        raise ValueError("a Rigid with vertices needs the Shell or Solid whose vertices they are among the bodies")
+        raise ValueError(
+            "a Rigid with vertices needs the Shell or Solid whose vertices they are among the bodies"
+        )
     of = bodies.of(part)
     chosen = np.asarray(indices("Rigid vertices", part.vertices, of.mesh.n_vertices))
     if len(chosen) < 3:

@@ -91,6 +91,11 @@ def write_mesh(
     if ending not in _WRITERS:
         raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}")
     solid = isinstance(mesh, TetMesh)
+    if not solid and not isinstance(mesh, TriangleMesh) and hasattr(mesh, "surface"):
+        raise ValueError(
+            "mesh is that of several bodies, some of tetrahedra: write_series writes a result of all of them, and of one "
+            "write its own, result[body].mesh"
+        )
     points = mesh.rest_positions if solid else checked_mesh(mesh).rest_positions
     if positions is not None:
         points = quantity("positions", "m", detached(positions), (mesh.n_vertices, 3))
@@ -105,6 +110,11 @@ def write_mesh(
     if ending == ".ply":
         write_ply(path, points, mesh.faces, on_vertices, on_faces)
         return
+    write_cells(path, points, cells, on_vertices, cell_data)
+
+
+def write_cells(path: Path, points, cells: list, on_vertices: dict, cell_data: dict[str, list]) -> None:
+    """A VTU of what has been checked: cells [(meshio's kind, rows)] and data {name: [of each kind]}."""
     meshio = _meshio("vtu")
     content = _meshio().Mesh(points, cells, point_data=on_vertices, cell_data=cell_data)
     with replacing(path) as part:

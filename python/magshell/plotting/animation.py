@@ -17,6 +17,7 @@ from .frames import Reel, Scenery
 from .limits import arrow_count, checked_width
 from .panels import Drawing, Options, size_of
 from .playing import Moment, between, moments, same_faces, speed_of, spoken, spread, state_at
+from .surfaces import on_surfaces, scalar_on_surfaces
 from .view import view_of
 
 SLOWEST, FASTEST = 0.01, 1000.0  # frames a second that the formats can hold
@@ -89,7 +90,8 @@ def animate(
     states = with_times(states, times)
     speed = speed_of(states, speed)
     unit = length_unit(size_of(states))
-    scalar = scalar_of(states, color, color_label, color_range, unit)
+    scalar = scalar_on_surfaces(scalar_of(states, color, color_label, color_range, unit), states)
+    states = on_surfaces(states)
     options = Options(count, show_field, rest, mesh_lines)
     scenery = Scenery(states, scalar, view_of(states, view), unit, options)
     shown = moments(states, fps, speed)

@@ -138,7 +138,43 @@ def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
     return Scalar(f"magnetic energy [{unit}]", values, _range(values))
 
 
-NAMED = {"magnetization": _magnetization, "displacement": _displacement, "magnetic_energy": _magnetic_energy}
+def _volume_ratio(states: list[State], _: LengthUnit) -> Scalar:
+    """J, even on both sides of 1."""
+    values = _of_elements(states, "volume_ratio", "volume_ratios")
+    bound = max(float(np.nanmax(np.abs(each - 1.0))) for each in values) or 1.0
+    return Scalar("$J$", values, (1.0 - bound, 1.0 + bound), "diverging")
+
+
+def _von_mises(states: list[State], _: LengthUnit) -> Scalar:
+    values = _of_elements(states, "von_mises_stress", "von_mises_stresses")
+    factor, unit = prefixed(max(map(np.nanmax, values)), "Pa")
+    values = [each / factor for each in values]
+    return Scalar(f"von Mises stress [{unit}]", values, (0.0, _range(values)[1]))
+
+
+def _of_elements(states: list[State], name: str, of_points: str) -> list[np.ndarray]:
+    """The mean in the tetrahedron behind each face; NaN on sheets."""
+    found = []
+    for state in states:
+        if state.elements is None:
+            raise ValueError(
+                f"color={name!r} is of the solids of a result: there is none with its own positions"
+            )
+        values = np.full(state.mesh.n_faces, np.nan)
+        for first, mesh, strains in state.elements():
+            means = strains.mean(getattr(strains, of_points))
+            values[first : first + mesh.n_faces] = means[mesh.face_tetrahedra]
+        found.append(values)
+    return found
+
+
+NAMED = {
+    "magnetization": _magnetization,
+    "displacement": _displacement,
+    "magnetic_energy": _magnetic_energy,
+    "volume_ratio": _volume_ratio,
+    "von_mises_stress": _von_mises,
+}
 
 
 def _given(states: list[State], color) -> list[np.ndarray]:

@@ -14,6 +14,7 @@ from .limits import arrow_count, check_columns, checked_width
 from .panels import Options, draw, size_of
 from .picture import Picture, paint
 from .playing import spread
+from .surfaces import on_surfaces, scalar_on_surfaces
 from .view import view_of
 
 MOST_STATES = 9  # of a path, unless asked for more
@@ -45,15 +46,16 @@ def plot(
 ) -> Picture:
     """A picture of a sheet, its magnetization and the field; of several, side by side or over each other.
 
-    what: a mesh, a Shell, a Scene, a result, or a list of those.
+    what: a mesh, a Shell, a Solid, a Scene, a result, or a list of those. Of solids, their surface is drawn.
     positions, remanent_magnetization, applied_flux_density, field: (n_v, 3) m, (n_f, 3) A/m, (3,) T and
         fields that vary in space: for a mesh, which has none, or instead of a result's own.
     obstacles: what is around the sheet, one one sees through; by default what the contacts of a scene are about.
     states: numbers of those to draw, of a path or a motion; by default all, or nine evenly spread ones.
     color: "magnetization" (the component of M_r along the axis that all of it shares, else its angle or
-        magnitude), "displacement", "magnetic_energy" (a rest volume), an array with a number a face or a
-        vertex, a list of such arrays, one a state, or None for plain sheets. "auto": magnetization if it
-        varies, else displacement.
+        magnitude), "displacement", "magnetic_energy" (a rest volume), of a
+        result's solids "volume_ratio" (J) or "von_mises_stress" (the mean of the tetrahedron behind a face),
+        an array with a number a face or a vertex, a list of such arrays, one a state, or None for plain sheets.
+        "auto": magnetization if it varies, else displacement.
     color_label, color_range: the text, with the unit, and the ends of the colour bar.
     arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
     show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it.
@@ -87,7 +89,8 @@ def plot(
     drawn = _chosen(drawn, states)
     titles = noted_crossings(checked_titles(titles, drawn), drawn)
     unit = length_unit(size_of(drawn))
-    scalar = scalar_of(drawn, color, color_label, color_range, unit)
+    scalar = scalar_on_surfaces(scalar_of(drawn, color, color_label, color_range, unit), drawn)
+    drawn = on_surfaces(drawn)
     groups = [drawn] if overlay or fade else [[state] for state in drawn]
     options = Options(count, show_field, rest, mesh_lines, fade)
     drawing = draw(groups, titles, scalar, view_of(drawn, view), unit, options)

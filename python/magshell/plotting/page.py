@@ -22,6 +22,7 @@ from .drawing import checked_titles
 from .limits import arrow_count
 from .panels import outline, size_of
 from .playing import SAMPLES, same_faces, speed_of, spread
+from .surfaces import on_surfaces, scalar_on_surfaces
 from .view import view_of
 
 
@@ -75,14 +76,18 @@ def write_page(
         applied_flux_density=applied_flux_density,
         field=field,
     )
-    mesh = states[0].mesh
     same_faces(states, "a page")
     size_limit = positive("size_limit", "bytes", size_limit)
     states = with_times(states, times)
     speed = speed_of(states, speed)
     size = size_of(states)
     unit = length_unit(size)
-    scalars = _scalars(states, color, color_label, color_range, unit)
+    scalars = [
+        scalar_on_surfaces(scalar, states)
+        for scalar in _scalars(states, color, color_label, color_range, unit)
+    ]
+    states = on_surfaces(states)
+    mesh = states[0].mesh
     titles = checked_titles(titles, states)
     fields = _sources(states, size)
     numbers = 3 * mesh.n_vertices + 6 * count + sum(len(s.values[0]) for s in scalars if not _is_constant(s))

@@ -17,6 +17,9 @@ from .surroundings import obstacle_solids
 from .view import View
 
 CREASE = np.cos(np.radians(40.0))  # rest edges that turn by more are drawn as lines
+SOLID_CREASE = np.cos(
+    np.radians(65.0)
+)  # of closed surfaces, where coarse triangles turn by more on what is round
 LINE = 0.0022  # width, in sizes of the drawing
 LONGEST_FIELD = 0.2  # arrow of a uniform field, in sizes of the drawing
 PALEST = 0.8  # the way to white of the first of many states that fade
@@ -124,10 +127,35 @@ def size_of(states: list[State]) -> float:
 
 def outline(mesh: TriangleMesh) -> np.ndarray:
     """Edges to draw as lines: those of the boundary, and creases of the rest shape."""
+    return mesh.edges[_outline(mesh)]
+
+
+def _outline(mesh: TriangleMesh) -> np.ndarray:
+    """Their numbers."""
     interior = mesh.interior_edges
     normals = mesh.face_normals[mesh.edge_faces[interior]]
     turn = np.einsum("ei,ei->e", normals[:, 0], normals[:, 1])
-    return mesh.edges[np.sort(np.concatenate([mesh.boundary_edges, interior[turn < CREASE]]))]
+    creases = interior[turn < np.where(_of_closed(mesh)[interior], SOLID_CREASE, CREASE)]
+    return np.sort(np.concatenate([mesh.boundary_edges, creases]))
+
+
+def _of_closed(mesh: TriangleMesh) -> np.ndarray:
+    """(n_e,), whether the piece that each edge belongs to has no boundary."""
+    of_edge = mesh.components[mesh.edges[:, 0]]
+    return ~np.isin(of_edge, of_edge[mesh.boundary_edges])
+
+
+def _seen(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    """Those of the edges (k,) that are not behind a closed surface, where a line's lift would let them shine through."""
+    mesh = state.mesh
+    x0, x1, x2 = np.moveaxis(state.positions[mesh.faces], 1, 0)
+    piece = mesh.components[mesh.faces[:, 0]]
+    volumes = np.bincount(
+        piece, np.einsum("fi,fi->f", x0, np.cross(x1, x2))
+    )  # negative where normals point inwards
+    towards = np.cross(x1 - x0, x2 - x0) @ eye * np.sign(volumes)[piece] > 0
+    hidden = _of_closed(mesh)[edges] & ~towards[mesh.edge_faces[edges]].any(axis=1)
+    return edges[~hidden]
 
 
 def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, options: Options) -> list[Solid]:
@@ -135,14 +163,13 @@ def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, opti
     step = float(mesh.edge_lengths.mean())
     solids = [sheet(state.positions, mesh.faces, shades)]
     if options.mesh_lines:
-        solids.append(
-            ribbons(state.positions[mesh.edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step)
-        )
-    lines = outline(mesh)
-    if len(lines):
-        solids.append(ribbons(state.positions[lines], eye, LINE * size, colors.OUTLINE, 0.8 * step))
+        edges = mesh.edges[_seen(state, np.arange(mesh.n_edges), eye)]
+        solids.append(ribbons(state.positions[edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))
+    lines = _outline(mesh)
+    if len(shown := mesh.edges[_seen(state, lines, eye)]):
+        solids.append(ribbons(state.positions[shown], eye, LINE * size, colors.OUTLINE, 0.8 * step))
     if options.rest and state.displacements.any():
-        lines = lines if len(lines) else mesh.edges
+        lines = mesh.edges[lines] if len(lines) else mesh.edges
         solids.append(ribbons(mesh.rest_positions[lines], eye, 0.8 * LINE * size, colors.REST, 0.0))
     return solids
 

@@ -17,6 +17,8 @@ from .._checks.quantity import quantity, shape_of
 from .._checks.tensors import detached
 from .._machine.files import replacing
 from ..mesh.io import check_field_name, write_mesh
+from ..mesh.triangle_mesh import TriangleMesh
+from .solid_files import write_solids
 from .state import State, states_of, with_times
 
 
@@ -42,6 +44,8 @@ def write_series(
     remanent_magnetization, applied_flux_density, field: as in `plot`.
     vertex_fields, face_fields: name -> (n, n_v) or (n, n_v, k), and (n, n_f) or (n, n_f, k), which are added.
 
+    Tetrahedra are written as such, with sheets beside them as triangles, and of a result with their means of
+    `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`, rows of matrices; on triangles NaN.
     Points have `displacement` [m], `velocity` [m/s] and, in a field, `flux_density` [T]; faces of a magnetized sheet
     have `magnetization` [A/m], F_0 M_r, as it turns with them. Returns the path of the PVD. progress: show a bar once it
     has taken two seconds.
@@ -93,9 +97,12 @@ def write_series(
             if in_field:
                 on_vertices["flux_density"] = state.flux_density_at(state.positions)
             on_faces = {name: values[k] for name, values in more["face"].items()}
-            if magnetized:
+            if magnetized and isinstance(state.mesh, TriangleMesh):
                 on_faces["magnetization"] = state.magnetization
-            write_mesh(path.parent / names[k], state.mesh, state.positions, on_vertices, on_faces)
+            if isinstance(state.mesh, TriangleMesh):
+                write_mesh(path.parent / names[k], state.mesh, state.positions, on_vertices, on_faces)
+            else:
+                write_solids(path.parent / names[k], state, on_vertices)
             done.append(k)
     return path
 
@@ -103,6 +110,10 @@ def write_series(
 def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
     fields = named_values(f"{kind}_fields", fields)
     mesh = states[0].mesh
+    if kind == "face" and fields and not isinstance(mesh, TriangleMesh):
+        raise ValueError(
+            "face_fields: a file of tetrahedra has no faces of theirs; write the solid's `surface`"
+        )
     rows = mesh.n_vertices if kind == "vertex" else mesh.n_faces
     for name, values in fields.items():
         check_field_name(kind, name)

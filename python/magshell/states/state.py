@@ -1,4 +1,4 @@
-"""What there is to draw: the states of a sheet, from whatever holds them."""
+"""What there is to draw: the states of a sheet or a solid, from whatever holds them."""
 
 from __future__ import annotations
 
@@ -10,9 +10,13 @@ import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.tensors import detached
+from ..bodies.joined_mesh import JoinedMesh
 from ..bodies.shell import Shell
+from ..bodies.solid import Solid
+from ..bodies.solid_states import SolidStates, states_at
 from ..dynamics.trajectory import Trajectory
 from ..fields.field import UniformField
+from ..mesh.tet_mesh import TetMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ..obstacles import Obstacle
 from ..scene.scene import Scene
@@ -29,9 +33,10 @@ class State:
     flux_density: (3,), T, the uniform field, or None without one.
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
     title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
+    elements: () -> [(first face, mesh, SolidStates)] of the solids of a result, or None without any.
     """
 
-    mesh: TriangleMesh
+    mesh: TriangleMesh | TetMesh | JoinedMesh
     positions: np.ndarray
     remanent_magnetization: np.ndarray | None = None
     flux_density: np.ndarray | None = None
@@ -39,6 +44,7 @@ class State:
     title: str = ""
     time: float | None = None
     obstacles: tuple[Obstacle, ...] = ()
+    elements: Callable[[], list[tuple[int, TetMesh, SolidStates]]] | None = None
 
     @property
     def magnetization(self) -> np.ndarray:
@@ -83,7 +89,7 @@ def states_of(
     field=None,
     obstacles=None,
 ) -> list[State]:
-    """The states in a mesh, a Shell, a Scene, a result, or a list of those; keywords come before their own.
+    """The states in a mesh, a Shell, a Solid, a Scene, a result, or a list of those; keywords come before their own.
 
     A result is anything with a `scene` and `positions`: (n_v, 3) is one state, (k, n_v, 3) are k of them.
     """
@@ -94,9 +100,9 @@ def states_of(
         "field": field,
         "obstacles": obstacles,
     }
-    if isinstance(what, TriangleMesh):
+    if isinstance(what, TriangleMesh | TetMesh):
         return _states(what, given)
-    if isinstance(what, Shell):
+    if isinstance(what, Shell | Solid):
         return _states(what.mesh, _magnetized(given, [what]))
     if isinstance(what, Scene):
         return _states(what.mesh, _with_own(given, what), what.fields)
@@ -106,6 +112,7 @@ def states_of(
         merged = {name: own.get(name) if value is None else value for name, value in given.items()}
         merged = _with_own(merged, what.scene, getattr(what, "_obstacles", None))
         states = _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
+        states = _with_elements(what, states, positions)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
@@ -116,8 +123,28 @@ def states_of(
         if states:
             return states
         raise ValueError("there is nothing to draw: the list is empty")
-    kinds = "a mesh, a Shell, a Scene, a result, or a list of them"
+    kinds = "a mesh, a Shell, a Solid, a Scene, a result, or a list of them"
     raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
+
+
+def _with_elements(result, states: list[State], positions) -> list[State]:
+    """With what the tetrahedra of its solids go through, where the states are those that it has itself."""
+    solids = result.scene._bodies.solids
+    if not solids or positions is not None or not hasattr(result, "_values_at"):
+        return states
+
+    def elements_of(k: int, at: np.ndarray):
+        bodies = result.scene._bodies
+        return lambda: [
+            (
+                bodies.spans[bodies.number(each)].first_face,
+                each.mesh,
+                states_at(result._values_at(k), each, at),
+            )
+            for each in solids
+        ]
+
+    return [replace(state, elements=elements_of(k, state.positions)) for k, state in enumerate(states)]
 
 
 def timed(states: list[State], times) -> list[State]:
@@ -239,7 +266,9 @@ def _magnetized(given: dict[str, Any], bodies) -> dict[str, Any]:
     if given["remanent_magnetization"] is not None or all(each is None for each in own):
         return given
     pairs = zip(own, bodies, strict=True)
-    rows = [np.zeros((body.mesh.n_faces, 3)) if each is None else each for each, body in pairs]
+    rows = [
+        np.broadcast_to(np.zeros(3) if each is None else each, (body.mesh.n_faces, 3)) for each, body in pairs
+    ]
     return {**given, "remanent_magnetization": np.concatenate(rows)}
 
 

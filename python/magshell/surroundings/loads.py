@@ -135,7 +135,11 @@ class EdgeCouple(Owner):
         self.couple_per_length = quantity("couple_per_length", "N", array, array.shape)
 
     def edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """The edges (k,) and their couples (k,), N m."""
+        """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn."""
+        if not isinstance(mesh, TriangleMesh):
+            raise ValueError(
+                "an EdgeCouple turns edges of a shell: a couple on a solid is one of PointLoads on its face"
+            )
         edges, along = self._along(mesh)
         return edges, along @ np.atleast_1d(self.couple_per_length)
 
