@@ -37,15 +37,17 @@ def timoshenko(mode, nu):
     shear_factor = 10 * (1 + nu) / (12 + 11 * nu)
     norm = np.trapezoid(shape**2, x)
     rotary = radius * np.trapezoid(slope**2, x) / norm
-    sheared = E * inertia / (shear_factor * E / (2 * (1 + nu)) * area) * np.trapezoid(shear**2, x) / k**4 / norm
+    sheared = (
+        E * inertia / (shear_factor * E / (2 * (1 + nu)) * area) * np.trapezoid(shear**2, x) / k**4 / norm
+    )
     return np.sqrt(square / (1 + rotary + sheared)) / (2 * np.pi)
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
 def test_frequencies_of_a_cantilever(nu):
-    solid = bar(nu)
+    thick = 1 if nu < 0.4 else 2  # with one cell, elements of mean volume are too soft in bending
+    solid = bar(nu, cells=(16, thick, thick))
     modes = ms.vibration_modes(ms.Scene(solid, supports=[ms.Pin(root(solid))]), count=4)
-    print(modes.frequencies, timoshenko(1, nu), timoshenko(2, nu))
     assert modes.unstable == 0
     assert np.allclose(modes.frequencies[:2], timoshenko(1, nu), rtol=0.01)  # both ways, of a square section
     assert np.allclose(modes.frequencies[2:], timoshenko(2, nu), rtol=0.02)
@@ -57,14 +59,12 @@ def test_axial_frequencies(element):
     solid = bar(0.0, element)
     sides = [ms.Pin(np.arange(solid.mesh.n_vertices), "yz"), ms.Pin(root(solid), "x")]
     modes = ms.vibration_modes(ms.Scene(solid, supports=sides), count=2)
-    print(modes.frequencies/(np.array([1, 3]) * np.sqrt(E / RHO) / (4 * L)))
     assert np.allclose(modes.frequencies, np.array([1, 3]) * np.sqrt(E / RHO) / (4 * L), rtol=5e-3)
 
 
 def test_a_free_solid_has_six_motions_that_nothing_resists():
     scene = ms.Scene(bar(0.3, cells=(4, 1, 1)), allow_rigid_motions=True)
     modes = ms.vibration_modes(scene, count=7)
-    print(modes.frequencies)
     assert np.all(modes.squares[:6] == 0.0) and modes.squares[6] > 0
 
 
@@ -100,52 +100,46 @@ def test_a_shell_and_a_solid_keep_their_frequencies_side_by_side():
             scene, applied_flux_density=(0, 0, 0), values={sheet: {"remanent_magnetization": (1e4, 0, 0)}}
         )
         assert np.allclose(
-            ms.vibration_modes(scene, rest, count=3).frequencies, np.sort(np.concatenate(alone))[:3], rtol=1e-6
+            ms.vibration_modes(scene, rest, count=3).frequencies,
+            np.sort(np.concatenate(alone))[:3],
+            rtol=1e-6,
         )
 
 
 def test_vibrations_without_a_density_are_refused():
-    solid = ms.Solid(ms.meshes.box((1, 1, 1), cells=(1, 1, 1)), material=ms.NeoHookean(young_modulus=E, poisson_ratio=0))
+    solid = ms.Solid(
+        ms.meshes.box((1, 1, 1), cells=(1, 1, 1)), material=ms.NeoHookean(young_modulus=E, poisson_ratio=0)
+    )
     with pytest.raises(ValueError, match="mass_density"):
         ms.vibration_modes(ms.Scene(solid, supports=[ms.Pin(root(solid))]))
 
 
-def compressed(solid, force=1.0):
-    end = solid.mesh.vertices_at(x=L)
-    loads = np.zeros((solid.mesh.n_vertices, 3))
-    for corners in solid.mesh.faces_of_corners:
-        if np.isin(corners, end).all():
-            area = 0.5 * np.linalg.norm(np.cross(*(np.diff(solid.mesh.rest_positions[corners], axis=0))))
-            tet = solid.mesh.tetrahedra[(np.isin(solid.mesh.corners, corners).sum(axis=1) == 3)][0]
-            middles = [n for n, pair in zip(tet[4:], [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)], strict=True) if np.isin(tet[list(pair)], corners).all()]
-            loads[middles, 0] -= force * area / H**2 / 3  # a quadratic side carries an even load by its middle nodes
-    point = ms.PointLoad(np.arange(solid.mesh.n_vertices), force=loads)
-    return ms.Scene(solid, supports=[ms.Pin(root(solid))], loads=[point])
-
-
 def test_a_column_buckles_at_euler_s_load():
+    """Shortened between its root and an end that may sway but not turn: pi^2 E I / L^2 = E A u / L."""
     solid = bar(0.0)
-    found = ms.linear_buckling(compressed(solid), modes=2)
-    euler = np.pi**2 * E * H**4 / 12 / (4 * L**2)
-    print(found.factors/euler)
-    assert np.allclose(found.factors, euler, rtol=0.01)
+    end = ms.Pin(solid.mesh.vertices_at(x=L), "x", displacement=(-1e-3, 0, 0))
+    found = ms.linear_buckling(ms.Scene(solid, supports=[ms.Pin(root(solid)), end]), modes=2)
+    assert np.allclose(1e-3 * found.factors, np.pi**2 * H**2 / (12 * L), rtol=0.01)
 
 
 def test_a_small_deflection_is_that_of_a_beam():
     solid = bar(0.0)
     end = solid.mesh.vertices_at(x=L)
-    scene = ms.Scene(solid, supports=[ms.Pin(root(solid))], loads=[ms.PointLoad(end, force=(0, 0, 1e-3 / len(end)))])
+    scene = ms.Scene(
+        solid, supports=[ms.Pin(root(solid))], loads=[ms.PointLoad(end, force=(0, 0, 1e-3 / len(end)))]
+    )
     response = ms.linear_response(scene)
     inertia = H**4 / 12
     exact = 1e-3 * L**3 / (3 * E * inertia) + 1e-3 * L / (5 / 6 * E / 2 * H**2)
-    print(response.displacements[end, 2].mean() / exact)
     assert np.isclose(response.displacements[end, 2].mean(), exact, rtol=0.01)
     assert np.allclose(ms.equilibrium(scene).displacements, response.displacements, atol=1e-3 * exact)
 
 
 def bent(solid, tip=0.3):
     end = solid.mesh.vertices_at(x=L)
-    return ms.Scene(solid, supports=[ms.Pin(root(solid))], loads=[ms.PointLoad(end, force=(0, 0, tip / len(end)))])
+    return ms.Scene(
+        solid, supports=[ms.Pin(root(solid))], loads=[ms.PointLoad(end, force=(0, 0, tip / len(end)))]
+    )
 
 
 def test_follow_warm_start_and_multistart_come_to_the_equilibrium():
@@ -157,7 +151,9 @@ def test_follow_warm_start_and_multistart_come_to_the_equilibrium():
     warm = ms.WarmStart(scene)
     warm()
     changed = {solid: {"young_modulus": 1.1 * E}}
-    assert np.allclose(warm(values=changed).positions, ms.equilibrium(scene, values=changed).positions, atol=1e-7)
+    assert np.allclose(
+        warm(values=changed).positions, ms.equilibrium(scene, values=changed).positions, atol=1e-7
+    )
 
 
 def test_copies_and_pickles_vibrate_alike():

@@ -260,8 +260,8 @@ def _refuse_corners_alone(mesh, vertices: np.ndarray) -> None:
     corners = held[mesh.faces_of_corners].all(axis=1)
     if corners.any():
         raise ValueError(
-            f"Pin vertices hold the corners of {np.count_nonzero(corners)} faces of a quadratic Solid, and none of the nodes "
-            "between them: select on the mesh of the solid, as in solid.mesh.vertices_at(x=0.0), which has ten nodes a "
+            f"Pin vertices hold the corners of {np.count_nonzero(corners)} faces of a quadratic Solid, and none of the "
+            "nodes between them: select on the mesh of the solid, as in solid.mesh.vertices_at(x=0.0), which has ten nodes a "
             "tetrahedron"
         )
 
