@@ -230,6 +230,10 @@ class Bodies:
         """Of one body, among the sheets."""
         return sum(isinstance(body, Shell) for body in self.shells[: span.bodies.start or 0])
 
+    def sheets_before(self, body) -> tuple[Shell, ...]:
+        """The sheets that come before a body, whose rows come before its own where there are rows of sheets alone."""
+        return tuple(each for each in self.shells[: self.number(body)] if isinstance(each, Shell))
+
     def sheets_of(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `split`, with the number of the body among the sheets."""
         of, own = self.split(edges)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..mesh.triangle_mesh import TriangleMesh
 from .shell import Shell
+from .strains import Strains
 
 
 class BodyResult:
@@ -17,6 +18,7 @@ class BodyResult:
     def __init__(self, result, body: Shell):
         bodies = result.scene._bodies
         self._result, self._span = result, bodies.spans[bodies.number(body)]
+        self._first_row = sum(sheet.mesh.n_faces for sheet in bodies.sheets_before(body))
         self.body = body
 
     @property
@@ -42,6 +44,13 @@ class BodyResult:
     def velocities(self):
         """(n, n_v, 3) m/s, of a motion."""
         return self._result.velocities[..., self._span.vertices, :]
+
+    def strains(self, index: int = -1) -> Strains:
+        """The principal strains of its faces, as `strains` of the result has them for all sheets; of a motion or a path in
+        a recorded state, by default the last."""
+        arguments = () if np.ndim(self._result.positions) == 2 else (index,)
+        rows = slice(self._first_row, self._first_row + self.mesh.n_faces)
+        return Strains(*(each[rows] for each in self._result.strains(*arguments)))
 
     @property
     def remanent_magnetization(self):

@@ -15,7 +15,9 @@ ELEMENTS = ("quadratic", "linear")
 class Solid(Owner):
     """A soft body of tetrahedra.
 
-    mesh: TetMesh, its positions are the rest shape. Of four nodes it is made one of ten where the element asks for it.
+    mesh: TetMesh, its positions are the rest shape. Of four nodes it is made one of ten where the element asks for it, so
+        `solid.mesh` is another mesh than the one given: select the vertices for supports and loads on `solid.mesh`, as in
+        `ms.Pin(solid.mesh.vertices_at(x=0.0))`, which has the nodes between the corners too.
     material: NeoHookean, StableNeoHookean, StVenantKirchhoff, Corotated or Guccione.
     mass_density: kg/m3, positive, a number or (n_t,); only gravity and motions ask for it.
     element: "quadratic", ten nodes each; or "linear", four, as in [Chen22]: cheap, and far too stiff in bending: with one

@@ -33,6 +33,11 @@ class SolidStates(NamedTuple):
         return 0.5 * (np.swapaxes(f, -1, -2) @ f - np.eye(3))
 
     @property
+    def largest_green_strain(self) -> float:
+        """The largest magnitude of a principal Green strain, of all points."""
+        return float(np.abs(np.linalg.eigvalsh(self.green_strains)).max())
+
+    @property
     def von_mises_stresses(self) -> np.ndarray:
         """(n_t, p), Pa, of the Cauchy stress."""
         pressure = np.trace(self.cauchy_stresses, axis1=-2, axis2=-1)[..., None, None] / 3.0
@@ -45,8 +50,17 @@ class SolidStates(NamedTuple):
         return np.einsum("tp,tp...->t...", weights, of_points)
 
 
+def states_at(values, body: Solid, positions: np.ndarray) -> SolidStates:
+    """At positions (n_v of the scene, 3) m, with these values of the scene in its core."""
+    scene = values.scene
+    with values.in_core():
+        rotations = np.zeros(scene.mesh.n_edges)
+        return states_of(scene, body, scene._model.state(np.ascontiguousarray(positions), rotations))
+
+
 def states_of(scene, body: Solid, state: np.ndarray) -> SolidStates:
-    """Of a state of the scene's core. Raises ValueError where the body is no solid of the scene."""
+    """Of a state of the scene's core, with the values that are in it. Raises ValueError where the body is no solid of the
+    scene."""
     for k, each in enumerate(scene._bodies.solids):
         if each is body:
             return SolidStates(*_core.solid_point_states(scene._model, k, state))

@@ -15,7 +15,8 @@ _MOST_NAMED = 5  # faces in a warning
 
 
 class Strains(NamedTuple):
-    """Principal strains of every face, (n_f, 2) each, dimensionless, the larger value first.
+    """Principal strains of every face, (n_f, 2) each, dimensionless, the larger value first; of one shell after another,
+    solids between them have no rows.
 
     membrane: of Green's strain of the middle surface, (F^T F - 1)/2: a stretch s gives (s^2 - 1)/2.
     bending: half the thickness times the change of curvature since rest: the strain that bending makes at the
@@ -80,7 +81,9 @@ def is_small(strain: float) -> bool:
 
 
 def strains_of(scene, state: np.ndarray, thickness: np.ndarray) -> Strains:
-    """Of a state of the core."""
+    """Of a state of the core. Raises ValueError where the scene has solids only."""
+    if scene._bodies.solids and not scene._bodies.sheets:
+        raise ValueError("strains() has those of shells, and the scene has none: ask result[solid].strains()")
     rows = scene._model.principal_strains(state, thickness)
     return Strains(rows[:, :2], rows[:, 2:])
 

@@ -242,6 +242,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         linear_time=found.linear_time,
         _field_factors=asked.recorded("field_factor", recorded),
         _thickness=thickness,
+        _values=values,
         _directions=found.directions(model),
         _placed=[
             (

@@ -13,9 +13,12 @@ from .._checks.quantity import quantity
 from .._checks.tensors import detached
 from .._machine.files import replace_file
 from ..bodies.body_result import BodyResult
+from ..bodies.of_body import result_of
 from ..bodies.rigid import Rigid
 from ..bodies.rigid_result import RigidResult
 from ..bodies.shell import Shell
+from ..bodies.solid import Solid
+from ..bodies.solid_result import SolidResult, told_strains
 from ..bodies.strains import StrainHistory, Strains, strains_of
 from ..mesh.crossings import told
 from ..methods.clock import Clock, clock_of
@@ -123,6 +126,7 @@ class Trajectory:
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
     _thickness: np.ndarray = field(repr=False)
+    _values: Any = field(repr=False)
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
     _placed: list = field(
         repr=False, default_factory=list
@@ -130,9 +134,9 @@ class Trajectory:
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
 
-    def __getitem__(self, body: Shell | Rigid) -> BodyResult | RigidResult:
+    def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
         """What it says of one body of the scene."""
-        return RigidResult(self, body) if isinstance(body, Rigid) else BodyResult(self, body)
+        return result_of(self, body)
 
     @property
     def displacements(self):
@@ -141,6 +145,9 @@ class Trajectory:
         if isinstance(self.positions, np.ndarray):
             return self.positions - rest
         return self.positions - self.positions.new_tensor(np.array(rest))
+
+    def _values_at(self, index: int):
+        return self._values
 
     @property
     def _obstacles(self) -> tuple:
@@ -201,7 +208,7 @@ class Trajectory:
         return (
             f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
             f"{type(self.integrator).__name__}\n"
-            f"  {strain}\n"
+            f"  {told_strains(self, strain)}\n"
             f"  {crossings}\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations\n"
             f"  {self.wall_time:.3g} s, {a_step:.3g} ms a step; for gradients: {self.keep}, {self.bytes / 1e6:.3g} MB"

@@ -12,6 +12,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 from .. import _core
 from .._machine.entry import solve_entry
 from ..bodies.shell import Shell
+from ..bodies.solid import Solid
 from ..errors import NotConverged
 from ..scene.inputs import Inputs
 from ..scene.replacements import requested
@@ -244,10 +245,9 @@ def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict | None) 
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if equilibrium is None:
-        replaced = requested(scene, None, values, moving=True)
-        magnetized = any("remanent_magnetization" in replaced.get(body, {}) for body in scene.bodies)
-        idle = np.zeros(3) if scene.fields and not magnetized else None
-        return Inputs(scene, idle, uniform, replaced=replaced)
+        return Inputs(
+            scene, None, uniform, replaced=_idle(scene, requested(scene, None, values, moving=True))
+        )
     if values is not None:
         raise ValueError(
             "values are those of the equilibrium: give them to ms.equilibrium, or give no equilibrium"
@@ -256,12 +256,28 @@ def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict | None) 
         raise ValueError(f"equilibrium must be an Equilibrium, got {type(equilibrium).__name__}")
     if equilibrium.scene is not scene:
         raise ValueError("the equilibrium is of another scene")
-    inputs = Inputs(scene, np.zeros(3) if scene.fields else None, uniform)
+    inputs = Inputs(scene, None, uniform, replaced=_idle(scene, {}))
     inputs.values = equilibrium._values
     return inputs
 
 
-def _slow_square(shell: Shell) -> float:
-    """D / (rho h size^4), 1/s2: the square of the slowest angular frequency of a held sheet, but for a factor."""
-    per_face = shell.young_modulus * shell.thickness**2 / shell.mass_density
-    return float(per_face.mean()) / (12.0 * shell.mesh.size**4)
+def _idle(scene: Scene, replaced: dict) -> dict:
+    """With a magnetization of zero for the sheets that are given none, as no field acts on it."""
+    if not scene.fields:
+        return replaced
+    nothing = {"remanent_magnetization": np.zeros(3)}
+    return {**replaced, **{sheet: {**nothing, **replaced.get(sheet, {})} for sheet in scene._bodies.sheets}}
+
+
+def _slow_square(body: Shell | Solid) -> float:
+    """D / (rho h size^4), 1/s2: the square of the slowest angular frequency of a body that is held, but for a factor."""
+    if isinstance(body, Solid):
+        mesh = body.mesh
+        modulus, thickness = (
+            body.material.wave_modulus(mesh.n_tetrahedra),
+            2.0 * mesh.volume / mesh.face_areas.sum(),
+        )
+    else:
+        modulus, thickness = body.young_modulus, body.thickness
+    each = modulus * thickness**2 / body.mass_density
+    return float(each.mean()) / (12.0 * body.mesh.size**4)

@@ -195,6 +195,11 @@ class TetMesh(TetSelection):
         return self._triangles[0]
 
     @property
+    def faces_of_corners(self) -> np.ndarray:
+        """(n, 3): the corners of each outer side of a tetrahedron, one triangle a side also where there are ten nodes."""
+        return self.corners[self._outer[:, None] // 4, FACES[self._outer % 4]]
+
+    @property
     def face_tetrahedra(self) -> np.ndarray:
         """(n_f,): the tetrahedron behind each face, int32, read-only."""
         return self._triangles[1]
@@ -219,7 +224,7 @@ class TetMesh(TetSelection):
     @cached_property
     def boundary_edges(self) -> np.ndarray:
         """Indices of the edges on the surface, ascending."""
-        nodes = self.corners[self._outer[:, None] // 4, FACES[self._outer % 4]].astype(np.int64)
+        nodes = self.faces_of_corners.astype(np.int64)
         ends = np.sort(nodes[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
         keys = self.edges[:, 0].astype(np.int64) * self.n_vertices + self.edges[:, 1]
         return frozen(np.searchsorted(keys, np.unique(ends[:, 0] * self.n_vertices + ends[:, 1])))

@@ -132,8 +132,5 @@ class Inputs:
     @contextmanager
     def in_core(self):
         """The scene's core with this magnetization in it, for one solve; those of other threads wait."""
-        with self.scene._exclusive():
-            if self.scene._in_core is not self.values:
-                self.scene._model.set_values(self.values.numbers)
-                self.scene._in_core = self.values
+        with self.values.in_core():
             yield

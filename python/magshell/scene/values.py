@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+
 import numpy as np
 
 from ..bodies.bodies import Whole, joined
@@ -50,6 +52,16 @@ class Values:
                 if (f"body {k}", "remanent_magnetization") in scene._value_layout:
                     numbers[f"body {k}", "remanent_magnetization"] = magnetization[span.faces]
         self.numbers = scene._value_layout.packed(numbers)
+
+    @contextmanager
+    def in_core(self):
+        """The scene's core with these values in it; solves of other threads wait."""
+        scene = self.scene
+        with scene._exclusive():
+            if scene._in_core is not self:
+                scene._model.set_values(self.numbers)
+                scene._in_core = self
+            yield
 
     def same_as(self, other: Values) -> bool:
         return np.array_equal(self.numbers, other.numbers)

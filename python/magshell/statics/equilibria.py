@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from .._checks.tensors import is_tensor
-from ..bodies.body_result import BodyResult
-from ..bodies.shell import Shell
+from ..bodies.bodies import BODIES
+from ..bodies.of_body import result_of
+from ..bodies.strains import Strains
 from .equilibrium import Equilibrium
 
 
@@ -59,13 +60,20 @@ class Equilibria(Sequence):
         """In all."""
         return sum(case.factorizations for case in self._cases)
 
+    def strains(self, index: int = -1) -> Strains:
+        """The principal strains of every face in one of the cases, by default the last."""
+        return self._cases[index].strains()
+
+    def _values_at(self, index: int):
+        return self._cases[index]._values
+
     def __len__(self) -> int:
         return len(self._cases)
 
     def __getitem__(self, index):
         """A case, some of them, or what all say of one body of the scene."""
-        if isinstance(index, Shell):
-            return BodyResult(self, index)
+        if isinstance(index, BODIES):
+            return result_of(self, index)
         chosen = self._cases[index]
         return Equilibria(chosen) if isinstance(index, slice) else chosen
 

@@ -9,9 +9,12 @@ import numpy as np
 
 from .._checks.tensors import detached
 from ..bodies.body_result import BodyResult
+from ..bodies.of_body import result_of
 from ..bodies.rigid import Rigid
 from ..bodies.rigid_result import RigidResult
 from ..bodies.shell import Shell
+from ..bodies.solid import Solid
+from ..bodies.solid_result import SolidResult, told_strains
 from ..bodies.strains import Largest, Strains, strains_of
 from ..mesh.crossings import told
 from ..scene.scene import Scene
@@ -64,9 +67,9 @@ class Equilibrium:
             "edge_rotations and energies"
         )
 
-    def __getitem__(self, body: Shell | Rigid) -> BodyResult | RigidResult:
+    def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
         """What it says of one body of the scene."""
-        return RigidResult(self, body) if isinstance(body, Rigid) else BodyResult(self, body)
+        return result_of(self, body)
 
     @property
     def displacements(self):
@@ -75,6 +78,9 @@ class Equilibrium:
         if isinstance(self.positions, np.ndarray):
             return self.positions - rest
         return self.positions - self.positions.new_tensor(np.array(rest))
+
+    def _values_at(self, index: int):
+        return self._values
 
     @property
     def _obstacles(self) -> tuple:
@@ -117,7 +123,7 @@ class Equilibrium:
         extra += f", {self.relaxation_steps} relaxation steps" if self.relaxation_steps else ""
         return (
             f"Equilibrium: {kind}; largest displacement {moved:.4g} m\n"
-            f"  {strain}\n"
+            f"  {told_strains(self, strain)}\n"
             f"  {crossings}\n"
             f"  energy {self.energy:.6g} J ({energies})\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.load_steps} load steps{extra}\n"

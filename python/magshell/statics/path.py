@@ -16,6 +16,7 @@ from .._checks.scalars import positive
 from .._machine.entry import solve_entry
 from .._machine.progress import progress_bar
 from ..bodies.caps import warn_of_caps
+from ..bodies.solid_result import told_strains
 from ..bodies.strains import StrainHistory, Strains, strains_of, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..mesh.crossings import told
@@ -90,6 +91,9 @@ class Path:
         """The principal strains of every face at one of the points, by default the last."""
         return strains_of(self.scene, self._points[index].state, self._inputs.values.whole.thickness)
 
+    def _values_at(self, index: int):
+        return self._moving.values(self.parameters[index])
+
     @property
     def applied_flux_densities(self) -> np.ndarray:
         """The uniform field at each point, (n, 3), T."""
@@ -121,7 +125,8 @@ class Path:
             f"  {point.kind} at {point.parameter:.6g}, after point {point.after_point}"
             for point in self.critical
         ]
-        lines.append(f"  {StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)}")
+        strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
+        lines.append(f"  {told_strains(self, strain)}")
         lines.append(f"  {told(self.scene.mesh, self.positions)}")
         lines.append(
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s"
@@ -242,7 +247,7 @@ def follow(
 
 def _bending_energies(scene: Scene, found, controls) -> list[float]:
     """Of its points, where faces are to be looked at for which that matters."""
-    if not scene._caps.faces.size:
+    if scene._bodies.solids or not scene._caps.faces.size:
         return []
     return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]
 

@@ -116,6 +116,8 @@ class Pin(Support):
 
     def held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = indices("Pin vertices", self.vertices, mesh.n_vertices)
+        if not isinstance(mesh, TriangleMesh):
+            _refuse_corners_alone(mesh, vertices)
         directions = np.eye(3)[[_AXES.index(c) for c in self.components]]
         move = self._move.about(mesh.rest_positions[vertices], self)
         return [Held(vertices, np.broadcast_to(directions, (len(vertices), *directions.shape)), move)]
@@ -243,6 +245,24 @@ class SymmetryPlane(Support):
     def __repr__(self) -> str:
         return (
             f"SymmetryPlane(normal {_numbers(self.normal)}, point {_numbers(self.point)}{on_body(self.body)})"
+        )
+
+
+def _refuse_corners_alone(mesh, vertices: np.ndarray) -> None:
+    """What was selected on a mesh of four nodes would hold a face of a quadratic solid by its corners, and the middle nodes
+    would stay free, in silence."""
+    if mesh.order == 1:
+        return
+    held = np.zeros(mesh.n_vertices, dtype=bool)
+    held[vertices] = True
+    if held[mesh.edge_nodes].any():
+        return
+    corners = held[mesh.faces_of_corners].all(axis=1)
+    if corners.any():
+        raise ValueError(
+            f"Pin vertices hold the corners of {np.count_nonzero(corners)} faces of a quadratic Solid, and none of the "
+            "nodes between them: select on the mesh of the solid, as in solid.mesh.vertices_at(x=0.0), which has ten nodes a "
+            "tetrahedron"
         )
 
 

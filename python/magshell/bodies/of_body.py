@@ -1,0 +1,17 @@
+"""What a result says of one body, whatever it is."""
+
+from __future__ import annotations
+
+from .body_result import BodyResult
+from .rigid import Rigid
+from .rigid_result import RigidResult
+from .shell import Shell
+from .solid import Solid
+from .solid_result import SolidResult
+
+
+def result_of(result, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
+    """`result[body]`. Raises ValueError where the scene has no such body."""
+    if isinstance(body, Rigid):
+        return RigidResult(result, body)
+    return SolidResult(result, body) if isinstance(body, Solid) else BodyResult(result, body)
