@@ -181,6 +181,17 @@ def test_t5_t6_beam_to_half_a_percent_with_3060_unknowns(poisson_ratio):
     assert abs(end[2] / w - 1) < 0.005 and abs(-end[0] / shortening - 1) < 0.012
 
 
+@pytest.mark.parametrize("cells", [(8, 2, 2), (9, 3, 3), (15, 1, 1)], ids=str)
+def test_t6_takes_one_load_step_and_as_many_iterations_on_any_mesh(cells):
+    """20 are allowed, and as many with nu = 0.499 as with 0.45."""
+    counts = []
+    for poisson_ratio in BEAM:
+        rest, _, _ = bent_beam(cells, poisson_ratio)
+        assert rest.load_steps == 1
+        counts.append(rest.iterations)
+    assert max(counts) <= 10 and abs(counts[0] - counts[1]) <= 2
+
+
 # T9a: pressure inside, E = 1: inner and outer radius by the radial equation, to 1e-10.
 TUBES = {
     ("ln J", 0.3, 0.1): (1.258337759, 2.172135088),
