@@ -24,8 +24,9 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
     return scale > 0.0 ? length / scale : length > 0.0 ? 1.0 : 0.0;
 }
 
-// An iteration that will converge does so with few unstable directions, and from its sixth step on with steps
-// that shrink.
+// An iteration that will converge does so from its sixth step on with steps that shrink; that of a sheet, with few
+// unstable directions. A solid that a first step has stretched too far has as many as its mesh has modes across it, and
+// none after the next one.
 constexpr Index most_new_negative_pivots = 10;
 constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
@@ -354,7 +355,8 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             if (!report.factor.succeeded) return fail(report.factor.reason);
             const Index negative_pivots = report.factor.negative_pivots;
             if (report.iterations == 0) first_negative_pivots = negative_pivots;
-            report.lost = negative_pivots > first_negative_pivots + most_new_negative_pivots;
+            report.lost = model_.bodies().solids().empty() &&
+                          negative_pivots > first_negative_pivots + most_new_negative_pivots;
             if (mixed && report.lost) return fail("the iteration lost its way");
             moved = last_step <= small_move * model_.length_scale() ? 0.0
                                                                     : std::numeric_limits<double>::infinity();

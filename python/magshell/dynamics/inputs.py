@@ -232,7 +232,7 @@ class MotionInputs:
         given = inputs.take("positions", start)
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
         inputs.scene._bodies.check_welded("start", "m", positions)
-        check_faces(mesh, positions)
+        check_faces(inputs.scene, positions)
         self._outside = positions
         state = model.state(positions, np.zeros(mesh.n_edges))
         check_rigid(inputs.scene, positions, model.positions(state), "start [m]", mesh.size)

@@ -9,6 +9,7 @@ import numpy as np
 from .._checks.quantity import quantity
 from .._checks.tensors import to_array
 from ..bodies.rigid_place import check_rigid
+from ..bodies.solid import Solid
 from ..scene.inputs import Inputs
 from ..scene.scene import Scene
 from ..surroundings.contact_inputs import check_outside
@@ -40,18 +41,23 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     if len(positions) != n_v:
         raise ValueError(f"start [m] must have shape (n_v, 3) = ({n_v}, 3), got {positions.shape}")
     scene._bodies.check_welded("start", "m", positions)
-    check_faces(scene.mesh, positions)
+    check_faces(scene, positions)
     check_outside(scene, inputs.values, positions, 0.0)
     state = model.state(positions, np.zeros(scene.mesh.n_edges))
     check_rigid(scene, positions, model.positions(state), "start [m]", scene.mesh.size)
     return state, [], inputs.controls, False
 
 
-def check_faces(mesh, positions: np.ndarray) -> None:
-    """A face without area has no normal, and no forces either."""
-    corners = positions[mesh.faces]
-    a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = 0.5 * np.linalg.norm(np.cross(a1, a2), axis=1)
-    flat = np.flatnonzero(area <= 1e-12 * mesh.face_areas)
-    if flat.size:
-        raise ValueError(f"start [m] leaves face {flat[0]} without area: {area[flat[0]]:.3g} m2")
+def check_faces(scene: Scene, positions: np.ndarray) -> None:
+    """A face of a shell without area has no normal, and no forces either. Solids may be flat: their materials say."""
+    for body, span in zip(scene._bodies.shells, scene._bodies.spans, strict=True):
+        if isinstance(body, Solid):
+            continue
+        corners = positions[span.vertices][span.mesh.faces]
+        a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area = 0.5 * np.linalg.norm(np.cross(a1, a2), axis=1)
+        flat = np.flatnonzero(area <= 1e-12 * span.mesh.face_areas)
+        if flat.size:
+            raise ValueError(
+                f"start [m] leaves face {span.first_face + flat[0]} without area: {area[flat[0]]:.3g} m2"
+            )
