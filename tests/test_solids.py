@@ -182,8 +182,6 @@ def test_bad_input_is_named(call, message):
 def test_what_acts_on_shells_only_is_refused_around_solids():
     solid, _ = finger()
     mesh = solid.mesh
-    with pytest.raises(ValueError, match="water acts on shells"):
-        ms.Scene(solid, water=ms.Water(), allow_rigid_motions=True)
     with pytest.raises(ValueError, match="about a Solid"):
         ms.Scene(
             solid, contacts=[ms.Contact(ms.obstacles.Plane(center=(0, 0, -1)))], allow_rigid_motions=True
