@@ -247,7 +247,7 @@ def magnetized_solid_in_motion() -> Kind:
         {"time_step": 2e-3, "applied_flux_density": flux},
         ms.simulate,
         fixed=fixed,
-        step=1e-5,
+        step=1e-3,
         reach=REACH,
     )
 
