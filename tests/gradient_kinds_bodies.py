@@ -230,7 +230,20 @@ def magnetized_solid_at_rest() -> Kind:
     tension = ms.SurfaceTension(RNG.uniform(1.0, 2.0, 3), faces=[1, 40, 70])
     load = ms.AreaLoad((1.0, 2.0, -3.0), faces=[5, 6])
     field = [ms.UniformField(), DIPOLES]
-    scene = ms.Scene(body, supports=[held], loads=[tension, load], field=field, gravity=(0.2, 0.1, -9.81))
+    floor = ms.Contact(
+        ob.Plane((-0.02, 0.01, 1.0), center=(0.05, 0, body.mesh.rest_positions[:, 2].min() - 2e-4)),
+        contact_stiffness=5.0,
+        offset=3e-4,
+        smoothing=1e-4,
+    )
+    scene = ms.Scene(
+        body,
+        supports=[held],
+        loads=[tension, load],
+        field=field,
+        gravity=(0.2, 0.1, -9.81),
+        contacts=[floor],
+    )
     controls = {"applied_flux_density": (2e-3, -3e-3, 1e-2), "field_factor": 0.9, "load_factor": 0.8}
     return Kind(scene, controls, fixed=EXACT, reach=REACH)
 

@@ -117,6 +117,23 @@ def test_water_on_a_solid_is_that_on_a_shell_around_it():
     np.testing.assert_allclose(forces[0], forces[1], rtol=1e-3)
 
 
+@pytest.mark.parametrize("element", ["linear", "quadratic"])
+def test_a_solid_on_a_floor_is_carried_by_it(element):
+    """Its weight, by the springs of the vertices on its underside; what is inside it touches nothing."""
+    mesh = ms.meshes.box((0.02, 0.02, 0.02), cells=(2, 2, 2))
+    stiff = ms.NeoHookean(young_modulus=1e9, poisson_ratio=0.3)
+    solid = ms.Solid(mesh, material=stiff, mass_density=1e3, element=element)
+    low = solid.mesh.rest_positions.min(axis=0)
+    floor = ms.Contact(ms.obstacles.Plane(center=(0, 0, low[2])), contact_stiffness=100.0)
+    scene = ms.Scene(solid, contacts=[floor], gravity=(0, 0, -9.81), allow_rigid_motions=True)
+    motion = ms.simulate(scene, steps=400, time_step=1e-3, integrator=ms.ImplicitEuler())
+    bottom = np.flatnonzero(np.abs(solid.mesh.rest_positions[:, 2] - low[2]) < 1e-9)
+    depths = low[2] - motion.positions[-1][bottom, 2]
+    smoothing = floor.law(solid)[1]
+    carried = 100.0 * np.where(depths > smoothing, depths - smoothing / 2, depths**2 / (2 * smoothing)).sum()
+    assert carried == pytest.approx(8e-6 * 1e3 * 9.81, rel=1e-3)
+
+
 def skinned(**skin):
     mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1))
     return ms.Solid(mesh, material=SOFT, skin=ms.Skin(**{"thickness": 1e-3, **skin}))

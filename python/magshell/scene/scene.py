@@ -92,7 +92,6 @@ class Scene:
         if water is not None and not isinstance(water, Water):
             raise ValueError(f"water must be a Water, got {type(water).__name__}")
         self.water = water
-        _refuse_contacts_of_solids(self)
         _refuse_idle_magnetization(self)
         self.gravity = np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
         if any(f._core is None and not isinstance(f, UniformField) for f in self.fields):
@@ -364,14 +363,6 @@ def _refuse_support(parts, held: np.ndarray) -> None:
                 f"a support holds vertex {both[0]}, which rigid part {k} carries: leave it out of the part's vertices; what "
                 "is to stand still altogether needs no Rigid"
             )
-
-
-def _refuse_contacts_of_solids(scene: Scene) -> None:
-    """What acts on shells only must not pass over solids in silence."""
-    solids = scene._bodies.solids
-    for contact in scene.contacts:
-        if any(body in solids for body in scene.bodies[scene._bodies.of(contact).bodies]):
-            raise ValueError(f"{contact!r} is about a Solid: contacts are about shells")
 
 
 def _refuse_idle_magnetization(scene: Scene) -> None:
