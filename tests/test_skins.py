@@ -175,3 +175,27 @@ def test_uniform_magnetization_pushes_only_at_the_boundary(element):
         for place in places:
             wanted[np.argmin(np.linalg.norm(x - place, axis=1))] += pull
     np.testing.assert_allclose(force, wanted, atol=1e-10 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("element", ["linear", "quadratic"])
+def test_same_bits_on_any_number_of_threads(element):
+    mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(9, 4, 4))
+    solid = ms.Solid(
+        mesh,
+        material=SOFT,
+        element=element,
+        skin=ms.Skin(thickness=1e-3, remanent_magnetization=rows(mesh.n_faces, 1e4)),
+        remanent_magnetization=rows(mesh.n_tetrahedra, 1e3),
+    )
+    scene = in_field(solid, DIPOLES, loads=[ms.SurfaceTension(0.5)])
+    model, q, controls = scene._model, bent(scene), controls_of(scene)
+    before, found = ms.num_threads(), []
+    try:
+        for threads in (1, 2, 4):
+            ms.set_num_threads(threads)
+            found.append((model.gradient(q, controls), model.hessian(q, controls, False)[3]))
+    finally:
+        ms.set_num_threads(before)
+    for other in found[1:]:
+        for a, b in zip(found[0], other, strict=True):
+            np.testing.assert_array_equal(a, b)
