@@ -4,6 +4,8 @@ from functools import cache
 
 import numpy as np
 from gradient_kinds_bodies import (
+    magnetized_solid_at_rest,
+    magnetized_solid_in_motion,
     rigid_at_rest,
     rigid_in_motion,
     solid_at_rest,
@@ -240,6 +242,8 @@ MAKERS = {
     ),
     "a solid at rest": solid_at_rest,
     "a solid in motion": solid_in_motion,
+    "a magnetized solid at rest": magnetized_solid_at_rest,
+    "a magnetized solid in motion, in water": magnetized_solid_in_motion,
     "in motion, euler": lambda: moving(ms.ImplicitEuler(), "hinge"),
     "in motion, tr_bdf2": lambda: moving(ms.TRBDF2()),
     "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),

@@ -206,6 +206,65 @@ def solid_at_rest(material=None, element="quadratic", **more) -> Kind:
     return Kind(scene, factors, fixed=EXACT, reach=REACH)
 
 
+def _magnetized_block(element: str):
+    """Half of its skin and its inside magnetized, held at one end."""
+    mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(2, 1, 1))
+    faces = np.flatnonzero(mesh.face_barycenters[:, 0] > 0.04)
+    body = ms.Solid(
+        mesh,
+        material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.4),
+        mass_density=1e3,
+        element=element,
+        skin=ms.Skin(
+            thickness=RNG.uniform(1e-3, 2e-3, len(faces)),
+            faces=faces,
+            remanent_magnetization=RNG.uniform(-2e4, 2e4, (len(faces), 3)),
+        ),
+        remanent_magnetization=RNG.uniform(-2e3, 2e3, (mesh.n_tetrahedra, 3)),
+    )
+    return body, ms.Pin(np.flatnonzero(body.mesh.rest_positions[:, 0] < 1e-9))
+
+
+def magnetized_solid_at_rest() -> Kind:
+    body, held = _magnetized_block("quadratic")
+    tension = ms.SurfaceTension(RNG.uniform(1.0, 2.0, 3), faces=[1, 40, 70])
+    load = ms.AreaLoad((1.0, 2.0, -3.0), faces=[5, 6])
+    field = [ms.UniformField(), DIPOLES]
+    floor = ms.Contact(
+        ob.Plane((-0.02, 0.01, 1.0), center=(0.05, 0, body.mesh.rest_positions[:, 2].min() - 2e-4)),
+        contact_stiffness=5.0,
+        offset=3e-4,
+        smoothing=1e-4,
+    )
+    scene = ms.Scene(
+        body,
+        supports=[held],
+        loads=[tension, load],
+        field=field,
+        gravity=(0.2, 0.1, -9.81),
+        contacts=[floor],
+    )
+    controls = {"applied_flux_density": (2e-3, -3e-3, 1e-2), "field_factor": 0.9, "load_factor": 0.8}
+    return Kind(scene, controls, fixed=EXACT, reach=REACH)
+
+
+def magnetized_solid_in_motion() -> Kind:
+    """In water, which acts on its surface."""
+    body, held = _magnetized_block("linear")
+    water = ms.Water(800.0, (0.05, -0.02, 0.01), added_mass=0.6)
+    scene = ms.Scene(body, supports=[held], field=[ms.UniformField(), DIPOLES], water=water)
+    flux = np.array((2e-3, -3e-3, 1e-2)) * RNG.uniform(0.5, 1.5, (4, 3))
+    fixed = {"steps": 3, "integrator": ms.TRBDF2(), "progress": False, **EXACT}
+    return Kind(
+        scene,
+        {"time_step": 2e-3, "applied_flux_density": flux},
+        ms.simulate,
+        fixed=fixed,
+        step=1e-3,
+        reach=REACH,
+    )
+
+
 def solid_in_motion() -> Kind:
     still = solid_at_rest(ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.45), "linear")
     fixed = {"steps": 3, "integrator": ms.TRBDF2(), **EXACT}

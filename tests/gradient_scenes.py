@@ -95,9 +95,11 @@ class Kind:
         for (owner, name), value in self.of_objects.items():
             if owner is self.scene and name in continuous(self.function):
                 own[None, name] = value
-            if self.scene.bodies == (owner,) and name in continuous(
-                self.function
-            ):  # of several: by values only
+            inside = (
+                isinstance(owner, ms.Solid) and name == "remanent_magnetization"
+            )  # the keyword is of faces
+            # Of several bodies: by values only.
+            if self.scene.bodies == (owner,) and name in continuous(self.function) and not inside:
                 own[None, name] = value.mean()
         return own
 
@@ -176,7 +178,9 @@ def _names_of(kind: type) -> tuple[str, ...]:
     materials = [
         each for each in vars(ms).values() if isinstance(each, type) and issubclass(each, SolidMaterial)
     ]
-    return tuple({name for each in materials for name in each._ranges} | {"mass_density"})
+    return tuple(
+        {name for each in materials for name in each._ranges} | {"mass_density", "remanent_magnetization"}
+    )
 
 
 def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:

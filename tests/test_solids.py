@@ -179,15 +179,9 @@ def test_bad_input_is_named(call, message):
         call(ms.meshes.box((1, 1, 1), cells=(1, 1, 1)))
 
 
-def test_what_acts_on_shells_only_is_refused_around_solids():
+def test_clamps_are_refused_on_solids():
     solid, _ = finger()
     mesh = solid.mesh
-    with pytest.raises(ValueError, match="water acts on shells"):
-        ms.Scene(solid, water=ms.Water(), allow_rigid_motions=True)
-    with pytest.raises(ValueError, match="about a Solid"):
-        ms.Scene(
-            solid, contacts=[ms.Contact(ms.obstacles.Plane(center=(0, 0, -1)))], allow_rigid_motions=True
-        )
     with pytest.raises(ValueError, match="Clamp holds edges of a shell"):
         ms.Scene(solid, supports=[ms.Clamp(mesh.boundary_edges[:1])])
 

@@ -74,6 +74,7 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     input.original = given["original"].cast<std::vector<Index>>();
     input.sheets = sheets_of(given["sheets"]);
     input.solids = solids_of(given["solids"]);
+    input.skins = skins_of(given["skins"]);
     input.rigid = rigid_of(given["rigid"]);
     input.directions = to_rows3(array("directions"));
     input.held = held_nodes(indices("held_nodes"), array("held_frames"));
@@ -82,7 +83,7 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     for (py::ssize_t k = 0; k < couples.shape(0); ++k)
         input.couples.push_back({couples.at(k, 0), couples.at(k, 1), couples.at(k, 2)});
     for (const py::handle each : given["face_energies"])
-        input.face_energies.push_back({each["owner"].cast<std::string>(), each["sheet"].cast<Index>(),
+        input.face_energies.push_back({each["owner"].cast<std::string>(), each["body"].cast<Index>(),
                                        each["energy"].cast<std::shared_ptr<FaceEnergy>>()});
     input.gravity = given["gravity"].cast<bool>();
     input.loads = given["loads"].cast<bool>();

@@ -16,6 +16,11 @@ py::array_t<double> matrices(const std::vector<Mat3>& given, Index elements, int
     return out;
 }
 
+SolidSurface surface_of(const py::handle& given) {
+    return {given["surface"].cast<std::shared_ptr<TriangleMesh>>(),
+            given["surface_vertices"].cast<std::vector<Index>>()};
+}
+
 // (F, Cauchy stress, volumes) at the points of integration: (n_t, p, 3, 3) twice and (n_t, p).
 py::tuple point_states(const Model& model, Index solid, const VectorXd& q) {
     PointStates states;
@@ -43,11 +48,19 @@ std::vector<SolidInput> solids_of(const py::list& given) {
         solid.elements.assign(elements.data(), elements.data() + elements.size());
         solid.nodes_per_element = static_cast<int>(elements.shape(1));
         solid.vertices = each["vertices"].cast<std::vector<Index>>();
-        solid.surface.mesh = each["surface"].cast<std::shared_ptr<TriangleMesh>>();
-        solid.surface.vertices = each["surface_vertices"].cast<std::vector<Index>>();
+        solid.surface = surface_of(each);
+        solid.magnetic = each["magnetic"].cast<bool>();
+        solid.surface_acts = each["surface_acts"].cast<bool>();
         solid.response = {each["material"].cast<std::string>(), each["mean_volume"].cast<bool>()};
     }
     return solids;
+}
+
+std::vector<SkinInput> skins_of(const py::list& given) {
+    std::vector<SkinInput> skins;
+    for (const py::handle each : given)
+        skins.push_back({each["owner"].cast<std::string>(), surface_of(each)});
+    return skins;
 }
 
 void register_solid(py::module_& module) {

@@ -7,5 +7,6 @@
 namespace magshell::bindings {
 
 std::vector<SolidInput> solids_of(const py::list& given);
+std::vector<SkinInput> skins_of(const py::list& given);
 
 }  // namespace magshell::bindings

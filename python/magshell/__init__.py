@@ -8,6 +8,7 @@ from .bodies.materials import Corotated, Guccione, NeoHookean, StableNeoHookean,
 from .bodies.rigid import Rigid
 from .bodies.rigid_result import RigidResult
 from .bodies.shell import Shell
+from .bodies.skin import Skin
 from .bodies.solid import Solid
 from .bodies.strains import Strains
 from .bodies.ties import Tie
@@ -105,6 +106,7 @@ __all__ = [
     "SampledField",
     "Scene",
     "Shell",
+    "Skin",
     "Solid",
     "StVenantKirchhoff",
     "StableNeoHookean",

@@ -121,7 +121,10 @@ def _solids() -> Iterator[Call]:
     mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1))
     moduli = {"young_modulus": 1e5, "poisson_ratio": 0.45}
     solid = {"mesh": mesh, "mass_density": 1e3, "element": "quadratic", "mean_volume": True}
-    yield Call("Solid", ms.Solid, {**solid, "material": ms.NeoHookean(**moduli)})
+    skin = {"thickness": 1e-3, "faces": [0, 3], "remanent_magnetization": (1e4, 0, 0)}
+    magnetized = {"skin": ms.Skin(**skin), "remanent_magnetization": (1e4, 0, 0)}
+    yield Call("Solid", ms.Solid, {**solid, **magnetized, "material": ms.NeoHookean(**moduli)})
+    yield Call("Skin", lambda **a: ms.Solid(mesh, material=ms.NeoHookean(**moduli), skin=ms.Skin(**a)), skin)
     yield Call("NeoHookean", ms.NeoHookean, {"volume": "J", **moduli})
     yield Call("StableNeoHookean", ms.StableNeoHookean, {"log_barrier": True, **moduli})
     yield Call("StVenantKirchhoff", ms.StVenantKirchhoff, moduli)

@@ -15,6 +15,9 @@ Bodies::Bodies(const SceneInput& input) {
         owned_solids_.push_back(std::make_unique<Solid>(solid.owner, solid.rest_positions, solid.elements,
                                                         solid.nodes_per_element, solid.vertices,
                                                         solid.surface, numbering));
+    for (const SkinInput& skin : input.skins)
+        owned_skins_.push_back(
+            std::make_unique<Surface>(skin.owner, *skin.surface.mesh, skin.surface.vertices, numbering));
     add_rigid(input.rigid, numbering);
     nodes_ = numbering.finish(input.directions, input.original);
     for (Index user = 0; user < nodes_.n_user_vertices(); ++user)
@@ -30,6 +33,17 @@ Bodies::Bodies(const SceneInput& input) {
         solids_.push_back(solid.get());
         all_.push_back(solid.get());
     }
+    for (std::size_t k = 0; k < sheets_.size(); ++k) faces_.push_back({sheets_[k], static_cast<Index>(k)});
+    for (std::size_t k = 0; k < solids_.size(); ++k)
+        add_surface(input.solids[k].surface_acts ? solids_[k]->surface() : nullptr);
+    for (const std::unique_ptr<Surface>& skin : owned_skins_) add_surface(skin.get());
+}
+
+void Bodies::add_surface(const Surface* surface) {
+    Faces& faces = faces_.emplace_back();
+    if (!surface) return;
+    faces = {surface, static_cast<Index>(all_.size())};
+    all_.push_back(owned_surfaces_.emplace_back(std::make_unique<SurfaceBody>(*surface)).get());
 }
 
 void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering) {

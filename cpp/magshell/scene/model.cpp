@@ -45,6 +45,11 @@ Model::Model(const SceneInput& input)
         registry_.controls.add("scene", factor, "1", 1, 1);
     for (Index body = 0; body < static_cast<Index>(bodies_.sheets().size()); ++body)
         add_loops(body, input.sheets[body].curvature_scale);
+    for (std::size_t k = bodies_.sheets().size(); k < bodies_.faces().size(); ++k) {
+        const auto& [surface, body] = bodies_.faces()[k];
+        loops_.push_back(surface ? std::make_unique<FaceLoop>(surface->corners, schedule_.of(body), matrix_)
+                                 : nullptr);
+    }
     add_terms(input);
     for (const std::unique_ptr<Term>& term : terms_) {
         if (term->body() >= 0) of_body_[term->body()].push_back(term.get());
@@ -279,9 +284,9 @@ Index Model::n_strains() const {
 
 std::size_t Model::bytes() const {
     std::size_t total = matrix_.bytes() + reduction_.bytes() + schedule_.bytes();
-    for (std::size_t k = 0; k < loops_.size(); ++k)
-        total += loops_[k]->bytes() + membrane_faces_[k]->bytes() +
-                 (membrane_loops_[k] ? membrane_loops_[k]->bytes() : 0);
+    for (const std::unique_ptr<FaceLoop>& loop : loops_) total += loop ? loop->bytes() : 0;
+    for (std::size_t k = 0; k < membrane_faces_.size(); ++k)
+        total += membrane_faces_[k]->bytes() + (membrane_loops_[k] ? membrane_loops_[k]->bytes() : 0);
     for (const std::unique_ptr<Term>& term : terms_) total += term->bytes();
     return total;
 }

@@ -139,6 +139,7 @@ class Model {
   private:
     void add_loops(Index body, const VectorXd& curvature_scale);
     void add_terms(const SceneInput& input);
+    void add_magnetic_terms(const SceneInput& input);
     void add_moments(const SceneInput& input);
     void add_solids(const SceneInput& input);
     void add_couples(const SceneInput& input);
@@ -153,7 +154,8 @@ class Model {
     SystemMatrix matrix_;
     Reduction reduction_;
     Schedule schedule_;
-    std::vector<std::unique_ptr<FaceLoop>> loops_;  // of each surface
+    std::vector<std::unique_ptr<FaceLoop>>
+        loops_;  // of each of Bodies::faces(); nullptr where it has no chunks
     std::vector<std::unique_ptr<MembraneFaces>> membrane_faces_;
     std::vector<std::unique_ptr<FaceLoop>> membrane_loops_;  // nullptr where those are the sheet's own
     FieldSources sources_;

@@ -8,6 +8,7 @@
 #include "magshell/term/couple_term.h"
 #include "magshell/term/friction_term.h"
 #include "magshell/term/load_term.h"
+#include "magshell/term/magnetic_solid_term.h"
 #include "magshell/term/magnetic_term.h"
 #include "magshell/term/membrane_term.h"
 #include "magshell/term/moment_term.h"
@@ -57,14 +58,12 @@ void Model::add_terms(const SceneInput& input) {
         elastic_.push_back(term.get());
         terms_.push_back(std::move(term));
     }
-    for (Index body = 0; body < count; ++body)
-        if (input.sheets[body].magnetic)
-            terms_.push_back(std::make_unique<MagneticTerm>(*bodies_.sheets()[body], body, *loops_[body],
-                                                            sources_, registry_));
+    add_magnetic_terms(input);
     add_solids(input);
-    for (const FaceEnergyInput& given : input.face_energies)
-        terms_.push_back(given.energy->term(given.owner, given.sheet, *bodies_.sheets()[given.sheet],
-                                            *loops_[given.sheet], registry_));
+    for (const FaceEnergyInput& given : input.face_energies) {
+        const auto& [surface, body] = bodies_.faces()[given.body];
+        terms_.push_back(given.energy->term(given.owner, body, *surface, *loops_[given.body], registry_));
+    }
     add_moments(input);
     if (input.gravity)
         terms_.push_back(std::make_unique<LoadTerm>("gravity", "gravity_factor", nodes(), registry_));
@@ -72,9 +71,26 @@ void Model::add_terms(const SceneInput& input) {
     if (!input.couples.empty()) add_couples(input);
     if (!input.contacts.empty()) add_contacts(input);
     if (input.water)
-        for (Index body = 0; body < count; ++body)
-            forces_.push_back(
-                std::make_unique<WaterTerm>(*bodies_.sheets()[body], *loops_[body], *input.water, registry_));
+        for (Index k = 0; k < count + static_cast<Index>(input.solids.size()); ++k)
+            forces_.push_back(std::make_unique<WaterTerm>(*bodies_.faces()[k].surface, *loops_[k],
+                                                          *input.water, registry_));
+}
+
+void Model::add_magnetic_terms(const SceneInput& input) {
+    const std::size_t sheets = input.sheets.size(), solids = input.solids.size();
+    const auto add = [&](std::size_t k) {
+        const auto& [surface, body] = bodies_.faces()[k];
+        terms_.push_back(std::make_unique<MagneticTerm>(*surface, body, *loops_[k], sources_, registry_));
+    };
+    for (std::size_t k = 0; k < sheets; ++k)
+        if (input.sheets[k].magnetic) add(k);
+    for (std::size_t k = 0; k < input.skins.size(); ++k) add(sheets + solids + k);
+    for (std::size_t k = 0; k < solids; ++k) {
+        const Index body = static_cast<Index>(sheets + k);
+        if (input.solids[k].magnetic)
+            terms_.push_back(make_magnetic_solid_term(*bodies_.solids()[k], body, schedule_.of(body), matrix_,
+                                                      sources_, registry_));
+    }
 }
 
 void Model::add_moments(const SceneInput& input) {

@@ -39,12 +39,20 @@ struct SolidInput {
     std::vector<Index> vertices;  // the scene's vertex of each row
     SolidSurface surface;
     SolidResponse response;
+    bool magnetic = false;
+    bool surface_acts = false;  // whether water, or a face energy, acts on its surface
+};
+
+/// Magnetized triangles on nodes of solids.
+struct SkinInput {
+    std::string owner;  // under which its parameters are registered
+    SolidSurface surface;
 };
 
 /// An energy of a body's faces beside its elastic and magnetic ones.
 struct FaceEnergyInput {
     std::string owner;  // under which its inputs are registered
-    Index sheet;
+    Index body;         // sheets first, then solids
     std::shared_ptr<const FaceEnergy> energy;
 };
 
@@ -65,6 +73,7 @@ struct SceneInput {
     std::vector<Index> original;  // of each vertex: itself, or the one that it is welded to; empty if none is
     std::vector<SheetInput> sheets;
     std::vector<SolidInput> solids;  // numbered on after the sheets
+    std::vector<SkinInput> skins;
     std::vector<RigidInput> rigid;
     Rows3 directions;  // (n_d, 3), of directed edges and of couples
     std::vector<HeldNode> held;

@@ -2,6 +2,8 @@
 
 #include <Eigen/LU>
 
+#include "magshell/term/field_packs.h"
+
 namespace magshell {
 namespace {
 
@@ -78,15 +80,8 @@ std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Control
     const Vec3 everywhere = uniform(controls);
     std::vector<Magnetic::Field> packs(loop_.packs());
     for (Index pack = 0; pack < loop_.packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Index f = loop_.face(pack, lane);
-            set_lane(packs[pack].flux, lane, Vec3(samples.flux[f] + everywhere));
-            for (int r = 0; r < 3; ++r)
-                for (int c = 0; c < 3; ++c) {
-                    if (order >= 1) packs[pack].gradient.at[3 * r + c].set(lane, samples.gradient[f](r, c));
-                    if (order >= 2) packs[pack].curvature.at[3 * r + c].set(lane, samples.curvature[f](r, c));
-                }
-        }
+        for (int lane = 0; lane < Pack::width; ++lane)
+            set_field(packs[pack], lane, samples, loop_.face(pack, lane), order, everywhere);
     return packs;
 }
 

@@ -14,6 +14,7 @@ from .joined_mesh import JoinedMesh
 from .no_mesh import NoMesh
 from .rigid import Rigid
 from .shell import Shell
+from .skin import Skin
 from .solid import Solid
 from .ties import Tie, joined_components, originals
 
@@ -158,6 +159,11 @@ class Bodies:
         return tuple(body for body in self.shells if isinstance(body, Solid))
 
     @property
+    def skins(self) -> tuple[Skin, ...]:
+        """Of the solids that have one, in their order."""
+        return tuple(body.skin for body in self.solids if body.skin is not None)
+
+    @property
     def size(self) -> float:
         """Of the largest body: the diagonal of its bounding box [m]."""
         return max((mesh.size for mesh in self.meshes), default=0.0)
@@ -226,9 +232,12 @@ class Bodies:
         of = np.searchsorted(first, edges, side="right") - 1
         return of, edges - first[of]
 
-    def sheet_number(self, span: Span) -> int:
-        """Of one body, among the sheets."""
-        return sum(isinstance(body, Shell) for body in self.shells[: span.bodies.start or 0])
+    def core_number(self, span: Span) -> int:
+        """Of one body, where sheets come first and solids after them."""
+        number = span.bodies.start or 0
+        solid = isinstance(self.shells[number], Solid)
+        before = sum(isinstance(body, Solid) is solid for body in self.shells[:number])
+        return before + solid * len(self.sheets)
 
     def sheets_before(self, body) -> tuple[Shell, ...]:
         """The sheets that come before a body, whose rows come before its own where there are rows of sheets alone."""

@@ -119,6 +119,11 @@ class Shell(Owner):
         return MeshQuality(self.mesh, self.thickness)
 
     @property
+    def face_magnetization(self) -> np.ndarray | None:
+        """(n_f, 3) A/m, of its own."""
+        return self.remanent_magnetization
+
+    @property
     def face_volumes(self) -> np.ndarray:
         """Rest volumes, (n_f,), m3."""
         return self.mesh.face_areas * self.thickness
@@ -151,14 +156,14 @@ class Shell(Owner):
         return f"Shell({', '.join(parts)}, bending {self.bending})"
 
 
-def magnetization_of(given, n_faces: int) -> np.ndarray:
-    """(n_f, 3) A/m, of one vector for all faces or one a face."""
+def magnetization_of(given, count: int, rows: str = "(n_f, 3)") -> np.ndarray:
+    """One row for each of `count`, of one vector for all or one each."""
     given = real_numbers("remanent_magnetization [A/m]", given)
-    if given.shape not in ((3,), (n_faces, 3)):
+    if given.shape not in ((3,), (count, 3)):
         raise ValueError(
-            f"remanent_magnetization [A/m] must have shape (n_f, 3) = ({n_faces}, 3) or (3,), got {given.shape}"
+            f"remanent_magnetization [A/m] must have shape {rows} = ({count}, 3) or (3,), got {given.shape}"
         )
-    return np.broadcast_to(quantity("remanent_magnetization", "A/m", given, given.shape), (n_faces, 3))
+    return np.broadcast_to(quantity("remanent_magnetization", "A/m", given, given.shape), (count, 3))
 
 
 def _property(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:

@@ -8,6 +8,8 @@ from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
 from ..mesh.tet_mesh import TetMesh
 from .materials import SolidMaterial
+from .shell import magnetization_of
+from .skin import Skin
 
 ELEMENTS = ("quadratic", "linear")
 
@@ -25,6 +27,9 @@ class Solid(Owner):
         0.499. By default quadratic.
     mean_volume: whether the volumetric part of the energy acts on the mean change of volume of each element, which keeps
         nearly incompressible material from locking; for quadratic elements. By default where Poisson's ratio is above 0.4.
+    skin: Skin, a thin magnetized layer on its surface; as `solid.skin` it has values of its own.
+    remanent_magnetization: (3,) or (n_t, 3) A/m, at rest, in world axes, of a solid that is magnetized throughout; zero
+        where a solve is to say it.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
@@ -37,8 +42,6 @@ class Solid(Owner):
     True
     """
 
-    remanent_magnetization = np.zeros(3)  # it has no skin
-
     def __init__(
         self,
         mesh: TetMesh,
@@ -47,6 +50,8 @@ class Solid(Owner):
         mass_density=None,
         element: str = "quadratic",
         mean_volume: bool | None = None,
+        skin: Skin | None = None,
+        remanent_magnetization=None,
     ):
         if not isinstance(mesh, TetMesh):
             raise ValueError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
@@ -67,10 +72,29 @@ class Solid(Owner):
             element == "quadratic" and material.nearly_incompressible if mean_volume is None else mean_volume
         )
         self.mass_density = None if mass_density is None else self._density(mass_density)
+        if skin is not None and not isinstance(skin, Skin):
+            raise ValueError(f"skin must be a Skin, got {skin!r:.60}")
+        self.skin = None if skin is None else skin._on(mesh, self.mesh)
+        self.remanent_magnetization = None
+        if remanent_magnetization is not None:
+            self.remanent_magnetization = magnetization_of(
+                remanent_magnetization, self.mesh.n_tetrahedra, "(n_t, 3)"
+            )
 
     @property
     def _replaceable(self) -> tuple[str, ...]:
-        return (*self.material.names, "mass_density")
+        magnetized = () if self.remanent_magnetization is None else ("remanent_magnetization",)
+        return (*self.material.names, "mass_density", *magnetized)
+
+    @property
+    def face_magnetization(self) -> np.ndarray | None:
+        """(n_f, 3) A/m, of its skin: zero on faces without. None where the skin has none of its own."""
+        rows = np.zeros((self.mesh.n_faces, 3))
+        if self.skin is not None:
+            if self.skin.remanent_magnetization is None:
+                return None
+            rows[self.skin.faces] = self.skin.remanent_magnetization
+        return rows
 
     def __getattr__(self, name: str) -> np.ndarray:
         """The values of its material, one a tetrahedron, under their own names."""
@@ -95,12 +119,15 @@ class Solid(Owner):
     def replaced(self, **values) -> Solid:
         """The same solid with other values: those of its material, and the mass density."""
         density = values.pop("mass_density", self.mass_density)
+        magnetization = values.pop("remanent_magnetization", self.remanent_magnetization)
         return Solid(
             self.mesh,
             material=self.material.replaced(**values),
             mass_density=density,
             element=self.element,
             mean_volume=self.mean_volume,
+            skin=self.skin,
+            remanent_magnetization=magnetization,
         )
 
     def _core_input(self, owner: str, vertices: np.ndarray) -> dict:
@@ -114,16 +141,20 @@ class Solid(Owner):
             "surface_vertices": vertices[self.mesh.surface_vertices],
             "material": self.material._core_name,
             "mean_volume": self.mean_volume,
+            "magnetic": self.remanent_magnetization is not None,
         }
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         for name in self.material.names:
             rows = self.material.rows(name, self.mesh.n_tetrahedra)
             numbers[label, name] = _unit(rows) if name == "fibres" else rows
+        if self.remanent_magnetization is not None:
+            numbers[label, "remanent_magnetization"] = self.remanent_magnetization
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
         """With what its values do to the masses and the weights of the vertices."""
-        found = {name: gradient.value(label, name) for name in self.material.names}
+        names = [*self.material.names, "remanent_magnetization"]
+        found = {name: gradient.value(label, name) for name in names if gradient.has(label, name)}
         if "fibres" in found:
             given = self.material.rows("fibres", self.mesh.n_tetrahedra)
             along, by = _unit(given), found["fibres"]

@@ -10,7 +10,7 @@ import numpy as np
 from .._checks.quantity import quantity
 from .._checks.tensors import detached, is_tensor, to_array, wants_gradient
 from ..bodies.shell import magnetization_of
-from .magnetization import check_given_once, of_all_bodies
+from .magnetization import check_given_once, check_on_skins, of_all_bodies
 from .replacements import checked
 from .scene import Scene
 from .values import Values
@@ -71,6 +71,8 @@ class Inputs:
         numbers = self._numbers("remanent_magnetization", remanent_magnetization)
         self.magnetization = None if numbers is None else magnetization_of(numbers, scene.mesh.n_faces)
         flux_density = self._flux_density(self._numbers("applied_flux_density", applied_flux_density))
+        if numbers is not None:
+            check_on_skins(scene, np.asarray(numbers))
         controls = {
             ("scene", key): float(quantity(key, "1", self._numbers(key, value), ()))
             for key, value in factors.items()

@@ -1,47 +1,103 @@
-"""The magnetization of a solve: of all bodies at once, of each by itself, or their own."""
+"""The magnetization of a solve: of all faces at once, of each body by itself, or their own."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from .._checks.tensors import is_tensor, require_torch
-from ..bodies.bodies import joined
+from ..bodies.solid import Solid
 
 _NAME = "remanent_magnetization"
 
 
 def check_given_once(scene, given, replaced: dict[object, dict]) -> None:
-    """Raises ValueError where it is given twice, or without a field, or not for every body."""
-    replacing = any(_NAME in replaced.get(body, {}) for body in scene.bodies)
+    """Raises ValueError where it is given twice, or without a field, or not for every shell and skin."""
+    replacing = any(_NAME in replaced.get(carrier, {}) for _, carrier, _ in _carriers(scene))
     if not scene.fields:
         if given is not None or replacing:
             raise ValueError(
                 "remanent_magnetization was given, but the scene has no field: Scene(..., field=...)"
             )
         return
-    if given is not None and scene._bodies.solids:
-        raise ValueError(
-            "remanent_magnetization was given for all bodies, but a Solid has none: values={shell: {...}}"
-        )
     if given is not None and replacing:
         raise ValueError("remanent_magnetization was given twice: as an argument and in values")
-    for k, body in enumerate(scene.bodies):
-        if given is None and _NAME not in replaced.get(body, {}) and body.remanent_magnetization is None:
+    for k, carrier, _ in _carriers(scene):
+        if (
+            given is None
+            and _NAME not in replaced.get(carrier, {})
+            and carrier.remanent_magnetization is None
+        ):
             whose = f" of body {k}" if len(scene.bodies) > 1 else ""
-            raise ValueError(f"the scene has a field, so remanent_magnetization{whose} [A/m] is needed")
+            skin = "" if carrier is scene.bodies[k] else ", of its skin,"
+            raise ValueError(f"the scene has a field, so remanent_magnetization{whose}{skin} [A/m] is needed")
+
+
+def check_on_skins(scene, given: np.ndarray) -> None:
+    """Raises ValueError where one of all faces (3,), or of single ones (n_f of all, 3), is of none that can have one."""
+    if given.ndim == 1:
+        if given.any() and scene.bodies and not any(True for _ in _carriers(scene)):
+            raise ValueError(
+                "remanent_magnetization was given for all faces, but the scene has no Shell, and no Solid with a skin"
+            )
+        return
+    bare = np.zeros(scene.mesh.n_faces, dtype=bool)
+    for body, span in zip(scene.bodies, scene._bodies.spans, strict=True):
+        bare[span.faces] = isinstance(body, Solid)
+    for _, _, faces in _carriers(scene):
+        bare[faces] = False
+    idle = bare & given.any(axis=1)
+    if idle.any():
+        raise ValueError(
+            f"remanent_magnetization [A/m] of face {np.argmax(idle)} must be zero: it is of a Solid that has no skin there"
+        )
+
+
+def of_carriers(scene, magnetization: np.ndarray):
+    """(core owner, its rows) of shells and skins, of one for all faces (n_f of all, 3)."""
+    labels = {id(each): label for each, label in scene._labels}
+    for _, carrier, faces in _carriers(scene):
+        yield labels[id(carrier)], magnetization[faces]
+
+
+def gradient_by_all(scene, gradient) -> np.ndarray:
+    """(n_f of all, 3): the transpose of `of_carriers`."""
+    labels = {id(each): label for each, label in scene._labels}
+    found = np.zeros((scene.mesh.n_faces, 3))
+    for _, carrier, faces in _carriers(scene):
+        found[faces] = gradient.value(labels[id(carrier)], _NAME)
+    return found
 
 
 def of_all_bodies(scene, replaced: dict[object, dict]):
-    """(n_f of all, 3) A/m where it was not an argument: a tensor in its graph where there is one, None without a field.
+    """(n_f of all, 3) A/m where it was not an argument, zero on what has none: a tensor in its graph where there is one,
+    None without a field.
 
     For what has been checked.
     """
     if not scene.fields or not scene.bodies:
         return None
-    given = [replaced.get(body, {}).get(_NAME, body.remanent_magnetization) for body in scene.bodies]
-    counts = [body.mesh.n_faces for body in scene.bodies]
-    if not any(is_tensor(each) for each in given):
-        return joined([np.broadcast_to(each, (n, 3)) for each, n in zip(given, counts, strict=True)])
+    parts = [
+        (replaced.get(carrier, {}).get(_NAME, carrier.remanent_magnetization), faces)
+        for _, carrier, faces in _carriers(scene)
+    ]
+    n_faces = scene.mesh.n_faces
+    if not any(is_tensor(given) for given, _ in parts):
+        rows = np.zeros((n_faces, 3))
+        for given, faces in parts:
+            rows[faces] = given
+        return rows
     torch = require_torch("a tensor")
-    tensors = [each if is_tensor(each) else torch.tensor(np.array(each, dtype=float)) for each in given]
-    return torch.cat([each.expand(n, 3) for each, n in zip(tensors, counts, strict=True)])
+    rows = torch.zeros((n_faces, 3), dtype=torch.float64)
+    for given, faces in parts:
+        tensor = given if is_tensor(given) else torch.tensor(np.array(given, dtype=float))
+        rows = rows.index_put((torch.from_numpy(faces),), tensor.to(rows).expand(len(faces), 3))
+    return rows
+
+
+def _carriers(scene):
+    """(number of the body, Shell or Skin, its faces among those of all (k,)) of what faces are magnetized with."""
+    for k, (body, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True)):
+        if not isinstance(body, Solid):
+            yield k, body, span.first_face + np.arange(body.mesh.n_faces)
+        elif body.skin is not None:
+            yield k, body.skin, span.first_face + body.skin.faces

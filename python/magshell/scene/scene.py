@@ -92,7 +92,7 @@ class Scene:
         if water is not None and not isinstance(water, Water):
             raise ValueError(f"water must be a Water, got {type(water).__name__}")
         self.water = water
-        _refuse_around_solids(self)
+        _refuse_idle_magnetization(self)
         self.gravity = np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
         if any(f._core is None and not isinstance(f, UniformField) for f in self.fields):
             raise ValueError("field holds an AppliedField without a value: use a CustomField")
@@ -159,6 +159,7 @@ class Scene:
             original=bodies.original if bodies.ties else [],
             sheets=self._sheets(constraints),
             solids=self._solids(),
+            skins=self._skins(),
             rigid=[
                 place.as_input(f"rigid {k}", bool(self.fields) and part.magnetic_moment is not None)
                 for k, (part, place) in enumerate(zip(self.rigid_parts, self._rigid, strict=True))
@@ -204,16 +205,32 @@ class Scene:
 
     def _solids(self) -> list[dict]:
         """The solids as the core takes them."""
+        loaded = [self._bodies.of(load).bodies.start for load in self.loads if isinstance(load, FaceEnergy)]
         return [
-            body._core_input(f"body {k}", self._bodies.original[span.vertices])
+            {
+                **body._core_input(f"body {k}", self._bodies.original[span.vertices]),
+                "surface_acts": self.water is not None or k in loaded,
+            }
             for k, (body, span) in enumerate(zip(self.bodies, self._bodies.spans, strict=True))
             if isinstance(body, Solid)
+        ]
+
+    def _skins(self) -> list[dict]:
+        """Those of the solids as the core takes them."""
+        skinned = [
+            (body, span)
+            for body, span in zip(self.bodies, self._bodies.spans, strict=True)
+            if isinstance(body, Solid) and body.skin is not None
+        ]
+        return [
+            body.skin._core_input(f"skin {k}", body.mesh, self._bodies.original[span.vertices])
+            for k, (body, span) in enumerate(skinned)
         ]
 
     def _face_energies(self) -> list[dict]:
         """As the core takes them."""
         return [
-            {"owner": label, "sheet": self._bodies.sheet_number(self._bodies.of(load)), "energy": load._core}
+            {"owner": label, "body": self._bodies.core_number(self._bodies.of(load)), "energy": load._core}
             for load, label in self._labels
             if isinstance(load, FaceEnergy)
         ]
@@ -227,6 +244,7 @@ class Scene:
         """Every object of it with the name that the core has for its values."""
         kinds = (
             ("body", self.bodies),
+            ("skin", self._bodies.skins),
             ("rigid", self.rigid_parts),
             ("support", self.supports),
             ("load", self.loads),
@@ -283,6 +301,7 @@ class Scene:
         water = () if self.water is None else (self.water,)
         return (
             *self.bodies,
+            *self._bodies.skins,
             *self.rigid_parts,
             *self.supports,
             *self.loads,
@@ -346,19 +365,14 @@ def _refuse_support(parts, held: np.ndarray) -> None:
             )
 
 
-def _refuse_around_solids(scene: Scene) -> None:
-    """What acts on shells only must not pass over solids in silence."""
-    solids = scene._bodies.solids
-    if not solids:
+def _refuse_idle_magnetization(scene: Scene) -> None:
+    """A skin does nothing but feel a field."""
+    if scene.fields:
         return
-    if scene.water is not None:
-        raise ValueError("water acts on shells, but the scene has a Solid")
-    for load in scene.loads:
-        if isinstance(load, FaceEnergy) and scene.bodies[scene._bodies.of(load).bodies][0] in solids:
-            raise ValueError(f"{load!r} is about a Solid: it acts on shells")
-    for contact in scene.contacts:
-        if any(body in solids for body in scene.bodies[scene._bodies.of(contact).bodies]):
-            raise ValueError(f"{contact!r} is about a Solid: contacts are about shells")
+    for k, body in enumerate(scene.bodies):
+        if isinstance(body, Solid) and (body.skin is not None or body.remanent_magnetization is not None):
+            what = "a skin" if body.skin is not None else "a remanent_magnetization"
+            raise ValueError(f"body {k} has {what}, but the scene has no field: Scene(..., field=...)")
 
 
 def _couple_edges(bodies: Bodies, loads) -> np.ndarray:

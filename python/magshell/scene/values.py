@@ -9,6 +9,7 @@ import numpy as np
 from ..bodies.bodies import Whole, joined
 from ..bodies.shell import Shell
 from ..surroundings.constraints import Constraints, gather
+from .magnetization import gradient_by_all, of_carriers
 
 
 class Values:
@@ -48,9 +49,8 @@ class Values:
             own_points = [np.zeros((10, 3)) for _ in self.rigid]
             numbers["loads", "forces"] = joined([numbers["loads", "forces"], *own_points])
         if magnetization is not None:
-            for k, span in enumerate(scene._bodies.spans):
-                if (f"body {k}", "remanent_magnetization") in scene._value_layout:
-                    numbers[f"body {k}", "remanent_magnetization"] = magnetization[span.faces]
+            for label, rows in of_carriers(scene, magnetization):
+                numbers[label, "remanent_magnetization"] = rows
         self.numbers = scene._value_layout.packed(numbers)
 
     @contextmanager
@@ -196,7 +196,6 @@ class Gradient:
         if name in self.others:
             return self.others[name]
         if name == "remanent_magnetization":
-            owners = [f"body {k}" for k in range(len(self._scene.bodies))]
-            return joined([self.value(owner, name) for owner in owners if self.has(owner, name)])
+            return gradient_by_all(self._scene, self)
         by_control = self.control("scene", name)
         return by_control[..., 0, :] if name == "applied_flux_density" else by_control[..., 0]

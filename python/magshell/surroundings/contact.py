@@ -19,6 +19,7 @@ _FACE_POINTS = {  # barycentric coordinates of the points on a face
     3: np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0,
 }
 _SMOOTHING = 1e-2  # of the mean thickness
+_SMOOTHING_OF_SOLIDS = 1e-4  # of the extent
 _STICKING = 1e-2  # of the largest sheet's extent, a second
 
 
@@ -31,13 +32,13 @@ class Contact(Owner):
     sticking_speed: m/s. Below it friction holds: a point that carries a share r of its greatest friction creeps at
         sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's extent in a second
         (of the largest where there are several).
-    smoothing: m, the length of the parabola; by default a hundredth of the thickness.
+    smoothing: m, the length of the parabola; by default a hundredth of the thickness, of solids alone 1e-4 of the extent.
     offset: m, the distance from the obstacle at which the force begins; half the thickness lets the face of the sheet
         touch instead of its middle surface.
     lagged_friction: take normal forces and normals of friction from the beginning of each step. The matrix stays
         symmetric; the friction is late by a step.
-    vertices: those that touch; all by default.
-    body: the Shell that touches; by default all, where no vertices are given.
+    vertices: those that touch; by default all, of a solid those on its surface.
+    body: the Shell or Solid that touches; by default all, where no vertices are given.
     face_samples: points on every face that touch too: 0, 1 or 3, for meshes that are coarse beside the obstacle.
 
     >>> import magshell as ms
@@ -119,9 +120,11 @@ class Contact(Owner):
 
     def points(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
         """What of a body touches: vertices (k, 3), -1 where there are fewer, and weights (k, 3); those on faces last."""
-        chosen = np.arange(mesh.n_vertices) if self.vertices is None else None
-        if chosen is None:
+        if self.vertices is not None:
             chosen = indices("Contact vertices", self.vertices, mesh.n_vertices)
+        else:
+            sheet = isinstance(mesh, TriangleMesh)
+            chosen = np.arange(mesh.n_vertices) if sheet else np.unique(mesh.faces)
         alone = np.full((len(chosen), 3), -1)
         alone[:, 0] = chosen
         faces = mesh.faces[np.isin(mesh.faces, chosen).all(axis=1)]
@@ -135,10 +138,11 @@ class Contact(Owner):
     def law(self, *sheets: Shell) -> tuple[float, ...]:
         """The numbers of `_replaceable` for the sheets that touch: N/m, m, m, 1, m/s."""
         extent = max(np.linalg.norm(np.ptp(sheet.mesh.rest_positions, axis=0)) for sheet in sheets)
-        thickness = joined([sheet.thickness for sheet in sheets])
+        thick = [sheet.thickness for sheet in sheets if isinstance(sheet, Shell)]
+        smoothing = _SMOOTHING * float(np.mean(joined(thick))) if thick else _SMOOTHING_OF_SOLIDS * extent
         return (
             self.contact_stiffness,
-            _SMOOTHING * float(np.mean(thickness)) if self.smoothing is None else self.smoothing,
+            smoothing if self.smoothing is None else self.smoothing,
             self.offset,
             self.friction_coefficient or 0.0,
             _STICKING * extent if self.sticking_speed is None else self.sticking_speed,
@@ -151,7 +155,11 @@ class Contact(Owner):
     def by_thickness(self, label: str, sheets, gradient) -> float:
         """By the thickness of each face of the sheets that touch, which a default in `law` is made from."""
         by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
-        return _SMOOTHING * by_smoothing / sum(sheet.thickness.size for sheet in sheets)
+        return (
+            _SMOOTHING
+            * by_smoothing
+            / sum(sheet.thickness.size for sheet in sheets if isinstance(sheet, Shell))
+        )
 
     def __repr__(self) -> str:
         friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..bodies.solid import Solid
+
 
 def obstacles_of(contacts) -> tuple:
     """Every obstacle once, in the order in which contacts name them."""
@@ -58,12 +60,14 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
 
 
 def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
-    """A body that starts deeper in an obstacle than half its thickness would be shot out of it."""
+    """A sheet that starts deeper in an obstacle than half its thickness would be shot out of it, or a solid that starts
+    deeper than a hundredth of its size."""
     if not scene.contacts:
         return
     allowed = np.empty(scene.mesh.n_vertices)
     for span, sheet in zip(scene._bodies.spans, values.sheets, strict=True):
-        allowed[span.vertices] = 0.5 * np.max(sheet.thickness)
+        solid = isinstance(sheet, Solid)
+        allowed[span.vertices] = 0.01 * sheet.mesh.size if solid else 0.5 * np.max(sheet.thickness)
     for contact in scene.contacts:
         vertices, weights = scene._bodies.contact_points(contact)
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])

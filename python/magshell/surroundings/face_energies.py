@@ -19,7 +19,7 @@ class FaceEnergy(Owner):
     A kind of it names its numbers in `_replaceable`, their units in `_units`, and the core's energy in `_energy`; the
     core's kernel has the same names. Each number is one for all of the faces, or one a face.
     faces: where it acts; by default on the whole body.
-    body: the Shell that it acts on, in a scene of several.
+    body: the Shell or Solid that it acts on, in a scene of several.
     """
 
     _units: tuple[str, ...] = ()
@@ -77,7 +77,7 @@ class SurfaceTension(FaceEnergy):
     surface_tension: one for all, or one a face. A liquid film that wets both sides of a sheet has two surfaces: give the
         sum of both. It is a load: the load factor scales it.
     faces: where there is liquid; by default on the whole body.
-    body: the Shell that it acts on, in a scene of several.
+    body: the Shell or Solid that it acts on, in a scene of several.
 
     A free sheet under a surface tension gamma shrinks by gamma (1 - nu) / (Y h) each way:
 

@@ -92,7 +92,7 @@ class EdgeLoad(DeadLoad):
 class AreaLoad(DeadLoad):
     """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face.
 
-    body: the Shell that it acts on; by default all, where no faces are given.
+    body: the Shell or Solid that it acts on; by default all, where no faces are given.
     """
 
     _replaceable = ("force_per_area",)

@@ -1,0 +1,225 @@
+#include "magshell/term/magnetic_solid_term.h"
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/energy/magnetic_solid.h"
+#include "magshell/strain/tetrahedron_shapes.h"
+#include "magshell/term/field_packs.h"
+
+namespace magshell {
+namespace {
+
+template <class Element>
+class MagneticSolidTerm final : public Term {
+    static constexpr int N = Element::nodes, points = Element::points;
+    using Nodes = std::array<Index, N>;
+    using Point = MagneticSolid<N>;
+    struct Points {
+        Point at[points];
+    };
+    struct Fields {
+        Magnetic::Field at[points];
+    };
+
+  public:
+    MagneticSolidTerm(const Solid& solid, const std::vector<Nodes>& nodes, Index body,
+                      const ChunkLoop& chunks, const SystemMatrix& matrix, const FieldSources& sources,
+                      Registry& registry)
+        : solid_(solid),
+          body_(body),
+          loop_(nodes, chunks, matrix),
+          sources_(sources),
+          magnetization_(registry.values.add(solid.owner, "remanent_magnetization", "A/m", solid.n_elements(),
+                                             3, &solid.elements)),
+          flux_density_(registry.controls.add("scene", "applied_flux_density", "T", 1, 3)),
+          field_factor_(registry.controls.add("scene", "field_factor", "1", 1, 1)),
+          elements_(loop_.packs()) {
+        for (int p = 0; p < points; ++p) shapes_[p] = shapes_at(Element(), p);
+    }
+
+    std::string_view name() const override { return Magnetic::name; }
+    Index body() const override { return body_; }
+
+    bool set_values(const Values& values) override {
+        if (!values.changed(magnetization_)) return false;
+        for (Index pack = 0; pack < loop_.packs(); ++pack)
+            for (int lane = 0; lane < Pack::width; ++lane) {
+                const Index t = loop_.element(pack, lane);
+                const RestElement<Element> rest = rest_of(t);
+                const Vec3 m = values.vector(magnetization_, t);
+                for (int p = 0; p < points; ++p) {
+                    const Eigen::Matrix<double, N, 1> alpha = gradients(rest, p) * m;
+                    elements_[pack].at[p].volume.set(lane, rest.volume[p]);
+                    for (int k = 0; k < N; ++k) elements_[pack].at[p].alpha[k].set(lane, alpha[k]);
+                }
+            }
+        return true;
+    }
+
+    double energy(const double* q, const Controls& controls) const override {
+        const std::vector<Fields> fields = sample(q, controls, 0);
+        const Pack3 everywhere = broadcast(uniform(controls));
+        return loop_.sum([&](Index pack) {
+            Pack3 x[N];
+            loop_.gather(pack, q, x);
+            Pack total(0.0);
+            for (int p = 0; p < points; ++p)
+                total +=
+                    elements_[pack].at[p].energy(x, fields.empty() ? everywhere : fields[pack].at[p].flux);
+            return total;
+        });
+    }
+
+    void evaluate(const double* q, const Controls& controls, Residual& out) override {
+        const std::vector<Fields> fields = sample(q, controls, 1);
+        const Pack3 everywhere = broadcast(uniform(controls)), none = broadcast(Vec3::Zero());
+        loop_.scatter_packs([&](Index pack) {
+            Pack3 x[N], g[N];
+            loop_.gather(pack, q, x);
+            std::fill_n(g, N, none);
+            for (int p = 0; p < points; ++p) {
+                const Point& point = elements_[pack].at[p];
+                point.add_gradient(fields.empty() ? everywhere : fields[pack].at[p].flux, g);
+                if (!fields.empty()) point.add_gradient_by_place(shapes_[p], x, fields[pack].at[p], g);
+            }
+            loop_.scatter(pack, g, out);
+        });
+    }
+
+    void prepare_assembly(const double* q, const Controls& controls) override {
+        fields_ = sample(q, controls, 2);
+    }
+
+    void assemble(const Chunk& chunk, const double*, const Controls&, bool,
+                  SystemMatrix& out) const override {
+        if (fields_.empty()) return;
+        ElementLoop<N>::over_packs(chunk, [&](Index pack) {
+            Pack33 h[N * (N + 1) / 2];
+            for (Pack33& block : h) std::fill_n(block.at, 9, Pack(0.0));
+            for (int p = 0; p < points; ++p)
+                elements_[pack].at[p].add_hessian(shapes_[p], fields_[pack].at[p], h);
+            loop_.scatter(pack, h, out);
+        });
+    }
+
+    // The rate of the energy along lambda, with F' and v the rates of F and of x_p,
+    //
+    //   D = - V_p (F' M . B + F M . G v),
+    //
+    // is linear in the magnetization and in the field.
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override {
+        const Vec3 everywhere = uniform(controls);
+        const double factor = controls[field_factor_.first];
+        std::vector<Vec3> places, magnetizations, rates, turns;
+        at_points(q, places, magnetizations);
+        at_points(lambda, rates, turns);
+        FieldSamples samples;
+        samples.reset(places.size(), 1);
+        sources_.add_samples(places, magnetizations, 1, 1.0, samples);
+        FieldProbe probe;  // - V_p (F' M, F M, v)
+        probe.direction = rates;
+        for (Index t = 0; t < solid_.n_elements(); ++t) {
+            const RestElement<Element> rest = rest_of(t);
+            const Eigen::Matrix<double, 3, N> x = nodes_of(t, q), along = nodes_of(t, lambda);
+            Vec3 by_magnetization = Vec3::Zero();
+            for (int p = 0; p < points; ++p) {
+                const Index n = t * points + p;
+                const Eigen::Matrix<double, N, 3> g = gradients(rest, p);
+                const Vec3 flux = everywhere + factor * samples.flux[n],
+                           flux_rate = factor * (samples.gradient[n] * rates[n]);
+                by_magnetization -=
+                    rest.volume[p] * (g.transpose() * (along.transpose() * flux + x.transpose() * flux_rate));
+                probe.flux.push_back(-rest.volume[p] * turns[n]);
+                probe.moment.push_back(-rest.volume[p] * magnetizations[n]);
+                out.controls.segment<3>(flux_density_.first) += probe.flux[n];
+                out.controls[field_factor_.first] +=
+                    probe.flux[n].dot(samples.flux[n]) + probe.moment[n].dot(samples.gradient[n] * rates[n]);
+            }
+            out.values.segment<3>(magnetization_.at(t)) += by_magnetization;
+        }
+        sources_.add_vjp(places, probe, factor, out);
+    }
+
+    std::size_t bytes() const override { return loop_.bytes() + bytes_of(elements_) + bytes_of(fields_); }
+
+  private:
+    Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
+
+    RestElement<Element> rest_of(Index element) const {
+        Vec3 x[N];
+        for (int k = 0; k < N; ++k) x[k] = solid_.rest(element, k);
+        return RestElement<Element>(x);
+    }
+
+    // The g_k of a point, one a row.
+    static Eigen::Matrix<double, N, 3> gradients(const RestElement<Element>& rest, int p) {
+        return Element::shape_derivatives(p) * rest.gradients[p];
+    }
+
+    Eigen::Matrix<double, 3, N> nodes_of(Index element, const double* from) const {
+        Eigen::Matrix<double, 3, N> at;
+        const std::span<const Index> nodes = solid_.nodes_of(element);
+        for (int k = 0; k < N; ++k) at.col(k) = Eigen::Map<const Vec3>(from + 3 * nodes[k]);
+        return at;
+    }
+
+    // x_p and F M of each point, one element after another; of rates, theirs.
+    void at_points(const double* q, std::vector<Vec3>& places, std::vector<Vec3>& magnetizations) const {
+        places.resize(static_cast<std::size_t>(solid_.n_elements()) * points);
+        magnetizations.resize(places.size());
+        loop_.each_pack([&](Index pack) {
+            Pack3 x[N];
+            loop_.gather(pack, q, x);
+            for (int p = 0; p < points; ++p) {
+                const Pack3 place = Point::place(shapes_[p], x), m = elements_[pack].at[p].magnetization(x);
+                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+                    const Index n = loop_.element(pack, lane) * points + p;
+                    places[n] = lane_of(place, lane);
+                    magnetizations[n] = lane_of(m, lane);
+                }
+            }
+        });
+    }
+
+    // The applied field at every point, in packs; none where it is uniform. Order as in AppliedField::add_samples.
+    std::vector<Fields> sample(const double* q, const Controls& controls, int order) const {
+        const double factor = controls[field_factor_.first];
+        if (sources_.empty() || factor == 0.0) return {};
+        std::vector<Vec3> places, moments;
+        at_points(q, places, moments);
+        FieldSamples samples;
+        samples.reset(places.size(), order);
+        sources_.add_samples(places, moments, order, factor, samples);
+        const Vec3 everywhere = uniform(controls);
+        std::vector<Fields> packs(loop_.packs());
+        for (Index pack = 0; pack < loop_.packs(); ++pack)
+            for (int p = 0; p < points; ++p)
+                for (int lane = 0; lane < Pack::width; ++lane)
+                    set_field(packs[pack].at[p], lane, samples, loop_.element(pack, lane) * points + p, order,
+                              everywhere);
+        return packs;
+    }
+
+    const Solid& solid_;
+    const Index body_;
+    const ElementLoop<N> loop_;
+    const FieldSources& sources_;
+    Slot magnetization_;                // values
+    Slot flux_density_, field_factor_;  // controls
+    std::array<double, N> shapes_[points];
+    std::vector<Points> elements_;
+    std::vector<Fields> fields_;  // sampled for the assembly at hand; empty in a uniform field
+};
+
+}  // namespace
+
+std::unique_ptr<Term> make_magnetic_solid_term(const Solid& solid, Index body, const ChunkLoop& chunks,
+                                               const SystemMatrix& matrix, const FieldSources& sources,
+                                               Registry& registry) {
+    if (solid.quadratic())
+        return std::make_unique<MagneticSolidTerm<QuadraticTetrahedron>>(solid, solid.quadratic_nodes, body,
+                                                                         chunks, matrix, sources, registry);
+    return std::make_unique<MagneticSolidTerm<LinearTetrahedron>>(solid, solid.linear_nodes, body, chunks,
+                                                                  matrix, sources, registry);
+}
+
+}  // namespace magshell

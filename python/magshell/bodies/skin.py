@@ -1,0 +1,115 @@
+"""A thin magnetized layer on the surface of a solid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.owner import Owner
+from .._checks.quantity import quantity, real_numbers
+from .._checks.selections import indices, selection
+from ..mesh.tet_mesh import TetMesh
+from ..mesh.triangle_mesh import TriangleMesh
+from .shell import magnetization_of
+
+
+class Skin(Owner):
+    """A magnetized layer on the surface of a Solid, without stiffness or mass, as in [Chen22] 6.4.
+
+    A layer with a modulus of its own is a Shell: `ms.Shell(solid.mesh.surface, ...)` with `ms.Tie(solid, shell)`.
+
+    thickness: m, positive, a number or (k,), one a face.
+    faces: (k,), those of the mesh that the solid is made of; by default all. `solid.skin` has them in the numbers of
+        `solid.mesh`, whose quadratic tetrahedra show four flat triangles a face, and rows for each of these.
+    remanent_magnetization: (3,) or (k, 3) A/m, at rest, in world axes; where it is None a solve says it:
+        `values={solid.skin: {"remanent_magnetization": ...}}`.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
+    >>> top = ms.Skin(thickness=1e-3, faces=mesh.faces_at(z=0.02), remanent_magnetization=(1e5, 0, 0))
+    >>> finger = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.45), skin=top)
+    >>> finger.skin
+    Skin(160 faces, thickness 0.001 m)
+    >>> held = ms.Pin(finger.mesh.vertices_at(x=0.0))
+    >>> scene = ms.Scene(finger, supports=[held], field=ms.UniformField())
+    >>> bent = ms.equilibrium(scene, applied_flux_density=(0, 0, 0.05))
+    >>> bool(bent.displacements[:, 2].max() > 1e-4)
+    True
+    """
+
+    _replaceable = ("thickness", "remanent_magnetization")
+
+    def __init__(self, *, thickness, faces=None, remanent_magnetization=None):
+        self.faces = None if faces is None else selection("Skin faces", faces)
+        thickness = real_numbers("thickness [m]", thickness)
+        if thickness.ndim > 1:
+            raise ValueError(
+                f"thickness [m] of a Skin must be a number or one a face, got shape {thickness.shape}"
+            )
+        self.thickness = quantity("thickness", "m", thickness, thickness.shape)
+        if (thickness <= 0).any():
+            raise ValueError(f"thickness [m] of a Skin must be positive, got {thickness.min():g}")
+        self.remanent_magnetization = None
+        if remanent_magnetization is not None:
+            given = real_numbers("remanent_magnetization [A/m]", remanent_magnetization)
+            self.remanent_magnetization = quantity("remanent_magnetization", "A/m", given, given.shape)
+        if self.faces is not None and self.faces.dtype != bool:
+            self._check_rows(len(self.faces))
+
+    def _check_rows(self, count: int) -> None:
+        if self.thickness.shape not in ((), (count,)):
+            raise ValueError(
+                f"thickness [m] of a Skin must be a number or have shape (k,) = ({count},), one a face, got "
+                f"{self.thickness.shape}"
+            )
+        if self.remanent_magnetization is not None:
+            magnetization_of(self.remanent_magnetization, count)
+
+    def _on(self, given: TetMesh, mesh: TetMesh) -> Skin:
+        """Of a solid of `mesh`: a row for each triangle there. The faces are those of `given`, which it is made of."""
+        faces = np.arange(given.n_faces) if self.faces is None else self.faces
+        if faces.dtype != bool and (faces.min() < 0 or faces.max() >= given.n_faces):
+            bad = faces[(faces < 0) | (faces >= given.n_faces)][0]
+            raise ValueError(
+                f"a Skin is on faces of the solid's surface, which are 0 to {given.n_faces - 1}, got {bad}"
+            )
+        faces = indices("Skin faces", faces, given.n_faces)
+        self._check_rows(len(faces))
+        parts = mesh.n_faces // given.n_faces
+        if parts == 0:
+            if self.faces is not None or self.thickness.ndim or np.ndim(self.remanent_magnetization) > 1:
+                raise ValueError(
+                    "a Skin of a linear solid counts faces of four-node tetrahedra: make it for mesh.first_order(), and "
+                    "the solid of that mesh"
+                )
+            faces, parts = np.arange(mesh.n_faces), 1
+        skin = Skin(thickness=np.repeat(np.broadcast_to(self.thickness, len(faces)), parts))
+        skin.faces = (parts * faces[:, None] + np.arange(parts)).ravel()
+        if self.remanent_magnetization is not None:
+            of_faces = magnetization_of(self.remanent_magnetization, len(faces))
+            skin.remanent_magnetization = np.repeat(of_faces, parts, axis=0)
+        return skin
+
+    def replaced(self, **values) -> Skin:
+        """The same skin with other values."""
+        now = {name: getattr(self, name) for name in self._replaceable}
+        return Skin(faces=self.faces, **(now | values))
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        count = len(self.faces)
+        numbers[label, "thickness"] = np.broadcast_to(self.thickness, count)
+        given = self.remanent_magnetization
+        numbers[label, "remanent_magnetization"] = magnetization_of(
+            np.zeros(3) if given is None else given, count
+        )
+
+    def _core_input(self, owner: str, mesh: TetMesh, vertices: np.ndarray) -> dict:
+        """As the core takes it. mesh: the solid's; vertices: the scene's of each of that, (n_v,)."""
+        faces = mesh.faces[self.faces]
+        used = np.unique(faces)
+        surface = TriangleMesh(mesh.rest_positions[used], np.searchsorted(used, faces))
+        return {"owner": owner, "surface": surface._core, "surface_vertices": vertices[used]}
+
+    def __repr__(self) -> str:
+        where = "all faces" if self.faces is None else f"{len(self.faces)} faces"
+        low, high = self.thickness.min(), self.thickness.max()
+        return f"Skin({where}, thickness {low:g}{'' if low == high else f' to {high:g}'} m)"
