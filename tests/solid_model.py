@@ -60,6 +60,7 @@ class SolidModel:
             n_vertices=len(self.nodes),
             original=[],
             sheets=[],
+            skins=[],
             rigid=[],
             face_energies=[],
             solids=[
@@ -72,6 +73,8 @@ class SolidModel:
                     "surface_vertices": [],
                     "material": material,
                     "mean_volume": mean,
+                    "magnetic": False,
+                    "surface_acts": False,
                 }
             ],
             directions=np.zeros((0, 3)),

@@ -262,11 +262,17 @@ def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict | None) 
 
 
 def _idle(scene: Scene, replaced: dict) -> dict:
-    """With a magnetization of zero for the sheets that are given none, as no field acts on it."""
+    """With a magnetization of zero for the sheets and skins that are given none, as no field acts on it."""
     if not scene.fields:
         return replaced
     nothing = {"remanent_magnetization": np.zeros(3)}
-    return {**replaced, **{sheet: {**nothing, **replaced.get(sheet, {})} for sheet in scene._bodies.sheets}}
+    return {
+        **replaced,
+        **{
+            sheet: {**nothing, **replaced.get(sheet, {})}
+            for sheet in (*scene._bodies.sheets, *scene._bodies.skins)
+        },
+    }
 
 
 def _slow_square(body: Shell | Solid) -> float:
