@@ -1,4 +1,5 @@
-"""python -m magshell.bench kernels: what a gradient and a Hessian cost, a face, by bending and magnetization."""
+"""python -m magshell.bench kernels: what a gradient and a Hessian cost, a face, by bending and magnetization; and a
+tetrahedron."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from magshell.scene.values import Values
 
 from .ratios import note
 from .report import add_rounds, chosen, print_table
+from .solid_kernels import solids
 from .timing import Timing, clocked, measure, peak_memory
 
 FACES, QUICK_FACES = (8192, 131072), (128, 512)
@@ -75,10 +77,12 @@ def run(options: argparse.Namespace) -> dict:
         headings,
         rows,
     )
+    of_solids = solids(options.quick, options.rounds)
     gain = two_threads(SHEETS[0], sizes[0], options.rounds)
     _print_targets(costs[SHEETS[0].name], gain)
     return {
         "sheets": {name: [each._asdict() for each in of_sheet] for name, of_sheet in costs.items()},
+        "solids": of_solids,
         "two threads": gain,
     }
 
