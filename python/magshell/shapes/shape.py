@@ -46,6 +46,7 @@ class Shape:
 
     # Put together
 
+    # NotImplemented is how an operator tells Python to ask the other side, and then to raise TypeError.
     def __or__(self, other) -> Shape:
         return Union([self, other]) if isinstance(other, Shape) else NotImplemented
 
