@@ -3,6 +3,8 @@
 
 #include <pybind11/eigen.h>
 
+#include <vector>
+
 #include "bindings/bindings.h"
 #include "magshell/core/types.h"
 
@@ -15,6 +17,19 @@ inline Rows3 to_rows3(const Array& array) {
 
 inline VectorXd to_vector(const Array& array) {
     return Eigen::Map<const VectorXd>(array.data(), array.size());
+}
+
+/// One for each of `rows`, `each` of a row: (n, k, 3, 3), without the second where k = 0.
+inline py::array_t<double> to_matrices(const std::vector<Mat3>& given, Index rows, int each) {
+    std::vector<py::ssize_t> shape = {static_cast<py::ssize_t>(rows)};
+    if (each > 0) shape.push_back(each);
+    shape.insert(shape.end(), {3, 3});
+    py::array_t<double> out(shape);
+    double* to = out.mutable_data();
+    for (const Mat3& matrix : given)
+        for (int r = 0; r < 3; ++r)
+            for (int c = 0; c < 3; ++c) *to++ = matrix(r, c);
+    return out;
 }
 
 }  // namespace magshell::bindings

@@ -24,6 +24,7 @@ void register_force(py::module_& module);
 void register_linalg(py::module_& module);
 void register_model(py::module_& module);
 void register_obstacle(py::module_& module);
+void register_sheet(py::module_& module);
 void register_solid(py::module_& module);
 void register_statics(py::module_& module);
 

@@ -13,6 +13,7 @@ PYBIND11_MODULE(_core, module) {
     b::register_force(module);
     b::register_face_energies(module);
     b::register_model(module);
+    b::register_sheet(module);
     b::register_solid(module);
     b::register_statics(module);
     b::register_adjoint(module);       // takes what a solve found

@@ -6,16 +6,6 @@
 namespace magshell::bindings {
 namespace {
 
-py::array_t<double> matrices(const std::vector<Mat3>& given, Index elements, int points) {
-    py::array_t<double> out({static_cast<py::ssize_t>(elements), static_cast<py::ssize_t>(points),
-                             py::ssize_t{3}, py::ssize_t{3}});
-    double* to = out.mutable_data();
-    for (const Mat3& each : given)
-        for (int r = 0; r < 3; ++r)
-            for (int c = 0; c < 3; ++c) *to++ = each(r, c);
-    return out;
-}
-
 SolidSurface surface_of(const py::handle& given) {
     return {given["surface"].cast<std::shared_ptr<TriangleMesh>>(),
             given["surface_vertices"].cast<std::vector<Index>>()};
@@ -32,8 +22,8 @@ py::tuple point_states(const Model& model, Index solid, const VectorXd& q) {
     py::array_t<double> volumes(
         {static_cast<py::ssize_t>(elements), static_cast<py::ssize_t>(states.points)});
     std::copy(states.volumes.begin(), states.volumes.end(), volumes.mutable_data());
-    return py::make_tuple(matrices(states.deformation_gradients, elements, states.points),
-                          matrices(states.cauchy_stresses, elements, states.points), volumes);
+    return py::make_tuple(to_matrices(states.deformation_gradients, elements, states.points),
+                          to_matrices(states.cauchy_stresses, elements, states.points), volumes);
 }
 
 }  // namespace

@@ -55,6 +55,7 @@ __all__: list[str] = [
     "pull_back_motion",
     "sample_fields",
     "set_num_threads",
+    "sheet_stresses",
     "simulate",
     "solid_point_states",
     "vacuum_permeability",
@@ -842,6 +843,15 @@ def sample_fields(
     """
 
 def set_num_threads(count: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+def sheet_stresses(
+    model: Model,
+    sheet: typing.SupportsInt | typing.SupportsIndex,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> tuple:
+    """
+    (Green's strain, change of curvature [1/m], membrane force [N/m], bending moment [N]) of a sheet's faces at rest, in world axes: (n_f, 3, 3) each.
+    """
+
 def simulate(
     model: Model,
     input: MotionInput,

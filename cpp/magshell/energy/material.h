@@ -1,13 +1,15 @@
 // The constant stiffness C of a face's strain measures, from its rest shape and material.
 //
 // St. Venant-Kirchhoff in plane stress; t~_i is the rest edge i turned by 90 degrees in the face's plane.
-//   membrane  S_i = (t~_j (x) t~_k + t~_k (x) t~_j) / (16 A~^2)      [Chen22] (18), (22)
+//   membrane  S_i = - (t~_j (x) t~_k + t~_k (x) t~_j) / (16 A~^2), Green's strain is sum_i S_i s_i
+//                                                                    [Chen22] (18), (22)
 //             C_ij = Y A~ h / (1 - nu^2) ((1 - nu) tr(S_i S_j) + nu tr S_i tr S_j)
 //   bending   R_i = t~_i (x) t~_i / (A~ l~_i)                        [Chen22] (19), (23)
 //             C_ij = Y A~ h^3 / (12 (1 - nu^2)) ((1 - nu) tr(R_i R_j) + nu tr R_i tr R_j)
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 
 #include "magshell/core/types.h"
 
@@ -45,13 +47,29 @@ struct RestFace {
         return bending(m).by_poisson_ratio(m.poisson_ratio);
     }
 
+    /// S_i and R_i, in axes along edge 0 and, turned to the left, across it.
+    std::array<Eigen::Matrix2d, 3> membrane_measures() const {
+        std::array<Eigen::Matrix2d, 3> measure;
+        for (int i = 0; i < 3; ++i) {
+            const Eigen::Vector2d &tj = turned_edge[(i + 1) % 3], &tk = turned_edge[(i + 2) % 3];
+            measure[i] = -(tj * tk.transpose() + tk * tj.transpose()) / (16.0 * area * area);
+        }
+        return measure;
+    }
+    std::array<Eigen::Matrix2d, 3> bending_measures() const {
+        std::array<Eigen::Matrix2d, 3> measure;
+        for (int i = 0; i < 3; ++i)
+            measure[i] = turned_edge[i] * turned_edge[i].transpose() / (area * edge_length[i]);
+        return measure;
+    }
+
   private:
     // C = modulus / (1 - nu^2) ((1 - nu) products + nu traces)
     struct PlaneStress {
         Mat3 products, traces;  // tr(S_i S_j), tr S_i tr S_j
         double modulus;
 
-        PlaneStress(const Eigen::Matrix2d measure[3], double modulus_) : modulus(modulus_) {
+        PlaneStress(const std::array<Eigen::Matrix2d, 3>& measure, double modulus_) : modulus(modulus_) {
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) {
                     products(i, j) = (measure[i] * measure[j]).trace();
@@ -72,20 +90,12 @@ struct RestFace {
     };
 
     PlaneStress membrane(const SheetMaterial& m) const {
-        Eigen::Matrix2d measure[3];
-        for (int i = 0; i < 3; ++i) {
-            const Eigen::Vector2d &tj = turned_edge[(i + 1) % 3], &tk = turned_edge[(i + 2) % 3];
-            measure[i] = (tj * tk.transpose() + tk * tj.transpose()) / (16.0 * area * area);
-        }
-        return {measure, m.young_modulus * area * m.thickness};
+        return {membrane_measures(), m.young_modulus * area * m.thickness};
     }
 
     PlaneStress bending(const SheetMaterial& m) const {
-        Eigen::Matrix2d measure[3];
-        for (int i = 0; i < 3; ++i)
-            measure[i] = turned_edge[i] * turned_edge[i].transpose() / (area * edge_length[i]);
         const double cubed = m.thickness * m.thickness * m.thickness;
-        return {measure, m.young_modulus * area * cubed / 12.0};
+        return {bending_measures(), m.young_modulus * area * cubed / 12.0};
     }
 };
 

@@ -136,6 +136,13 @@ VectorXd Model::strain_forces(const StrainSet& stresses) {
     return std::move(forces.gradient);
 }
 
+const ElasticTerm& Model::elastic_term(Index sheet, std::string_view name) const {
+    const auto found = std::find_if(elastic_.begin(), elastic_.end(), [&](const ElasticTerm* term) {
+        return term->body() == sheet && term->name() == name;
+    });
+    return **found;
+}
+
 StrainSet Model::stresses(const StrainSet& strains) const {
     StrainSet stresses;
     for (std::size_t k = 0; k < elastic_.size(); ++k)

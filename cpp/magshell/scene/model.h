@@ -111,6 +111,8 @@ class Model {
     double largest_share(const VectorXd& q, const VectorXd& p) const;
     std::string refusal(const VectorXd& q) const;
 
+    /// That of a sheet, "membrane" or "bending".
+    const ElasticTerm& elastic_term(Index sheet, std::string_view name) const;
     /// The elastic term of a solid.
     const SolidTerm& solid_term(Index solid) const { return *solid_terms_[solid]; }
 

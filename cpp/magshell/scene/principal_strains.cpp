@@ -2,32 +2,13 @@
 
 #include <cmath>
 
-#include "magshell/assembly/folds.h"
-#include "magshell/core/parallel.h"
+#include "magshell/scene/sheet_loops.h"
 
 namespace magshell {
 namespace {
 
-constexpr Index block = 1024;  // of folds or faces; a multiple of every pack's width
-
-/// body(first, last) over [0, count), in blocks on all threads.
-template <class Body>
-void over_blocks(Index count, const Body& body) {
-    parallel_for((count + block - 1) / block,
-                 [&](int k) { body(k * block, std::min((k + 1) * block, count)); });
-}
-
-std::vector<double> turns_of(const Sheet& sheet, const double* q) {
-    std::vector<double> turns(sheet.folds.size());
-    over_blocks(static_cast<Index>(turns.size()), [&](Index from, Index to) {
-        for (Index first = from; first < to; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, to);
-            const Pack angle = folds_at(sheet, first, last, q).angle();
-            for (Index h = first; h < last; ++h) turns[h] = turn_from(sheet.folds[h], angle[h - first]);
-        }
-    });
-    return turns;
-}
+using sheet_loops::fold_turns;
+using sheet_loops::over_blocks;
 
 /// A symmetric 2x2 tensor a lane.
 struct Tensor2 {
@@ -80,7 +61,7 @@ struct FlatFace {
 // The rows of one sheet, whose first face is that row.
 void add_sheet(const Sheet& sheet, const MembraneFaces& membrane, Index first_scalar, const VectorXd& q,
                const VectorXd& thickness, Index first_row, PrincipalStrains& out) {
-    const std::vector<double> turns = turns_of(sheet, q.data());
+    const std::vector<double> turns = fold_turns(sheet, q.data());
     const auto turn_of = [&](Index fold) { return turns[fold]; };
     const double* rotations = q.data() + first_scalar;
     over_blocks(sheet.n_faces(), [&](Index from, Index to) {

@@ -12,7 +12,10 @@ namespace {
 
 constexpr int corrector_iterations = 8, wanted_iterations = 3;
 constexpr double smallest_turn_cosine =
-    0.5;                             // of successive tangents; a sharper bend asks for a shorter step
+    0.5;  // of successive tangents; a sharper bend asks for a shorter step
+// Of the largest step, while the parameter goes from 0 to 1: below that nothing moves but by rounding, and arc
+// length is that of the parameter.
+constexpr double least_movement = 1e-3;
 constexpr double coincident = 1e-6;  // of a step: critical points closer than that count as one
 
 struct Tangent {
@@ -44,8 +47,7 @@ class Follower {
         here.turns = model_.turns();
         Tangent tangent;
         if (!find_tangent(here, tangent)) return fail("the tangent does not exist at the start");
-        const double moved = length(tangent.state);
-        psi_ = moved > 0.0 ? moved / std::abs(tangent.parameter) : 1.0;
+        psi_ = std::max(length(tangent.state), least_movement * options_.largest_step);
         normalize(tangent);
         if (tangent.parameter < 0.0) flip(tangent);
         result_.points.push_back(here);
