@@ -6,6 +6,7 @@ import numpy as np
 
 from ..mesh.triangle_mesh import TriangleMesh
 from .shell import Shell
+from .shell_stresses import ShellStresses, stresses_of
 from .strains import Strains
 
 
@@ -51,6 +52,21 @@ class BodyResult:
         arguments = () if np.ndim(self._result.positions) == 2 else (index,)
         rows = slice(self._first_row, self._first_row + self.mesh.n_faces)
         return Strains(*(each[rows] for each in self._result.strains(*arguments)))
+
+    def stresses(self, index: int = -1) -> ShellStresses:
+        """Membrane force and bending moment of its faces with the strain and curvature that make them, stress at the
+        surfaces, von Mises stress, with the values that the result was found with; of a motion or a path in a recorded
+        state, by default the last. Of a solid, `stresses` has the same names where they mean the same.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+        >>> ends = [ms.Pin(mesh.vertices_at(x=0.0)), ms.Pin(mesh.vertices_at(x=0.1), displacement=(0.001, 0, 0))]
+        >>> stresses = ms.equilibrium(ms.Scene(sheet, supports=ends))[sheet].stresses()
+        >>> stresses.principal_membrane_forces[0].round(3)  # Y h times a Green strain of 1.005 %, nothing across
+        array([10.05,  0.  ])
+        """
+        return stresses_of(self._result._values_at(index), self.body, self._result._state_at(index))
 
     @property
     def remanent_magnetization(self):

@@ -32,6 +32,11 @@ class SolidResult(BodyResult):
         at = positions if positions.ndim == 2 else positions[index]
         return states_at(self._result._values_at(index), self.body, at)
 
+    def stresses(self, index: int = -1) -> SolidStates:
+        """As `strains`, which has both: `green_strains`, `cauchy_stresses`, `von_mises_stresses` and `mean` are those of
+        a shell's `stresses` too."""
+        return self.strains(index)
+
 
 def told_strains(result, of_sheets) -> str:
     """For a repr, one line for all sheets and one a solid, of the last state. of_sheets: what is said of the sheets."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import _core
+from .at_points import mean, von_mises
 from .solid import Solid
 
 
@@ -40,14 +41,11 @@ class SolidStates(NamedTuple):
     @property
     def von_mises_stresses(self) -> np.ndarray:
         """(n_t, p), Pa, of the Cauchy stress."""
-        pressure = np.trace(self.cauchy_stresses, axis1=-2, axis2=-1)[..., None, None] / 3.0
-        deviator = self.cauchy_stresses - pressure * np.eye(3)
-        return np.sqrt(1.5 * np.sum(deviator**2, axis=(-2, -1)))
+        return von_mises(self.cauchy_stresses)
 
     def mean(self, of_points: np.ndarray) -> np.ndarray:
         """Of each tetrahedron, (n_t, ...), weighed by the volumes: of (n_t, p, ...)."""
-        weights = self.volumes / self.volumes.sum(axis=1, keepdims=True)
-        return np.einsum("tp,tp...->t...", weights, of_points)
+        return mean(self.volumes, of_points)
 
 
 def states_at(values, body: Solid, positions: np.ndarray) -> SolidStates:

@@ -185,12 +185,16 @@ class Trajectory:
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face in a recorded state, by default the last."""
+        return strains_of(self.scene, self._state_at(index), self._thickness)
+
+    def _state_at(self, index: int) -> np.ndarray:
+        """Of the core."""
         positions, rotations = (detached(each)[index] for each in (self.positions, self.edge_rotations))
         model = self.scene._model
         state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
         before = 3 * self.scene._bodies.n_points
         state[before : before + self._directions.shape[1]] = self._directions[index]
-        return strains_of(self.scene, state, self._thickness)
+        return state
 
     def self_intersections(self, index: int = -1) -> np.ndarray:
         """The faces that pass through each other in a recorded state, as in TriangleMesh.self_intersections, (k, 2)."""

@@ -67,6 +67,9 @@ class Equilibria(Sequence):
     def _values_at(self, index: int):
         return self._cases[index]._values
 
+    def _state_at(self, index: int) -> np.ndarray:
+        return self._cases[index]._state
+
     def __len__(self) -> int:
         return len(self._cases)
 

@@ -82,6 +82,9 @@ class Equilibrium:
     def _values_at(self, index: int):
         return self._values
 
+    def _state_at(self, index: int) -> np.ndarray:
+        return self._state
+
     @property
     def _obstacles(self) -> tuple:
         """Of the scene, where they were."""

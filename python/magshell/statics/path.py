@@ -15,8 +15,14 @@ from .._checks.arrays import count, number
 from .._checks.scalars import positive
 from .._machine.entry import solve_entry
 from .._machine.progress import progress_bar
+from ..bodies.body_result import BodyResult
 from ..bodies.caps import warn_of_caps
-from ..bodies.solid_result import told_strains
+from ..bodies.of_body import result_of
+from ..bodies.rigid import Rigid
+from ..bodies.rigid_result import RigidResult
+from ..bodies.shell import Shell
+from ..bodies.solid import Solid
+from ..bodies.solid_result import SolidResult, told_strains
 from ..bodies.strains import StrainHistory, Strains, strains_of, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..mesh.crossings import told
@@ -48,7 +54,7 @@ class CriticalPoint:
 
 @dataclass(frozen=True, repr=False)
 class Path:
-    """A path of equilibria, stable and unstable.
+    """A path of equilibria, stable and unstable. `path[body]` has those of one body.
 
     parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.
     unstable_directions: (n,), zero where the equilibrium is stable. critical: CriticalPoints, in order.
@@ -89,7 +95,34 @@ class Path:
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face at one of the points, by default the last."""
-        return strains_of(self.scene, self._points[index].state, self._inputs.values.whole.thickness)
+        return strains_of(self.scene, self._state_at(index), self._inputs.values.whole.thickness)
+
+    def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
+        """What it says of one body of the scene, a row for each point; points themselves: `equilibrium`."""
+        return result_of(self, body)
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """(n, n_v, 3) m, from the rest shape."""
+        return self.positions - self.scene.mesh.rest_positions
+
+    @property
+    def edge_rotations(self) -> np.ndarray:
+        """(n, n_e) rad, zero where an edge has none."""
+        return self._at_points(self.scene._model.edge_rotations)
+
+    @property
+    def _own_points(self) -> np.ndarray:
+        """(n, 10 a rigid part, 3) m, of the rigid parts."""
+        return self._at_points(self.scene._model.points)[:, self.scene.mesh.n_vertices :]
+
+    def _at_points(self, what: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """(n, ...), of each point's state."""
+        shape = what(self.scene._model.rest_state()).shape
+        return np.reshape([what(point.state) for point in self._points], (len(self), *shape))
+
+    def _state_at(self, index: int) -> np.ndarray:
+        return self._points[index].state
 
     def _values_at(self, index: int):
         return self._moving.values(self.parameters[index])
