@@ -42,6 +42,14 @@ def test_a_motion_comes_back(move, tmp_path) -> None:
         assert np.array_equal(on_vertices["velocity"], move.velocities[k])
         assert np.array_equal(on_vertices["displacement"], move.displacements[k])
         assert np.array_equal(on_vertices["flux_density"][3], move.applied_flux_density[k])
+        (shell,) = move.scene.bodies
+        stresses = move[shell].stresses(k)
+        for name, tensors in (
+            ("membrane_force", stresses.membrane_forces),
+            ("bending_moment", stresses.bending_moments),
+        ):
+            assert np.allclose(on_faces[name].reshape(-1, 3, 3), stresses.in_space(tensors), atol=1e-12)
+        assert np.allclose(on_faces["von_mises_stress"], stresses.von_mises_stresses.max(axis=1))
         turned = on_faces["magnetization"]
         along = mesh.rest_positions[mesh.faces[:, 1]] - mesh.rest_positions[mesh.faces[:, 0]]
         flat = MESH.rest_positions[MESH.faces[:, 1]] - MESH.rest_positions[MESH.faces[:, 0]]

@@ -8,7 +8,10 @@ from model_access import Controls
 
 import magshell as ms
 from magshell.bodies.shell_stresses import stresses_of
+from magshell.plotting.colors import scalar_of
 from magshell.scene.values import Values
+from magshell.states.state import states_of
+from magshell.states.units import length_unit
 from magshell.surroundings.supports import rotation_matrix
 
 YOUNG, POISSON, THICKNESS = 2e6, 0.3, 2e-3  # Pa, 1, m
@@ -208,3 +211,22 @@ def test_shells_and_solids_have_the_same_names():
             assert found.mean(found.von_mises_stresses).shape == rows[:1]
     with pytest.raises(ValueError, match=r"a shell of the scene.*Solid"):
         stresses_of(Values(rest.scene), solid, rest._state)
+
+
+def test_pictures_and_pages_are_coloured_by_them(tmp_path):
+    shell, end, clamp = strip()
+    rest = ms.equilibrium(ms.Scene(shell, supports=[clamp], loads=[ms.EdgeLoad(end, (1.0, 0, 1e-3))]))
+    stresses, states = rest[shell].stresses(), states_of(rest)
+    for color, pair in (
+        ("membrane_force", stresses.principal_membrane_forces),
+        ("bending_moment", 1e6 * stresses.principal_bending_moments),
+    ):
+        scalar = scalar_of(states, color, None, None, length_unit(0.1))
+        largest = np.take_along_axis(pair, np.abs(pair).argmax(axis=1)[:, None], 1)[:, 0]
+        assert scalar.values[0] == pytest.approx(largest) and color.replace("_", " ") in scalar.label
+        ms.plot(rest, color=color, width=400, backend="matplotlib")
+        ms.write_page(rest, tmp_path / "rest.html", color=color)
+    with pytest.raises(ValueError, match=r"volume_ratio.*solids of a result, which has none"):
+        ms.plot(rest, color="volume_ratio", width=400, backend="matplotlib")
+    with pytest.raises(ValueError, match=r"bending_moment.*shells of a result"):
+        ms.plot(shell, color="bending_moment", width=400, backend="matplotlib")

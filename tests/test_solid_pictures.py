@@ -65,7 +65,12 @@ def test_colours_are_those_of_the_tetrahedra_behind(scenes, name):
     ):
         scalar = scalar_on_surfaces(scalar_of(states, color, None, None, length_unit(0.1)), states)
         expected = strains.mean(of_points)[solid.mesh.face_tetrahedra] / unit
-        assert np.allclose(scalar.values[0][:n], expected) and np.isnan(scalar.values[0][n:]).all()
+        assert np.allclose(scalar.values[0][:n], expected)
+        if color == "volume_ratio":
+            assert np.isnan(scalar.values[0][n:]).all()
+        elif name == "both":
+            stress = rest[rest.scene.bodies[1]].stresses().von_mises_stresses.max(axis=1)
+            assert np.allclose(scalar.values[0][n:], stress / unit)
     moved = scalar_on_surfaces(scalar_of(states, "displacement", None, None, length_unit(0.1)), states)
     vertices = rest.scene.mesh.surface_vertices
     assert np.allclose(moved.values[0], 1e3 * np.linalg.norm(rest.displacements[vertices], axis=1))
@@ -108,7 +113,7 @@ def test_meshes_bodies_scenes_and_motions_are_drawn(scenes, tmp_path):
 def test_stress_of_what_has_none_is_refused(scenes):
     solid, rest, _ = scenes["alone"]
     for what, given in ((solid, {}), (rest, {"positions": rest.positions})):
-        with pytest.raises(ValueError, match=r"von_mises_stress.*solids of a result"):
+        with pytest.raises(ValueError, match=r"von_mises_stress.*of a result"):
             ms.plot(what, color="von_mises_stress", **given, **SMALL)
     sheet = ms.meshes.rectangle(0.1, 0.1, cells=(1, 1))
     with pytest.raises(ValueError, match=r"solids of a result"):
@@ -178,9 +183,39 @@ def test_files_that_hold_no_such_mesh_say_what_does(scenes, tmp_path):
     _, rest, motion = scenes["both"]
     with pytest.raises(ValueError, match=r"several bodies.*write_series"):
         ms.write_mesh(tmp_path / "both.vtu", rest.scene.mesh, rest.positions)
-    ones = np.ones((len(motion), motion.scene.mesh.n_faces))
-    with pytest.raises(ValueError, match=r"face_fields.*tetrahedra"):
+    ones = np.ones((len(motion), motion.scene.mesh.n_faces + 1))
+    with pytest.raises(ValueError, match=r"face field 'a' must have shape"):
         ms.write_series(tmp_path / "both.pvd", motion, face_fields={"a": ones}, progress=False)
+    with pytest.raises(ValueError, match=r"tetrahedron field 'a' must have shape \(4, 96\)"):
+        ms.write_series(tmp_path / "both.pvd", motion, tetrahedron_fields={"a": ones}, progress=False)
+    sheet = ms.meshes.rectangle(0.1, 0.1, cells=(1, 1))
+    with pytest.raises(ValueError, match=r"tetrahedron_fields: there are no tetrahedra"):
+        ms.write_series(tmp_path / "sheet.pvd", sheet, tetrahedron_fields={"a": ones}, progress=False)
+
+
+@pytest.mark.parametrize("name", ["alone", "both"])
+def test_a_series_of_solids_takes_fields_of_ones_own(scenes, name, tmp_path):
+    """Of the tetrahedra, and of the faces of all bodies, for which the solid's surface is written too."""
+    solid, _, motion = scenes[name]
+    inside = np.arange(4.0 * solid.mesh.n_tetrahedra).reshape(4, -1)
+    outside = np.arange(8.0 * motion.scene.mesh.n_faces).reshape(4, -1, 2)
+    fields = {"tetrahedron_fields": {"inside": inside}, "face_fields": {"outside": outside}}
+    ms.write_series(tmp_path / "motion.pvd", motion, progress=False, **fields)
+    content = blocks(tmp_path / "motion" / "motion_2.vtu")
+    kinds = [block.type for block in content.cells]
+    assert kinds[0] == "tetra10" and set(kinds[1:]) == {"triangle"}
+    data = {field: np.concatenate(values) for field, values in content.cell_data.items()}
+    n = solid.mesh.n_tetrahedra
+    assert np.array_equal(data["inside"][:n], inside[2]) and np.isnan(data["inside"][n:]).all()
+    assert np.array_equal(data["outside"][n:], outside[2]) and np.isnan(data["outside"][:n]).all()
+    triangles = np.concatenate([block.data for block in content.cells if block.type == "triangle"])
+    assert np.array_equal(triangles, motion.scene.mesh.faces)
+    if name == "both":
+        sheet = motion.scene.bodies[1]
+        stresses = motion[sheet].stresses(2)
+        rows = data["membrane_force"][-sheet.mesh.n_faces :].reshape(-1, 3, 3)
+        assert np.allclose(rows, stresses.in_space(stresses.membrane_forces))
+        assert np.isnan(data["membrane_force"][: -sheet.mesh.n_faces]).all()
 
 
 def test_a_saved_motion_of_a_solid_goes_on(scenes, tmp_path):

@@ -8,6 +8,9 @@ import numpy as np
 
 from .._checks.quantity import quantity, shape_of
 from .._checks.tensors import detached
+from ..bodies.shell_stresses import ShellStresses
+from ..bodies.solid_states import SolidStates
+from ..states.element_fields import element_fields
 from ..states.state import State
 from ..states.units import LengthUnit, prefixed
 
@@ -140,30 +143,53 @@ def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
 
 def _volume_ratio(states: list[State], _: LengthUnit) -> Scalar:
     """J, even on both sides of 1."""
-    values = _of_elements(states, "volume_ratio", "volume_ratios")
+    values = _of_elements(states, "volume_ratio", lambda found: found.mean(found.volume_ratios), SolidStates)
     bound = max(float(np.nanmax(np.abs(each - 1.0))) for each in values) or 1.0
     return Scalar("$J$", values, (1.0 - bound, 1.0 + bound), "diverging")
 
 
 def _von_mises(states: list[State], _: LengthUnit) -> Scalar:
-    values = _of_elements(states, "von_mises_stress", "von_mises_stresses")
+    values = _of_elements(states, "von_mises_stress", lambda found: element_fields(found)["von_mises_stress"])
     factor, unit = prefixed(max(map(np.nanmax, values)), "Pa")
     values = [each / factor for each in values]
     return Scalar(f"von Mises stress [{unit}]", values, (0.0, _range(values)[1]))
 
 
-def _of_elements(states: list[State], name: str, of_points: str) -> list[np.ndarray]:
-    """The mean in the tetrahedron behind each face; NaN on sheets."""
+def _resultant(name: str, text: str, unit: str, of_faces: str):
+    """Of sheets: the principal value of larger magnitude, even on both sides of 0."""
+
+    def scalar(states: list[State], _: LengthUnit) -> Scalar:
+        def largest(found):
+            pair = getattr(found, of_faces)
+            return np.where(np.abs(pair[:, 0]) >= np.abs(pair[:, 1]), pair[:, 0], pair[:, 1])
+
+        values = _of_elements(states, name, largest, ShellStresses)
+        bound = max(float(np.nanmax(np.abs(each))) for each in values) or 1.0
+        factor, prefixed_unit = prefixed(bound, unit)
+        bound /= factor
+        label = f"largest {text} [{prefixed_unit}]"
+        return Scalar(label, [each / factor for each in values], (-bound, bound), "diverging")
+
+    return scalar
+
+
+def _of_elements(states: list[State], name: str, of_element, kind=(SolidStates, ShellStresses)) -> list[np.ndarray]:
+    """What each face of a sheet has, and the tetrahedron behind each face of a solid; NaN on bodies that are not of this
+    kind."""
+    bodies = {SolidStates: "solids", ShellStresses: "shells"}.get(kind, "bodies")
+    wrong = f"color={name!r} is of the {bodies} of a result"
     found = []
     for state in states:
         if state.elements is None:
-            raise ValueError(
-                f"color={name!r} is of the solids of a result: there is none with its own positions"
-            )
+            raise ValueError(f"{wrong}: there is none with its own positions")
         values = np.full(state.mesh.n_faces, np.nan)
-        for first, mesh, strains in state.elements():
-            means = strains.mean(getattr(strains, of_points))
-            values[first : first + mesh.n_faces] = means[mesh.face_tetrahedra]
+        for first, mesh, elements in state.elements():
+            if isinstance(elements, kind):
+                rows = of_element(elements)
+                behind = mesh.face_tetrahedra if isinstance(elements, SolidStates) else slice(None)
+                values[first : first + mesh.n_faces] = rows[behind]
+        if np.isnan(values).all():
+            raise ValueError(f"{wrong}, which has none")
         found.append(values)
     return found
 
@@ -174,6 +200,12 @@ NAMED = {
     "magnetic_energy": _magnetic_energy,
     "volume_ratio": _volume_ratio,
     "von_mises_stress": _von_mises,
+    "membrane_force": _resultant(
+        "membrane_force", "principal membrane force", "N/m", "principal_membrane_forces"
+    ),
+    "bending_moment": _resultant(
+        "bending_moment", "principal bending moment", "N", "principal_bending_moments"
+    ),
 }
 
 

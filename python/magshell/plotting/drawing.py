@@ -53,7 +53,8 @@ def plot(
     states: numbers of those to draw, of a path or a motion; by default all, or nine evenly spread ones.
     color: "magnetization" (the component of M_r along the axis that all of it shares, else its angle or
         magnitude), "displacement", "magnetic_energy" (a rest volume), of a
-        result's solids "volume_ratio" (J) or "von_mises_stress" (the mean of the tetrahedron behind a face),
+        result "von_mises_stress" (the mean of the tetrahedron behind a face; of a sheet the larger of both surfaces'),
+        of its solids "volume_ratio" (J), of its sheets "membrane_force" or "bending_moment" (the larger principal one),
         an array with a number a face or a vertex, a list of such arrays, one a state, or None for plain sheets.
         "auto": magnetization if it varies, else displacement.
     color_label, color_range: the text, with the unit, and the ends of the colour bar.

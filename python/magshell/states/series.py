@@ -17,7 +17,9 @@ from .._checks.quantity import quantity, shape_of
 from .._checks.tensors import detached
 from .._machine.files import replacing
 from ..mesh.io import check_field_name, write_mesh
+from ..mesh.tet_mesh import TetMesh
 from ..mesh.triangle_mesh import TriangleMesh
+from .element_fields import element_fields
 from .solid_files import write_solids
 from .state import State, states_of, with_times
 
@@ -34,6 +36,7 @@ def write_series(
     field=None,
     vertex_fields: dict | None = None,
     face_fields: dict | None = None,
+    tetrahedron_fields: dict | None = None,
     progress: bool = True,
 ) -> Path:
     """Writes a motion for ParaView: strip.pvd, and in a folder strip/ beside it one VTU a state (the extra `io`).
@@ -42,11 +45,13 @@ def write_series(
     positions: (n, n_v, 3) m, where `what` has none. times: (n,) s; by default its own, else 0, 1, 2, ...
     velocities: (n, n_v, 3) m/s; by default its own.
     remanent_magnetization, applied_flux_density, field: as in `plot`.
-    vertex_fields, face_fields: name -> (n, n_v) or (n, n_v, k), and (n, n_f) or (n, n_f, k), which are added.
+    vertex_fields, face_fields, tetrahedron_fields: name -> (n, n_v) or (n, n_v, k), (n, n_f) or (n, n_f, k), and (n, n_t)
+        or (n, n_t, k), which are added; rows are those of one body after another, faces those of solids' surfaces too.
 
-    Tetrahedra are written as such, with sheets beside them as triangles, and of a result with their means of
-    `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`, rows of matrices; on triangles NaN.
-    Points have `displacement` [m], `velocity` [m/s] and, in a field, `flux_density` [T]; faces of a magnetized sheet
+    Tetrahedra are written as such, with sheets beside them as triangles. Of a result they have their means of
+    `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`; sheets have `membrane_force` [N/m]
+    and `bending_moment` [N] as they pull now, and the larger `von_mises_stress` [Pa] of their surfaces. Matrices are
+    by rows; what an element does not have is NaN. Points have `displacement` [m], `velocity` [m/s] and, in a field, `flux_density` [T]; faces of a magnetized sheet
     have `magnetization` [A/m], F_0 M_r, as it turns with them. Returns the path of the PVD. progress: show a bar once it
     has taken two seconds.
 
@@ -82,6 +87,7 @@ def write_series(
     more = {
         "vertex": _by_state(vertex_fields, "vertex", states),
         "face": _by_state(face_fields, "face", states),
+        "tetrahedron": _by_state(tetrahedron_fields, "tetrahedron", states),
     }
     if velocities is not None:
         row = (states[0].mesh.n_vertices, 3)
@@ -96,13 +102,14 @@ def write_series(
             on_vertices |= {name: values[k] for name, values in more["vertex"].items()}
             if in_field:
                 on_vertices["flux_density"] = state.flux_density_at(state.positions)
-            on_faces = {name: values[k] for name, values in more["face"].items()}
-            if magnetized and isinstance(state.mesh, TriangleMesh):
-                on_faces["magnetization"] = state.magnetization
+            on_faces, on_tetrahedra = (
+                {name: values[k] for name, values in more[kind].items()} for kind in ("face", "tetrahedron")
+            )
             if isinstance(state.mesh, TriangleMesh):
+                on_faces = _of_sheets(state, magnetized) | on_faces
                 write_mesh(path.parent / names[k], state.mesh, state.positions, on_vertices, on_faces)
             else:
-                write_solids(path.parent / names[k], state, on_vertices)
+                write_solids(path.parent / names[k], state, on_vertices, on_faces, on_tetrahedra)
             done.append(k)
     return path
 
@@ -110,11 +117,9 @@ def write_series(
 def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
     fields = named_values(f"{kind}_fields", fields)
     mesh = states[0].mesh
-    if kind == "face" and fields and not isinstance(mesh, TriangleMesh):
-        raise ValueError(
-            "face_fields: a file of tetrahedra has no faces of theirs; write the solid's `surface`"
-        )
-    rows = mesh.n_vertices if kind == "vertex" else mesh.n_faces
+    if kind == "tetrahedron" and fields and isinstance(mesh, TriangleMesh):
+        raise ValueError("tetrahedron_fields: there are no tetrahedra")
+    rows = _counts(mesh)[kind]
     for name, values in fields.items():
         check_field_name(kind, name)
         shape = shape_of(f"{kind} field {name!r}", values)
@@ -124,6 +129,23 @@ def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, 
                 f"got {shape}"
             )
     return {name: np.asarray(detached(values)) for name, values in fields.items()}
+
+
+def _counts(mesh) -> dict[str, int]:
+    bodies = getattr(mesh, "meshes", [mesh])
+    tetrahedra = sum(each.n_tetrahedra for each in bodies if isinstance(each, TetMesh))
+    return {"vertex": mesh.n_vertices, "face": mesh.n_faces, "tetrahedron": tetrahedra}
+
+
+def _of_sheets(state: State, magnetized: bool) -> dict[str, np.ndarray]:
+    """What their faces have of themselves."""
+    found: dict[str, np.ndarray] = {}
+    if state.elements is not None:
+        fields = [element_fields(each) for _, _, each in state.elements()]
+        found |= {name: np.concatenate([each[name] for each in fields]) for name in fields[0]} if fields else {}
+    if magnetized:
+        found["magnetization"] = state.magnetization
+    return found
 
 
 @contextmanager

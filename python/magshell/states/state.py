@@ -11,9 +11,11 @@ import numpy as np
 from .._checks.quantity import quantity
 from .._checks.tensors import detached
 from ..bodies.joined_mesh import JoinedMesh
+from ..bodies.of_body import result_of
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
-from ..bodies.solid_states import SolidStates, states_at
+from ..bodies.shell_stresses import ShellStresses
+from ..bodies.solid_states import SolidStates
 from ..dynamics.trajectory import Trajectory
 from ..fields.field import UniformField
 from ..mesh.tet_mesh import TetMesh
@@ -33,7 +35,7 @@ class State:
     flux_density: (3,), T, the uniform field, or None without one.
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
     title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
-    elements: () -> [(first face, mesh, SolidStates)] of the solids of a result, or None without any.
+    elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
     """
 
     mesh: TriangleMesh | TetMesh | JoinedMesh
@@ -44,7 +46,7 @@ class State:
     title: str = ""
     time: float | None = None
     obstacles: tuple[Obstacle, ...] = ()
-    elements: Callable[[], list[tuple[int, TetMesh, SolidStates]]] | None = None
+    elements: Callable[[], list[tuple[int, TriangleMesh | TetMesh, SolidStates | ShellStresses]]] | None = None
 
     @property
     def magnetization(self) -> np.ndarray:
@@ -128,23 +130,18 @@ def states_of(
 
 
 def _with_elements(result, states: list[State], positions) -> list[State]:
-    """With what the tetrahedra of its solids go through, where the states are those that it has itself."""
-    solids = result.scene._bodies.solids
-    if not solids or positions is not None or not hasattr(result, "_values_at"):
+    """With what the elements of its bodies go through, where the states are those that it has itself."""
+    if positions is not None or not hasattr(result, "_values_at"):
         return states
+    bodies = result.scene._bodies
 
-    def elements_of(k: int, at: np.ndarray):
-        bodies = result.scene._bodies
+    def elements_of(k: int):
         return lambda: [
-            (
-                bodies.spans[bodies.number(each)].first_face,
-                each.mesh,
-                states_at(result._values_at(k), each, at),
-            )
-            for each in solids
+            (span.first_face, body.mesh, result_of(result, body).stresses(k))
+            for body, span in zip(bodies.shells, bodies.spans, strict=True)
         ]
 
-    return [replace(state, elements=elements_of(k, state.positions)) for k, state in enumerate(states)]
+    return [replace(state, elements=elements_of(k)) for k, state in enumerate(states)]
 
 
 def timed(states: list[State], times) -> list[State]:
