@@ -116,7 +116,9 @@ def test_virtual_work(bending):
         at = mesh.rest_positions + 0.01 * start[0] + t * along[0]
         return model.state(at, 0.2 * start[1] + t * along[1])
 
-    start, along = ([random.normal(size=(mesh.n_vertices, 3)), random.normal(size=mesh.n_edges)] for _ in "ab")
+    start, along = (
+        [random.normal(size=(mesh.n_vertices, 3)), random.normal(size=mesh.n_edges)] for _ in "ab"
+    )
     step = 1e-6
     before, here, after = (stresses_of(values, shell, state(t)) for t in (-step, 0.0, step))
     rates = ((getattr(after, name) - getattr(before, name)) / (2 * step) for name in after._fields[:2])
@@ -130,7 +132,8 @@ def test_virtual_work(bending):
         change = (energies[1][name] - energies[0][name]) / (2 * step)
         assert done == pytest.approx(change, rel=1e-6), name
     elastic = 0.5 * sum(
-        np.sum(mesh.face_areas[:, None, None] * force * strain) for force, strain in zip(forces, here[:2], strict=True)
+        np.sum(mesh.face_areas[:, None, None] * force * strain)
+        for force, strain in zip(forces, here[:2], strict=True)
     )
     assert elastic == pytest.approx(sum(model.energies(state(0.0), controls).values()), rel=1e-10)
 
@@ -176,9 +179,7 @@ def test_every_kind_of_result_has_them_with_the_values_it_was_found_with():
     thick = ms.equilibrium(scene, values={shell: {"thickness": 2e-3}})
     stresses = thick[shell].stresses()
     assert np.allclose(stresses.membrane_forces, force, atol=2e-3)
-    assert np.allclose(
-        2 * stresses.von_mises_stresses, rest[shell].stresses().von_mises_stresses, rtol=1e-2
-    )
+    assert np.allclose(2 * stresses.von_mises_stresses, rest[shell].stresses().von_mises_stresses, rtol=1e-2)
     assert np.array_equal(rest[shell].stresses().membrane_forces, force)
     path = ms.follow(scene)
     assert np.allclose(path[shell].stresses().membrane_forces, force, atol=1e-5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,12 +43,15 @@ class Scalar:
     """Numbers on the faces or the vertices of each state, and how to show them.
 
     values: one array a state; NaN is drawn grey. limits: the ends of the scale, in the unit of the values.
+    inside: what a cut shows, one array a state: (n_t,) of the tetrahedra of all bodies where `of_tetrahedra`, else (n_v,).
     """
 
     label: str
     values: list[np.ndarray]
     limits: tuple[float, float]
     scale: str = "sequential"
+    inside: list[np.ndarray] | None = None
+    of_tetrahedra: bool = False
 
     def colors(self, state: int) -> np.ndarray:
         """(n, 3), 0 to 1."""
@@ -65,8 +68,11 @@ def scale_colors(scale: str, values: np.ndarray, limits: tuple[float, float]) ->
     return colors
 
 
-def scalar_of(states: list[State], color, label: str | None, limits, unit: LengthUnit) -> Scalar | None:
-    """The scalar that `color` asks for: None, "auto", a name, an array, or one array a state.
+def scalar_of(
+    states: list[State], color, label: str | None, limits, unit: LengthUnit, cut: bool = False
+) -> Scalar | None:
+    """The scalar that `color` asks for: None, "auto", a name, an array, or one array a state. cut: the scale holds what is
+    inside too.
 
     Raises ValueError on an unknown name, one whose data is missing, or an array of a wrong length.
     """
@@ -80,10 +86,24 @@ def scalar_of(states: list[State], color, label: str | None, limits, unit: Lengt
                 f"color must be None, 'auto', {', '.join(map(repr, NAMED))} or an array, got {color!r}"
             )
         scalar = NAMED[color](states, unit)
-        label = label or scalar.label
-        return Scalar(label, scalar.values, _limits(limits, scalar.limits), scalar.scale)
+        own = _wider(scalar) if cut and scalar.of_tetrahedra else scalar.limits
+        return replace(scalar, label=label or scalar.label, limits=_limits(limits, own))
     values = _given(states, color)
-    return Scalar(label or "", values, _limits(limits, _range(values)))
+    at_vertices = all(len(each) == state.mesh.n_vertices for each, state in zip(values, states, strict=True))
+    inside = values if at_vertices else None
+    return Scalar(label or "", values, _limits(limits, _range(values)), inside=inside)
+
+
+def _wider(scalar: Scalar) -> tuple[float, float]:
+    """The limits with what is inside; even on both sides of the middle where they are."""
+    low, high = scalar.limits
+    inside = np.concatenate([*scalar.inside, (low, high)])
+    least, most = float(inside.min()), float(inside.max())
+    if scalar.scale == "diverging":
+        middle = 0.5 * (low + high)
+        bound = max(high - middle, most - middle, middle - least)
+        return middle - bound, middle + bound
+    return min(low, least), max(high, most)
 
 
 def _automatic(states: list[State]) -> str | None:
@@ -124,7 +144,7 @@ def _magnetization(states: list[State], _: LengthUnit) -> Scalar:
 
 def _displacement(states: list[State], unit: LengthUnit) -> Scalar:
     values = [np.linalg.norm(state.displacements, axis=1) / unit.meters for state in states]
-    return Scalar(f"displacement [{unit.name}]", values, (0.0, _range(values)[1]))
+    return Scalar(f"displacement [{unit.name}]", values, (0.0, _range(values)[1]), inside=values)
 
 
 def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
@@ -143,16 +163,21 @@ def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
 
 def _volume_ratio(states: list[State], _: LengthUnit) -> Scalar:
     """J, even on both sides of 1."""
-    values = _of_elements(states, "volume_ratio", lambda found: found.mean(found.volume_ratios), SolidStates)
+    values, inside = _of_elements(
+        states, "volume_ratio", lambda found: found.mean(found.volume_ratios), SolidStates
+    )
     bound = max(float(np.nanmax(np.abs(each - 1.0))) for each in values) or 1.0
-    return Scalar("$J$", values, (1.0 - bound, 1.0 + bound), "diverging")
+    return Scalar("$J$", values, (1.0 - bound, 1.0 + bound), "diverging", inside, True)
 
 
 def _von_mises(states: list[State], _: LengthUnit) -> Scalar:
-    values = _of_elements(states, "von_mises_stress", lambda found: element_fields(found)["von_mises_stress"])
+    values, inside = _of_elements(
+        states, "von_mises_stress", lambda found: element_fields(found)["von_mises_stress"]
+    )
     factor, unit = prefixed(max(map(np.nanmax, values)), "Pa")
-    values = [each / factor for each in values]
-    return Scalar(f"von Mises stress [{unit}]", values, (0.0, _range(values)[1]))
+    values, inside = ([each / factor for each in some] for some in (values, inside))
+    limits = (0.0, _range(values)[1])
+    return Scalar(f"von Mises stress [{unit}]", values, limits, inside=inside, of_tetrahedra=True)
 
 
 def _resultant(name: str, text: str, unit: str, of_faces: str):
@@ -163,7 +188,7 @@ def _resultant(name: str, text: str, unit: str, of_faces: str):
             pair = getattr(found, of_faces)
             return np.where(np.abs(pair[:, 0]) >= np.abs(pair[:, 1]), pair[:, 0], pair[:, 1])
 
-        values = _of_elements(states, name, largest, ShellStresses)
+        values, _ = _of_elements(states, name, largest, ShellStresses)
         bound = max(float(np.nanmax(np.abs(each))) for each in values) or 1.0
         factor, prefixed_unit = prefixed(bound, unit)
         bound /= factor
@@ -173,24 +198,28 @@ def _resultant(name: str, text: str, unit: str, of_faces: str):
     return scalar
 
 
-def _of_elements(states: list[State], name: str, of_element, kind=(SolidStates, ShellStresses)) -> list[np.ndarray]:
+def _of_elements(states: list[State], name: str, of_element, kind=(SolidStates, ShellStresses)):
     """What each face of a sheet has, and the tetrahedron behind each face of a solid; NaN on bodies that are not of this
-    kind."""
+    kind. Beside it what all tetrahedra have; one array a state each."""
     bodies = {SolidStates: "solids", ShellStresses: "shells"}.get(kind, "bodies")
     wrong = f"color={name!r} is of the {bodies} of a result"
-    found = []
+    found: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
     for state in states:
         if state.elements is None:
             raise ValueError(f"{wrong}: there is none with its own positions")
-        values = np.full(state.mesh.n_faces, np.nan)
+        values, inside = np.full(state.mesh.n_faces, np.nan), [np.zeros(0)]
         for first, mesh, elements in state.elements():
-            if isinstance(elements, kind):
-                rows = of_element(elements)
-                behind = mesh.face_tetrahedra if isinstance(elements, SolidStates) else slice(None)
-                values[first : first + mesh.n_faces] = rows[behind]
+            if not isinstance(elements, kind):
+                continue
+            rows = of_element(elements)
+            if isinstance(elements, SolidStates):
+                inside.append(rows)
+                rows = rows[mesh.face_tetrahedra]
+            values[first : first + mesh.n_faces] = rows
         if np.isnan(values).all():
             raise ValueError(f"{wrong}, which has none")
-        found.append(values)
+        found[0].append(values)
+        found[1].append(np.concatenate(inside))
     return found
 
 

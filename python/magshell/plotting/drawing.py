@@ -10,6 +10,7 @@ from ..states.state import State, states_of
 from ..states.units import length_unit
 from . import backend as backends
 from .colors import scalar_of
+from .cuts import checked_cut, section
 from .limits import arrow_count, check_columns, checked_width
 from .panels import Options, draw, size_of
 from .picture import Picture, paint
@@ -41,6 +42,7 @@ def plot(
     fade: bool = False,
     columns: int | None = None,
     view=None,
+    cut=None,
     width: int = 1600,
     backend: str | None = None,
 ) -> Picture:
@@ -65,6 +67,10 @@ def plot(
     overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light shows a motion.
     columns: of panels, by default what fits best.
     view: (elevation, azimuth) in degrees of the eye, as in matplotlib; by default what suits the sheet.
+    cut: a plane that opens solids (and cuts sheets): "x", "y" or "z" through the middle of the rest shape, ("x", 0.05) at
+        that place [m], or a point [m] and a normal, (3,) each. What is on the eye's side of it, in every state as it is,
+        is taken away; the section has the colours of the tetrahedra for what they have, of displacements and numbers at
+        vertices those between, and is grey where a color is one of faces. mesh_lines: with the tetrahedra's edges.
     width: pixels, 400 to 8000; a picture has at most 16 million of them.
     backend: "pyvista" or "matplotlib"; by default the environment variable MAGSHELL_PLOT, else pyvista where
         it can render off the screen, else matplotlib.
@@ -90,11 +96,15 @@ def plot(
     drawn = _chosen(drawn, states)
     titles = noted_crossings(checked_titles(titles, drawn), drawn)
     unit = length_unit(size_of(drawn))
-    scalar = scalar_on_surfaces(scalar_of(drawn, color, color_label, color_range, unit), drawn)
-    drawn = on_surfaces(drawn)
+    scalar = scalar_of(drawn, color, color_label, color_range, unit, cut is not None)
+    scalar = scalar_on_surfaces(scalar, drawn)
+    whole, drawn = drawn, on_surfaces(drawn)
+    seen = view_of(drawn, view)
+    plane = checked_cut(cut, whole, seen)
+    sections = () if plane is None else tuple(section(state, plane) for state in whole)
     groups = [drawn] if overlay or fade else [[state] for state in drawn]
-    options = Options(count, show_field, rest, mesh_lines, fade)
-    drawing = draw(groups, titles, scalar, view_of(drawn, view), unit, options)
+    options = Options(count, show_field, rest, mesh_lines, fade, plane, sections)
+    drawing = draw(groups, titles, scalar, seen, unit, options)
     return paint(drawing, width, columns, painter)
 
 

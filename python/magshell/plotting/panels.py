@@ -12,6 +12,7 @@ from ..states.state import State
 from ..states.units import LengthUnit, with_unit
 from . import colors, glyphs
 from .colors import Scalar, rgb
+from .cuts import Cut, Section, cut_edges, opened, section_solid
 from .solids import Solid, arrows, ribbons, sheet
 from .surroundings import obstacle_solids
 from .view import View
@@ -79,6 +80,8 @@ class Options:
     rest: bool = False
     mesh_lines: bool = False
     fade: bool = False  # of the states in one panel, the earlier ones are paler
+    cut: Cut | None = None
+    sections: tuple[Section, ...] = ()  # one a state, where there is a cut
 
 
 def draw(
@@ -101,7 +104,12 @@ def draw(
             series = 0 if options.fade else index % len(colors.SERIES)
             plain = colors.SERIES[series] if len(group) > 1 else colors.SHEET
             shades = rgb(plain) if scalar is None else scalar.colors(first + index)
-            panel.solids += _pale(sheet_solids(state, shades, view, size, options), paleness)
+            solids = sheet_solids(state, shades, view, size, options)
+            if options.cut is not None:
+                solids = [opened(each, options.cut) for each in solids]
+                solids += _section_solids(state, first + index, scalar, view, size, options)
+                solids = [each for each in solids if len(each.faces)]
+            panel.solids += _pale(solids, paleness)
         panel.solids += obstacle_solids(group, size)
         if len(group) > 1:
             labels = _series_labels(group, titles, view)
@@ -111,7 +119,8 @@ def draw(
         strongest = glyphs.largest(states)
         for panel, group in zip(panels, groups, strict=True):
             for state, paleness in zip(group, _paleness(len(group), options), strict=True):
-                panel.solids += _pale(magnetization_solids(state, strongest, options.arrows), paleness)
+                chosen = magnetization_solids(state, strongest, options.arrows, options.cut)
+                panel.solids += _pale(chosen, paleness)
         legend.append(magnetization_key(strongest))
     if options.field:
         _uniform_fields(panels, groups, view, size, options)
@@ -174,11 +183,27 @@ def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, opti
     return solids
 
 
-def magnetization_solids(state: State, strongest: float, count: int) -> list[Solid]:
+def _section_solids(
+    state: State, number: int, scalar: Scalar | None, view: View, size: float, options: Options
+) -> list[Solid]:
+    """What a cut shows: the plane's part inside solids, and its edges."""
+    found, step, eye = options.sections[number], float(state.mesh.edge_lengths.mean()), view.axes[2]
+    solids = [section_solid(found, options.cut, scalar, number)]
+    if options.mesh_lines:
+        lines = found.points[found.lines]
+        solids.append(ribbons(lines, eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))
+    return [*solids, ribbons(cut_edges(state, options.cut), eye, LINE * size, colors.OUTLINE, 0.8 * step)]
+
+
+def magnetization_solids(state: State, strongest: float, count: int, cut: Cut | None = None) -> list[Solid]:
     if not state.is_magnetized:
         return []
     chosen = glyphs.magnetization_glyphs(state, count, strongest)
-    return [arrows(chosen.starts, chosen.vectors, chosen.radius, colors.MAGNETIZATION, chosen.lift)]
+    starts, vectors = chosen.starts, chosen.vectors
+    if cut is not None:
+        kept = cut.heights(starts + 0.5 * vectors) <= 0
+        starts, vectors = starts[kept], vectors[kept]
+    return [arrows(starts, vectors, chosen.radius, colors.MAGNETIZATION, chosen.lift)]
 
 
 def _paleness(count: int, options: Options) -> list[float]:

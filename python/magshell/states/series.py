@@ -51,7 +51,9 @@ def write_series(
     Tetrahedra are written as such, with sheets beside them as triangles. Of a result they have their means of
     `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`; sheets have `membrane_force` [N/m]
     and `bending_moment` [N] as they pull now, and the larger `von_mises_stress` [Pa] of their surfaces. Matrices are
-    by rows; what an element does not have is NaN. Points have `displacement` [m], `velocity` [m/s] and, in a field, `flux_density` [T]; faces of a magnetized sheet
+    by rows; what an element does not have is NaN.
+
+    Points have `displacement` [m], `velocity` [m/s] and, in a field, `flux_density` [T]; faces of a magnetized sheet
     have `magnetization` [A/m], F_0 M_r, as it turns with them. Returns the path of the PVD. progress: show a bar once it
     has taken two seconds.
 
@@ -142,7 +144,9 @@ def _of_sheets(state: State, magnetized: bool) -> dict[str, np.ndarray]:
     found: dict[str, np.ndarray] = {}
     if state.elements is not None:
         fields = [element_fields(each) for _, _, each in state.elements()]
-        found |= {name: np.concatenate([each[name] for each in fields]) for name in fields[0]} if fields else {}
+        found |= (
+            {name: np.concatenate([each[name] for each in fields]) for name in fields[0]} if fields else {}
+        )
     if magnetized:
         found["magnetization"] = state.magnetization
     return found

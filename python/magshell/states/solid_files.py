@@ -56,4 +56,3 @@ def write_solids(
         for name, shape in shapes.items()
     }
     write_cells(path, state.positions, cells, on_vertices, filled)
-

@@ -13,8 +13,8 @@ from .._checks.tensors import detached
 from ..bodies.joined_mesh import JoinedMesh
 from ..bodies.of_body import result_of
 from ..bodies.shell import Shell
-from ..bodies.solid import Solid
 from ..bodies.shell_stresses import ShellStresses
+from ..bodies.solid import Solid
 from ..bodies.solid_states import SolidStates
 from ..dynamics.trajectory import Trajectory
 from ..fields.field import UniformField
@@ -46,7 +46,9 @@ class State:
     title: str = ""
     time: float | None = None
     obstacles: tuple[Obstacle, ...] = ()
-    elements: Callable[[], list[tuple[int, TriangleMesh | TetMesh, SolidStates | ShellStresses]]] | None = None
+    elements: Callable[[], list[tuple[int, TriangleMesh | TetMesh, SolidStates | ShellStresses]]] | None = (
+        None
+    )
 
     @property
     def magnetization(self) -> np.ndarray:
