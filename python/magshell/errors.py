@@ -23,7 +23,8 @@ class EquilibriumJumped(DesignRejected):
 
 
 class MeshQualityWarning(UserWarning):
-    """Faces of the mesh are so flat that a result cannot be trusted. See TriangleMesh.quality."""
+    """Faces of the mesh are so flat that a result cannot be trusted, see TriangleMesh.quality; or a solid has too few
+    tetrahedra for their mean volume."""
 
 
 class Interrupted(KeyboardInterrupt):

@@ -19,6 +19,8 @@ class SolidMaterial:
     Raises ValueError where a value is out of range.
     """
 
+    isochoric = False  # whether the part that resists shear is blind to growth
+
     # Of each value: unit, what it has to be, and a test of that.
     _ranges: ClassVar[dict[str, tuple[str, str, Callable]]] = {}
 
@@ -132,7 +134,7 @@ class NeoHookean(_Isotropic):
     def __init__(self, volume: str = "ln J", *, young_modulus, poisson_ratio):
         if volume not in self._VOLUMES:
             raise ValueError(f"volume must be one of {self._VOLUMES}, got {volume!r}")
-        self.volume = volume
+        self.volume, self.isochoric = volume, volume == "isochoric"
         super().__init__(young_modulus=young_modulus, poisson_ratio=poisson_ratio)
 
     @property

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
 from ..mesh.tet_mesh import TetMesh
 from .materials import SolidMaterial
+from .mean_volume import warn_of_mean_volume
 from .shell import magnetization_of
 from .skin import Skin
 
@@ -28,7 +31,8 @@ class Solid(Owner):
     mean_volume: whether the volumetric part of the energy acts on the mean change of volume of each element, which keeps
         nearly incompressible material from locking; for quadratic elements. By default where Poisson's ratio is above 0.4.
         Use two cells or more through every thickness: with one, a slender bar's two lowest frequencies are 2 and 12 % too
-        low at a Poisson's ratio of 0.45, with two within 1 %.
+        low at a Poisson's ratio of 0.45, with two within 1 %. An ms.MeshQualityWarning says where a slender region has one,
+        and where tetrahedra are so few that shapes of isochoric material cost no energy.
     skin: Skin, a thin magnetized layer on its surface; as `solid.skin` it has values of its own.
     remanent_magnetization: (3,) or (n_t, 3) A/m, at rest, in world axes, of a solid that is magnetized throughout; zero
         where a solve is to say it.
@@ -77,11 +81,9 @@ class Solid(Owner):
         if skin is not None and not isinstance(skin, Skin):
             raise ValueError(f"skin must be a Skin, got {skin!r:.60}")
         self.skin = None if skin is None else skin._on(mesh, self.mesh)
-        self.remanent_magnetization = None
-        if remanent_magnetization is not None:
-            self.remanent_magnetization = magnetization_of(
-                remanent_magnetization, self.mesh.n_tetrahedra, "(n_t, 3)"
-            )
+        self.remanent_magnetization = self._magnetization(remanent_magnetization)
+        if self.mean_volume:
+            warn_of_mean_volume(self.mesh, material.isochoric)
 
     @property
     def _replaceable(self) -> tuple[str, ...]:
@@ -105,6 +107,9 @@ class Solid(Owner):
             raise AttributeError(f"{type(self).__name__} has no {name}")
         return material.rows(name, self.mesh.n_tetrahedra)
 
+    def _magnetization(self, given) -> np.ndarray | None:
+        return None if given is None else magnetization_of(given, self.mesh.n_tetrahedra, "(n_t, 3)")
+
     def _density(self, given) -> np.ndarray:
         n = self.mesh.n_tetrahedra
         array = real_numbers("mass_density [kg/m3]", given)
@@ -120,17 +125,16 @@ class Solid(Owner):
 
     def replaced(self, **values) -> Solid:
         """The same solid with other values: those of its material, and the mass density."""
-        density = values.pop("mass_density", self.mass_density)
-        magnetization = values.pop("remanent_magnetization", self.remanent_magnetization)
-        return Solid(
-            self.mesh,
-            material=self.material.replaced(**values),
-            mass_density=density,
-            element=self.element,
-            mean_volume=self.mean_volume,
-            skin=self.skin,
-            remanent_magnetization=magnetization,
-        )
+        other = copy(self)  # not made anew, which would warn anew
+        if "mass_density" in values:
+            density = values.pop("mass_density")
+            other.mass_density = None if density is None else self._density(density)
+        if "remanent_magnetization" in values:
+            other.remanent_magnetization = self._magnetization(values.pop("remanent_magnetization"))
+        other.material = self.material.replaced(**values)
+        for name in values:
+            other.material.rows(name, self.mesh.n_tetrahedra)
+        return other
 
     def _core_input(self, owner: str, vertices: np.ndarray) -> dict:
         """As the core takes it. vertices: the scene's, (n_v,)."""

@@ -1,0 +1,137 @@
+"""Where the mean volume of each element is too soft there is a warning, and nowhere else."""
+
+import warnings
+
+import numpy as np
+import pytest
+from model_access import Controls, Problem
+
+import magshell as ms
+
+MODULI = {"young_modulus": 1e5, "poisson_ratio": 0.45}
+SOFT = ms.NeoHookean(**MODULI)
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0], [1, 1, 1], [-1, 0.3, 0.3]])
+FEW = [[0, 1, 2, 3], [1, 2, 3, 4], [0, 2, 3, 5]]  # face to face
+
+
+def box(*cells, **given):
+    return ms.meshes.box(tuple(0.01 * n for n in cells), cells=cells, **given)
+
+
+def fin(cells):
+    """A thick block with a fin that is so many cells thick and ten cells long."""
+    mesh = ms.meshes.box((1.0, 0.4, 0.5), cells=(20, 8, 10))
+    x, _, z = mesh.tetrahedron_barycenters.T
+    kept = (x < 0.5) | ((z > 0.2) & (z < 0.2 + 0.05 * cells))
+    return ms.TetMesh.mended(mesh.rest_positions, mesh.tetrahedra[kept]).mesh
+
+
+def wedge():
+    mesh = ms.meshes.box((1.0, 1.0, 1.0), (10, 4, 10), "aligned")
+    x = mesh.rest_positions.copy()
+    x[:, 2] *= 0.02 + 0.98 * x[:, 0]
+    return ms.TetMesh(x, mesh.tetrahedra)
+
+
+def few(n):
+    return ms.TetMesh.mended(0.1 * CORNERS[: 3 + n], FEW[:n]).mesh
+
+
+def capsule():
+    shape = ms.shapes.capsule((0, 0, 0), (0.06, 0, 0), 0.01)
+    return ms.meshes.from_distance(shape, 0.006)
+
+
+THIN = {
+    "plate": lambda: box(6, 6, 1),
+    "bar": lambda: box(8, 1, 1),
+    "flat bar": lambda: box(10, 2, 1),
+    "tube": lambda: ms.meshes.tube(0.01, 0.012, 0.05, cells=(1, 12, 8)),
+    "fin of a block": lambda: fin(1),
+}
+THICK = {
+    "plate": lambda: box(6, 6, 2),
+    "plate of cells with a vertex inside": lambda: box(6, 6, 1, diagonals="crossed"),
+    "bar": lambda: box(12, 2, 2),
+    "bar with all corners of some on its edges": lambda: box(12, 2, 2, diagonals="aligned"),
+    "wedge": lambda: wedge(),
+    "flat cells": lambda: ms.meshes.box((0.1, 0.1, 0.002), cells=(10, 10, 2)),
+    "cube": lambda: box(1, 1, 1, diagonals="crossed"),
+    "block": lambda: box(4, 4, 4),
+    "tube": lambda: ms.meshes.tube(0.01, 0.012, 0.05, cells=(2, 12, 8)),
+    "ball": lambda: ms.meshes.ball(0.01, 3),
+    "rod": lambda: ms.meshes.solid_cylinder(0.01, 0.1, (2, 10)),
+    "capsule": capsule,
+    "fin of a block": lambda: fin(2),
+}
+
+
+@pytest.mark.parametrize("name", THIN)
+def test_one_cell_through_a_thickness_is_warned_of(name):
+    mesh = THIN[name]()
+    with pytest.warns(ms.MeshQualityWarning, match=r"a slender region about .* one cell thick") as told:
+        ms.Solid(mesh, material=SOFT)
+    assert told[0].filename == __file__ and len(told) == 1
+    with warnings.catch_warnings():  # not where each point has its own volume
+        warnings.simplefilter("error")
+        ms.Solid(mesh, material=SOFT, element="linear")
+        ms.Solid(mesh, material=SOFT, mean_volume=False)
+        ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3))
+
+
+@pytest.mark.parametrize("name", THICK)
+def test_no_warning_without_reason(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ms.Solid(THICK[name](), material=SOFT)
+
+
+def test_a_fin_is_named_by_its_place_and_a_solve_does_not_warn_again():
+    with pytest.warns(ms.MeshQualityWarning) as told:
+        solid = ms.Solid(fin(1), material=SOFT)
+    place = np.fromstring(str(told[0].message).split("[")[1].split("]")[0], sep=",")
+    assert place == pytest.approx((0.75, 0.2, 0.225), abs=0.01)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        other = solid.replaced(young_modulus=2e5, mass_density=900.0)
+    assert other.young_modulus[0] == 2e5 and other.mass_density[0] == 900.0 and solid.young_modulus[0] == 1e5
+    assert solid.mass_density is None and other.mesh is solid.mesh
+    with pytest.raises(ValueError, match=r"young_modulus.*must be a number or have shape"):
+        solid.replaced(young_modulus=np.ones(3))
+
+
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
+def test_one_cell_is_too_soft_and_two_are_not():
+    """The end of a bar that is bent, against a finer mesh; nor is one cell with a vertex inside."""
+
+    def deflection(cells, diagonals="alternating"):
+        solid = ms.Solid(ms.meshes.box((0.1, 0.01, 0.01), cells, diagonals), material=SOFT)
+        end = solid.mesh.vertices_at(x=0.1)
+        load = ms.PointLoad(end, np.tile([0, 0, 1e-6 / len(end)], (len(end), 1)))
+        rest = ms.equilibrium(ms.Scene(solid, supports=[ms.Pin(solid.mesh.vertices_at(x=0.0))], loads=[load]))
+        return rest.displacements[end, 2].mean()
+
+    fine = deflection((20, 4, 4))
+    assert 1.12 < deflection((20, 1, 1)) / fine < 1.20
+    assert 1.0 < deflection((20, 2, 2)) / fine < 1.03
+    assert 1.0 < deflection((20, 1, 1), "crossed") / fine < 1.05
+
+
+@pytest.mark.parametrize(
+    ("mesh", "free"), [(few(1), 3), (few(2), 2), (few(3), 1), (box(1, 1, 1), 1), (box(2, 1, 1), 0)]
+)
+def test_shapes_of_isochoric_material_that_cost_nothing_are_counted(mesh, free):
+    """The eigenvalues of the Hessian at rest that are zero, beside six of rigid motions."""
+    material = ms.NeoHookean("isochoric", **MODULI)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        solid = ms.Solid(mesh, material=material)
+        ms.Solid(mesh, material=SOFT)  # of so few none is slender
+    assert len(told) <= 1
+    said = [str(each.message) for each in told if "cost no energy" in str(each.message)]
+    assert len(said) == (free > 0) and all(f"has {free} shape" in text for text in said)
+    for each, count in ((solid, 6 + free), (ms.Solid(mesh, material=SOFT), 6)):
+        scene = ms.Scene(each, allow_rigid_motions=True)
+        hessian = Problem(scene, Controls()).hessian(scene._model.rest_state())
+        values = np.linalg.eigvalsh(hessian.toarray() if hasattr(hessian, "toarray") else hessian)
+        assert (np.abs(values) < 1e-9 * values.max()).sum() == count
