@@ -217,6 +217,7 @@ def _magnetized_block(element: str):
         element=element,
         skin=ms.Skin(
             thickness=RNG.uniform(1e-3, 2e-3, len(faces)),
+            mass_density=np.linspace(1e3, 3e3, len(faces)),
             faces=faces,
             remanent_magnetization=RNG.uniform(-2e4, 2e4, (len(faces), 3)),
         ),

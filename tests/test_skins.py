@@ -6,6 +6,7 @@ import torch
 from test_adjoint import DIPOLES
 
 import magshell as ms
+from magshell.scene.values import Values
 
 SOFT = ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.45)
 RNG = np.random.default_rng(3)
@@ -199,3 +200,31 @@ def test_same_bits_on_any_number_of_threads(element):
     for other in found[1:]:
         for a, b in zip(found[0], other, strict=True):
             np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("element", ["linear", "quadratic"])
+def test_a_skin_with_mass_weighs_and_is_inert(element):
+    """Thickness times density on each face, beside the solid's own; without one as before."""
+    mesh = ms.meshes.box((0.06, 0.02, 0.02), cells=(2, 1, 1))
+    rows = np.linspace(1e3, 2e3, mesh.n_faces)
+    heavy, light = (
+        block(element, skin=ms.Skin(thickness=1e-3, mass_density=density, remanent_magnetization=(1, 0, 0)))
+        for density in (rows, None)
+    )
+    more = heavy.vertex_masses - light.vertex_masses
+    assert more.sum() == pytest.approx(1e-3 * mesh.face_areas @ rows)
+    on_surface = np.isin(np.arange(len(more)), heavy.mesh.boundary_vertices)
+    assert (more[on_surface] > 0).all() and not more[~on_surface].any()
+    assert np.allclose(heavy.weighed_masses - light.weighed_masses, more)
+    scene = in_field(heavy, gravity=(0, 0, -9.81))
+    values = {heavy.skin: {"thickness": 2e-3}}
+    for given, factor in (({}, 1.0), (values, 2.0)):
+        now = Values(scene, given)
+        assert now.vertex_masses.sum() == pytest.approx(light.vertex_masses.sum() + factor * more.sum())
+    assert "mass_density 1000 to 2000 kg/m3" in repr(heavy.skin)
+    with pytest.raises(ValueError, match=r"mass_density \[kg/m3\] of a Skin must be positive"):
+        ms.Skin(thickness=1e-3, mass_density=0.0)
+    with pytest.raises(
+        ValueError, match=r"mass_density \[kg/m3\] of a Skin must be a number or have shape \(k,\)"
+    ):
+        block(element, skin=ms.Skin(thickness=1e-3, mass_density=np.ones(3)))

@@ -124,6 +124,9 @@ def test_a_face_of_a_quadratic_solid_is_not_held_by_its_corners_alone():
     with pytest.raises(ValueError, match=r"corners of 2 faces.*solid\.mesh\.vertices_at"):
         ms.Scene(quadratic, supports=[ms.Pin(wrong)])
     ms.Scene(quadratic, supports=[ms.Pin(quadratic.mesh.vertices_at(x=0.0))])
+    right = quadratic.mesh.vertices_at(x=0.1)  # beside faces that are held as a whole
+    with pytest.raises(ValueError, match=r"corners of 2 faces"):
+        ms.Scene(quadratic, supports=[ms.Pin(np.union1d(wrong, right))])
     linear = ms.Solid(mesh, material=ms.NeoHookean(**MODULI), element="linear")
     ms.Scene(linear, supports=[ms.Pin(wrong)])
 

@@ -13,13 +13,16 @@ from .shell import magnetization_of
 
 
 class Skin(Owner):
-    """A magnetized layer on the surface of a Solid, without stiffness or mass, as in [Chen22] 6.4.
+    """A magnetized layer on the surface of a Solid, without stiffness, and without mass unless one is given, as in [Chen22]
+    6.4.
 
     A layer with a modulus of its own is a Shell: `ms.Shell(solid.mesh.surface, ...)` with `ms.Tie(solid, shell)`.
 
     thickness: m, positive, a number or (k,), one a face.
     faces: (k,), those of the mesh that the solid is made of; by default all. `solid.skin` has them in the numbers of
         `solid.mesh`, whose quadratic tetrahedra show four flat triangles a face, and rows for each of these.
+    mass_density: kg/m3, positive, a number or (k,), times the thickness on each face, beside the solid's own, which needs
+        one too; by default the layer has no mass.
     remanent_magnetization: (3,) or (k, 3) A/m, at rest, in world axes; where it is None a solve says it:
         `values={solid.skin: {"remanent_magnetization": ...}}`.
 
@@ -36,18 +39,13 @@ class Skin(Owner):
     True
     """
 
-    _replaceable = ("thickness", "remanent_magnetization")
+    _replaceable = ("thickness", "mass_density", "remanent_magnetization")
+    _corners, _areas = np.zeros((0, 3), dtype=np.int32), np.zeros(0)  # of its triangles, on a solid's mesh
 
-    def __init__(self, *, thickness, faces=None, remanent_magnetization=None):
+    def __init__(self, *, thickness, mass_density=None, faces=None, remanent_magnetization=None):
         self.faces = None if faces is None else selection("Skin faces", faces)
-        thickness = real_numbers("thickness [m]", thickness)
-        if thickness.ndim > 1:
-            raise ValueError(
-                f"thickness [m] of a Skin must be a number or one a face, got shape {thickness.shape}"
-            )
-        self.thickness = quantity("thickness", "m", thickness, thickness.shape)
-        if (thickness <= 0).any():
-            raise ValueError(f"thickness [m] of a Skin must be positive, got {thickness.min():g}")
+        self.thickness = _positive("thickness", "m", thickness)
+        self.mass_density = None if mass_density is None else _positive("mass_density", "kg/m3", mass_density)
         self.remanent_magnetization = None
         if remanent_magnetization is not None:
             given = real_numbers("remanent_magnetization [A/m]", remanent_magnetization)
@@ -56,11 +54,11 @@ class Skin(Owner):
             self._check_rows(len(self.faces))
 
     def _check_rows(self, count: int) -> None:
-        if self.thickness.shape not in ((), (count,)):
-            raise ValueError(
-                f"thickness [m] of a Skin must be a number or have shape (k,) = ({count},), one a face, got "
-                f"{self.thickness.shape}"
-            )
+        for name, rows in (("thickness [m]", self.thickness), ("mass_density [kg/m3]", self.mass_density)):
+            if rows is not None and rows.shape not in ((), (count,)):
+                raise ValueError(
+                    f"{name} of a Skin must be a number or have shape (k,) = ({count},), one a face, got {rows.shape}"
+                )
         if self.remanent_magnetization is not None:
             magnetization_of(self.remanent_magnetization, count)
 
@@ -76,7 +74,10 @@ class Skin(Owner):
         self._check_rows(len(faces))
         parts = mesh.n_faces // given.n_faces
         if parts == 0:
-            if self.faces is not None or self.thickness.ndim or np.ndim(self.remanent_magnetization) > 1:
+            by_face = (
+                self.thickness.ndim or np.ndim(self.mass_density) or np.ndim(self.remanent_magnetization) > 1
+            )
+            if self.faces is not None or by_face:
                 raise ValueError(
                     "a Skin of a linear solid counts faces of four-node tetrahedra: make it for mesh.first_order(), and "
                     "the solid of that mesh"
@@ -84,6 +85,9 @@ class Skin(Owner):
             faces, parts = np.arange(mesh.n_faces), 1
         skin = Skin(thickness=np.repeat(np.broadcast_to(self.thickness, len(faces)), parts))
         skin.faces = (parts * faces[:, None] + np.arange(parts)).ravel()
+        skin._corners, skin._areas = mesh.faces[skin.faces], mesh.face_areas[skin.faces]
+        if self.mass_density is not None:
+            skin.mass_density = np.repeat(np.broadcast_to(self.mass_density, len(faces)), parts)
         if self.remanent_magnetization is not None:
             of_faces = magnetization_of(self.remanent_magnetization, len(faces))
             skin.remanent_magnetization = np.repeat(of_faces, parts, axis=0)
@@ -92,7 +96,28 @@ class Skin(Owner):
     def replaced(self, **values) -> Skin:
         """The same skin with other values."""
         now = {name: getattr(self, name) for name in self._replaceable}
-        return Skin(faces=self.faces, **(now | values))
+        other = Skin(faces=self.faces, **(now | values))
+        other._corners, other._areas = self._corners, self._areas
+        return other
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        """With what its values do to the masses of the vertices."""
+        found = {name: gradient.value(label, name) for name in ("thickness", "remanent_magnetization")}
+        by_masses = None if self.mass_density is None else values.by_masses(gradient)
+        if by_masses is not None:
+            vertices = values.part_of_skin(self).vertices
+            by_volumes = by_masses[vertices][self._corners].sum(axis=1) / 3.0 * self._areas
+            found["thickness"] = found["thickness"] + by_volumes * self.mass_density
+            found["mass_density"] = by_volumes * self.thickness
+        return found
+
+    def masses(self, n_vertices: int) -> np.ndarray:
+        """Of its solid's vertices, (n_v,), kg: a third of each triangle's; zeros without a mass density."""
+        masses = np.zeros(n_vertices)
+        if self.mass_density is not None:
+            of_faces = self._areas * self.thickness * self.mass_density
+            np.add.at(masses, self._corners, (of_faces / 3.0)[:, None])
+        return masses
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         count = len(self.faces)
@@ -112,4 +137,18 @@ class Skin(Owner):
     def __repr__(self) -> str:
         where = "all faces" if self.faces is None else f"{len(self.faces)} faces"
         low, high = self.thickness.min(), self.thickness.max()
-        return f"Skin({where}, thickness {low:g}{'' if low == high else f' to {high:g}'} m)"
+        mass = ""
+        if self.mass_density is not None:
+            least, most = self.mass_density.min(), self.mass_density.max()
+            mass = f", mass_density {least:g}{'' if least == most else f' to {most:g}'} kg/m3"
+        return f"Skin({where}, thickness {low:g}{'' if low == high else f' to {high:g}'} m{mass})"
+
+
+def _positive(name: str, unit: str, given) -> np.ndarray:
+    array = real_numbers(f"{name} [{unit}]", given)
+    if array.ndim > 1:
+        raise ValueError(f"{name} [{unit}] of a Skin must be a number or one a face, got shape {array.shape}")
+    array = quantity(name, unit, array, array.shape)
+    if (array <= 0).any():
+        raise ValueError(f"{name} [{unit}] of a Skin must be positive, got {array.min():g}")
+    return array

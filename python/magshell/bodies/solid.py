@@ -197,11 +197,11 @@ class Solid(Owner):
             raise ValueError("the solid has no mass_density [kg/m3]")
         masses = np.zeros(self.mesh.n_vertices)
         np.add.at(masses, self.mesh.tetrahedra, self.mass_density[:, None] * shares)
-        return masses
+        return masses if self.skin is None else masses + self.skin.masses(self.mesh.n_vertices)
 
     @property
     def vertex_masses(self) -> np.ndarray:
-        """Lumped masses for inertia, (n_v,), kg."""
+        """Lumped masses for inertia, its skin's with them, (n_v,), kg."""
         return self._gathered(self._shares[0])
 
     @property

@@ -11,8 +11,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 from .._checks.arrays import count
 from .._machine.entry import solve_entry
 from ..errors import NotConverged
-from ..scene.inputs import Inputs
-from ..scene.replacements import requested
+from ..scene.inputs import Inputs, plain_inputs
 from ..scene.scene import Scene
 from .mode_shapes import mode_shapes
 from .rest import RestStiffness
@@ -82,11 +81,11 @@ def linear_buckling(
     0.021
     """
     modes = count("modes", modes)
-    inputs = Inputs(
+    inputs = plain_inputs(
         scene,
         remanent_magnetization,
         applied_flux_density,
-        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
+        values,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,

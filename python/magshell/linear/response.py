@@ -10,8 +10,7 @@ import numpy as np
 
 from .._checks.tensors import like
 from .._machine.entry import solve_entry
-from ..scene.inputs import Inputs
-from ..scene.replacements import requested
+from ..scene.inputs import plain_inputs
 from ..scene.scene import Scene
 from .rest import RestStiffness
 
@@ -72,11 +71,11 @@ def linear_response(
     >>> round(float(tip), 3)  # p L^3 / (3 E I) = 0.04
     0.04
     """
-    inputs = Inputs(
+    inputs = plain_inputs(
         scene,
         remanent_magnetization,
         applied_flux_density,
-        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
+        values,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,

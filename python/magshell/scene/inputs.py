@@ -11,7 +11,7 @@ from .._checks.quantity import quantity
 from .._checks.tensors import detached, is_tensor, to_array, wants_gradient
 from ..bodies.shell import magnetization_of
 from .magnetization import check_given_once, check_on_skins, of_all_bodies
-from .replacements import checked
+from .replacements import checked, requested
 from .scene import Scene
 from .values import Values
 
@@ -136,3 +136,9 @@ class Inputs:
         """The scene's core with this magnetization in it, for one solve; those of other threads wait."""
         with self.values.in_core():
             yield
+
+
+def plain_inputs(scene, remanent_magnetization, applied_flux_density, values, **factors) -> Inputs:
+    """Of a solve whose values may be replaced, without gradients."""
+    replaced = requested(scene, None, values) if isinstance(scene, Scene) else None
+    return Inputs(scene, remanent_magnetization, applied_flux_density, replaced=replaced, **factors)

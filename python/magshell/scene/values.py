@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from copy import copy
 
 import numpy as np
 
@@ -31,6 +32,10 @@ class Values:
         self._now = {
             item: item.replaced(**values) for item, values in (replaced or {}).items() if item is not scene
         }
+        for body in scene._bodies.solids:
+            if body.skin in self._now:
+                self._now[body] = copy(self.current(body))
+                self._now[body].skin = self._now[body.skin]
         self.sheets = tuple(self.current(body) for body in scene.bodies)
         self.rigid = tuple(self.current(span) for span in scene.rigid_parts)
         self.constraints = scene._constraints
@@ -101,6 +106,10 @@ class Values:
         return next(
             span for span, each in zip(self.scene._bodies.spans, self.sheets, strict=True) if each is sheet
         )
+
+    def part_of_skin(self, skin):
+        """Where the solid that has it, as it is in this solve, stands among the bodies."""
+        return self.part_of(next(each for each in self.sheets if getattr(each, "skin", None) is skin))
 
     @property
     def vertex_masses(self) -> np.ndarray:

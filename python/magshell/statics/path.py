@@ -27,8 +27,7 @@ from ..bodies.strains import StrainHistory, Strains, strains_of, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..mesh.crossings import told
 from ..methods.solvers import MixedNewton, Newton
-from ..scene.inputs import Inputs
-from ..scene.replacements import requested
+from ..scene.inputs import Inputs, plain_inputs
 from ..scene.scene import Scene
 from .along_path import AlongPath
 from .equilibrium import Equilibrium
@@ -227,11 +226,11 @@ def follow(
         raise ValueError(f"until must be a function of (parameter, positions), got {until!r}")
     if start is not None and not isinstance(start, Equilibrium):
         raise ValueError(f"start must be an Equilibrium of this scene, got {type(start).__name__}")
-    inputs = Inputs(
+    inputs = plain_inputs(
         scene,
         remanent_magnetization,
         applied_flux_density,
-        replaced=requested(scene, None, values) if isinstance(scene, Scene) else None,
+        values,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,

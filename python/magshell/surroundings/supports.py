@@ -255,9 +255,8 @@ def _refuse_corners_alone(mesh, vertices: np.ndarray) -> None:
         return
     held = np.zeros(mesh.n_vertices, dtype=bool)
     held[vertices] = True
-    if held[mesh.edge_nodes].any():
-        return
-    corners = held[mesh.faces_of_corners].all(axis=1)
+    middles = mesh.faces[3::4]  # of the four triangles of a face, the one between its middle nodes
+    corners = held[mesh.faces_of_corners].all(axis=1) & ~held[middles].any(axis=1)
     if corners.any():
         raise ValueError(
             f"Pin vertices hold the corners of {np.count_nonzero(corners)} faces of a quadratic Solid, and none of the "
