@@ -14,7 +14,9 @@ def test_a_path_says_what_each_body_goes_through():
         ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1)).transformed(translation=(0, 0.1, 0)),
         material=ms.StVenantKirchhoff(young_modulus=1e6, poisson_ratio=0.3),
     )
-    ball = ms.Rigid(mass=0.01, inertia=1e-6, vertices=mesh.vertices_at(x=0.1), body=strip)
+    ball = ms.Rigid(
+        mass=0.01, inertia=1e-6, vertices=np.flatnonzero(mesh.rest_positions[:, 0] > 0.08), body=strip
+    )
     held = [ms.Clamp(mesh.edges_at(x=0.0), body=strip), ms.Pin(solid.mesh.vertices_at(x=0.0), body=solid)]
     pull = ms.PointLoad(solid.mesh.vertices_at(x=0.1)[:1], (0.1, 0, 0), body=solid)
     push = ms.AreaLoad((0, 0, 0.05), body=strip)
@@ -23,13 +25,13 @@ def test_a_path_says_what_each_body_goes_through():
     for body in (solid, strip):
         assert path[body].positions.shape == (len(path), body.mesh.n_vertices, 3)
         assert np.allclose(path[body].displacements[-1], last[body].displacements, atol=1e-9)
-        assert not path[body].displacements[0].any()
+        assert np.abs(path[body].displacements[0]).max() < 1e-12
     assert path[strip].edge_rotations.shape == (len(path), mesh.n_edges)
     assert np.allclose(path[strip].edge_rotations[-1], last[strip].edge_rotations, atol=1e-7)
     assert np.allclose(path[solid].strains().volume_ratios, last[solid].strains().volume_ratios)
     assert np.allclose(path[ball].rotation[-1], last[ball].rotation, atol=1e-7)
     assert np.allclose(path[ball].center[-1], last[ball].center, atol=1e-9)
-    with pytest.raises(ValueError, match="a body of the scene is one of scene.bodies"):
+    with pytest.raises(ValueError, match=r"a body of the scene is one of scene\.bodies"):
         path[ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)]
 
 
