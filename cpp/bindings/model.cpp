@@ -22,7 +22,8 @@ std::vector<HeldNode> held_nodes(const IndexArray& nodes, const Array& frames) {
         Mat3 frame;
         for (int r = 0; r < 3; ++r)
             for (int c = 0; c < 3; ++c) frame(r, c) = frames.at(k, r, c);
-        held.push_back({nodes.at(k, 0), nodes.at(k, 1), frame, nodes.at(k, 2)});
+        held.push_back(
+            {nodes.at(k, 0), nodes.at(k, 1), frame, {nodes.at(k, 2), nodes.at(k, 3), nodes.at(k, 4)}});
     }
     return held;
 }

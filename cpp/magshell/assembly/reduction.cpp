@@ -91,50 +91,51 @@ void Reduction::set_values(const Values& values) {
 
 VectorXd Reduction::prescribed_increment(const VectorXd& q, const Controls& controls) const {
     VectorXd increment = VectorXd::Zero(q.size());
-    for (const HeldNode& h : held_) {
-        Vec3 wanted = nodes_.rest[h.node];
-        if (h.move >= 0)
-            wanted = h.node < nodes_.n_vertices() ? moves_[h.move].point(wanted, progress(controls))
-                                                  : moves_[h.move].direction(wanted, progress(controls));
-        increment.segment<3>(3 * h.node) = held_part(h, wanted - q.segment<3>(3 * h.node));
-    }
+    const double t = progress(controls);
+    for (const HeldNode& h : held_)
+        increment.segment<3>(3 * h.node) = held_part(
+            h, [&](Index move) -> Vec3 { return place(h.node, move, t) - q.segment<3>(3 * h.node); });
     return increment;
 }
 
-Vec3 Reduction::held_part(const HeldNode& h, const Vec3& vector) {
-    Vec3 part = Vec3::Zero();
-    for (int axis = 0; axis < h.held; ++axis) part += h.frame.col(axis) * h.frame.col(axis).dot(vector);
-    return part;
-}
-
 VectorXd Reduction::prescribed_rate(const Controls& controls) const {
-    VectorXd rate = VectorXd::Zero(full_size_);
+    VectorXd out = VectorXd::Zero(full_size_);
+    const double t = progress(controls);
     for (const HeldNode& h : held_)
-        if (h.move >= 0) rate.segment<3>(3 * h.node) = held_part(h, rate_of(h, progress(controls)));
-    return rate;
+        out.segment<3>(3 * h.node) = held_part(h, [&](Index move) { return rate(h.node, move, t); });
+    return out;
 }
 
-Vec3 Reduction::rate_of(const HeldNode& h, double progress) const {
-    const SupportMove& move = moves_[h.move];
-    const Vec3& rest = nodes_.rest[h.node];
-    return h.node < nodes_.n_vertices() ? move.point_rate(rest, progress)
-                                        : move.direction_rate(rest, progress);
+Vec3 Reduction::place(Index node, Index move, double progress) const {
+    const Vec3& rest = nodes_.rest[node];
+    if (move < 0) return rest;
+    return node < nodes_.n_vertices() ? moves_[move].point(rest, progress)
+                                      : moves_[move].direction(rest, progress);
+}
+
+Vec3 Reduction::rate(Index node, Index move, double progress) const {
+    if (move < 0) return Vec3::Zero();
+    const Vec3& rest = nodes_.rest[node];
+    return node < nodes_.n_vertices() ? moves_[move].point_rate(rest, progress)
+                                      : moves_[move].direction_rate(rest, progress);
 }
 
 void Reduction::vjp(const VectorXd& by_state, const Controls& controls, Gradient& out) const {
     const double t = progress(controls);
     std::vector<SupportMove> by_move(moves_.size());
-    for (const HeldNode& h : held_) {
-        if (h.move < 0) continue;
-        const Vec3 by_place = held_part(h, by_state.segment<3>(3 * h.node));
-        const SupportMove& move = moves_[h.move];
-        const Vec3& rest = nodes_.rest[h.node];
-        if (h.node < nodes_.n_vertices())
-            move.point_vjp(rest, t, by_place, by_move[h.move]);
-        else
-            move.direction_vjp(rest, t, by_place, by_move[h.move]);
-        out.controls[progress_.first] += by_place.dot(rate_of(h, t));
-    }
+    for (const HeldNode& h : held_)
+        for (int axis = 0; axis < h.held; ++axis) {
+            const Index move = h.moves[axis];
+            if (move < 0) continue;
+            const Vec3 along = h.frame.col(axis),
+                       by_place = along * along.dot(by_state.segment<3>(3 * h.node));
+            const Vec3& rest = nodes_.rest[h.node];
+            if (h.node < nodes_.n_vertices())
+                moves_[move].point_vjp(rest, t, by_place, by_move[move]);
+            else
+                moves_[move].direction_vjp(rest, t, by_place, by_move[move]);
+            out.controls[progress_.first] += by_place.dot(rate(h.node, move, t));
+        }
     for (std::size_t k = 0; k < slots_.size(); ++k) {
         out.values.segment<3>(slots_[k].center.first) += by_move[k].center;
         out.values.segment<3>(slots_[k].rotation.first) += by_move[k].rotation_vector;

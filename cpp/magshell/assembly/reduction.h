@@ -5,6 +5,7 @@
 // is held along the first one or two axes. Nodes without supports cost nothing here.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -17,12 +18,13 @@
 
 namespace magshell {
 
-/// A node and the orthonormal directions along which it is held (the first `held` columns of `frame`).
+/// A node and the orthonormal directions along which it is held (the first `held` columns of `frame`), each by the move
+/// of one support, or -1 where that stays.
 struct HeldNode {
     Index node;
     int held;
     Mat3 frame;
-    Index move = -1;
+    std::array<Index, 3> moves = {-1, -1, -1};
 };
 
 class Reduction {
@@ -92,9 +94,18 @@ class Reduction {
 
   private:
     /// The part of a node's vector along which it is held.
-    static Vec3 held_part(const HeldNode& h, const Vec3& vector);
+    /// The sum over the held directions d of a node of d (d . vector_of(move)).
+    template <class VectorOf>
+    static Vec3 held_part(const HeldNode& h, const VectorOf& vector_of) {
+        Vec3 part = Vec3::Zero();
+        for (int axis = 0; axis < h.held; ++axis)
+            part += h.frame.col(axis) * h.frame.col(axis).dot(vector_of(h.moves[axis]));
+        return part;
+    }
+    /// Where a move has a node, and how fast it takes it along; -1 leaves it at rest.
+    Vec3 place(Index node, Index move, double progress) const;
     /// How fast its move carries a node, as the progress changes.
-    Vec3 rate_of(const HeldNode& h, double progress) const;
+    Vec3 rate(Index node, Index move, double progress) const;
     bool axis_aligned(const HeldNode& h) const;
     void turn_blocks(SystemMatrix& full) const;
     VectorXd gathered(const VectorXd& full) const;

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..bodies.bodies import Bodies, Span
 from .supports import DirectedEdges, Held, RigidMove
+
+
+class Hold(NamedTuple):
+    """What one support does to a vertex: directions (m, 3), and its move, or None where it stays."""
+
+    along: np.ndarray
+    move: RigidMove | None
+
 
 _LOOKED_AT = (0.37, 1.0)  # a full turn ends where it began, but is elsewhere on its way
 
@@ -18,7 +27,7 @@ class Constraints:
 
     directed_edges: np.ndarray  # (k, 2): the scene's edge, direction
     directions: np.ndarray  # (n_d, 3)
-    held_nodes: np.ndarray  # (m, 3): node, how many directions, move or -1
+    held_nodes: np.ndarray  # (m, 5): node, how many directions, of each the move or -1
     held_frames: np.ndarray  # (m, 3, 3): columns, the held directions first
     moves: tuple[RigidMove, ...]
 
@@ -34,12 +43,12 @@ def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints
     directions = np.concatenate([directions, free_directions])
     direction_moves += [-1] * len(free_directions)
     for k, move in enumerate(direction_moves):
-        nodes.append((mesh.n_vertices + k, 3, move))
+        nodes.append((mesh.n_vertices + k, 3, move, move, move))
         frames.append(np.eye(3))
     return Constraints(
         np.array(pairs, dtype=np.int32).reshape(-1, 2),
         directions,
-        np.array(nodes, dtype=np.int32).reshape(-1, 3),
+        np.array(nodes, dtype=np.int32).reshape(-1, 5),
         np.array(frames).reshape(-1, 3, 3),
         tuple(moves),
     )
@@ -82,21 +91,16 @@ def free_rigid_motions(bodies: Bodies, constraints: Constraints) -> list[str]:
 
 
 def _held_vertices(bodies: Bodies, held: list[Held], moves: list[RigidMove]):
-    directions: dict[int, list[np.ndarray]] = {}
-    move_of: dict[int, RigidMove] = {}
+    holds: dict[int, list[Hold]] = {}
     for support in held:
         for vertex, along in zip(support.vertices.tolist(), support.directions, strict=True):
-            directions.setdefault(vertex, []).extend(along)
-            if support.move is not None:
-                known = move_of.setdefault(vertex, support.move)
-                _check_same_move(bodies, vertex, known, support.move)
-    _check_against_still(bodies, held, move_of)
+            holds.setdefault(vertex, []).append(Hold(along, support.move))
     numbers: dict[int, int] = {}
     nodes, frames = [], []
-    for vertex, along in sorted(directions.items()):
-        frame, count = _frame(np.array(along))
-        move = move_of.get(vertex)
-        nodes.append((vertex, count, _number(move, moves, numbers)))
+    for vertex, some in sorted(holds.items()):
+        _check_agree(bodies, vertex, some)
+        frame, count, by = _frame(some)
+        nodes.append((vertex, count, *(_number(move, moves, numbers) for move in by)))
         frames.append(frame)
     return nodes, frames
 
@@ -110,41 +114,63 @@ def _number(move: RigidMove | None, moves: list[RigidMove], numbers: dict[int, i
     return numbers[id(move)]
 
 
-def _check_same_move(bodies, vertex: int, a: RigidMove, b: RigidMove) -> None:
-    if a is b:
-        return
+def _check_agree(bodies, vertex: int, holds: list[Hold]) -> None:
+    """Supports may share a vertex where they hold it along directions at right angles, or have it at the same place along
+    those that are not. One that stays may hold it beside one that moves, as long as that does not move it along what it
+    holds."""
     point = bodies.mesh.rest_positions[[vertex]]
-    apart = max(np.abs(a.moved(point, at) - b.moved(point, at)).max() for at in _LOOKED_AT)
-    if apart > 1e-12 * bodies.size or not np.allclose(a.rotation, b.rotation):
-        raise ValueError(f"two supports move vertex {vertex} to different places")
 
+    def places(move: RigidMove | None) -> np.ndarray:
+        return np.concatenate([point if move is None else move.moved(point, at) for at in _LOOKED_AT])
 
-def _check_against_still(bodies, held: list[Held], move_of: dict[int, RigidMove]) -> None:
-    """A support that stays may share a vertex with one that moves, as long as it is not moved along what it holds."""
-    for support in held:
-        if support.move is not None:
-            continue
-        for vertex, along in zip(support.vertices.tolist(), support.directions, strict=True):
-            move = move_of.get(vertex)
-            if move is None:
+    for k, a in enumerate(holds):
+        for b in holds[:k]:
+            if a.move is b.move:
                 continue
-            point = bodies.mesh.rest_positions[[vertex]]
-            moves = np.array([(move.moved(point, at) - point)[0] for at in _LOOKED_AT])
-            if np.abs(moves @ along.T).max() > 1e-9 * bodies.size:
-                raise ValueError(
-                    f"one support holds vertex {vertex} along a direction in which another moves it"
-                )
+            apart = places(a.move) - places(b.move)
+            if a.move is None or b.move is None:
+                still = a if a.move is None else b
+                if np.abs(apart @ still.along.T).max() > 1e-9 * bodies.size:
+                    raise ValueError(
+                        f"one support holds vertex {vertex} along a direction in which another moves it"
+                    )
+                continue
+            shared = np.abs(a.along @ b.along.T) > 1e-9
+            if not shared.any():
+                continue
+            both = np.concatenate([a.along[shared.any(axis=1)], b.along[shared.any(axis=0)]])
+            turned = not np.allclose(a.move.rotation, b.move.rotation)
+            if turned or np.abs(apart @ both.T).max() > 1e-12 * bodies.size:
+                raise ValueError(f"two supports move vertex {vertex} to different places")
 
 
-def _frame(directions: np.ndarray) -> tuple[np.ndarray, int]:
-    """Orthonormal columns, the held ones first, and their number. World axes where the directions are world axes."""
+def _frame(holds: list[Hold]) -> tuple[np.ndarray, int, list[RigidMove | None]]:
+    """Orthonormal columns, the held ones first, their number, and whose each is; of what moves and what stays along the
+    same direction, that of what moves. World axes where the directions are world axes."""
+    directions = np.concatenate([hold.along for hold in holds])
+    moving = [hold for hold in holds if hold.move is not None]
+    movers = list({id(hold.move): hold.move for hold in moving}.values())
     axes = np.unique(np.argmax(np.abs(directions), axis=1))
     if np.all(np.abs(directions).max(axis=1) == 1.0):
-        order = [*axes, *np.setdiff1d(np.arange(3), axes)]
-        return np.eye(3)[:, order], len(axes)
-    _, values, rows = np.linalg.svd(directions)
-    count = int(np.sum(values > 1e-9))
-    return (np.eye(3) if count == 3 else rows.T), count
+        frame = np.eye(3)[:, [*axes, *np.setdiff1d(np.arange(3), axes)]]
+        return frame, len(axes), [_mover(frame[:, k], moving) if k < len(axes) else None for k in range(3)]
+    if len(movers) <= 1:
+        _, values, rows = np.linalg.svd(directions)
+        count = int(np.sum(values > 1e-9))
+        return (np.eye(3) if count == 3 else rows.T), count, [*movers, None][:1] * 3
+    columns, by = np.zeros((3, 0)), []
+    for hold in [*moving, *(hold for hold in holds if hold.move is None)]:
+        for along in hold.along:
+            rest = along - columns @ (columns.T @ along)
+            if np.linalg.norm(rest) > 1e-9:
+                columns = np.column_stack([columns, rest / np.linalg.norm(rest)])
+                by.append(hold.move)
+    free = np.linalg.svd(columns.T)[2][len(by) :].T
+    return np.column_stack([columns, free]), len(by), [*by, None, None, None][:3]
+
+
+def _mover(axis: np.ndarray, moving: list[Hold]) -> RigidMove | None:
+    return next((hold.move for hold in moving if (np.abs(hold.along @ axis) == 1.0).any()), None)
 
 
 def _directed_edges(directed: list[DirectedEdges], moves: list[RigidMove]):
@@ -171,7 +197,7 @@ def _directed_edges(directed: list[DirectedEdges], moves: list[RigidMove]):
 def _prevented(bodies, constraints: Constraints, in_part: np.ndarray, center: np.ndarray) -> np.ndarray:
     """Rows (k, 6) of the infinitesimal rigid motions (translation, size-scaled rotation) that supports see."""
     rows, mesh, size = [np.zeros((1, 6))], bodies.mesh, bodies.size
-    for (node, count, _), frame in zip(constraints.held_nodes, constraints.held_frames, strict=True):
+    for (node, count, *_), frame in zip(constraints.held_nodes, constraints.held_frames, strict=True):
         if node < mesh.n_vertices and in_part[node]:
             along = frame[:, :count].T
             arm = (mesh.rest_positions[node] - center) / size
