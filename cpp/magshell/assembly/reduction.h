@@ -49,6 +49,9 @@ class Reduction {
     /// Adds the gradients by the moves and by their progress, given the gradient by what supports hold.
     void vjp(const VectorXd& by_state, const Controls& controls, Gradient& out) const;
 
+    /// Whether [axis]x between two nodes does anything along motions of the free ones.
+    bool feels_skew(Index a, Index b, const Vec3& axis) const;
+
     /// The largest angle [rad] by which a support turns in all.
     double largest_turn() const;
 
@@ -93,6 +96,8 @@ class Reduction {
   private:
     /// The part of a node's vector along which it is held.
     static Vec3 held_part(const HeldNode& h, const Vec3& vector);
+    /// Of a node: along which motions it is free.
+    Mat3 free_motions(Index node) const;
     /// How fast its move carries a node, as the progress changes.
     Vec3 rate_of(const HeldNode& h, double progress) const;
     bool axis_aligned(const HeldNode& h) const;
@@ -110,6 +115,7 @@ class Reduction {
     Slot progress_;
     Index full_size_;
     std::vector<Index> frame_of_;       // per node: index into held_ where turned, else -1; empty if none is
+    std::vector<Index> held_at_;        // per node: index into held_, else -1
     std::vector<Index> free_unknowns_;  // reduced -> full, ascending
     std::shared_ptr<const SparsePattern> pattern_;
     // What is left of the full matrix, in pieces without a gap: supports take little away.

@@ -6,6 +6,7 @@ import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
+from ..mesh.tet_jacobian import shape_integrals
 from ..mesh.tet_mesh import TetMesh
 from .materials import SolidMaterial
 from .shell import magnetization_of
@@ -176,7 +177,8 @@ class Solid(Owner):
     def _shares(self) -> tuple[np.ndarray, np.ndarray]:
         """Of each tetrahedron's volume, at its nodes, (n_t, 4) or (n_t, 10) m3: for inertia, for weights.
 
-        A quadratic element's weight is carried by its middle nodes, -1/20 at corners and 1/5 between them; for inertia its
+        A quadratic element's weight is shared out by its shape functions, curved ones exactly: -1/20 at corners and 1/5
+        between them where it is straight; for inertia its
         mass is lumped in proportion to the diagonal of its mass matrix (Hinton, Rock, Zienkiewicz 1976), 1/36 and 4/27,
         which are positive and add up to one.
         """
@@ -185,8 +187,7 @@ class Solid(Owner):
             even = np.repeat(volumes / 4.0, 4, axis=1)
             return even, even
         lumped = np.array([1 / 36] * 4 + [4 / 27] * 6)
-        carried = np.array([-1 / 20] * 4 + [1 / 5] * 6)
-        return volumes * lumped, volumes * carried
+        return volumes * lumped, shape_integrals(self.mesh.rest_positions[self.mesh.tetrahedra])
 
     def _gathered(self, shares: np.ndarray) -> np.ndarray:
         if self.mass_density is None:

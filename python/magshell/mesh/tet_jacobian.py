@@ -81,6 +81,38 @@ def quadratic_volumes(node_positions: np.ndarray) -> np.ndarray:
     return volumes
 
 
+def _shape_integrals() -> np.ndarray:
+    """(10, 20): of each shape function times each polynomial of Bernstein, over a tetrahedron of volume 1/6.
+
+    With barycentric coordinates b, the integral of a monomial b^p is p! / (|p| + 3)!.
+    """
+    monomials = np.eye(4, dtype=int)
+    shapes = []  # of each: {powers: factor}, homogeneous of degree two
+    for i in range(4):
+        shapes.append({tuple(monomials[i] + monomials[j]): (1.0 if i == j else -1.0) for j in range(4)})
+    shapes += [{tuple(monomials[i] + monomials[j]): 4.0} for i, j in EDGES]
+    integrals = np.zeros((10, len(_POWERS)))
+    for k, shape in enumerate(shapes):
+        for powers, factor in shape.items():
+            for j, others in enumerate(_POWERS):
+                top = np.prod([factorial(p) for p in others + powers])
+                scale = 6 / np.prod([factorial(p) for p in others])
+                integrals[k, j] += factor * scale * top / factorial(8)
+    return integrals
+
+
+_SHAPE_INTEGRALS = _shape_integrals()
+
+
+def shape_integrals(node_positions: np.ndarray) -> np.ndarray:
+    """(n_t, 10), m3: the integrals of the ten shape functions over ten-node tetrahedra (n_t, 10, 3). Of straight ones
+    -1/20 of the volume at corners and 1/5 between them."""
+    integrals = straight_volumes(node_positions[:, :4])[:, None] * np.array([-1 / 20] * 4 + [1 / 5] * 6)
+    curved = bent(node_positions)
+    integrals[curved] = jacobians(node_positions[curved]) @ _SHAPE_INTEGRALS.T
+    return integrals
+
+
 def least_jacobians(coefficients: np.ndarray) -> np.ndarray:
     """(n_t,), m3: the least value on each of the 20 points that decide a cubic polynomial."""
     return (coefficients @ _basis(_POINTS).T).min(axis=1)
