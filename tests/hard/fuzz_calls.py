@@ -165,6 +165,11 @@ def _scenes(s: Sample) -> Iterator[Call]:
     yield Call("EdgeCouple", loaded(ms.EdgeCouple), {"edges": far, "couple_per_length": 1e-3})
     wet = {"surface_tension": np.full(3, 0.02), "faces": np.arange(3)}
     yield Call("SurfaceTension", loaded(ms.SurfaceTension), wet)
+    yield Call(
+        "Pressure",
+        loaded(ms.Pressure),
+        {"pressure": np.full(3, 0.02), "faces": np.arange(3), "body": s.shell},
+    )
     whole = {
         "bodies": s.shell,
         "supports": [s.clamp],

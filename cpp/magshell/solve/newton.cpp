@@ -348,8 +348,11 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             moved = last_step <= small_move * model_.length_scale() ? 0.0
                                                                     : std::numeric_limits<double>::infinity();
         }
-        VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
-                                                 deserved(report.residual, options_.tolerance));
+        // Loads at rest leave a remainder of few nodes, which takes few vectors: no digit is given away.
+        const VectorXd force = -gradient(q, anchor) - pull.col(0);
+        VectorXd step =
+            move + (anchor.motion ? solve_with_factor(force, deserved(report.residual, options_.tolerance))
+                                  : solve_with_factor(force));
         if (model_.refuses_states()) {
             const double share = model_.largest_share(q, step / of_way_to_inversion);
             if (share < shortest_share)
