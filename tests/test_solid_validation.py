@@ -1,4 +1,4 @@
-"""Solids against exact and published numbers: cases T2, T4, T5, T6, T9, T10 and I1 of the validation set."""
+"""Solids against exact and published numbers: cases T4, T5, T6, T9, T10 and I1 of the validation set."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import torch
 from solid_faces import Faces
 
 import magshell as ms
-from magshell.bodies.solid_states import states_of
 
 TINY = 1e-9
 
@@ -24,85 +23,6 @@ def dead(forces: np.ndarray) -> ms.PointLoad:
 def faces_where(body, condition) -> np.ndarray:
     """Those of its faces whose corners all are where condition, of x (..., 3), says."""
     return np.flatnonzero(condition(body.mesh.rest_positions[body.mesh.faces]).all(axis=1))
-
-
-# T2a, E = 1e6, nu = 0.45: (material, mode, stretch): (nominal stress, stretch of the free sides). By root finding to 1e-12.
-HOMOGENEOUS = {
-    ("ln J", "uniaxial", 0.5): (-1086102.809, 1.350869747),
-    ("ln J", "uniaxial", 2.0): (598796.2703, 0.7259350056),
-    ("ln J", "equibiaxial", 0.8): (-572676.623, 1.403071547),
-    ("ln J", "equibiaxial", 2.0): (676425.278, 0.2770079198),
-    ("isochoric", "uniaxial", 0.5): (-1170024.716, 1.369383597),
-    ("isochoric", "uniaxial", 2.0): (557672.8792, 0.7420503532),
-    ("isochoric", "equibiaxial", 0.8): (-604967.4479, 1.392834952),
-    ("isochoric", "equibiaxial", 2.0): (597259.9171, 0.2998041702),
-    ("Corotated", "uniaxial", 0.5): (-500000.0, 1.225),
-    ("Corotated", "uniaxial", 2.0): (1000000.0, 0.55),
-    ("Corotated", "equibiaxial", 0.8): (-363636.3636, 1.327272727),
-    ("Corotated", "equibiaxial", 1.5): (909090.9091, 0.1818181818),
-}
-# Simple shear by gamma: P12, P21, P11, P22, P33.
-SHEAR = {
-    ("ln J", 1.0): (344827.5862, 344827.5862, 0.0, 0.0, 0.0),
-    ("isochoric", 0.1): (34482.75862, 34597.70115, -1149.425287, -1149.425287, -1149.425287),
-    ("isochoric", 1.0): (344827.5862, 459770.1149, -114942.5287, -114942.5287, -114942.5287),
-    ("Corotated", 0.5): (223892.2411, 120935.3451, 205913.7921, 205913.7921, 191025.9708),
-    ("Corotated", 1.0): (708871.7552, -19216.58276, 728088.3379, 728088.3379, 732624.7578),
-}
-
-
-def block(material: str, element: str, diagonals: str) -> ms.Solid:
-    moduli = {"young_modulus": 1e6, "poisson_ratio": 0.45}
-    kind = ms.Corotated(**moduli) if material == "Corotated" else ms.NeoHookean(material, **moduli)
-    return ms.Solid(
-        ms.meshes.box((1, 1, 1), cells=(1, 1, 1), diagonals=diagonals), material=kind, element=element
-    )
-
-
-def nominal_stresses(solid: ms.Solid, rest: ms.Equilibrium) -> np.ndarray:
-    """First Piola-Kirchhoff's, (n_t p, 3, 3)."""
-    found = states_of(rest.scene, solid, rest._state)
-    ratios = found.volume_ratios[..., None, None]
-    stresses = ratios * found.cauchy_stresses @ np.linalg.inv(found.deformation_gradients).swapaxes(-1, -2)
-    return stresses.reshape(-1, 3, 3)
-
-
-@pytest.mark.parametrize("element", ["linear", "quadratic"])
-@pytest.mark.parametrize("case", HOMOGENEOUS, ids=lambda case: "{} {} {}".format(*case))
-def test_t2a_stretched_blocks(case, element):
-    """One cell: of more, a block at half its length is a saddle between shapes that bulge to one side."""
-    material, mode, stretch = case
-    solid = block(material, element, "aligned")
-    pulled = "x" if mode == "uniaxial" else "xy"
-    pins = [ms.Pin(at(solid, **{axis: 0.0}), components=axis) for axis in "xyz"]
-    ends = {axis: at(solid, **{axis: 1.0}) for axis in pulled}
-    shared = np.intersect1d(ends["x"], ends["y"]) if mode == "equibiaxial" else []
-    for axes, vertices in [*((axis, np.setdiff1d(ends[axis], shared)) for axis in pulled), (pulled, shared)]:
-        if len(vertices):
-            move = np.where([each in axes for each in "xyz"], stretch - 1.0, 0.0)
-            pins.append(ms.Pin(vertices, components=axes, displacement=move))
-    rest = ms.equilibrium(ms.Scene(solid, supports=pins))
-    stress, across = HOMOGENEOUS[case]
-    factors = [stretch if axis in pulled else across for axis in "xyz"]
-    assert np.allclose(rest.positions, solid.mesh.rest_positions * factors, rtol=0, atol=1e-8)
-    expected = np.diag([stress if axis in pulled else 0.0 for axis in "xyz"])
-    assert np.allclose(nominal_stresses(solid, rest), expected, rtol=0, atol=1e-8 * abs(stress))
-
-
-@pytest.mark.parametrize("element", ["linear", "quadratic"])
-@pytest.mark.parametrize("case", SHEAR, ids=lambda case: "{} {}".format(*case))
-def test_t2a_sheared_blocks(case, element):
-    solid = block(case[0], element, "crossed")
-    x = solid.mesh.rest_positions
-    outside = np.abs(x - 0.5).max(axis=1) > 0.5 - TINY
-    pins = [
-        ms.Pin(np.flatnonzero(outside & (np.abs(x[:, 1] - y) < TINY)), displacement=(case[1] * y, 0, 0))
-        for y in np.unique(np.round(x[outside, 1], 12))
-    ]
-    stresses = nominal_stresses(solid, ms.equilibrium(ms.Scene(solid, supports=pins)))
-    p12, p21, p11, p22, p33 = SHEAR[case]
-    expected = np.array([[p11, p12, 0], [p21, p22, 0], [0, 0, p33]])
-    assert np.allclose(stresses, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
 
 
 def cook(cells, poisson_ratio: float, volume: str = "isochoric", element: str = "quadratic"):
@@ -169,6 +89,14 @@ def test_t5_t6_beam_to_half_a_percent_with_3060_unknowns(poisson_ratio):
     assert unknowns == 3060 and rest.load_steps == 1 and rest.iterations <= 10
     w, shortening = BEAM[poisson_ratio]
     assert abs(end[2] / w - 1) < 0.005 and abs(-end[0] / shortening - 1) < 0.012
+
+
+@pytest.mark.parametrize("poisson_ratio", BEAM)
+def test_t6_deflection_and_shortening_to_half_a_percent(poisson_ratio):
+    """Four cells across: 0.07 and 0.19 %. With (12, 4, 4) 0.2 and 0.43 %: one mean volume an element is soft."""
+    rest, end, _ = bent_beam((10, 4, 4), poisson_ratio)
+    assert rest.load_steps == 1 and rest.iterations <= 10
+    assert np.allclose((end[2], -end[0]), BEAM[poisson_ratio], rtol=0.005)
 
 
 @pytest.mark.parametrize("cells", [(8, 2, 2), (9, 3, 3), (15, 1, 1)], ids=str)

@@ -163,13 +163,8 @@ def _scenes(s: Sample) -> Iterator[Call]:
     yield Call("EdgeLoad", loaded(ms.EdgeLoad), {"edges": far, "force_per_length": (0, 0, 1)})
     yield Call("AreaLoad", loaded(ms.AreaLoad), {"force_per_area": (0, 0, 1), "faces": np.arange(3)})
     yield Call("EdgeCouple", loaded(ms.EdgeCouple), {"edges": far, "couple_per_length": 1e-3})
-    wet = {"surface_tension": np.full(3, 0.02), "faces": np.arange(3)}
-    yield Call("SurfaceTension", loaded(ms.SurfaceTension), wet)
-    yield Call(
-        "Pressure",
-        loaded(ms.Pressure),
-        {"pressure": np.full(3, 0.02), "faces": np.arange(3), "body": s.shell},
-    )
+    for kind, name in ((ms.SurfaceTension, "surface_tension"), (ms.Pressure, "pressure")):
+        yield Call(kind.__name__, loaded(kind), {name: np.full(3, 0.02), "faces": np.arange(3)})
     whole = {
         "bodies": s.shell,
         "supports": [s.clamp],

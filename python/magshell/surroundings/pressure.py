@@ -37,7 +37,7 @@ class Pressure(Owner):
     >>> sides = [ms.SymmetryPlane(normal) for normal in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
     >>> sunk = ms.equilibrium(ms.Scene(cube, supports=sides, loads=[ms.Pressure(0.03)]))
     >>> round(sunk.positions.max().item(), 4)
-    0.9847
+    0.9857
     """
 
     _replaceable = ("pressure",)
