@@ -247,9 +247,8 @@ def _solves(s: Sample) -> Iterator[Call]:
     )
     yield Call("linear_response", ms.linear_response, magnetic)
     yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "modes": 1}, cost=2)
-    yield Call(
-        "vibration_modes", ms.vibration_modes, {"scene": s.scene, "equilibrium": s.rest, "count": 2}, cost=2
-    )
+    modes = {"scene": s.scene, "equilibrium": s.rest, "count": 2, "mass": "consistent"}
+    yield Call("vibration_modes", ms.vibration_modes, modes, cost=2)
     viscous = {"damping": 1e-3, "stiffness_damping": 1e-4, "maxwell_modulus": 0.1, "maxwell_time": 1e-2}
     motion = {
         **magnetic,

@@ -6,7 +6,7 @@ import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
-from ..mesh.tet_jacobian import shape_integrals
+from ..mesh.tet_integrals import shape_integrals, shape_products
 from ..mesh.tet_mesh import TetMesh
 from .materials import SolidMaterial
 from .shell import magnetization_of
@@ -205,6 +205,19 @@ class Solid(Owner):
     def weighed_masses(self) -> np.ndarray:
         """What gravity pulls at each vertex by, (n_v,), kg; negative at corners of quadratic elements."""
         return self._gathered(self._shares[1])
+
+    @property
+    def element_masses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Consistent masses: the nodes of each element (n_t, k), and the integrals of its density times the products of
+        their shape functions (n_t, k, k), kg."""
+        if self.mass_density is None:
+            raise ValueError("the solid has no mass_density [kg/m3]")
+        nodes = self.mesh.tetrahedra
+        if self.element == "linear":
+            products = self.mesh.volumes[:, None, None] * (np.ones((4, 4)) + np.eye(4)) / 20.0
+        else:
+            products = shape_products(self.mesh.rest_positions[nodes])
+        return nodes, self.mass_density[:, None, None] * products
 
     def __repr__(self) -> str:
         parts = [f"{self.mesh.n_tetrahedra} {self.element} tetrahedra", repr(self.material)]

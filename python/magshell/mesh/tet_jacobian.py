@@ -13,15 +13,15 @@ import numpy as np
 
 from .tet_topology import EDGES
 
-_POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])  # (20, 4)
-_POINTS = _POWERS / 3.0
+POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])  # (20, 4)
+_POINTS = POWERS / 3.0
 _LEVELS = 4  # halvings that decide whether a polynomial with coefficients of both signs is positive
 
 
 def _basis(points: np.ndarray) -> np.ndarray:
     """(n, 20): the polynomials of Bernstein at barycentric coordinates (n, 4)."""
-    weights = [6 / np.prod([factorial(p) for p in powers]) for powers in _POWERS.tolist()]
-    return np.prod(points[:, None, :] ** _POWERS, axis=2) * weights
+    weights = [6 / np.prod([factorial(p) for p in powers]) for powers in POWERS.tolist()]
+    return np.prod(points[:, None, :] ** POWERS, axis=2) * weights
 
 
 _FROM_VALUES = np.linalg.inv(_basis(_POINTS))
@@ -79,38 +79,6 @@ def quadratic_volumes(node_positions: np.ndarray) -> np.ndarray:
     curved = bent(node_positions)
     volumes[curved] = jacobians(node_positions[curved]).mean(axis=1) / 6
     return volumes
-
-
-def _shape_integrals() -> np.ndarray:
-    """(10, 20): of each shape function times each polynomial of Bernstein, over a tetrahedron of volume 1/6.
-
-    With barycentric coordinates b, the integral of a monomial b^p is p! / (|p| + 3)!.
-    """
-    monomials = np.eye(4, dtype=int)
-    shapes = []  # of each: {powers: factor}, homogeneous of degree two
-    for i in range(4):
-        shapes.append({tuple(monomials[i] + monomials[j]): (1.0 if i == j else -1.0) for j in range(4)})
-    shapes += [{tuple(monomials[i] + monomials[j]): 4.0} for i, j in EDGES]
-    integrals = np.zeros((10, len(_POWERS)))
-    for k, shape in enumerate(shapes):
-        for powers, factor in shape.items():
-            for j, others in enumerate(_POWERS):
-                top = np.prod([factorial(p) for p in others + powers])
-                scale = 6 / np.prod([factorial(p) for p in others])
-                integrals[k, j] += factor * scale * top / factorial(8)
-    return integrals
-
-
-_SHAPE_INTEGRALS = _shape_integrals()
-
-
-def shape_integrals(node_positions: np.ndarray) -> np.ndarray:
-    """(n_t, 10), m3: the integrals of the ten shape functions over ten-node tetrahedra (n_t, 10, 3). Of straight ones
-    -1/20 of the volume at corners and 1/5 between them."""
-    integrals = straight_volumes(node_positions[:, :4])[:, None] * np.array([-1 / 20] * 4 + [1 / 5] * 6)
-    curved = bent(node_positions)
-    integrals[curved] = jacobians(node_positions[curved]) @ _SHAPE_INTEGRALS.T
-    return integrals
 
 
 def least_jacobians(coefficients: np.ndarray) -> np.ndarray:
