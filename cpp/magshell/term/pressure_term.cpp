@@ -10,8 +10,27 @@ namespace {
 // Of the magnitudes that cancel between neighbours: what is left below is round-off.
 constexpr double cancelled = 1e-13, round_off = 8.0 * std::numeric_limits<double>::epsilon();
 
-Pack33 skew_block(const Vec3& axis) {
-    return cross_matrix(Pack3{Pack(axis.x()), Pack(axis.y()), Pack(axis.z())});
+// [axis]x in the first lane of a block whose diagonal is zero.
+void set_skew(Pack33& block, const Vec3& axis) {
+    block.at[1].set(0, -axis.z());
+    block.at[2].set(0, axis.y());
+    block.at[3].set(0, axis.z());
+    block.at[5].set(0, -axis.x());
+    block.at[6].set(0, -axis.y());
+    block.at[7].set(0, axis.x());
+}
+
+// Of all parts of a face together.
+template <class Kernel>
+const typename Kernel::Coefficients& of_all_parts() {
+    static const typename Kernel::Coefficients known = [] {
+        typename Kernel::Coefficients sum{};
+        for (const auto& part : Kernel::of_parts())
+            for (std::size_t k = 0; k < sum.size(); ++k)
+                for (int pair = 0; pair < Kernel::pairs; ++pair) sum[k][pair] += part[k][pair];
+        return sum;
+    }();
+    return known;
 }
 
 }  // namespace
@@ -79,13 +98,16 @@ template <int N>
 typename FacePressure<N>::Coefficients PressureTerm::Face<N>::coefficients(
     const std::vector<double>& pressures) const {
     typename Kernel::Coefficients sum{};
-    for (int part = 0; part < Kernel::parts; ++part) {
-        if (places[part] < 0) continue;
-        const double pressure = pressures[places[part]];
+    const auto add = [&](const typename Kernel::Coefficients& a, double pressure) {
         for (int k = 0; k < N; ++k)
-            for (int pair = 0; pair < Kernel::pairs; ++pair)
-                sum[k][pair] += pressure * Kernel::of_parts()[part][k][pair];
+            for (int pair = 0; pair < Kernel::pairs; ++pair) sum[k][pair] += pressure * a[k][pair];
+    };
+    if (places.front() >= 0 && std::equal(places.begin() + 1, places.end(), places.begin())) {
+        add(of_all_parts<Kernel>(), pressures[places.front()]);
+        return sum;
     }
+    for (int part = 0; part < Kernel::parts; ++part)
+        if (places[part] >= 0) add(Kernel::of_parts()[part], pressures[places[part]]);
     return sum;
 }
 
@@ -136,10 +158,10 @@ void PressureTerm::finish_assembly(const double* q, const Controls& controls, Sy
         using Kernel = typename std::remove_cvref_t<decltype(face)>::Kernel;
         constexpr int n = std::tuple_size_v<typename Kernel::Corners>;
         const auto c = Kernel::axes(face.coefficients(pressures_), Kernel::relative(face.at(q)));
-        Pack33 blocks[n * (n + 1) / 2];
-        for (int k = 0; k < n; ++k)
-            for (int l = 0; l <= k; ++l)
-                blocks[lower_index(k, l)] = skew_block(-0.5 * factor * (c[k][l] - c[l][k]));
+        Pack33 blocks[n * (n + 1) / 2]{};
+        for (int k = 1; k < n; ++k)
+            for (int l = 0; l < k; ++l)
+                set_skew(blocks[lower_index(k, l)], -0.5 * factor * (c[k][l] - c[l][k]));
         scatter_blocks<n>(out, face.nodes, face.slots, blocks, 0);
     });
 }
