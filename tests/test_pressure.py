@@ -4,6 +4,7 @@ scene: test_every_gradient.py; the tube and the beam of the validation set: test
 import numpy as np
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 from solid_faces import Faces
 
 import magshell as ms
@@ -126,6 +127,38 @@ def test_a_free_border_has_none_and_a_held_one_has():
         with pytest.raises(ValueError, match="pressure has no potential here"):
             ms.follow(scene)
     assert ms.follow(held).parameters[-1] == pytest.approx(1.0)
+
+
+def test_oblique_symmetry_planes_close_a_surface():
+    """A quarter of a tube, turned: its border slides in the planes; the same answer as upright, and a potential."""
+    turn = Rotation.from_rotvec([0.4, -0.3, 0.7]).as_matrix()
+    found = []
+    for rotation in (np.eye(3), turn):
+        mesh = ms.meshes.tube(1.0, 2.0, 0.5, np.pi / 2, cells=(2, 4, 1), order=2)
+        upright = mesh.rest_positions[mesh.faces]
+        inner = np.flatnonzero((np.hypot(*upright[..., :2].T) < 1 + 1e-9).all(axis=0))
+        solid = ms.Solid(
+            mesh.transformed(rotation),
+            material=ms.NeoHookean(young_modulus=1.0, poisson_ratio=0.3),
+            mass_density=1.0,
+        )
+        planes = [ms.SymmetryPlane(rotation[:, k]) for k in range(2)]
+        heights = np.unique(np.round(mesh.rest_positions[:, 2], 9))[[0, -1]]
+        planes += [ms.SymmetryPlane(rotation[:, 2], point=rotation[:, 2] * z) for z in heights]
+        scene = ms.Scene(solid, supports=planes, loads=[ms.Pressure(0.05, faces=inner)])
+        rest = ms.equilibrium(scene)
+        found.append((rest.positions @ rotation, ms.vibration_modes(scene, rest, count=3).squares))
+    assert np.allclose(found[0][0], found[1][0], rtol=0, atol=1e-9)
+    assert np.allclose(found[0][1], found[1][1], rtol=1e-7)
+
+
+def test_a_warm_start_goes_on_without_a_potential():
+    scene = flap_of("linear")
+    warm = ms.WarmStart(scene)
+    for pressure in (15.0, 18.0, 20.0):
+        rest = warm(values={scene.loads[0]: {"pressure": pressure}})
+    assert rest.iterations <= 4
+    assert np.allclose(rest.positions, ms.equilibrium(scene).positions, rtol=0, atol=1e-9)
 
 
 def flap_of(element: str, **options) -> ms.Scene:
