@@ -15,6 +15,7 @@ from gradient_kinds_bodies import (
     two_sheets_at_rest,
     two_sheets_in_motion,
 )
+from gradient_kinds_pressure import pressed_sheet, pressed_solid
 from gradient_scenes import Kind
 from gradient_world import (
     BEGIN,
@@ -244,6 +245,10 @@ MAKERS = {
     "a solid in motion": solid_in_motion,
     "a magnetized solid at rest": magnetized_solid_at_rest,
     "a magnetized solid in motion, in water": magnetized_solid_in_motion,
+    "a solid under pressure at rest": lambda: pressed_solid(False),
+    "a solid under pressure in motion": lambda: pressed_solid(True),
+    "a sheet under pressure at rest": lambda: pressed_sheet(False),
+    "a sheet under pressure in motion": lambda: pressed_sheet(True),
     "in motion, euler": lambda: moving(ms.ImplicitEuler(), "hinge"),
     "in motion, tr_bdf2": lambda: moving(ms.TRBDF2()),
     "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),

@@ -63,6 +63,7 @@ class SolidModel:
             skins=[],
             rigid=[],
             face_energies=[],
+            pressures=[],
             solids=[
                 {
                     "owner": "body 0",

@@ -88,7 +88,11 @@ test_values_are_refused = refused(
             "give it a displacement in the scene",
         ),
         ("no gravity", lambda: solve(mass_density=1e3), "the scene has no gravity"),
-        ("no loads", lambda: solve(vertex_loads=np.zeros((N_V, 3))), "the scene has no loads"),
+        (
+            "no loads",
+            lambda: solve(vertex_loads=np.zeros((N_V, 3))),
+            "the scene has no PointLoad, EdgeLoad or AreaLoad",
+        ),
         (
             "loads' shape",
             lambda: solve(scene(loads=[LOAD]), vertex_loads=np.zeros(3)),
@@ -99,7 +103,7 @@ test_values_are_refused = refused(
             lambda: solve(
                 scene(loads=[LOAD]), vertex_loads=np.zeros((N_V, 3)), values={LOAD: {"force": (0, 0, 1)}}
             ),
-            "vertex_loads stands for all loads",
+            "vertex_loads stands for all point, edge and area loads",
         ),
         ("modulus", lambda: solve(young_modulus=-1.0), r"young_modulus \[Pa\] must be positive"),
         ("ratio", lambda: solve(poisson_ratio=0.6), r"poisson_ratio \[1\] must be in"),

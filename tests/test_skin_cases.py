@@ -17,33 +17,61 @@ def magnetic_energy(scene, positions):
     return model.energies(model.state(positions, rotations), controls)["magnetic"]
 
 
-def bent(points):
-    """To a curvature of 1/m, with straight unit normals."""
+def bent(points, curvature):
+    """With straight unit normals, from one end on."""
     x, y, z = points.T
-    return np.stack([np.sin(x) - z * np.sin(x), y, 1 - np.cos(x) + z * np.cos(x)], axis=1)
+    angle = curvature * x
+    return np.stack(
+        [np.sin(angle) * (1 / curvature - z), y, (1 - np.cos(angle)) / curvature + z * np.cos(angle)], axis=1
+    )
 
 
-@pytest.mark.parametrize(
-    ("magnetization", "layers", "volume", "shell"),
-    [  # M2: bend, 1.0, 32 cells
-        ((1.0, 0, 0), 2, -0.003100997254, -0.003100997254),
-        ((1.0, 0, 0), 6, -0.003100997254, -0.003100997254),
-        ((0, 1.0, 0), 2, -0.0025, -0.0025),
-        ((0, 0, 1.0), 2, -0.002676119594, -0.002676446302),
-        ((0, 0, 1.0), 6, -0.002676119594, -0.002676446302),
-    ],
-)
-def test_energy_of_a_bent_plate_in_layers_and_as_a_shell(magnetization, layers, volume, shell):
-    mesh = ms.meshes.box(PLATE, cells=(32, 4, layers))
-    solid = ms.Solid(mesh, material=SOFT, element="linear", remanent_magnetization=magnetization)
-    scene = ms.Scene(solid, field=ms.UniformField(), allow_rigid_motions=True)
-    low = mesh.rest_positions.min(axis=0) + np.array([0, 0, PLATE[2] / 2])
-    assert magnetic_energy(scene, bent(mesh.rest_positions - low)) == pytest.approx(volume, rel=2e-9)
-    flat = ms.meshes.rectangle(*PLATE[:2], cells=(32, 4))
-    sheet = ms.Shell(flat, thickness=PLATE[2], young_modulus=1e5, remanent_magnetization=magnetization)
+def twisted(points, twist):
+    """About its axis; lines across the plate stay across it."""
+    x, y, z = points.T
+    cosine, sine = np.cos(twist * x), np.sin(twist * x)
+    return np.stack([x, y * cosine - z * sine, y * sine + z * cosine], axis=1)
+
+
+PI = 3.141592654
+# M2 by deformation and its size, magnetization, cells along, four times those across: energies of the volume and of the
+# shell. Rows of two and of six layers are the same.
+LAYERS = {
+    (bent, 1.0, "x", 32): (-0.003100997254, -0.003100997254),
+    (bent, 1.0, "y", 32): (-0.0025, -0.0025),
+    (bent, 1.0, "z", 32): (-0.002676119594, -0.002676446302),
+    (bent, 1.0, "z", 64): (-0.002676282948, -0.002676364623),
+    (bent, PI, "x", 32): (-0.002546479089, -0.002546479089),
+    (bent, PI, "y", 32): (-0.0025, -0.0025),
+    (bent, PI, "z", 32): (0.0009541625449, 0.0009553132616),
+    (bent, PI, "z", 64): (0.0009547379033, 0.0009550255391),
+    (twisted, 1.0, "x", 32): (-0.0015, -0.0015),
+    (twisted, 1.0, "y", 32): (-0.003942147394, -0.003942147394),
+    (twisted, 1.0, "z", 32): (-0.00221645931, -0.002210553146),
+    (twisted, PI, "x", 32): (-0.0015, -0.0015),
+    (twisted, PI, "y", 32): (-0.002544433453, -0.002544433453),
+    (twisted, PI, "z", 32): (0.001590270908, 0.001551084985),
+    (twisted, PI, "z", 64): (0.001591229839, 0.00155270535),
+}
+
+
+@pytest.mark.parametrize("case", LAYERS, ids=lambda case: "{} {} {} {}".format(case[0].__name__, *case[1:]))
+def test_energy_of_a_deformed_plate_in_layers_and_as_a_shell(case):
+    deform, size, axis, cells = case
+    volume, shell = LAYERS[case]
+    along = np.array([float(each == axis) for each in "xyz"])
+    middle = np.array([0.0, PLATE[1] / 2, PLATE[2] / 2])
+    for layers in (2, 6) if cells == 32 else (2,):
+        mesh = ms.meshes.box(PLATE, cells=(cells, cells // 4, layers))
+        solid = ms.Solid(mesh, material=SOFT, element="linear", remanent_magnetization=along)
+        scene = ms.Scene(solid, field=ms.UniformField(), allow_rigid_motions=True)
+        at = mesh.rest_positions - mesh.rest_positions.min(axis=0) - middle
+        assert magnetic_energy(scene, deform(at, size)) == pytest.approx(volume, rel=2e-9)
+    flat = ms.meshes.rectangle(*PLATE[:2], cells=(cells, cells // 4), diagonals="aligned")
+    sheet = ms.Shell(flat, thickness=PLATE[2], young_modulus=1e5, remanent_magnetization=along)
     thin = ms.Scene(sheet, field=ms.UniformField(), allow_rigid_motions=True)
-    at = flat.rest_positions - flat.rest_positions.min(axis=0)
-    assert magnetic_energy(thin, bent(at)) == pytest.approx(shell, rel=2e-9)
+    at = flat.rest_positions - flat.rest_positions.min(axis=0) - middle * (1, 1, 0)
+    assert magnetic_energy(thin, deform(at, size)) == pytest.approx(shell, rel=2e-9)
 
 
 @pytest.mark.parametrize(

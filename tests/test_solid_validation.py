@@ -1,8 +1,4 @@
-"""Solids against exact and published numbers: cases T2, T4, T5, T6, T9, T10 and I1 of the validation set.
-
-Pressure does not follow solids in scenes yet: where a case has one, its forces are found by turns with the shape, until
-both stand still, which is where a live pressure is in balance too.
-"""
+"""Solids against exact and published numbers: cases T4, T5, T6, T9, T10 and I1 of the validation set."""
 
 import numpy as np
 import pytest
@@ -10,7 +6,6 @@ import torch
 from solid_faces import Faces
 
 import magshell as ms
-from magshell.bodies.solid_states import states_of
 
 TINY = 1e-9
 
@@ -25,94 +20,9 @@ def dead(forces: np.ndarray) -> ms.PointLoad:
     return ms.PointLoad(vertices, forces[vertices])
 
 
-def blown(scene_of, faces: Faces, pressure: float, turns: int = 60) -> ms.Equilibrium:
-    """The equilibrium under a live pressure. scene_of: loads -> Scene."""
-    found, forces = None, faces.forces(faces.mesh.rest_positions, pressure=pressure)
-    for _ in range(turns):
-        found = ms.equilibrium(scene_of([dead(forces)]), start=found and found.positions)
-        last, forces = forces, faces.forces(found.positions, pressure=pressure)
-        if np.abs(forces - last).max() < 1e-7 * np.abs(forces).max():
-            return found
-    raise AssertionError("the pressure does not settle")
-
-
-# T2a, E = 1e6, nu = 0.45: (material, mode, stretch): (nominal stress, stretch of the free sides). By root finding to 1e-12.
-HOMOGENEOUS = {
-    ("ln J", "uniaxial", 0.5): (-1086102.809, 1.350869747),
-    ("ln J", "uniaxial", 2.0): (598796.2703, 0.7259350056),
-    ("ln J", "equibiaxial", 0.8): (-572676.623, 1.403071547),
-    ("ln J", "equibiaxial", 2.0): (676425.278, 0.2770079198),
-    ("isochoric", "uniaxial", 0.5): (-1170024.716, 1.369383597),
-    ("isochoric", "uniaxial", 2.0): (557672.8792, 0.7420503532),
-    ("isochoric", "equibiaxial", 0.8): (-604967.4479, 1.392834952),
-    ("isochoric", "equibiaxial", 2.0): (597259.9171, 0.2998041702),
-    ("Corotated", "uniaxial", 0.5): (-500000.0, 1.225),
-    ("Corotated", "uniaxial", 2.0): (1000000.0, 0.55),
-    ("Corotated", "equibiaxial", 0.8): (-363636.3636, 1.327272727),
-    ("Corotated", "equibiaxial", 1.5): (909090.9091, 0.1818181818),
-}
-# Simple shear by gamma: P12, P21, P11, P22, P33.
-SHEAR = {
-    ("ln J", 1.0): (344827.5862, 344827.5862, 0.0, 0.0, 0.0),
-    ("isochoric", 0.1): (34482.75862, 34597.70115, -1149.425287, -1149.425287, -1149.425287),
-    ("isochoric", 1.0): (344827.5862, 459770.1149, -114942.5287, -114942.5287, -114942.5287),
-    ("Corotated", 0.5): (223892.2411, 120935.3451, 205913.7921, 205913.7921, 191025.9708),
-    ("Corotated", 1.0): (708871.7552, -19216.58276, 728088.3379, 728088.3379, 732624.7578),
-}
-
-
-def block(material: str, element: str, diagonals: str) -> ms.Solid:
-    moduli = {"young_modulus": 1e6, "poisson_ratio": 0.45}
-    kind = ms.Corotated(**moduli) if material == "Corotated" else ms.NeoHookean(material, **moduli)
-    return ms.Solid(
-        ms.meshes.box((1, 1, 1), cells=(1, 1, 1), diagonals=diagonals), material=kind, element=element
-    )
-
-
-def nominal_stresses(solid: ms.Solid, rest: ms.Equilibrium) -> np.ndarray:
-    """First Piola-Kirchhoff's, (n_t p, 3, 3)."""
-    found = states_of(rest.scene, solid, rest._state)
-    ratios = found.volume_ratios[..., None, None]
-    stresses = ratios * found.cauchy_stresses @ np.linalg.inv(found.deformation_gradients).swapaxes(-1, -2)
-    return stresses.reshape(-1, 3, 3)
-
-
-@pytest.mark.parametrize("element", ["linear", "quadratic"])
-@pytest.mark.parametrize("case", HOMOGENEOUS, ids=lambda case: "{} {} {}".format(*case))
-def test_t2a_stretched_blocks(case, element):
-    """One cell: of more, a block at half its length is a saddle between shapes that bulge to one side."""
-    material, mode, stretch = case
-    solid = block(material, element, "aligned")
-    pulled = "x" if mode == "uniaxial" else "xy"
-    pins = [ms.Pin(at(solid, **{axis: 0.0}), components=axis) for axis in "xyz"]
-    ends = {axis: at(solid, **{axis: 1.0}) for axis in pulled}
-    shared = np.intersect1d(ends["x"], ends["y"]) if mode == "equibiaxial" else []
-    for axes, vertices in [*((axis, np.setdiff1d(ends[axis], shared)) for axis in pulled), (pulled, shared)]:
-        if len(vertices):
-            move = np.where([each in axes for each in "xyz"], stretch - 1.0, 0.0)
-            pins.append(ms.Pin(vertices, components=axes, displacement=move))
-    rest = ms.equilibrium(ms.Scene(solid, supports=pins))
-    stress, across = HOMOGENEOUS[case]
-    factors = [stretch if axis in pulled else across for axis in "xyz"]
-    assert np.allclose(rest.positions, solid.mesh.rest_positions * factors, rtol=0, atol=1e-8)
-    expected = np.diag([stress if axis in pulled else 0.0 for axis in "xyz"])
-    assert np.allclose(nominal_stresses(solid, rest), expected, rtol=0, atol=1e-8 * abs(stress))
-
-
-@pytest.mark.parametrize("element", ["linear", "quadratic"])
-@pytest.mark.parametrize("case", SHEAR, ids=lambda case: "{} {}".format(*case))
-def test_t2a_sheared_blocks(case, element):
-    solid = block(case[0], element, "crossed")
-    x = solid.mesh.rest_positions
-    outside = np.abs(x - 0.5).max(axis=1) > 0.5 - TINY
-    pins = [
-        ms.Pin(np.flatnonzero(outside & (np.abs(x[:, 1] - y) < TINY)), displacement=(case[1] * y, 0, 0))
-        for y in np.unique(np.round(x[outside, 1], 12))
-    ]
-    stresses = nominal_stresses(solid, ms.equilibrium(ms.Scene(solid, supports=pins)))
-    p12, p21, p11, p22, p33 = SHEAR[case]
-    expected = np.array([[p11, p12, 0], [p21, p22, 0], [0, 0, p33]])
-    assert np.allclose(stresses, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+def faces_where(body, condition) -> np.ndarray:
+    """Those of its faces whose corners all are where condition, of x (..., 3), says."""
+    return np.flatnonzero(condition(body.mesh.rest_positions[body.mesh.faces]).all(axis=1))
 
 
 def cook(cells, poisson_ratio: float, volume: str = "isochoric", element: str = "quadratic"):
@@ -181,6 +91,14 @@ def test_t5_t6_beam_to_half_a_percent_with_3060_unknowns(poisson_ratio):
     assert abs(end[2] / w - 1) < 0.005 and abs(-end[0] / shortening - 1) < 0.012
 
 
+@pytest.mark.parametrize("poisson_ratio", BEAM)
+def test_t6_deflection_and_shortening_to_half_a_percent(poisson_ratio):
+    """Four cells across: 0.07 and 0.19 %. With (12, 4, 4) 0.2 and 0.43 %: one mean volume an element is soft."""
+    rest, end, _ = bent_beam((10, 4, 4), poisson_ratio)
+    assert rest.load_steps == 1 and rest.iterations <= 10
+    assert np.allclose((end[2], -end[0]), BEAM[poisson_ratio], rtol=0.005)
+
+
 @pytest.mark.parametrize("cells", [(8, 2, 2), (9, 3, 3), (15, 1, 1)], ids=str)
 def test_t6_takes_one_load_step_and_as_many_iterations_on_any_mesh(cells):
     """20 are allowed, and as many with nu = 0.499 as with 0.45."""
@@ -194,41 +112,96 @@ def test_t6_takes_one_load_step_and_as_many_iterations_on_any_mesh(cells):
 
 # T9a: pressure inside, E = 1: inner and outer radius by the radial equation, to 1e-10.
 TUBES = {
+    ("ln J", 0.3, 0.05): (1.109330741, 2.071021744),
     ("ln J", 0.3, 0.1): (1.258337759, 2.172135088),
+    ("ln J", 0.3, 0.15): (1.480765136, 2.331096525),
+    ("isochoric", 0.3, 0.05): (1.111359133, 2.072775278),
     ("isochoric", 0.3, 0.1): (1.272230068, 2.183974725),
-    ("StableNeoHookean", 0.3, 0.1): (1.256809985, 2.169520862),
+    ("isochoric", 0.3, 0.15): (1.549240558, 2.389068018),
+    ("stable", 0.3, 0.05): (1.109066526, 2.070529559),
+    ("stable", 0.3, 0.1): (1.256809985, 2.169520862),
+    ("stable", 0.3, 0.15): (1.475258554, 2.322591116),
+    ("ln J", 0.45, 0.05): (1.11486589, 2.063771018),
     ("ln J", 0.45, 0.1): (1.276229591, 2.160073569),
+    ("ln J", 0.45, 0.15): (1.532138156, 2.326747822),
+    ("isochoric", 0.45, 0.05): (1.115564648, 2.06441743),
     ("isochoric", 0.45, 0.1): (1.281202438, 2.164484342),
+    ("isochoric", 0.45, 0.15): (1.558245937, 2.349099695),
+    ("stable", 0.45, 0.05): (1.114842354, 2.06372763),
+    ("stable", 0.45, 0.1): (1.276087234, 2.159836243),
+    ("stable", 0.45, 0.15): (1.53158399, 2.325930575),
+    ("ln J", 0.49, 0.05): (1.116072122, 2.061296034),
+    ("ln J", 0.49, 0.1): (1.280526398, 2.155767816),
+    ("ln J", 0.49, 0.15): (1.546268269, 2.324744868),
+    ("isochoric", 0.49, 0.05): (1.116224748, 2.06144039),
+    ("isochoric", 0.49, 0.1): (1.281622401, 2.156753111),
+    ("isochoric", 0.49, 0.15): (1.552085221, 2.329745838),
+    ("stable", 0.49, 0.05): (1.116071094, 2.061294146),
+    ("stable", 0.49, 0.1): (1.280520114, 2.15575742),
+    ("stable", 0.49, 0.15): (1.546243317, 2.324708552),
 }
+# Incompressible, mu = 1: pressure, radii, axial force in the wall; here at a Poisson's ratio of 0.4999.
+INCOMPRESSIBLE = [
+    (0.07013195082, 1.05, 2.02546291, 0.2312721785),
+    (0.1315622784, 1.1, 2.051828453, 0.454110587),
+    (0.2333697774, 1.2, 2.107130751, 0.8758452372),
+    (0.3770403124, 1.4, 2.227105745, 1.631237828),
+    (0.4697514859, 1.6, 2.357965225, 2.281471913),
+    (0.5740535723, 2.0, 2.645751311, 3.318138944),
+]
 
 
-def quarter_tube(material: str, poisson_ratio: float, element: str = "quadratic"):
-    """The solid, loads -> Scene, its inner faces."""
-    moduli = {"young_modulus": 1.0, "poisson_ratio": poisson_ratio}
-    stable = material == "StableNeoHookean"
-    kind = ms.StableNeoHookean(**moduli) if stable else ms.NeoHookean(material, **moduli)
+def quarter_tube(material: str, load, **moduli) -> tuple[ms.Equilibrium, np.ndarray]:
+    """Four cells through the wall: the equilibrium, and both radii. load: inner faces -> a load."""
+    kind = ms.StableNeoHookean(**moduli) if material == "stable" else ms.NeoHookean(material, **moduli)
     mesh = ms.meshes.tube(1.0, 2.0, 0.25, np.pi / 2, cells=(4, 8, 1), order=2)
-    solid = ms.Solid(mesh, material=kind, element=element)
+    solid = ms.Solid(mesh, material=kind)
     flat = np.union1d(at(solid, z=0.0), at(solid, z=0.25))
     pins = [ms.Pin(at(solid, x=0.0), components="x"), ms.Pin(at(solid, y=0.0), components="y")]
     pins.append(ms.Pin(flat, components="z"))
-    inner = Faces(solid.mesh, lambda x: np.hypot(x[:, 0], x[:, 1]) < 1 + TINY)
-    return solid, lambda loads: ms.Scene(solid, supports=pins, loads=loads), inner
+    inner = faces_where(solid, lambda x: np.hypot(x[..., 0], x[..., 1]) < 1 + TINY)
+    rest = ms.equilibrium(ms.Scene(solid, supports=pins, loads=[load(solid, inner)]))
+    radii = [np.hypot(*rest.positions[at(solid, x=r, y=0.0), :2].T).mean() for r in (1.0, 2.0)]
+    return rest, np.array(radii)
 
 
 @pytest.mark.parametrize("case", TUBES, ids=lambda case: "{} {} {}".format(*case))
 def test_t9a_tube_under_live_pressure(case):
+    """At the most 0.042 % off, where 0.2 % are allowed; 4 to 7 iterations."""
     material, poisson_ratio, pressure = case
-    solid, scene_of, inner = quarter_tube(material, poisson_ratio)
-    rest = blown(scene_of, inner, pressure)
-    radii = [np.hypot(*rest.positions[at(solid, x=r, y=0.0), :2].T).mean() for r in (1.0, 2.0)]
-    assert np.allclose(radii, TUBES[case], rtol=0.002)
+    rest, radii = quarter_tube(
+        material,
+        lambda _, inner: ms.Pressure(pressure, faces=inner),
+        young_modulus=1.0,
+        poisson_ratio=poisson_ratio,
+    )
+    assert rest.load_steps == 1 and rest.iterations <= 8
+    assert np.allclose(radii, TUBES[case], rtol=5e-4)
+
+
+@pytest.mark.parametrize("case", INCOMPRESSIBLE, ids=lambda case: f"{case[1]}")
+def test_t9a_incompressible_tube_and_its_axial_force(case):
+    pressure, inner, outer, force = case
+    rest, radii = quarter_tube(
+        "isochoric",
+        lambda _, faces: ms.Pressure(pressure, faces=faces),
+        young_modulus=2 * 1.4999,
+        poisson_ratio=0.4999,
+    )
+    assert rest.load_steps == 1 and rest.iterations <= 10
+    assert np.allclose(radii, (inner, outer), rtol=1e-3)
+    solid, model = rest.scene.bodies[0], rest.scene._model
+    pulls = model.positions(model.gradient(rest._state, rest._controls))
+    assert np.isclose(-4 * pulls[at(solid, z=0.0), 2].sum(), force, rtol=1e-3)
 
 
 def test_t9a_dead_pressure_blows_up_less():
-    solid, scene_of, inner = quarter_tube("ln J", 0.45)
-    rest = ms.equilibrium(scene_of([dead(inner.forces(solid.mesh.rest_positions, pressure=0.1))]))
-    assert np.isclose(rest.positions[at(solid, x=1.0, y=0.0), 0].mean(), 1.2124, rtol=0.002)
+    def dead_pressure(solid, inner):
+        forces = Faces(solid.mesh, lambda x: np.hypot(x[:, 0], x[:, 1]) < 1 + TINY)
+        return dead(forces.forces(solid.mesh.rest_positions, pressure=0.1))
+
+    _, radii = quarter_tube("ln J", dead_pressure, young_modulus=1.0, poisson_ratio=0.45)
+    assert np.isclose(radii[0], 1.2124, rtol=0.002)
 
 
 def test_t10a_land_beam_of_guccione():
@@ -242,11 +215,10 @@ def test_t10a_land_beam_of_guccione():
         fibres=(1, 0, 0),
     )
     solid = ms.Solid(ms.meshes.box((10, 1, 1), cells=(10, 2, 2), diagonals="crossed"), material=material)
-    below = Faces(solid.mesh, lambda x: x[:, 2] < TINY)
-    pin = ms.Pin(at(solid, x=0.0))
-    rest = blown(lambda loads: ms.Scene(solid, supports=[pin], loads=loads), below, 0.004)
+    below = ms.Pressure(0.004, faces=faces_where(solid, lambda x: x[..., 2] < TINY))
+    rest = ms.equilibrium(ms.Scene(solid, supports=[ms.Pin(at(solid, x=0.0))], loads=[below]))
     z = rest.positions[at(solid, x=10.0, y=0.5, z=1.0)[0], 2]
-    assert 4.15 < z < 4.19
+    assert rest.stable and 4.15 < z < 4.19
 
 
 def test_i1_moduli_of_two_blocks():

@@ -59,6 +59,15 @@ std::vector<SheetInput> sheets_of(const py::list& given) {
     return sheets;
 }
 
+std::vector<PressureInput> pressures_of(const py::list& given) {
+    std::vector<PressureInput> pressures;
+    for (const py::handle each : given)
+        pressures.push_back({each["owner"].cast<std::string>(), each["rows"].cast<Index>(),
+                             each["nodes_per_face"].cast<int>(), each["nodes"].cast<std::vector<Index>>(),
+                             each["row"].cast<std::vector<Index>>()});
+    return pressures;
+}
+
 std::vector<RigidInput> rigid_of(const py::list& given) {
     std::vector<RigidInput> rigid;
     for (const py::handle each : given)
@@ -86,6 +95,7 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     for (const py::handle each : given["face_energies"])
         input.face_energies.push_back({each["owner"].cast<std::string>(), each["body"].cast<Index>(),
                                        each["energy"].cast<std::shared_ptr<FaceEnergy>>()});
+    input.pressures = pressures_of(given["pressures"]);
     input.gravity = given["gravity"].cast<bool>();
     input.loads = given["loads"].cast<bool>();
     for (const py::handle source : given["field_sources"])
@@ -129,6 +139,7 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
         const std::lock_guard lock(model.in_use());
         model.evaluate(q, controls);
         model.assemble(q, controls, false);
+        model.require_symmetric();
         if (reduced) {
             model.reduction().matrix(model.matrix(), values);
             model.reduction().add_curvature(model.residual().gradient, values);

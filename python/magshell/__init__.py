@@ -54,6 +54,7 @@ from .statics.warm_start import WarmStart
 from .surroundings.contact import Contact
 from .surroundings.face_energies import SurfaceTension
 from .surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
+from .surroundings.pressure import Pressure
 from .surroundings.supports import Clamp, Pin, SymmetryPlane
 from .surroundings.water import Water
 
@@ -101,6 +102,7 @@ __all__ = [
     "Pin",
     "PlacedField",
     "PointLoad",
+    "Pressure",
     "Rigid",
     "RigidResult",
     "SampledField",

@@ -163,8 +163,8 @@ def _scenes(s: Sample) -> Iterator[Call]:
     yield Call("EdgeLoad", loaded(ms.EdgeLoad), {"edges": far, "force_per_length": (0, 0, 1)})
     yield Call("AreaLoad", loaded(ms.AreaLoad), {"force_per_area": (0, 0, 1), "faces": np.arange(3)})
     yield Call("EdgeCouple", loaded(ms.EdgeCouple), {"edges": far, "couple_per_length": 1e-3})
-    wet = {"surface_tension": np.full(3, 0.02), "faces": np.arange(3)}
-    yield Call("SurfaceTension", loaded(ms.SurfaceTension), wet)
+    for kind, name in ((ms.SurfaceTension, "surface_tension"), (ms.Pressure, "pressure")):
+        yield Call(kind.__name__, loaded(kind), {name: np.full(3, 0.02), "faces": np.arange(3)})
     whole = {
         "bodies": s.shell,
         "supports": [s.clamp],
@@ -247,9 +247,8 @@ def _solves(s: Sample) -> Iterator[Call]:
     )
     yield Call("linear_response", ms.linear_response, magnetic)
     yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "modes": 1}, cost=2)
-    yield Call(
-        "vibration_modes", ms.vibration_modes, {"scene": s.scene, "equilibrium": s.rest, "count": 2}, cost=2
-    )
+    modes = {"scene": s.scene, "equilibrium": s.rest, "count": 2, "mass": "consistent"}
+    yield Call("vibration_modes", ms.vibration_modes, modes, cost=2)
     viscous = {"damping": 1e-3, "stiffness_damping": 1e-4, "maxwell_modulus": 0.1, "maxwell_time": 1e-2}
     motion = {
         **magnetic,

@@ -217,7 +217,7 @@ class Backward {
             if (model_.has_forces()) model_.assemble_forces(controls);
             VectorXd reaction(model_.size());
             model_.matrix().multiply(lambda.data(), reaction.data());
-            if (model_.has_forces()) model_.remainder().add_product(lambda, true, reaction);
+            model_.remainder().add_product(lambda, true, reaction);
             reaction += by_x;
             model_.reduction().vjp(reaction, controls, scene_);
         }

@@ -1,6 +1,7 @@
 #include "magshell/adjoint/static.h"
 
 #include "magshell/core/errors.h"
+#include "magshell/solve/unsymmetric.h"
 
 namespace magshell {
 
@@ -13,15 +14,16 @@ Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorX
 
     model.set_turns(equilibrium.turns);
     model.evaluate(q, controls);
+    if (model.follows() || reduction.moves()) model.assemble(q, controls, false);
     VectorXd reduced = -reduction.vector(by_state);
-    equilibrium.factor->solve(reduced);
+    solve_at_equilibrium(model, *equilibrium.factor, true, reduced);
     const VectorXd lambda = reduction.expand(reduced);
     Gradient gradient(model.registry());
     model.vjp(q, controls, lambda, gradient);
     if (reduction.moves()) {
-        model.assemble(q, controls, false);
         VectorXd reaction(q.size());
         model.matrix().multiply(lambda.data(), reaction.data());
+        model.remainder().add_product(lambda, true, reaction);
         reaction += by_state;
         reduction.vjp(reaction, controls, gradient);
     }

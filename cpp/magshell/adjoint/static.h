@@ -2,7 +2,7 @@
 //
 //   H_ff lambda_f = - dF/dq_f,      dF/dk = lambda^T dg/dk + (dF/dq_h + H_hf lambda_f)^T dq_h/dk
 //
-// One back-substitution with the factorization that found the equilibrium stable serves all k.
+// with H transposed where loads that follow make it unsymmetric. One back-substitution with the factorization that found the equilibrium stable serves all k.
 #pragma once
 
 #include "magshell/solve/statics.h"

@@ -16,8 +16,10 @@ Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, con
                           registry.values.add(owner, "displacement", "m", 1, 3)});
     }
     std::vector<char> is_held(matrix.size(), 0);
+    held_at_.assign(matrix.nodes(), -1);
     for (Index k = 0; k < static_cast<Index>(held_.size()); ++k) {
         const HeldNode& h = held_[k];
+        held_at_[h.node] = k;
         if (h.held == 3 || axis_aligned(h)) {
             for (int axis = 0; axis < h.held; ++axis) {
                 Index component;
@@ -96,6 +98,22 @@ VectorXd Reduction::prescribed_increment(const VectorXd& q, const Controls& cont
         increment.segment<3>(3 * h.node) = held_part(
             h, [&](Index move) -> Vec3 { return place(h.node, move, t) - q.segment<3>(3 * h.node); });
     return increment;
+}
+
+Mat3 Reduction::free_motions(Index node) const {
+    Mat3 free = Mat3::Identity();
+    if (held_at_[node] < 0) return free;
+    const HeldNode& h = held_[held_at_[node]];
+    for (int axis = 0; axis < h.held; ++axis) free -= h.frame.col(axis) * h.frame.col(axis).transpose();
+    return h.held == 3 ? Mat3(Mat3::Zero()) : free;
+}
+
+// Along a symmetry plane, the plane of both nodes has no part of it but round-off.
+bool Reduction::feels_skew(Index a, Index b, const Vec3& axis) const {
+    constexpr double round_off = 1e-10;
+    Mat3 across;
+    across << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;
+    return (free_motions(a) * across * free_motions(b)).norm() > round_off * axis.norm();
 }
 
 VectorXd Reduction::prescribed_rate(const Controls& controls) const {
@@ -276,8 +294,8 @@ VectorXd Reduction::expand(const VectorXd& reduced) const {
 
 std::size_t Reduction::bytes() const {
     return pieces_.capacity() * sizeof(Piece) +
-           (frame_of_.capacity() + free_unknowns_.capacity() + pattern_->rows.capacity() +
-            pattern_->column_starts.capacity()) *
+           (frame_of_.capacity() + held_at_.capacity() + free_unknowns_.capacity() +
+            pattern_->rows.capacity() + pattern_->column_starts.capacity()) *
                sizeof(Index) +
            (carried_ ? carried_->bytes() : 0);
 }

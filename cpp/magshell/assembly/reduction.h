@@ -51,6 +51,9 @@ class Reduction {
     /// Adds the gradients by the moves and by their progress, given the gradient by what supports hold.
     void vjp(const VectorXd& by_state, const Controls& controls, Gradient& out) const;
 
+    /// Whether [axis]x between two nodes does anything along motions of the free ones.
+    bool feels_skew(Index a, Index b, const Vec3& axis) const;
+
     /// The largest angle [rad] by which a support turns in all.
     double largest_turn() const;
 
@@ -104,6 +107,8 @@ class Reduction {
     }
     /// Where a move has a node, and how fast it takes it along; -1 leaves it at rest.
     Vec3 place(Index node, Index move, double progress) const;
+    /// Of a node: along which motions it is free.
+    Mat3 free_motions(Index node) const;
     /// How fast its move carries a node, as the progress changes.
     Vec3 rate(Index node, Index move, double progress) const;
     bool axis_aligned(const HeldNode& h) const;
@@ -121,6 +126,7 @@ class Reduction {
     Slot progress_;
     Index full_size_;
     std::vector<Index> frame_of_;       // per node: index into held_ where turned, else -1; empty if none is
+    std::vector<Index> held_at_;        // per node: index into held_, else -1
     std::vector<Index> free_unknowns_;  // reduced -> full, ascending
     std::shared_ptr<const SparsePattern> pattern_;
     // What is left of the full matrix, in pieces without a gap: supports take little away.

@@ -21,6 +21,12 @@ void Remainder::add_product(const VectorXd& p, bool transposed, VectorXd& out) c
                            each.block.rightCols<3>() * at[2];
         for (int k = 0; k < 3; ++k) out.segment<3>(3 * each.nodes[k]) += each.weights[k] * force;
     }
+    for (const Skew& each : skews_) {
+        const auto& [a, b] = each.nodes;
+        const Vec3 axis = transposed ? Vec3(-each.axis) : each.axis;
+        out.segment<3>(3 * a) += axis.cross(Vec3(p.segment<3>(3 * b)));
+        if (a != b) out.segment<3>(3 * b) += axis.cross(Vec3(p.segment<3>(3 * a)));
+    }
 }
 
 }  // namespace magshell

@@ -1,4 +1,6 @@
 // What a symmetric matrix does not hold of the Jacobian of forces: small unsymmetric blocks, never assembled.
+//
+// Those of forces that act within time steps, and those of loads without a potential, which act always.
 #pragma once
 
 #include <array>
@@ -19,15 +21,26 @@ class Remainder {
         Mat39 block;
     };
 
+    /// Both nodes feel [axis]x of the other's motion; one node that is both, that of its own.
+    struct Skew {
+        std::array<Index, 2> nodes;
+        Vec3 axis;
+    };
+
     void clear() {
         points_.clear();
         shared_.clear();
+        skews_.clear();
     }
-    bool empty() const { return points_.empty() && shared_.empty(); }
+    bool empty() const { return !of_motion() && skews_.empty(); }
+    /// Whether there are blocks of forces that act within time steps only.
+    bool of_motion() const { return !points_.empty() || !shared_.empty(); }
+    const std::vector<Skew>& skews() const { return skews_; }
 
     /// A block of one node.
     void add(Index node, const Mat3& block) { points_.push_back({node, block}); }
     void add(const Shared& shared) { shared_.push_back(shared); }
+    void add(const Skew& skew) { skews_.push_back(skew); }
     /// So many more, for the caller to fill before the next call.
     Shared* extend(std::size_t count) {
         shared_.resize(shared_.size() + count);
@@ -44,6 +57,7 @@ class Remainder {
     };
     std::vector<Point> points_;
     std::vector<Shared> shared_;
+    std::vector<Skew> skews_;
 };
 
 }  // namespace magshell

@@ -222,6 +222,7 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
             term->assemble(chunk, q.data(), controls, extrapolated_stress, matrix_);
     });
     for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
+    add_remainders(q, controls);
 }
 
 void Model::share_out_columns() {

@@ -69,6 +69,12 @@ class Model {
     std::string not_finite(const VectorXd& q, const Controls& controls);
     /// The Hessian at the last evaluated state, in matrix().
     void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
+    /// Whether loads follow the bodies, which may make the Hessian unsymmetric; and whether, as assembled last, it is, for
+    /// what is free to move: then it is matrix() and remainder(), and there is no energy.
+    bool follows() const { return follows_; }
+    bool unsymmetric() const { return unsymmetric_; }
+    /// The same, and why, for those who need it symmetric. Throws InvalidInput.
+    void require_symmetric() const;
     void extrapolate(const VectorXd& p);
     /// How fast the gradient at q changes while the controls, now `at`, change at this rate: exact for those that it is
     /// linear in, by differences of fourth order for what varies. Leaves the model as evaluated elsewhere.
@@ -147,6 +153,7 @@ class Model {
     void add_couples(const SceneInput& input);
     void add_contacts(const SceneInput& input);
     void share_out_columns();
+    void add_remainders(const VectorXd& q, const Controls& controls);
     void hand_out_values();
     template <class Function>
     VectorXd rate_by_varying(const Controls& at, const Controls& rate, const Function& function);
@@ -168,6 +175,7 @@ class Model {
     std::vector<const Term*> refusing_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
     const ContactTerm* contact_ = nullptr;
+    bool follows_ = false, unsymmetric_ = false;
     // By chunk: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
     std::vector<std::vector<Index>> first_nodes_, first_rotations_;
     Values values_;

@@ -1,7 +1,34 @@
-// Of a model, what acts in time steps only: forces that no energy has, and obstacles in the way.
+// Of a model, forces that no energy has: loads that follow the bodies, and what acts in time steps only. And obstacles in
+// the way of those.
+#include <algorithm>
+
+#include "magshell/core/errors.h"
 #include "magshell/scene/model.h"
 
 namespace magshell {
+
+void Model::add_remainders(const VectorXd& q, const Controls& controls) {
+    remainder_.clear();
+    unsymmetric_ = false;
+    if (!follows_) return;
+    for (const std::unique_ptr<Term>& term : terms_) term->add_remainder(q.data(), controls, remainder_);
+    unsymmetric_ =
+        std::any_of(remainder_.skews().begin(), remainder_.skews().end(), [&](const Remainder::Skew& each) {
+            return reduction_.feels_skew(each.nodes[0], each.nodes[1], each.axis);
+        });
+}
+
+void Model::require_symmetric() const {
+    if (unsymmetric_)
+        throw InvalidInput(
+            "the pressure has no potential here, so the stiffness is not symmetric: its faces end at a "
+            "border that is "
+            "free, or neighbouring faces have different pressures. Equilibria, motions and their gradients "
+            "can be "
+            "computed, vibrations, buckling loads and followed paths cannot: close the surface, hold its "
+            "border, or "
+            "give one pressure to all of it");
+}
 
 void Model::begin_step(const VectorXd& q, const Controls& controls) {
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->begin_step(q, controls);
@@ -37,9 +64,9 @@ void Model::hold_forces(bool held) {
 }
 
 void Model::assemble_forces(const Controls& controls, bool cautious) {
-    remainder_.clear();
     for (const std::unique_ptr<ForceTerm>& force : forces_)
         force->assemble(kinematics_, controls, cautious, matrix_, remainder_);
+    unsymmetric_ |= remainder_.of_motion();
 }
 
 KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda, Gradient& out) const {

@@ -12,6 +12,7 @@
 #include "magshell/term/magnetic_term.h"
 #include "magshell/term/membrane_term.h"
 #include "magshell/term/moment_term.h"
+#include "magshell/term/pressure_term.h"
 #include "magshell/term/water_term.h"
 
 namespace magshell {
@@ -63,6 +64,10 @@ void Model::add_terms(const SceneInput& input) {
     for (const FaceEnergyInput& given : input.face_energies) {
         const auto& [surface, body] = bodies_.faces()[given.body];
         terms_.push_back(given.energy->term(given.owner, body, *surface, *loops_[given.body], registry_));
+    }
+    if (!input.pressures.empty()) {
+        terms_.push_back(std::make_unique<PressureTerm>(input.pressures, nodes(), matrix_, registry_));
+        follows_ = true;
     }
     add_moments(input);
     if (input.gravity)

@@ -12,6 +12,7 @@
 #include "magshell/force/drag.h"
 #include "magshell/term/contact_term.h"
 #include "magshell/term/face_energy.h"
+#include "magshell/term/pressure_term.h"
 #include "magshell/term/solid_term.h"
 
 namespace magshell {
@@ -80,6 +81,7 @@ struct SceneInput {
     Index moves = 0;  // that held nodes refer to
     std::vector<EdgeCoupleInput> couples;
     std::vector<FaceEnergyInput> face_energies;
+    std::vector<PressureInput> pressures;
     bool gravity = false, loads = false;
     std::vector<std::shared_ptr<const AppliedField>> field_sources;
     std::vector<ContactInput> contacts;

@@ -107,6 +107,7 @@ class Follower {
         const VectorXd held = model_.prescribed_rate(point.state, at, rate_);
         Eigen::MatrixXd pull = held;
         const FactorReport factor = newton_.factorize(point.state, at, false, {}, pull);
+        model_.require_symmetric();  // or the pivots say nothing of stability
         if (!factor.succeeded) return false;
         point.unstable_directions = factor.negative_pivots;
         tangent = {response(point.state, at, held, pull.col(0)), 1.0};

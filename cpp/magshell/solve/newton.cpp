@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "magshell/core/errors.h"
+#include "magshell/solve/unsymmetric.h"
 
 namespace magshell {
 namespace {
@@ -47,10 +48,7 @@ double deserved(double residual, double tolerance) {
 // square of the step before: negligible after a small move.
 constexpr double negligible_move = 1e-7, small_move = 1e-4;
 
-// Of solves with an unsymmetric matrix for gradients.
-constexpr double gradient_tolerance = 1e-13;
-constexpr int gradient_vectors = 300;
-// Of those with a factorization from nearby: a soft sheet's solution has up to four digits less than its residual.
+// Of solves for gradients with a factorization from nearby: a soft sheet's solution has up to four digits less than its residual.
 constexpr double nearby_gradient_tolerance = 1e-14;
 constexpr int nearby_gradient_vectors = 30;
 
@@ -137,9 +135,8 @@ void Newton::evaluate(const VectorXd& q, const Controls& controls, const Anchor&
 void Newton::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
                       const Anchor& anchor, bool cautious) {
     model_.assemble(q, controls, extrapolated_stress);
-    const bool forces = anchor.motion && model_.has_forces();
-    if (forces) model_.assemble_forces(controls, cautious);
-    unsymmetric_ = forces && !model_.remainder().empty();
+    if (anchor.motion && model_.has_forces()) model_.assemble_forces(controls, cautious);
+    unsymmetric_ = model_.unsymmetric();
 }
 
 FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
@@ -156,7 +153,7 @@ FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool
         const VectorXd move = moves.col(k);
         VectorXd pull(move.size());
         model_.matrix().multiply(move.data(), pull.data());
-        if (unsymmetric_) model_.remainder().add_product(move, false, pull);
+        model_.remainder().add_product(move, false, pull);
         moves.col(k) = pull;
     }
     return factorize_assembled(q, anchor);
@@ -199,7 +196,7 @@ VectorXd Newton::solve_with_factor(const VectorXd& rhs, double tolerance) const 
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
     if (unsymmetric_)
-        solve_unsymmetric(false, {tolerance, gradient_vectors}, reduced);
+        solve_unsymmetric(model_, *factor_, false, {tolerance, to_round_off.max_iterations}, reduced);
     else
         factor_->solve(reduced);
     return model_.reduction().expand(reduced);
@@ -209,21 +206,11 @@ VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
     if (!unsymmetric_) return solve_with_factor(rhs);
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.reduction().vector(rhs);
-    const GmresReport report = solve_unsymmetric(true, {gradient_tolerance, gradient_vectors}, reduced);
+    const GmresReport report = solve_unsymmetric(model_, *factor_, true, to_round_off, reduced);
     if (!report.converged)
-        throw InvalidInput("a linear solve with friction or water stopped at a residual of " +
+        throw InvalidInput("a linear solve with friction, water or pressure stopped at a residual of " +
                            std::to_string(report.residual));
     return model_.reduction().expand(reduced);
-}
-
-GmresReport Newton::solve_unsymmetric(bool transposed, const GmresOptions& options, VectorXd& reduced) const {
-    const Reduction& reduction = model_.reduction();
-    const auto assembled = [&](const VectorXd& x) {
-        VectorXd rest = VectorXd::Zero(model_.size());
-        model_.remainder().add_product(reduction.expand(x), transposed, rest);
-        return VectorXd(factor_->image(x) + reduction.vector(rest));
-    };
-    return gmres(assembled, [&](VectorXd& x) { factor_->solve(x); }, reduced, options);
 }
 
 bool Newton::still_holds(const VectorXd& q, const Controls& controls) {
@@ -361,8 +348,11 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             moved = last_step <= small_move * model_.length_scale() ? 0.0
                                                                     : std::numeric_limits<double>::infinity();
         }
-        VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
-                                                 deserved(report.residual, options_.tolerance));
+        // Loads at rest leave a remainder of few nodes, which takes few vectors: no digit is given away.
+        const VectorXd force = -gradient(q, anchor) - pull.col(0);
+        VectorXd step =
+            move + (anchor.motion ? solve_with_factor(force, deserved(report.residual, options_.tolerance))
+                                  : solve_with_factor(force));
         if (model_.refuses_states()) {
             const double share = model_.largest_share(q, step / of_way_to_inversion);
             if (share < shortest_share)

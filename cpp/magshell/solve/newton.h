@@ -119,8 +119,6 @@ class Newton {
                   bool cautious = false);
     /// Whether steps with the last factorization will do, which are as good as free.
     bool factor_serves(double contraction, double residual, double last_step) const;
-    /// As solve_with_factor with an unsymmetric K, or K^T, free unknowns.
-    GmresReport solve_unsymmetric(bool transposed, const GmresOptions& options, VectorXd& reduced) const;
     FactorReport factorize_assembled(const VectorXd& q, const Anchor& anchor);
     VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
 
@@ -129,7 +127,7 @@ class Newton {
     Watch watch_;
     mutable double watched_ = 1.0;  // the residual that the watch was told last
     std::shared_ptr<Factor> factor_;
-    bool unsymmetric_ = false;  // whether what was assembled last has a remainder
+    bool unsymmetric_ = false;  // whether what was assembled last is
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     mutable double linear_time_ = 0.0;
 };

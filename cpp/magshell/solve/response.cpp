@@ -1,6 +1,7 @@
 #include "magshell/solve/response.h"
 
 #include "magshell/core/errors.h"
+#include "magshell/solve/unsymmetric.h"
 
 namespace magshell {
 
@@ -14,14 +15,16 @@ VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, cons
     model.evaluate(q, to);
     VectorXd change = reduction.prescribed_increment(q, to);
     VectorXd force = model.residual().gradient;
-    if (!change.isZero(0.0)) {
-        model.assemble(q, to, false);
+    const bool moves = !change.isZero(0.0);
+    if (moves || model.follows()) model.assemble(q, to, false);
+    if (moves) {
         VectorXd pull(q.size());
         model.matrix().multiply(change.data(), pull.data());
+        model.remainder().add_product(change, false, pull);
         force += pull;
     }
     VectorXd reduced = -reduction.vector(force);
-    equilibrium.factor->solve(reduced);
+    solve_at_equilibrium(model, *equilibrium.factor, false, reduced);
     change += reduction.expand(reduced);
     return change;
 }

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "magshell/assembly/remainder.h"
 #include "magshell/assembly/residual.h"
 #include "magshell/assembly/schedule.h"
 #include "magshell/assembly/system_matrix.h"
@@ -55,6 +56,9 @@ class Term {
 
     /// Adds the share of the Hessian that is not on faces.
     virtual void finish_assembly(const double* /*q*/, const Controls&, SystemMatrix& /*out*/) const {}
+
+    /// Adds what of the derivative of its gradient is not symmetric: of forces that have no potential.
+    virtual void add_remainder(const double* /*q*/, const Controls&, Remainder& /*out*/) const {}
 
     /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J p).
     virtual void extrapolate(const double* /*p*/) {}

@@ -138,6 +138,15 @@ class Shell(Owner):
         return masses
 
     @property
+    def element_masses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Consistent masses: the corners of each face (n_f, 3), and the integrals of its mass per area times the products
+        of their shape functions (n_f, 3, 3), kg."""
+        if self.mass_density is None:
+            raise ValueError("the shell has no mass_density [kg/m3]")
+        products = (np.ones((3, 3)) + np.eye(3)) / 12.0
+        return self.mesh.faces, (self.face_volumes * self.mass_density)[:, None, None] * products
+
+    @property
     def weighed_masses(self) -> np.ndarray:
         """What gravity pulls at each vertex by, (n_v,), kg."""
         return self.vertex_masses

@@ -8,6 +8,7 @@ import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
+from ..mesh.tet_integrals import shape_integrals, shape_products
 from ..mesh.tet_mesh import TetMesh
 from .materials import SolidMaterial
 from .mean_volume import warn_of_mean_volume
@@ -180,7 +181,8 @@ class Solid(Owner):
     def _shares(self) -> tuple[np.ndarray, np.ndarray]:
         """Of each tetrahedron's volume, at its nodes, (n_t, 4) or (n_t, 10) m3: for inertia, for weights.
 
-        A quadratic element's weight is carried by its middle nodes, -1/20 at corners and 1/5 between them; for inertia its
+        A quadratic element's weight is shared out by its shape functions, curved ones exactly: -1/20 at corners and 1/5
+        between them where it is straight; for inertia its
         mass is lumped in proportion to the diagonal of its mass matrix (Hinton, Rock, Zienkiewicz 1976), 1/36 and 4/27,
         which are positive and add up to one.
         """
@@ -189,8 +191,7 @@ class Solid(Owner):
             even = np.repeat(volumes / 4.0, 4, axis=1)
             return even, even
         lumped = np.array([1 / 36] * 4 + [4 / 27] * 6)
-        carried = np.array([-1 / 20] * 4 + [1 / 5] * 6)
-        return volumes * lumped, volumes * carried
+        return volumes * lumped, shape_integrals(self.mesh.rest_positions[self.mesh.tetrahedra])
 
     def _gathered(self, shares: np.ndarray) -> np.ndarray:
         if self.mass_density is None:
@@ -208,6 +209,19 @@ class Solid(Owner):
     def weighed_masses(self) -> np.ndarray:
         """What gravity pulls at each vertex by, (n_v,), kg; negative at corners of quadratic elements."""
         return self._gathered(self._shares[1])
+
+    @property
+    def element_masses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Consistent masses: the nodes of each element (n_t, k), and the integrals of its density times the products of
+        their shape functions (n_t, k, k), kg."""
+        if self.mass_density is None:
+            raise ValueError("the solid has no mass_density [kg/m3]")
+        nodes = self.mesh.tetrahedra
+        if self.element == "linear":
+            products = self.mesh.volumes[:, None, None] * (np.ones((4, 4)) + np.eye(4)) / 20.0
+        else:
+            products = shape_products(self.mesh.rest_positions[nodes])
+        return nodes, self.mass_density[:, None, None] * products
 
     def __repr__(self) -> str:
         parts = [f"{self.mesh.n_tetrahedra} {self.element} tetrahedra", repr(self.material)]

@@ -18,12 +18,14 @@ from ..scene.inputs import Inputs
 from ..scene.replacements import requested
 from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
+from .inertia import consistent_masses, in_places
 from .mode_shapes import mode_shapes
 from .rest import symmetric
 
 _ROUND_OFF_SHARE = (
     64.0 * np.finfo(float).eps
 )  # of the fastest vibration's square: below, a square is round-off
+MASSES = ("lumped", "consistent")
 _SHIFT_GROWTH = 8.0
 _ATTEMPTS = 3  # each searches a larger space
 _TOLD_APART = (
@@ -72,19 +74,26 @@ class VibrationModes:
 
 @solve_entry
 def vibration_modes(
-    scene: Scene, equilibrium: Equilibrium | None = None, *, values: dict | None = None, count: int = 6
+    scene: Scene,
+    equilibrium: Equilibrium | None = None,
+    *,
+    values: dict | None = None,
+    count: int = 6,
+    mass: str = "lumped",
 ) -> VibrationModes:
     """The slowest small vibrations of a scene about an equilibrium, loaded, magnetised or buckled.
 
         K x = w^2 M x
 
-    with K the Hessian there, M the lumped masses and the edge rotations without mass; what supports hold stands still.
-    Damping does not count.
+    with K the Hessian there, M the masses and the edge rotations without mass; what supports hold stands still. Damping
+    does not count.
 
     equilibrium: of this scene, with the controls and values it was found for; one that is not stable has modes that
         grow. By default the rest shape without loads and fields.
     values: as in ms.equilibrium, where there is no equilibrium, which has its own.
     count: how many modes.
+    mass: "lumped" to the vertices, as motions have it: frequencies are off by the square of the size of the elements, 3 %
+        for a cube of 6 quadratic cells a side; or "consistent" with the elements' shapes: 1 % of it with 4, and from above.
 
     Raises ValueError on bad input, NotConverged where the search for the modes does not come to its end, Interrupted.
 
@@ -99,9 +108,12 @@ def vibration_modes(
     inputs = _inputs(scene, equilibrium, values)
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
         raise ValueError(f"count must be an integer of at least 1, got {count!r}")
+    if not isinstance(mass, str) or mass not in MASSES:
+        raise ValueError(f"mass must be one of {MASSES}, got {mass!r:.60}")
     began = time.perf_counter()
     model = scene._model
-    masses = model.free_weights(inputs.values.masses)
+    consistent = consistent_masses(inputs.values) if mass == "consistent" else None
+    masses = model.free_weights(inputs.values.masses) if consistent is None else consistent.diagonal()
     if count >= np.count_nonzero(masses):
         raise ValueError(
             f"count must be below the {np.count_nonzero(masses)} unknowns with mass, got {count}"
@@ -116,7 +128,9 @@ def vibration_modes(
             masses = model.free_weights(inputs.values.masses)  # as the parts are turned there
             inertia = model.free_weight_values(inputs.values.masses)
     slow = min(map(_slow_square, inputs.values.sheets), default=1.0)
-    pencil = _Pencil(stiffness, model.free_points, masses, slow, inertia)
+    if consistent is not None:
+        inertia = in_places(consistent, *stiffness[1:3])
+    pencil = _Pencil(stiffness, model.free_points, masses, slow, inertia, consistent)
     squares, vectors = pencil.lowest(int(count))
     modes, edge_rotations = mode_shapes(model, vectors)
     return VibrationModes(
@@ -135,6 +149,7 @@ class _Pencil:
 
     stiffness: (n, column starts, rows, values), the lower triangle of K. points: (n, 3), where the unknowns are.
     masses: (n,), the diagonal of M, zero for edge rotations. inertia: all of M, in the places of K, if that is more.
+    consistent: M (n, n), where it has no root at hand.
     slow_square: 1/s2, about as large as the lowest of a sheet that is held.
     """
 
@@ -145,13 +160,16 @@ class _Pencil:
         masses: np.ndarray,
         slow_square: float,
         inertia: np.ndarray | None = None,
+        consistent=None,
     ):
         *pattern, self._values = stiffness
         self._diagonal = pattern[1][:-1]
         self._masses = masses
         self._moving = np.flatnonzero(masses)
         self._inertia = inertia
-        self._root = _root(masses) if inertia is None else _root_of(symmetric(*pattern, inertia), masses)
+        self._consistent = consistent
+        if consistent is None:
+            self._root = _root(masses) if inertia is None else _root_of(symmetric(*pattern, inertia), masses)
         self._factor = _core.analyze(*pattern, points=points)
         self.factorizations = 0
         stiffest = self._values[self._diagonal][self._moving] / masses[self._moving]
@@ -184,6 +202,8 @@ class _Pencil:
     def _search(self, count: int, seed: int, space: int) -> tuple[np.ndarray, np.ndarray]:
         # With M = L L^T, y = L^T x and the edge rotations at rest: L^T (K - shift M)^-1 L y = y / (w^2 - shift).
         self._factorize(self._shift)
+        if self._consistent is not None:
+            return self._search_generalized(count, seed, space)
         times_root, times_transposed = self._root
 
         def moved_by(y: np.ndarray) -> np.ndarray:
@@ -203,6 +223,26 @@ class _Pencil:
         order = np.argsort(-inverses)
         modes = np.stack([moved_by(vectors[:, k]) for k in order], axis=1)
         return 1.0 / inverses[order] + self._shift, modes
+
+    def _search_generalized(self, count: int, seed: int, space: int) -> tuple[np.ndarray, np.ndarray]:
+        """K x = w^2 M x with M in the inner product: nearest to the shift are the lowest."""
+        size = len(self._masses)
+        inverse = LinearOperator((size, size), matvec=self._factor.solve, dtype=np.float64)
+        start = self._factor.solve(self._consistent @ np.random.default_rng(seed).standard_normal(size))
+        try:
+            squares, modes = eigsh(
+                inverse,  # K itself is not needed
+                count,
+                M=self._consistent,
+                sigma=self._shift,
+                OPinv=inverse,
+                v0=start,
+                ncv=min(space, len(self._moving)),
+            )
+        except ArpackError as error:
+            raise NotConverged(f"the vibration modes did not converge: {error}. Ask for fewer.") from error
+        order = np.argsort(squares)
+        return squares[order], modes[:, order]
 
     def _squares_below(self, square: float) -> int:
         return self._factorize(square).negative_pivots

@@ -13,15 +13,15 @@ import numpy as np
 
 from .tet_topology import EDGES
 
-_POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])  # (20, 4)
-_POINTS = _POWERS / 3.0
+POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])  # (20, 4)
+_POINTS = POWERS / 3.0
 _LEVELS = 4  # halvings that decide whether a polynomial with coefficients of both signs is positive
 
 
 def _basis(points: np.ndarray) -> np.ndarray:
     """(n, 20): the polynomials of Bernstein at barycentric coordinates (n, 4)."""
-    weights = [6 / np.prod([factorial(p) for p in powers]) for powers in _POWERS.tolist()]
-    return np.prod(points[:, None, :] ** _POWERS, axis=2) * weights
+    weights = [6 / np.prod([factorial(p) for p in powers]) for powers in POWERS.tolist()]
+    return np.prod(points[:, None, :] ** POWERS, axis=2) * weights
 
 
 _FROM_VALUES = np.linalg.inv(_basis(_POINTS))

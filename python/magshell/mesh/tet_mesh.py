@@ -28,6 +28,7 @@ from .tet_quality import TetQuality
 from .tet_refine import refined
 from .tet_selection import TetSelection, checked_part_names, checked_parts
 from .tet_topology import (
+    FACE_NODES,
     FACES,
     MIRRORED,
     edge_table,
@@ -198,6 +199,13 @@ class TetMesh(TetSelection):
     def faces_of_corners(self) -> np.ndarray:
         """(n, 3): the corners of each outer side of a tetrahedron, one triangle a side also where there are ten nodes."""
         return self.corners[self._outer[:, None] // 4, FACES[self._outer % 4]]
+
+    @property
+    def nodes_of_sides(self) -> np.ndarray:
+        """(n, 3) or (n, 6): the nodes of each outer side of a tetrahedron: the corners, then the nodes between the first
+        and the second, the second and the third, the third and the first. Of six, side k is faces 4 k to 4 k + 3."""
+        nodes = FACES if self.order == 1 else FACE_NODES
+        return self.tetrahedra[self._outer[:, None] // 4, nodes[self._outer % 4]]
 
     @property
     def face_tetrahedra(self) -> np.ndarray:

@@ -53,6 +53,7 @@ _UNITS = {
     "center": "m",
     "rotation": "rad",
     "displacement": "m",
+    "pressure": "Pa",
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from .._checks.quantity import quantity
 from .._machine.keywords import controls_of, nearest_first
 from ..bodies.shell import Shell
-from ..surroundings.loads import EdgeCouple
+from ..surroundings.loads import DeadLoad
 from .courses import refuse_functions
 
 # Those of a scene's one body that have a keyword of their own.
@@ -90,10 +90,13 @@ def _check_against_scene(scene, asked: dict, moving: bool) -> None:
             "gravity or mass_density was given, but the scene has no gravity: Scene(..., gravity=...)"
         )
     if "vertex_loads" in asked.get(scene, {}):
-        forces = [load for load in scene.loads if not isinstance(load, EdgeCouple)]
+        forces = [load for load in scene.loads if isinstance(load, DeadLoad)]
         if not forces:
             raise ValueError(
-                "vertex_loads was given, but the scene has no loads: Scene(..., loads=...), zero will do"
+                "vertex_loads was given, but the scene has no PointLoad, EdgeLoad or AreaLoad: Scene(..., loads=...), zero "
+                "will do"
             )
         if any(load in asked for load in forces):
-            raise ValueError("vertex_loads stands for all loads: leave them out of values")
+            raise ValueError(
+                "vertex_loads stands for all point, edge and area loads: leave them out of values"
+            )

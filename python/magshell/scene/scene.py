@@ -26,12 +26,13 @@ from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import contact_inputs, obstacles_of
 from ..surroundings.face_energies import FaceEnergy
 from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
+from ..surroundings.pressure import Pressure
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane, continuations
 from ..surroundings.water import Water
 from .layout import Layout
 from .values import Values
 
-_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy)
+_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure)
 _SUPPORTS = (Pin, Clamp, SymmetryPlane)
 
 
@@ -43,7 +44,7 @@ class Scene:
         faces of a result are those of one body after another, and `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
-    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple and SurfaceTension objects; likewise.
+    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     gravity: (3,), m/s2; needs the mass density of all bodies.
     contacts: Contact objects, each with the obstacles that it is about.
@@ -173,6 +174,11 @@ class Scene:
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
             face_energies=self._face_energies(),
+            pressures=[
+                load._core_input(label, self._bodies)
+                for load, label in self._labels
+                if isinstance(load, Pressure)
+            ],
             loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
             contacts=contact_inputs(self.contacts, bodies),

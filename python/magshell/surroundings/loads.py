@@ -9,6 +9,7 @@ from .._checks.quantity import quantity, real_numbers
 from .._checks.selections import indices, selection
 from ..bodies.bodies import checked_body
 from ..bodies.shell import Shell
+from ..mesh.face_shapes import shares
 from ..mesh.triangle_mesh import TriangleMesh
 
 
@@ -29,7 +30,7 @@ class DeadLoad(Owner):
         """(n_v, 3), N."""
         vertices, weights = self._shares(mesh)
         rows = _rows(self._label, getattr(self, self._replaceable[0]), len(vertices))
-        return _spread(mesh, vertices, rows * weights)
+        return _spread(mesh, vertices, rows[:, None] * weights[..., None])
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         key = ("loads", "forces")
@@ -42,10 +43,10 @@ class DeadLoad(Owner):
         part = values.scene._bodies.of(self)
         vertices, weights = self._shares(part.mesh)
         by_forces = gradient.value("loads", "forces")[part.vertices]
-        return {self._replaceable[0]: by_forces[vertices].sum(axis=1) * weights}
+        return {self._replaceable[0]: (by_forces[vertices] * weights[..., None]).sum(axis=1)}
 
     def _shares(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """The vertices of each part (k, m), and how much of the value each of them feels (k, 1)."""
+        """The vertices of each part (k, m), and how much of the value each of them feels (k, 1) or (k, m)."""
         raise TypeError(f"{type(self).__name__} is no load of its own")
 
 
@@ -90,7 +91,8 @@ class EdgeLoad(DeadLoad):
 
 
 class AreaLoad(DeadLoad):
-    """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face.
+    """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face. Faces of quadratic
+    elements are curved, and share it out by their shapes.
 
     body: the Shell or Solid that it acts on; by default all, where no faces are given.
     """
@@ -111,7 +113,7 @@ class AreaLoad(DeadLoad):
             if self.faces is None
             else indices("AreaLoad faces", self.faces, mesh.n_faces)
         )
-        return mesh.faces[faces], (mesh.face_areas[faces] / 3.0)[:, None]
+        return shares(mesh, faces)
 
 
 class EdgeCouple(Owner):
@@ -194,7 +196,7 @@ def _rows(label: str, vectors: np.ndarray, count: int) -> np.ndarray:
 
 
 def _spread(mesh: TriangleMesh, vertices: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Each row's force on each of the row's vertices."""
+    """The forces (k, 1, 3) or (k, m, 3) of each row on its vertices (k, m)."""
     at_vertices = np.zeros((mesh.n_vertices, 3))
-    np.add.at(at_vertices, vertices, forces[:, None, :])
+    np.add.at(at_vertices, vertices, forces)
     return at_vertices

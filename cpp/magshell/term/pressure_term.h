@@ -1,0 +1,82 @@
+// Pressures that follow the faces that they act on: of all bodies of a scene together, since what two of them do along the
+// border between them may cancel.                                                        energy/face_pressure.h
+//
+// The energy is minus the work of the forces on the straight way from the shape at rest: minus p times the change of the
+// volume in front of the faces wherever there is a potential, whatever closes the surface.
+#pragma once
+
+#include <tuple>
+#include <vector>
+
+#include "magshell/assembly/lanes.h"
+#include "magshell/body/nodes.h"
+#include "magshell/energy/face_pressure.h"
+#include "magshell/term/term.h"
+
+namespace magshell {
+
+/// The faces that one pressure acts on, in the caller's vertices.
+struct PressureInput {
+    std::string owner;         // under which its pressures are registered
+    Index rows = 1;            // how many it has
+    int nodes_per_face = 3;    // or 6
+    std::vector<Index> nodes;  // of all faces, one after another
+    std::vector<Index> row;    // of each face's parts, 1 or 4; negative: none acts there
+};
+
+class PressureTerm final : public Term {
+  public:
+    PressureTerm(const std::vector<PressureInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
+                 Registry& registry);
+
+    std::string_view name() const override { return "pressure"; }
+    bool set_values(const Values& values) override;
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void add_remainder(const double* q, const Controls& controls, Remainder& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    template <int N>
+    struct Face {
+        using Kernel = FacePressure<N>;
+
+        std::array<Index, N> nodes;
+        std::array<Index, Kernel::parts> places;  // among the pressures of all loads; negative: none
+        PairSlots<N> slots;
+        std::array<Index, N*(N + 1) / 2> pairs;  // of nodes, among all, at lower_index
+
+        typename Kernel::Corners at(const double* q) const;
+        /// Times the pressures of its parts.
+        typename Kernel::Coefficients coefficients(const std::vector<double>& pressures) const;
+    };
+    /// The pressures of one load.
+    struct Load {
+        Slot slot;
+        Index first;
+    };
+
+    template <int N>
+    void add_face(const PressureInput& input, std::size_t face, Index first, const Nodes& nodes,
+                  const SystemMatrix& matrix);
+    void number_pairs();
+    template <class Function>
+    void each_face(const Function& function) const {
+        std::apply([&](const auto&... kind) { (each_of(kind, function), ...); }, faces_);
+    }
+    template <class Faces, class Function>
+    static void each_of(const Faces& faces, const Function& function) {
+        for (const auto& face : faces) function(face);
+    }
+
+    const Nodes& nodes_;
+    Slot factor_;
+    std::vector<Load> loads_;
+    std::vector<double> pressures_;  // [Pa] of all loads
+    std::tuple<std::vector<Face<3>>, std::vector<Face<6>>> faces_;
+    std::vector<std::array<Index, 2>> pairs_;  // of nodes that a face has both of, each once
+};
+
+}  // namespace magshell
