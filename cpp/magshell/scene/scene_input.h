@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "magshell/assembly/reduction.h"
+#include "magshell/body/joint.h"
 #include "magshell/body/sheet.h"
 #include "magshell/body/solid.h"
 #include "magshell/field/applied_field.h"
@@ -67,6 +68,12 @@ struct RigidInput {
     static constexpr Index own = 10;
 };
 
+/// Rigid parts that are joined in a tree: joints[k] leads to the part links[k], parents first.
+struct SkeletonInput {
+    std::vector<Index> links;  // of SceneInput::rigid
+    std::vector<Joint> joints;
+};
+
 /// Held nodes count the scene's vertices first, then directions.
 struct SceneInput {
     Index n_vertices = 0;         // of sheets and solids
@@ -75,6 +82,7 @@ struct SceneInput {
     std::vector<SolidInput> solids;  // numbered on after the sheets
     std::vector<SkinInput> skins;
     std::vector<RigidInput> rigid;
+    std::vector<SkeletonInput> skeletons;
     Rows3 directions;  // (n_d, 3), of directed edges and of couples
     std::vector<HeldNode> held;
     Index moves = 0;  // that held nodes refer to
