@@ -72,6 +72,14 @@ struct RigidInput {
 struct SkeletonInput {
     std::vector<Index> links;  // of SceneInput::rigid
     std::vector<Joint> joints;
+    std::vector<std::string> owners;  // of joints in which something acts; empty where nothing does
+};
+
+/// A point of one rigid part that is pulled to a point of another, or of the world (negative).
+struct ClosureInput {
+    std::string owner;
+    Index parent, child;  // of SceneInput::rigid
+    Vec3 place;           // at rest
 };
 
 /// Held nodes count the scene's vertices first, then directions.
@@ -83,6 +91,7 @@ struct SceneInput {
     std::vector<SkinInput> skins;
     std::vector<RigidInput> rigid;
     std::vector<SkeletonInput> skeletons;
+    std::vector<ClosureInput> closures;
     Rows3 directions;  // (n_d, 3), of directed edges and of couples
     std::vector<HeldNode> held;
     Index moves = 0;  // that held nodes refer to
