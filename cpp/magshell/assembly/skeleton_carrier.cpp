@@ -34,7 +34,9 @@ std::vector<Index> nodes_of(const std::vector<RigidNodes>& links) {
 }
 
 // Of least norm where the rows leave coordinates undetermined.
-auto solver_of(const MatrixXd& rows) { return rows.completeOrthogonalDecomposition(); }
+auto solver_of(const MatrixXd& rows) {
+    return rows.completeOrthogonalDecomposition();
+}
 
 }  // namespace
 
@@ -108,7 +110,8 @@ MatrixXd SkeletonCarrier::jacobian(const VectorXd& q) const {
 MatrixXd SkeletonCarrier::second_derivative(const VectorXd& q, const VectorXd& gradient) const {
     const std::vector<Column> columns = this->columns(poses(q));
     std::vector<Vec3> forces(n_links(), Vec3::Zero());
-    std::vector<Mat3> products(n_links(), Mat3::Zero());  // sum (x - place) g^T, each about a place of its own
+    std::vector<Mat3> products(n_links(),
+                               Mat3::Zero());  // sum (x - place) g^T, each about a place of its own
     std::vector<Vec3> place(n_links());
     MatrixXd out = MatrixXd::Zero(coordinates_, coordinates_);
     for (Index k = n_links() - 1; k >= 0; --k) {
@@ -192,7 +195,9 @@ void SkeletonCarrier::move_on(VectorXd& q, std::vector<Pose> from, const VectorX
     }
 }
 
-void SkeletonCarrier::advance(VectorXd& q, const VectorXd& z) const { move_on(q, poses(q), z); }
+void SkeletonCarrier::advance(VectorXd& q, const VectorXd& z) const {
+    move_on(q, poses(q), z);
+}
 
 std::vector<SkeletonCarrier::Pose> SkeletonCarrier::first_fit(const VectorXd& q) const {
     std::vector<Pose> fit;

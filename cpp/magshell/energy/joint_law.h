@@ -19,9 +19,18 @@ struct JointLaw {
     double lower = 0.0, upper = 0.0, limit_stiffness = 0.0, limit_smoothing = 1.0;
 
     static constexpr int size = 10;
-    static constexpr std::array<const char*, size> names = {
-        "spring_stiffness", "rest_coordinate", "torque", "target",          "servo_stiffness",
-        "torque_limit",     "lower",           "upper",  "limit_stiffness", "limit_smoothing"};
+    using Names = std::array<const char*, size>;
+    /// What a turn about an axis calls them, a slide along it, and a ball joint, whose coordinate is the angle of its
+    /// rotation and which has no others.
+    static constexpr Names of_turns = {"spring_stiffness", "rest_angle",     "torque",      "target_angle",
+                                       "servo_stiffness",  "torque_limit",   "lower_limit", "upper_limit",
+                                       "limit_stiffness",  "limit_smoothing"};
+    static constexpr Names of_slides = {
+        "spring_stiffness", "rest_displacement", "force",       "target_displacement", "servo_stiffness",
+        "force_limit",      "lower_limit",       "upper_limit", "limit_stiffness",     "limit_smoothing"};
+    static constexpr Names of_balls = {
+        "spring_stiffness", nullptr,           nullptr,          nullptr, nullptr, nullptr, nullptr,
+        "upper_limit",      "limit_stiffness", "limit_smoothing"};
 };
 
 /// Energy, dE/ds, d2E/ds2, and by the law the derivative of dE/ds.

@@ -36,7 +36,8 @@ Carriers carriers_of(const Bodies& bodies, const std::vector<SkeletonInput>& ske
     }
     for (Index part = 0; part < static_cast<Index>(joined.size()); ++part)
         if (!joined[part])
-            carriers.push_back(std::make_unique<SkeletonCarrier>(std::vector{link(part)}, std::vector<Joint>(1)));
+            carriers.push_back(
+                std::make_unique<SkeletonCarrier>(std::vector{link(part)}, std::vector<Joint>(1)));
     return carriers;
 }
 

@@ -65,7 +65,8 @@ void LinkPair::add(const Eigen::Matrix<double, 8, 8>& h, const CornerForm::Corne
             if (i == j)
                 out.add_diagonal_block(nodes_[i], to_pack(block), 0);
             else
-                out.add_block(slots_[i][j], out.column_length(std::min(nodes_[i], nodes_[j])), to_pack(block), 0);
+                out.add_block(slots_[i][j], out.column_length(std::min(nodes_[i], nodes_[j])), to_pack(block),
+                              0);
         }
 }
 

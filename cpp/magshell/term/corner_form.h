@@ -50,7 +50,8 @@ class LinkPair {
   public:
     LinkPair() = default;
     /// `parent` is nullptr for the world. rest: of all nodes.
-    LinkPair(const Index* parent, const Index* child, const std::vector<Vec3>& rest, const SystemMatrix& matrix);
+    LinkPair(const Index* parent, const Index* child, const std::vector<Vec3>& rest,
+             const SystemMatrix& matrix);
 
     /// A vector, and a point, of the parent and of the child, from where they are at rest.
     CornerSum vector(bool of_child, const Vec3& at_rest) const;

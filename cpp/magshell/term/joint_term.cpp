@@ -18,6 +18,11 @@ Vec3 across(const Vec3& axis) {
     return axis.cross(Vec3::Unit(smallest)).normalized();
 }
 
+const JointLaw::Names& names_of(JointKind kind) {
+    if (kind == JointKind::prismatic) return JointLaw::of_slides;
+    return kind == JointKind::ball ? JointLaw::of_balls : JointLaw::of_turns;
+}
+
 }  // namespace
 
 JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest,
@@ -49,22 +54,25 @@ JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& 
             each.cosine.add(links.vector(false, joint.axis), apart);
         else
             for (int c = 0; c < 3; ++c) add(each.cosine, Vec3::Unit(c), Vec3::Unit(c), 1.0);
-        const char* unit = joint.kind == JointKind::prismatic ? "N, m" : "N m, rad";
-        for (const char* name : JointLaw::names)
-            each.slots.push_back(registry.values.add(input.owner, name, unit, 1, 1));
+        for (const char* name : names_of(joint.kind))
+            each.slots.push_back(name ? registry.values.add(input.owner, name, "SI", 1, 1) : Slot{});
     }
 }
 
 bool JointTerm::set_values(const Values& values) {
     bool changed = false;
     for (Each& each : each_) {
-        for (const Slot& slot : each.slots) changed |= values.changed(slot);
-        const auto number = [&](int k) { return values.number(each.slots[k]); };
+        for (const Slot& slot : each.slots) changed |= slot.size() > 0 && values.changed(slot);
+        const auto number = [&](int k) {
+            return each.slots[k].size() > 0 ? values.number(each.slots[k]) : 0.0;
+        };
         if (each.closure)
             each.stiffness = number(0);
         else
             each.law = {number(0), number(1), number(2), number(3), number(4),
                         number(5), number(6), number(7), number(8), number(9)};
+        // A ball joint's angle is not negative.
+        if (each.kind == JointKind::ball) each.law.lower = -1.0;
     }
     return changed;
 }
@@ -144,8 +152,8 @@ void JointTerm::finish_assembly(const double* q, const Controls&, SystemMatrix& 
         const Each& each = each_[k];
         if (each.closure) {
             const Corners none = Corners::Zero();
-            each.links.add(each.stiffness * each.gap.weights * each.gap.weights.transpose(), none, 0.0, none, 0.0,
-                           out);
+            each.links.add(each.stiffness * each.gap.weights * each.gap.weights.transpose(), none, 0.0, none,
+                           0.0, out);
             continue;
         }
         const State now = state(k, q);
@@ -177,7 +185,7 @@ void JointTerm::vjp(const double* q, const Controls&, const double* lambda, Grad
         }
         const JointEnergy law = law_at(each, now.coordinate);
         for (int n = 0; n < JointLaw::size; ++n)
-            out.values[each.slots[n].first] += along * law.force_by[n];
+            if (each.slots[n].size() > 0) out.values[each.slots[n].first] += along * law.force_by[n];
     }
 }
 
