@@ -1,6 +1,7 @@
 #include "magshell/term/corner_form.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "magshell/term/contact_term.h"
 
@@ -14,6 +15,7 @@ LinkPair::LinkPair(const Index* parent, const Index* child, const std::vector<Ve
         middle_[side] = Vec3::Zero();
         for (int k = 0; k < 4; ++k) {
             nodes_[4 * side + k] = corners[k];
+            rest_.col(4 * side + k) = rest[corners[k]];
             middle_[side] += 0.25 * rest[corners[k]];
         }
         for (int k = 0; k < 4; ++k) {
@@ -23,6 +25,11 @@ LinkPair::LinkPair(const Index* parent, const Index* child, const std::vector<Ve
     }
     for (int i = first_; i < 8; ++i)
         for (int j = first_; j < i; ++j) slots_[i][j] = matrix.node_slot(nodes_[i], nodes_[j]);
+}
+
+double LinkPair::length() const {
+    const double child = 1.0 / (4.0 * offsets_[4].norm()), parent = 1.0 / (4.0 * offsets_[0].norm());
+    return std::sqrt(3.0) * (world() ? child : std::min(child, parent));
 }
 
 CornerSum LinkPair::vector(bool of_child, const Vec3& at_rest) const {

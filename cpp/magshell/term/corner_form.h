@@ -65,9 +65,17 @@ class LinkPair {
         for (int k = first_; k < 8; ++k)
             for (int c = 0; c < 3; ++c) out.add(3 * nodes_[k] + c, vectors(c, k));
     }
+    void add_to(const CornerForm::Corners& vectors, VectorXd& out) const {
+        for (int k = first_; k < 8; ++k) out.segment<3>(3 * nodes_[k]) += vectors.col(k);
+    }
     /// Adds h_kl I + factor a_k a_l^T + cross (a_k b_l^T + b_k a_l^T).
     void add(const Eigen::Matrix<double, 8, 8>& h, const CornerForm::Corners& a, double factor,
              const CornerForm::Corners& b, double cross, SystemMatrix& out) const;
+
+    /// Where they are at rest; the largest coordinate there [m]; the smaller l.
+    const CornerForm::Corners& rest() const { return rest_; }
+    double reach() const { return rest_.cwiseAbs().maxCoeff(); }
+    double length() const;
 
   private:
     bool world() const { return first_ == 4; }
@@ -76,6 +84,7 @@ class LinkPair {
     std::array<Index, 8> nodes_{};
     std::array<Vec3, 8> offsets_{};  // rho / 4 l^2
     std::array<Vec3, 2> middle_{};
+    CornerForm::Corners rest_ = CornerForm::Corners::Zero();
     std::array<std::array<SystemMatrix::Slot, 8>, 8> slots_{};  // row above column
 };
 

@@ -38,6 +38,8 @@ JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& 
         const CornerSum apart = links.point(true, joint.origin) - links.point(false, joint.origin);
         if (input.closure) {
             each.gap = apart;
+            each.at_rest = Vec3::Ones() * apart.weights.cwiseAbs().transpose();
+            each.reach = links.reach();
             each.slots.push_back(registry.values.add(input.owner, "stiffness", "N/m", 1, 1));
             continue;
         }
@@ -54,6 +56,11 @@ JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& 
             each.cosine.add(links.vector(false, joint.axis), apart);
         else
             for (int c = 0; c < 3; ++c) add(each.cosine, Vec3::Unit(c), Vec3::Unit(c), 1.0);
+        each.at_rest =
+            (joint.kind == JointKind::revolute ? each.sine : each.cosine).gradient(links.rest()).cwiseAbs() *
+            (joint.kind == JointKind::revolute ? 0.5 : 1.0);
+        each.reach =
+            joint.kind == JointKind::prismatic ? links.reach() : 1.0 + links.reach() / links.length();
         for (const char* name : names_of(joint.kind))
             each.slots.push_back(name ? registry.values.add(input.owner, name, "SI", 1, 1) : Slot{});
     }
@@ -165,6 +172,17 @@ void JointTerm::finish_assembly(const double* q, const Controls&, SystemMatrix& 
             1.0 / std::complex<double>(each.cosine.value(now.at), each.sine.value(now.at));
         each.links.add(now.by_first * (inverse.real() * each.sine.pairs + inverse.imag() * each.cosine.pairs),
                        now.first, now.by_second, now.other, -now.by_first, out);
+    }
+}
+
+void JointTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
+    for (const Each& each : each_) {
+        const bool lengths = each.closure || each.kind == JointKind::prismatic;
+        const double rounds = each.reach + beyond / (lengths ? 1.0 : each.links.length()),
+                     stiffness = each.closure ? each.stiffness
+                                              : each.law.spring_stiffness + each.law.servo_stiffness +
+                                                    each.law.limit_stiffness;
+        each.links.add_to(stiffness * rounds * each.at_rest, out);
     }
 }
 

@@ -36,6 +36,7 @@ class JointTerm final : public Term {
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
     std::vector<double> turns() const override { return last_turn_; }
     void set_turns(const std::vector<double>& turns) override { last_turn_ = turns; }
@@ -46,8 +47,10 @@ class JointTerm final : public Term {
         JointKind kind;
         bool closure;
         LinkPair links;
-        CornerForm cosine, sine;  // of a revolute; of the others the first is their form
-        CornerSum gap;            // of a closure
+        CornerForm cosine, sine;      // of a revolute; of the others the first is their form
+        CornerSum gap;                // of a closure
+        CornerForm::Corners at_rest;  // |d(coordinate)/dx|
+        double reach;  // what rounds at rest: a length, in lengths of a link where the coordinate is an angle
         std::vector<Slot> slots;  // of the law; of a closure, its stiffness
         JointLaw law;
         double stiffness = 0.0;  // of a closure

@@ -141,7 +141,7 @@ class Scene:
         held = np.intersect1d(edges, constraints.directed_edges[:, 0])
         if held.size:
             raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
-        free = [] if allow_rigid_motions else free_rigid_motions(bodies, constraints)
+        free = [] if allow_rigid_motions else free_rigid_motions(bodies, constraints, self._held_by_joints())
         if not allow_rigid_motions:
             free += [
                 f"rigid part {k}, which is free"
@@ -189,6 +189,15 @@ class Scene:
         # What the core holds now: a solve with other values puts its own there.
         self._values = self._in_core = Values(self)
         self._model.set_values(self._values.numbers)
+
+    def _held_by_joints(self) -> np.ndarray:
+        """The vertices of links that joints hold to the world."""
+        held = [
+            place.vertices
+            for part, place in zip(self.rigid_parts, self._rigid, strict=True)
+            if self._bodies.held_by_joints(part)
+        ]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *held])
 
     def _sheets(self, constraints: Constraints) -> list[dict]:
         """The bodies as the core takes them."""
