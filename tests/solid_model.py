@@ -62,6 +62,8 @@ class SolidModel:
             sheets=[],
             skins=[],
             rigid=[],
+            skeletons=[],
+            closures=[],
             face_energies=[],
             pressures=[],
             solids=[

@@ -1,6 +1,9 @@
 // The model of a scene to Python: checked arrays in, numbers out. Scene in the package builds it.
 #include "magshell/scene/model.h"
 
+#include <map>
+#include <string>
+
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/solid.h"
@@ -76,6 +79,42 @@ std::vector<RigidInput> rigid_of(const py::list& given) {
     return rigid;
 }
 
+Vec3 to_vec3(const py::handle& given) {
+    const Array numbers = given.cast<Array>();
+    return {numbers.at(0), numbers.at(1), numbers.at(2)};
+}
+
+JointKind joint_kind(const std::string& name) {
+    const std::map<std::string, JointKind> kinds = {{"free", JointKind::free},
+                                                    {"fixed", JointKind::fixed},
+                                                    {"revolute", JointKind::revolute},
+                                                    {"prismatic", JointKind::prismatic},
+                                                    {"ball", JointKind::ball}};
+    return kinds.at(name);
+}
+
+std::vector<SkeletonInput> skeletons_of(const py::list& given) {
+    std::vector<SkeletonInput> skeletons;
+    for (const py::handle each : given) {
+        SkeletonInput& skeleton = skeletons.emplace_back();
+        skeleton.links = each["links"].cast<std::vector<Index>>();
+        skeleton.owners = each["owners"].cast<std::vector<std::string>>();
+        for (const py::handle joint : each["joints"])
+            skeleton.joints.push_back({joint_kind(joint["kind"].cast<std::string>()),
+                                       joint["parent"].cast<Index>(), to_vec3(joint["origin"]),
+                                       to_vec3(joint["axis"])});
+    }
+    return skeletons;
+}
+
+std::vector<ClosureInput> closures_of(const py::list& given) {
+    std::vector<ClosureInput> closures;
+    for (const py::handle each : given)
+        closures.push_back({each["owner"].cast<std::string>(), each["parent"].cast<Index>(),
+                            each["child"].cast<Index>(), to_vec3(each["place"])});
+    return closures;
+}
+
 std::unique_ptr<Model> make_model(const py::kwargs& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     const auto indices = [&](const char* name) { return given[name].cast<IndexArray>(); };
@@ -86,6 +125,8 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     input.solids = solids_of(given["solids"]);
     input.skins = skins_of(given["skins"]);
     input.rigid = rigid_of(given["rigid"]);
+    input.skeletons = skeletons_of(given["skeletons"]);
+    input.closures = closures_of(given["closures"]);
     input.directions = to_rows3(array("directions"));
     input.held = held_nodes(indices("held_nodes"), array("held_frames"));
     input.moves = given["moves"].cast<Index>();

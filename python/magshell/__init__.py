@@ -4,10 +4,14 @@ from . import control, meshes, objectives, obstacles, optim, parametrize, shapes
 from ._core import __version__
 from ._machine.threads import num_threads, set_num_threads, show_config
 from .bodies.body_result import BodyResult
+from .bodies.joint_result import JointResult
+from .bodies.joints import Ball, Closure, Fixed, Joint, Prismatic, Revolute
+from .bodies.link import Link
 from .bodies.materials import Corotated, Guccione, NeoHookean, StableNeoHookean, StVenantKirchhoff
 from .bodies.rigid import Rigid
 from .bodies.rigid_result import RigidResult
 from .bodies.shell import Shell
+from .bodies.skeleton import Skeleton
 from .bodies.skin import Skin
 from .bodies.solid import Solid
 from .bodies.strains import Strains
@@ -64,9 +68,11 @@ __all__ = [
     "TRBDF2",
     "AppliedField",
     "AreaLoad",
+    "Ball",
     "BodyResult",
     "Buckling",
     "Clamp",
+    "Closure",
     "Contact",
     "Corotated",
     "CriticalPoint",
@@ -80,11 +86,15 @@ __all__ = [
     "Equilibria",
     "Equilibrium",
     "EquilibriumJumped",
+    "Fixed",
     "Guccione",
     "ImplicitEuler",
     "Interrupted",
+    "Joint",
+    "JointResult",
     "LargeStrainWarning",
     "LinearResponse",
+    "Link",
     "MagpylibField",
     "MeshQualityWarning",
     "Minimum",
@@ -103,11 +113,14 @@ __all__ = [
     "PlacedField",
     "PointLoad",
     "Pressure",
+    "Prismatic",
+    "Revolute",
     "Rigid",
     "RigidResult",
     "SampledField",
     "Scene",
     "Shell",
+    "Skeleton",
     "Skin",
     "Solid",
     "StVenantKirchhoff",

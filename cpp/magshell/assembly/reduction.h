@@ -107,10 +107,10 @@ class Reduction {
     }
     /// Where a move has a node, and how fast it takes it along; -1 leaves it at rest.
     Vec3 place(Index node, Index move, double progress) const;
-    /// Of a node: along which motions it is free.
-    Mat3 free_motions(Index node) const;
     /// How fast its move carries a node, as the progress changes.
     Vec3 rate(Index node, Index move, double progress) const;
+    /// Of a node: along which motions it is free.
+    Mat3 free_motions(Index node) const;
     bool axis_aligned(const HeldNode& h) const;
     void turn_blocks(SystemMatrix& full) const;
     VectorXd gathered(const VectorXd& full) const;

@@ -19,6 +19,7 @@ Bodies::Bodies(const SceneInput& input) {
         owned_skins_.push_back(
             std::make_unique<Surface>(skin.owner, *skin.surface.mesh, skin.surface.vertices, numbering));
     add_rigid(input.rigid, numbering);
+    couple_links(input);
     nodes_ = numbering.finish(input.directions, input.original);
     for (Index user = 0; user < nodes_.n_user_vertices(); ++user)
         if (nodes_.vertices.is_copy(user)) copies_.push_back(user);
@@ -57,6 +58,22 @@ void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numb
     }
 }
 
+void Bodies::couple_links(const SceneInput& input) {
+    const auto couple = [&](Index a, Index b) {
+        std::vector<Index>& corners = coupled_corners_.emplace_back();
+        for (const Index part : {a, b})
+            if (part >= 0)
+                corners.insert(corners.end(), rigid_nodes_[part].begin(), rigid_nodes_[part].begin() + 4);
+    };
+    for (const SkeletonInput& skeleton : input.skeletons)
+        for (std::size_t k = 0; k < skeleton.links.size(); ++k)
+            if (!skeleton.owners[k].empty()) {
+                const Index parent = skeleton.joints[k].parent;
+                couple(parent < 0 ? -1 : skeleton.links[parent], skeleton.links[k]);
+            }
+    for (const ClosureInput& closure : input.closures) couple(closure.parent, closure.child);
+}
+
 std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
     std::vector<Stencil> all;
     for (const Sheet* sheet : sheets_) all.insert(all.end(), sheet->stencils.begin(), sheet->stencils.end());
@@ -79,6 +96,7 @@ std::vector<std::span<const Index>> Bodies::cliques() const {
     for (const Solid* solid : solids_)
         for (Index element = 0; element < solid->n_elements(); ++element)
             all.push_back(solid->nodes_of(element));
+    for (const std::vector<Index>& corners : coupled_corners_) all.push_back(corners);
     return all;
 }
 

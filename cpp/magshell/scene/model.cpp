@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "magshell/assembly/rigid_carrier.h"
+#include "magshell/assembly/skeleton_carrier.h"
 #include "magshell/core/errors.h"
 
 namespace magshell {
@@ -19,10 +19,25 @@ std::vector<HeldNode> renumbered(std::vector<HeldNode> held, const Bodies& bodie
     return held;
 }
 
-Carriers carriers_of(const Bodies& bodies) {
+// Of skeletons, then of the parts that are no links.
+Carriers carriers_of(const Bodies& bodies, const std::vector<SkeletonInput>& skeletons) {
+    const auto link = [&](Index part) {
+        return RigidNodes(bodies.rigid_nodes()[part], RigidInput::own, bodies.nodes().rest);
+    };
+    std::vector<char> joined(bodies.rigid_nodes().size(), 0);
     Carriers carriers;
-    for (const std::vector<Index>& nodes : bodies.rigid_nodes())
-        carriers.push_back(std::make_unique<RigidCarrier>(nodes, RigidInput::own, bodies.nodes().rest));
+    for (const SkeletonInput& skeleton : skeletons) {
+        std::vector<RigidNodes> links;
+        for (const Index part : skeleton.links) {
+            links.push_back(link(part));
+            joined[part] = 1;
+        }
+        carriers.push_back(std::make_unique<SkeletonCarrier>(std::move(links), skeleton.joints));
+    }
+    for (Index part = 0; part < static_cast<Index>(joined.size()); ++part)
+        if (!joined[part])
+            carriers.push_back(
+                std::make_unique<SkeletonCarrier>(std::vector{link(part)}, std::vector<Joint>(1)));
     return carriers;
 }
 
@@ -32,7 +47,7 @@ Model::Model(const SceneInput& input)
     : bodies_(input),
       matrix_(nodes().n_nodes(), nodes().scalars, bodies_.stencils(input), bodies_.cliques()),
       reduction_(matrix_, renumbered(input.held, bodies_), nodes(), input.moves, registry_,
-                 carriers_of(bodies_)),
+                 carriers_of(bodies_, input.skeletons)),
       schedule_(nodes().n_nodes(), bodies_.all()),
       sources_(input.field_sources, registry_),
       of_body_(bodies_.all().size()),

@@ -149,6 +149,7 @@ class Model {
     void add_terms(const SceneInput& input);
     void add_magnetic_terms(const SceneInput& input);
     void add_moments(const SceneInput& input);
+    void add_joints(const SceneInput& input);
     void add_solids(const SceneInput& input);
     void add_couples(const SceneInput& input);
     void add_contacts(const SceneInput& input);

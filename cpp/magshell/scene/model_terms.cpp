@@ -7,6 +7,7 @@
 #include "magshell/term/bending_term.h"
 #include "magshell/term/couple_term.h"
 #include "magshell/term/friction_term.h"
+#include "magshell/term/joint_term.h"
 #include "magshell/term/load_term.h"
 #include "magshell/term/magnetic_solid_term.h"
 #include "magshell/term/magnetic_term.h"
@@ -70,6 +71,7 @@ void Model::add_terms(const SceneInput& input) {
         follows_ = true;
     }
     add_moments(input);
+    add_joints(input);
     if (input.gravity)
         terms_.push_back(std::make_unique<LoadTerm>("gravity", "gravity_factor", nodes(), registry_));
     if (input.loads) terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));
@@ -106,6 +108,24 @@ void Model::add_moments(const SceneInput& input) {
                         magnets.emplace_back(MomentTerm::Magnet{input.rigid[k].owner, {}}).corners.begin());
     if (!magnets.empty())
         terms_.push_back(std::make_unique<MomentTerm>(magnets, nodes(), sources_, matrix_, registry_));
+}
+
+void Model::add_joints(const SceneInput& input) {
+    const auto corners = [&](Index part) { return part < 0 ? nullptr : bodies_.rigid_nodes()[part].data(); };
+    std::vector<JointTerm::Input> joints;
+    for (const SkeletonInput& skeleton : input.skeletons)
+        for (std::size_t k = 0; k < skeleton.links.size(); ++k) {
+            const Joint& joint = skeleton.joints[k];
+            if (!skeleton.owners[k].empty())
+                joints.push_back({skeleton.owners[k], joint,
+                                  corners(joint.parent < 0 ? -1 : skeleton.links[joint.parent]),
+                                  corners(skeleton.links[k])});
+        }
+    for (const ClosureInput& closure : input.closures)
+        joints.push_back({closure.owner, Joint{JointKind::ball, -1, closure.place, Vec3::Zero()},
+                          corners(closure.parent), corners(closure.child), true});
+    if (!joints.empty())
+        terms_.push_back(std::make_unique<JointTerm>(joints, nodes().rest, matrix_, registry_));
 }
 
 void Model::add_solids(const SceneInput& input) {

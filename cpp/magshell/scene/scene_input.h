@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "magshell/assembly/reduction.h"
+#include "magshell/body/joint.h"
 #include "magshell/body/sheet.h"
 #include "magshell/body/solid.h"
 #include "magshell/field/applied_field.h"
@@ -68,6 +69,20 @@ struct RigidInput {
     static constexpr Index own = 10;
 };
 
+/// Rigid parts that are joined in a tree: joints[k] leads to the part links[k], parents first.
+struct SkeletonInput {
+    std::vector<Index> links;  // of SceneInput::rigid
+    std::vector<Joint> joints;
+    std::vector<std::string> owners;  // of joints in which something acts; empty where nothing does
+};
+
+/// A point of one rigid part that is pulled to a point of another, or of the world (negative).
+struct ClosureInput {
+    std::string owner;
+    Index parent, child;  // of SceneInput::rigid
+    Vec3 place;           // at rest
+};
+
 /// Held nodes count the scene's vertices first, then directions.
 struct SceneInput {
     Index n_vertices = 0;         // of sheets and solids
@@ -76,6 +91,8 @@ struct SceneInput {
     std::vector<SolidInput> solids;  // numbered on after the sheets
     std::vector<SkinInput> skins;
     std::vector<RigidInput> rigid;
+    std::vector<SkeletonInput> skeletons;
+    std::vector<ClosureInput> closures;
     Rows3 directions;  // (n_d, 3), of directed edges and of couples
     std::vector<HeldNode> held;
     Index moves = 0;  // that held nodes refer to

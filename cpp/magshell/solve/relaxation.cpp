@@ -13,7 +13,8 @@ constexpr int iterations_a_step = 10, quick_iterations = 6;
 constexpr double above_instability = 1.3;  // the rate, over the most negative eigenvalue's size
 constexpr double rate_growth = 2.0, rate_decay = 4.0;
 constexpr double settled = 1e-4;  // of the extent: a step that moves less has come to rest, or to a saddle
-constexpr double rigid = 1e4;     // a rate this many times the stiffness allows no step to speak of
+constexpr double rigid =
+    1e4;  // a rate this many times the stiffness, or the forces', allows no step to speak of
 
 class Relaxation {
   public:
@@ -31,7 +32,8 @@ class Relaxation {
             while (!step()) {
                 rate_ *= rate_growth;
                 // Asked so that numbers beyond all bounds, and a rate of zero, which no doubling changes, end it too.
-                if (!(rate_ > 0.0 && rate_ <= rigid * largest_stiffness() && std::isfinite(rate_))) {
+                if (!(rate_ > 0.0 && rate_ <= rigid * std::max(largest_stiffness(), forced_rate()) &&
+                      std::isfinite(rate_))) {
                     report_.reason = "no step lowers the energy, however short";
                     return report_;
                 }

@@ -11,9 +11,11 @@ from .._checks.checked_list import checked_list
 from ..mesh.quality import MeshQuality
 from ..mesh.triangle_mesh import TriangleMesh
 from .joined_mesh import JoinedMesh
+from .joints import Joint
 from .no_mesh import NoMesh
 from .rigid import Rigid
 from .shell import Shell
+from .skeleton import Skeleton
 from .skin import Skin
 from .solid import Solid
 from .ties import Tie, joined_components, originals
@@ -53,18 +55,22 @@ def turning_edges(mesh) -> int:
 
 
 class Bodies:
-    """Raises ValueError where one is no Shell, Solid or Rigid, or is there twice, or where a tie cannot be.
+    """Raises ValueError where one is no Shell, Solid, Rigid or Skeleton, or is there twice, or where a tie cannot be.
 
-    shells: all Shells and Solids. rigid: the Rigid parts, whose points come after all vertices.
+    shells: all Shells and Solids. rigid: the Rigid parts, links among them, whose points come after all vertices.
     original: (n_v of all,), the first of the vertices that each is welded to, or itself.
     """
 
     def __init__(self, bodies, ties=()):
-        listed = checked_list("bodies", bodies, (*BODIES, Rigid))
+        listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton))
+        self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
+        self.listed: tuple = tuple(listed)
         self.shells: tuple[Shell | Solid, ...] = tuple(body for body in listed if isinstance(body, BODIES))
-        self.rigid: tuple[Rigid, ...] = tuple(body for body in listed if isinstance(body, Rigid))
+        self.rigid: tuple[Rigid, ...] = tuple(
+            part for body in listed for part in _parts(body) if isinstance(part, Rigid)
+        )
         if not listed:
-            raise ValueError("bodies must hold at least one Shell, Solid or Rigid")
+            raise ValueError("bodies must hold at least one Shell, Solid, Rigid or Skeleton")
         for k, part in enumerate(self.rigid):
             if self.rigid_number(part) < k:
                 raise ValueError(
@@ -149,6 +155,23 @@ class Bodies:
         return TriangleMesh(
             np.concatenate([mesh.rest_positions for mesh in self.meshes]), np.concatenate(faces)
         )
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Of all skeletons."""
+        return tuple(joint for skeleton in self.skeletons for joint in skeleton.joints)
+
+    def skeleton_of(self, part: Rigid) -> Skeleton | None:
+        """The one that it is a link of; None where it is alone."""
+        for skeleton in self.skeletons:
+            if any(part is link for link in skeleton.links):
+                return skeleton
+        return None
+
+    def held_by_joints(self, part: Rigid) -> bool:
+        """Whether joints lead from it to the world."""
+        skeleton = self.skeleton_of(part)
+        return skeleton is not None and skeleton.held(part)
 
     @property
     def sheets(self) -> tuple[Shell, ...]:
@@ -248,6 +271,10 @@ class Bodies:
         of, own = self.split(edges)
         before = np.cumsum([0, *(isinstance(body, Shell) for body in self.shells)])
         return before[of], own
+
+
+def _parts(body) -> tuple:
+    return body.links if isinstance(body, Skeleton) else (body,)
 
 
 class Whole:

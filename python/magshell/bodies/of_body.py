@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from .body_result import BodyResult
+from .joint_result import JointResult
+from .joints import Joint
 from .rigid import Rigid
 from .rigid_result import RigidResult
 from .shell import Shell
@@ -10,8 +12,12 @@ from .solid import Solid
 from .solid_result import SolidResult
 
 
-def result_of(result, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
-    """`result[body]`. Raises ValueError where the scene has no such body."""
+def result_of(
+    result, body: Shell | Solid | Rigid | Joint
+) -> BodyResult | SolidResult | RigidResult | JointResult:
+    """`result[body]`, or `result[joint]`. Raises ValueError where the scene has no such body."""
+    if isinstance(body, Joint):
+        return JointResult(result, body)
     if isinstance(body, Rigid):
         return RigidResult(result, body)
     return SolidResult(result, body) if isinstance(body, Solid) else BodyResult(result, body)

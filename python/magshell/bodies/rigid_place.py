@@ -9,6 +9,7 @@ import numpy as np
 from .._checks.selections import indices
 from .._checks.tensors import is_tensor
 from .rigid import Rigid, or_zero
+from .skeleton import Skeleton
 
 # The ten points of a part in units of its length: the corners of a tetrahedron, the middles of its edges. Any body has
 # the masses, center and inertia of ten point masses there, and of only one choice of them.
@@ -96,7 +97,8 @@ def places(bodies) -> list[Place]:
                     "the vertex to one of them"
                 )
             of_part[vertex] = k
-        found.append(_place(part, bodies.mesh.rest_positions[vertices], vertices, n_v + 10 * k))
+        skeleton = bodies.skeleton_of(part)
+        found.append(_place(part, skeleton, bodies.mesh.rest_positions[vertices], vertices, n_v + 10 * k))
     return found
 
 
@@ -121,7 +123,9 @@ def _vertices(part: Rigid, bodies) -> np.ndarray:
     return bodies.original[chosen + of.first_vertex]
 
 
-def _place(part: Rigid, rest: np.ndarray, vertices: np.ndarray, first: int) -> Place:
+def _place(
+    part: Rigid, skeleton: Skeleton | None, rest: np.ndarray, vertices: np.ndarray, first: int
+) -> Place:
     middle = rest.mean(axis=0) if len(rest) else np.zeros(3)
     center = middle if part.center is None else part.center
     tensor, axes, length = part.inertia_tensor, np.eye(3), 0.0
@@ -131,6 +135,12 @@ def _place(part: Rigid, rest: np.ndarray, vertices: np.ndarray, first: int) -> P
         length = np.sqrt(0.5 * np.trace(tensor) / part.mass)
     if len(rest):  # neither much smaller than what it carries, which it turns
         length = max(length, 0.5 * np.sqrt(((rest - center) ** 2).sum(axis=1).mean()))
+    if skeleton is not None:
+        length = max(length, 0.5 * skeleton.reach(part, center))
+    if not length > 0:
+        raise ValueError(
+            "a Link of a point mass needs a joint away from its center: nothing tells how it turns"
+        )
     points = center + length * _POINTS @ axes.T
     return Place(vertices, slice(first, first + 10), points, center, axes, length)
 

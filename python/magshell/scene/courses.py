@@ -9,8 +9,11 @@ import numpy as np
 
 from .._checks.quantity import shape_of
 from .._machine.keywords import nearest_first
+from ..bodies.joints import Joint
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
+
+_JUMPING = (AppliedField, Joint)  # their values may change at once, others move
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Course:
         if shape == self.row:
             return
         allowed = {"(steps + 1, ...)": (steps + 1, *self.row)}
-        if isinstance(self.owner, AppliedField):
+        if isinstance(self.owner, _JUMPING):
             allowed["(steps, ...)"] = (steps, *self.row)
         if shape not in allowed.values():
             wanted = " or ".join(f"{name} = {each}" for name, each in allowed.items())
@@ -44,6 +47,10 @@ class Course:
     @property
     def _label(self) -> str:
         return f"{self.name} [{self.unit}] of {type(self.owner).__name__}"
+
+
+def _unit(owner, name: str) -> str:
+    return owner._unit(name) if isinstance(owner, Joint) else _UNITS[name]
 
 
 _UNITS = {
@@ -65,7 +72,7 @@ def over_time(scene, replaced: dict[object, dict]) -> tuple[dict[object, dict], 
         for name, value in named.items():
             row = _row(owner, name)
             if row is not None and (callable(value) or len(shape_of(name, value)) == len(row) + 1):
-                courses.append(Course(owner, name, _UNITS[name], value, row))
+                courses.append(Course(owner, name, _unit(owner, name), value, row))
                 continue
             refuse_functions(owner, name, value, in_time=True)
             still.setdefault(owner, {})[name] = value
@@ -74,7 +81,7 @@ def over_time(scene, replaced: dict[object, dict]) -> tuple[dict[object, dict], 
             raise ValueError(
                 f"{owner!r} moves by its motion: give its center and rotation over time, or a motion, not both"
             )
-        if isinstance(owner, AppliedField):
+        if isinstance(owner, _JUMPING):
             continue
         constant = still.pop(owner, {})  # of its place: the same all the time
         courses += [Course(owner, name, _UNITS[name], value, (3,)) for name, value in constant.items()]

@@ -14,9 +14,12 @@ from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
+from ..bodies.joints import Joint
 from ..bodies.rigid import Rigid
 from ..bodies.rigid_place import places
 from ..bodies.shell import Shell
+from ..bodies.skeleton import Skeleton
+from ..bodies.skeleton_input import skeleton_inputs
 from ..bodies.solid import Solid
 from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
@@ -40,7 +43,8 @@ class Scene:
     """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
     needs and, up to 256 MB, the memory of its last factorization.
 
-    bodies: a Shell or a Solid, or several, which do not feel each other but through ties, and Rigid parts. Positions and
+    bodies: a Shell or a Solid, or several, which do not feel each other but through ties, Rigid parts and
+        Skeletons. Positions and
         faces of a result are those of one body after another, and `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
@@ -73,7 +77,7 @@ class Scene:
 
     def __init__(
         self,
-        bodies: Shell | Solid | Rigid | Iterable[Shell | Solid | Rigid],
+        bodies: Shell | Solid | Rigid | Skeleton | Iterable[Shell | Solid | Rigid | Skeleton],
         *,
         ties=(),
         supports=(),
@@ -109,7 +113,7 @@ class Scene:
     def __getstate__(self) -> dict:
         """What a copy, or another process, makes the scene from again."""
         return {
-            "bodies": (*self.bodies, *self.rigid_parts),
+            "bodies": self._bodies.listed,
             "ties": self.ties,
             "supports": self.supports,
             "loads": self.loads,
@@ -138,12 +142,12 @@ class Scene:
         held = np.intersect1d(edges, constraints.directed_edges[:, 0])
         if held.size:
             raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
-        free = [] if allow_rigid_motions else free_rigid_motions(bodies, constraints)
+        free = [] if allow_rigid_motions else free_rigid_motions(bodies, constraints, self._held_by_joints())
         if not allow_rigid_motions:
             free += [
                 f"rigid part {k}, which is free"
                 for k, each in enumerate(self.rigid_parts)
-                if each.vertices is None
+                if each.vertices is None and not bodies.held_by_joints(each)
             ]
         if free:
             raise ValueError(
@@ -165,6 +169,7 @@ class Scene:
                 place.as_input(f"rigid {k}", bool(self.fields) and part.magnetic_moment is not None)
                 for k, (part, place) in enumerate(zip(self.rigid_parts, self._rigid, strict=True))
             ],
+            **skeleton_inputs(bodies, self._labels),
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
             held_frames=constraints.held_frames,
@@ -190,6 +195,15 @@ class Scene:
         # What the core holds now: a solve with other values puts its own there.
         self._values = self._in_core = Values(self)
         self._model.set_values(self._values.numbers)
+
+    def _held_by_joints(self) -> np.ndarray:
+        """The vertices of links that joints hold to the world."""
+        held = [
+            place.vertices
+            for part, place in zip(self.rigid_parts, self._rigid, strict=True)
+            if self._bodies.held_by_joints(part)
+        ]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *held])
 
     def _sheets(self, constraints: Constraints) -> list[dict]:
         """The bodies as the core takes them."""
@@ -252,6 +266,7 @@ class Scene:
             ("body", self.bodies),
             ("skin", self._bodies.skins),
             ("rigid", self.rigid_parts),
+            ("joint", self.joints),
             ("support", self.supports),
             ("load", self.loads),
             ("field", self._sources),
@@ -290,6 +305,11 @@ class Scene:
         return self._bodies.rigid
 
     @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Of all skeletons."""
+        return self._bodies.joints
+
+    @property
     def shell(self) -> Shell:
         """The one body. Raises ValueError where there are several."""
         if len(self.bodies) != 1:
@@ -309,6 +329,7 @@ class Scene:
             *self.bodies,
             *self._bodies.skins,
             *self.rigid_parts,
+            *self.joints,
             *self.supports,
             *self.loads,
             *self.fields,
@@ -342,6 +363,7 @@ class Scene:
             lines += [f"  body {k}: {body!r}" for k, body in enumerate(self.bodies)]
         lines += [f"  welded by {tie!r}" for tie in self.ties]
         lines += [f"  with {part!r}{self._whose(part)}" for part in self.rigid_parts]
+        lines += [f"  joined by {joint!r}" for joint in self.joints]
         lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
         lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
         lines += [f"  in {field!r}" for field in self.fields]

@@ -76,11 +76,16 @@ def _directed(support, span: Span) -> list[DirectedEdges]:
     return [each._replace(edges=each.edges + span.first_edge) for each in support.directed(span.mesh)]
 
 
-def free_rigid_motions(bodies: Bodies, constraints: Constraints) -> list[str]:
-    """The rigid motions that no support prevents, in words; of every connected part."""
+def free_rigid_motions(bodies: Bodies, constraints: Constraints, on_joints=()) -> list[str]:
+    """The rigid motions that no support prevents, in words; of every connected part.
+
+    on_joints: vertices that a skeleton holds, as far as its joints do: their parts are not asked.
+    """
     found, mesh, size, components = [], bodies.mesh, bodies.size, bodies.components
     for part in range(components.max(initial=-1) + 1):
         vertices = np.flatnonzero(components == part)
+        if np.isin(on_joints, vertices).any():
+            continue
         center = mesh.rest_positions[vertices].mean(axis=0)
         rows = _prevented(bodies, constraints, components == part, center)
         _, values, modes = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]), full_matrices=False)

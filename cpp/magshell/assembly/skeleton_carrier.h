@@ -1,0 +1,63 @@
+// Rigid links in a tree of joints: nodes as functions of the joints' coordinates.            [Qiao21] 4, Algorithm 2
+//
+// A column of B is what one coordinate does to the nodes of its joint's link and of all links after it: a turn about an
+// axis w through o, or a slide along it,
+//
+//   dx/dz_b = w_b x (x - o_b) / l   or   w_b,      d2x/dz_a dz_b = w_a x dx/dz_b / l_a   (a turns, on the way to b),  0 (a slides)
+//
+// and of two turns of one joint the symmetric half. l, the length of the link, makes all coordinates lengths. Links are
+// rebuilt from their joints' coordinates top down, so that no rounding adds up at the joints. A rigid part is a skeleton of
+// one link with a free joint.
+#pragma once
+
+#include "magshell/assembly/carrier.h"
+#include "magshell/assembly/rigid_nodes.h"
+#include "magshell/body/joint.h"
+
+namespace magshell {
+
+class SkeletonCarrier final : public Carrier {
+  public:
+    /// joints[k] leads to links[k]; parents come first.
+    SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Joint> joints);
+
+    Index coordinates() const override { return coordinates_; }
+    Eigen::MatrixXd jacobian(const VectorXd& q) const override;
+    Eigen::MatrixXd curvature(const VectorXd& q, const VectorXd& gradient) const override;
+    void advance(VectorXd& q, const VectorXd& z) const override;
+    void settle(VectorXd& q, VectorXd* v) const override;
+    void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const override;
+
+  private:
+    using Pose = RigidNodes::Pose;
+    struct Column {
+        bool turns;
+        Vec3 axis;
+        Vec3 origin;   // of turns
+        double share;  // of a unit of the coordinate: radians, or meters
+    };
+
+    Index n_links() const { return static_cast<Index>(links_.size()); }
+    std::vector<Pose> poses(const VectorXd& q) const;
+    /// Of all coordinates.
+    std::vector<Column> columns(const std::vector<Pose>& poses) const;
+    Vec3 joint_place(Index link, const std::vector<Pose>& poses) const;
+    /// Where a link comes to, its parent being there already, as its own coordinates change by z.
+    Pose moved(Index link, const std::vector<Pose>& from, const std::vector<Pose>& to, const double* z) const;
+    /// sum_i g_i d2x_i/dz2, where columns of turns of one joint do not turn with it.
+    Eigen::MatrixXd second_derivative(const VectorXd& q, const VectorXd& gradient) const;
+    void move_on(VectorXd& q, std::vector<Pose> from, const VectorXd& z) const;
+    /// Poses that fit the vertices well enough to begin with, and the joints exactly.
+    std::vector<Pose> first_fit(const VectorXd& q) const;
+    /// The rows of B of what a start says: of vertices, or of all nodes where there are none.
+    Eigen::MatrixXd leading(const Eigen::MatrixXd& rows) const;
+    void scatter_leading(const Eigen::VectorXd& leading, Eigen::VectorXd& rows) const;
+
+    std::vector<RigidNodes> links_;
+    std::vector<Joint> joints_;
+    std::vector<Index> first_, row_;  // of each link: its joint's first coordinate; its first node among all
+    std::vector<Index> leading_;      // nodes, among all
+    Index coordinates_ = 0;
+};
+
+}  // namespace magshell

@@ -1,0 +1,91 @@
+// Quadratic forms of the corners of two rigid links: lengths and sines between vectors that ride on them.
+//
+//   f = 1/2 sum h_kl x_k . x_l + sum b_k . x_k + c          corners of the parent 0 to 3, of the child 4 to 7
+//
+// A vector y of a link is R y = sum gamma_k x_k with gamma_k = rho_k . y / 4 l^2, a point of it has 1/4 more: products of two
+// such sums are forms. Where the parent is the world, its vectors are numbers and the form is linear.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "magshell/assembly/system_matrix.h"
+#include "magshell/core/types.h"
+
+namespace magshell {
+
+/// A sum w . X of corners, plus a vector of the world.
+struct CornerSum {
+    Eigen::Matrix<double, 8, 1> weights = Eigen::Matrix<double, 8, 1>::Zero();
+    Vec3 fixed = Vec3::Zero();
+
+    friend CornerSum operator-(CornerSum a, const CornerSum& b) {
+        a.weights -= b.weights;
+        a.fixed -= b.fixed;
+        return a;
+    }
+};
+
+struct CornerForm {
+    using Corners = Eigen::Matrix<double, 3, 8>;
+
+    Eigen::Matrix<double, 8, 8> pairs = Eigen::Matrix<double, 8, 8>::Zero();
+    Corners linear = Corners::Zero();
+    double constant = 0.0;
+
+    /// Adds the scalar product of two sums.
+    void add(const CornerSum& a, const CornerSum& b, double factor = 1.0) {
+        pairs += factor * (a.weights * b.weights.transpose() + b.weights * a.weights.transpose());
+        linear += factor * (a.fixed * b.weights.transpose() + b.fixed * a.weights.transpose());
+        constant += factor * a.fixed.dot(b.fixed);
+    }
+    Corners gradient(const Corners& x) const { return x * pairs + linear; }
+    double value(const Corners& x) const {
+        return 0.5 * (x * pairs).cwiseProduct(x).sum() + linear.cwiseProduct(x).sum() + constant;
+    }
+};
+
+/// The corners of two links, or of one and the world, among all unknowns.
+class LinkPair {
+  public:
+    LinkPair() = default;
+    /// `parent` is nullptr for the world. rest: of all nodes.
+    LinkPair(const Index* parent, const Index* child, const std::vector<Vec3>& rest,
+             const SystemMatrix& matrix);
+
+    /// A vector, and a point, of the parent and of the child, from where they are at rest.
+    CornerSum vector(bool of_child, const Vec3& at_rest) const;
+    CornerSum point(bool of_child, const Vec3& at_rest) const;
+
+    /// Where they are, from a place nearby: sums of no weight do not feel from where. Of the world: as it is.
+    CornerForm::Corners positions(const double* q) const;
+    CornerForm::Corners gather(const double* all) const;
+    template <class Out>
+    void scatter(const CornerForm::Corners& vectors, Out& out) const {
+        for (int k = first_; k < 8; ++k)
+            for (int c = 0; c < 3; ++c) out.add(3 * nodes_[k] + c, vectors(c, k));
+    }
+    void add_to(const CornerForm::Corners& vectors, VectorXd& out) const {
+        for (int k = first_; k < 8; ++k) out.segment<3>(3 * nodes_[k]) += vectors.col(k);
+    }
+    /// Adds h_kl I + factor a_k a_l^T + cross (a_k b_l^T + b_k a_l^T).
+    void add(const Eigen::Matrix<double, 8, 8>& h, const CornerForm::Corners& a, double factor,
+             const CornerForm::Corners& b, double cross, SystemMatrix& out) const;
+
+    /// Where they are at rest; the largest coordinate there [m]; the smaller l.
+    const CornerForm::Corners& rest() const { return rest_; }
+    double reach() const { return rest_.cwiseAbs().maxCoeff(); }
+    double length() const;
+
+  private:
+    bool world() const { return first_ == 4; }
+
+    int first_ = 0;  // of the eight
+    std::array<Index, 8> nodes_{};
+    std::array<Vec3, 8> offsets_{};  // rho / 4 l^2
+    std::array<Vec3, 2> middle_{};
+    CornerForm::Corners rest_ = CornerForm::Corners::Zero();
+    std::array<std::array<SystemMatrix::Slot, 8>, 8> slots_{};  // row above column
+};
+
+}  // namespace magshell

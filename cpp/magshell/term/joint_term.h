@@ -1,0 +1,74 @@
+// What acts in the joints of skeletons: springs, torques, servos, limits; and closures of loops.
+//
+// The coordinate of a joint is read off the corners of its two links (corner_form.h):
+//   revolute   s = arg(C + i S),  C = u_p . u_c + v_p . v_c,  S = v_p . u_c - u_p . v_c      u, v across the axis
+//   prismatic  s = a_p . (o_c - o_p)
+//   ball       s = angle of the rotation, 1 + 2 cos s = sum e_p . e_c
+// A closure pulls a point of one link to a point of another: k/2 |o_c - o_p|^2.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "magshell/body/joint.h"
+#include "magshell/energy/joint_law.h"
+#include "magshell/term/corner_form.h"
+#include "magshell/term/term.h"
+
+namespace magshell {
+
+class JointTerm final : public Term {
+  public:
+    struct Input {
+        std::string owner;
+        Joint joint;
+        const Index* parent;  // four corners, or nullptr: the world
+        const Index* child;
+        bool closure = false;  // of a loop: reads its stiffness alone
+    };
+
+    JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest, const SystemMatrix& matrix,
+              Registry& registry);
+
+    std::string_view name() const override { return "joints"; }
+    bool set_values(const Values& values) override;
+    bool driven() const override { return false; }
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void add_cancelling_forces(double beyond, VectorXd& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::vector<double> turns() const override { return last_turn_; }
+    void set_turns(const std::vector<double>& turns) override { last_turn_ = turns; }
+    std::size_t bytes() const override { return each_.capacity() * sizeof(Each); }
+
+  private:
+    struct Each {
+        JointKind kind;
+        bool closure;
+        LinkPair links;
+        CornerForm cosine, sine;      // of a revolute; of the others the first is their form
+        CornerSum gap;                // of a closure
+        CornerForm::Corners at_rest;  // |d(coordinate)/dx|
+        double reach;  // what rounds at rest: a length, in lengths of a link where the coordinate is an angle
+        std::vector<Slot> slots;  // of the law; of a closure, its stiffness
+        JointLaw law;
+        double stiffness = 0.0;  // of a closure
+    };
+    /// What of a joint a state tells: E' and E'' by what `first` is the gradient of, its coordinate or its form.
+    struct State {
+        CornerForm::Corners at, first, other;  // other: of a revolute, the gradient of log |C + i S|
+        double coordinate, by_first, by_second;
+        double share;  // d(coordinate)/d(form) where first is that of a form
+    };
+
+    double coordinate(std::size_t k, const CornerForm::Corners& at) const;
+    State state(std::size_t k, const double* q) const;
+    Vec3 gap(const Each& joint, const CornerForm::Corners& at) const;
+    static JointEnergy law_at(const Each& joint, double coordinate) { return {joint.law, coordinate}; }
+
+    std::vector<Each> each_;
+    std::vector<double> last_turn_;
+};
+
+}  // namespace magshell

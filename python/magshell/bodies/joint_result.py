@@ -1,0 +1,86 @@
+"""What a result says of one joint of a skeleton."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .joints import Joint
+from .rigid_result import RigidResult
+
+
+class JointResult:
+    """A joint of a result. Of tensors in their graph, tensors."""
+
+    def __init__(self, result, joint: Joint):
+        if not any(joint is each for each in result.scene.joints):
+            raise ValueError(f"a joint of the scene is one of scene.joints, got {joint!r} that is not in it")
+        self._result, self.joint = result, joint
+        self._child = RigidResult(result, joint.child)
+        self._parent = None if joint.parent is None else RigidResult(result, joint.parent)
+
+    @property
+    def angle(self):
+        """(...) rad, of a Revolute, with its full turns over a motion; of a Ball, that of its rotation."""
+        kind = self.joint._kind
+        if kind not in ("revolute", "ball"):
+            raise ValueError(f"a {type(self.joint).__name__} has no angle")
+        turn = self._relative
+        xp = np if isinstance(turn, np.ndarray) else __import__("torch")
+        if kind == "ball":
+            trace = turn[..., 0, 0] + turn[..., 1, 1] + turn[..., 2, 2]
+            return 2.0 * xp.arcsin(xp.sqrt(xp.clip(0.25 * (3.0 - trace), 0.0, 1.0)))
+        axis = _like(self.joint.axis, turn)
+        # R = cos I + sin [a] + (1 - cos) a a^T
+        twice_sine = sum(
+            axis[k] * (turn[..., (k + 2) % 3, (k + 1) % 3] - turn[..., (k + 1) % 3, (k + 2) % 3])
+            for k in range(3)
+        )
+        trace = turn[..., 0, 0] + turn[..., 1, 1] + turn[..., 2, 2]
+        angle = xp.arctan2(twice_sine, trace - 1.0)
+        return _unwrapped(angle)
+
+    @property
+    def displacement(self):
+        """(...) m, of a Prismatic."""
+        if self.joint._kind != "prismatic":
+            raise ValueError(f"a {type(self.joint).__name__} has no displacement")
+        axis = _like(self.joint.axis, self._child.center)
+        along = axis if self._parent is None else self._parent.rotation @ axis
+        return (along * (self.place - self._place_of(self._parent))).sum(-1)
+
+    @property
+    def place(self):
+        """(..., 3) m, of the joint, on its child."""
+        return self._place_of(self._child)
+
+    @property
+    def gap(self):
+        """(...) m, between its place on the child and on the parent: what is left of a Closure, and round-off of others but
+        a Prismatic, whose displacement it is."""
+        return ((self.place - self._place_of(self._parent)) ** 2).sum(-1) ** 0.5
+
+    @property
+    def _relative(self):
+        child = self._child.rotation
+        return child if self._parent is None else self._parent.rotation.swapaxes(-1, -2) @ child
+
+    def _place_of(self, link: RigidResult | None):
+        if link is None:
+            return _like(self.joint.origin, self._child.center)
+        middle = link._place.center
+        return link.center + link.rotation @ _like(self.joint.origin - middle, link.center)
+
+    def __repr__(self) -> str:
+        return f"{type(self._result).__name__} of {self.joint!r}"
+
+
+def _like(array: np.ndarray, other):
+    return array if isinstance(other, np.ndarray) else other.new_tensor(array)
+
+
+def _unwrapped(angle):
+    """Over the first axis, where there is one."""
+    if angle.ndim == 0:
+        return angle
+    numbers = angle if isinstance(angle, np.ndarray) else angle.detach().numpy()
+    return angle + _like(np.unwrap(numbers, axis=0) - numbers, angle)

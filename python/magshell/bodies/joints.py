@@ -1,0 +1,273 @@
+"""What joins two links of a skeleton, or a link and the world, and what acts in there."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from .._checks.owner import Owner
+from .._checks.quantity import quantity
+from .._checks.scalars import not_negative, positive
+from .rigid import Rigid
+
+_FAR = 1e300  # a limit that nothing reaches
+
+
+class Joint(Owner):
+    """Between two links; make one of its subclasses.
+
+    child: the link (Rigid) that it carries. parent: the link that it is fixed to, or None for the world.
+    """
+
+    _kind: ClassVar[str] = ""
+    _may_jump = True  # what varies in time may have one value a step
+    _defaults: ClassVar[dict[str, float]] = {}  # by name: where it does not act
+
+    def __init__(self, child: Rigid, parent: Rigid | None, origin, axis=None, **law):
+        for name, link in (("child", child), ("parent", parent)):
+            if not isinstance(link, Rigid) and (name == "child" or link is not None):
+                raise ValueError(f"{name} of a {type(self).__name__} must be a Rigid, got {link!r:.60}")
+        if child is parent:
+            raise ValueError(f"child and parent of a {type(self).__name__} must be two links")
+        self.child, self.parent = child, parent
+        self.origin = np.array(quantity("origin", "m", origin, (3,)))
+        self.axis = np.zeros(3)
+        if axis is not None:
+            self.axis = np.array(quantity("axis", "", axis, (3,)))
+            length = np.linalg.norm(self.axis)
+            if not length > 0:
+                raise ValueError("axis must not be zero")
+            self.axis /= length
+        self._given = {name: value for name, value in law.items() if value is not None}
+        for name, value in self._given.items():
+            self._given[name] = self._checked(name, value)
+        self._check_together()
+        self._replaceable = self._in_time = tuple(self._given)
+
+    def __getattr__(self, name: str):
+        given = self.__dict__.get("_given", {})
+        if name in given:
+            return given[name]
+        if name in self._defaults:
+            return None
+        raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+
+    def _checked(self, name: str, value) -> float:
+        unit = self._unit(name)
+        if name in ("servo_stiffness", "torque_limit", "force_limit", "limit_stiffness", "limit_smoothing"):
+            return positive(name, unit, value)
+        if name == "spring_stiffness":
+            return not_negative(name, unit, value)
+        return float(quantity(name, unit, value, ()))
+
+    def _unit(self, name: str) -> str:
+        slides = self._kind == "prismatic"
+        if name in ("spring_stiffness", "servo_stiffness", "limit_stiffness"):
+            return "N/m" if slides else "N m/rad"
+        if name in ("torque", "torque_limit", "force", "force_limit"):
+            return "N" if slides else "N m"
+        return "m" if slides else "rad"
+
+    def _check_together(self) -> None:
+        given, kind = self._given, type(self).__name__
+        limited = [name for name in ("lower_limit", "upper_limit") if name in given]
+        if limited and not {"limit_stiffness", "limit_smoothing"} <= given.keys():
+            raise ValueError(
+                f"a {kind} with {limited[0]} needs limit_stiffness and limit_smoothing, how stiff it is beyond and how soon"
+            )
+        if len(limited) == 2 and not given["lower_limit"] < given["upper_limit"]:
+            raise ValueError(f"lower_limit of a {kind} must be below its upper_limit")
+        target = [name for name in self._defaults if name.startswith("target_")]
+        if target and (target[0] in given) != ("servo_stiffness" in given):
+            raise ValueError(
+                f"a {kind} that is to follow a target needs both {target[0]} and servo_stiffness"
+            )
+
+    @property
+    def acts(self) -> bool:
+        """Whether anything but the constraint itself is in it."""
+        return bool(self._given)
+
+    def replaced(self, **values) -> Joint:
+        """The same joint with other numbers of what acts in it."""
+        for name in values:
+            if name not in self._given:
+                raise ValueError(f"the {type(self).__name__} was made without {name}: zero will do")
+        return self._again({**self._given, **values})
+
+    def _again(self, law: dict) -> Joint:
+        axis = {"axis": self.axis} if self.axis.any() else {}
+        return type(self)(child=self.child, parent=self.parent, origin=self.origin, **axis, **law)
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        if self.acts:
+            for name, default in self._defaults.items():
+                numbers[label, name] = self._given.get(name, default)
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        return {name: gradient.value(label, name)[0] for name in self._given}
+
+    def __repr__(self) -> str:
+        law = "".join(f", {name} {value:g}" for name, value in self._given.items())
+        return f"{type(self).__name__}({'to the world' if self.parent is None else 'between two links'}{law})"
+
+
+class Fixed(Joint):
+    """Holds a link to its parent, or to the world: they move as one.
+
+    origin: has no meaning here; by default the world's.
+    """
+
+    _kind = "fixed"
+
+    def __init__(self, child: Rigid, parent: Rigid | None = None, origin=(0.0, 0.0, 0.0)):
+        super().__init__(child, parent, origin)
+
+
+class Revolute(Joint):
+    """Turns a link about an axis: a hinge. Its angle is zero at rest, and counts full turns.
+
+    origin, axis: (3,) m, and a direction, both in the world at rest and riding on the parent.
+    spring_stiffness, rest_angle: N m/rad, rad: a spring.
+    torque: N m, on the child about the axis, and on the parent against it.
+    target_angle, servo_stiffness, torque_limit: rad, N m/rad, N m: a servo that pulls towards the target, with a torque
+        that stays below the limit (none by default).
+    lower_limit, upper_limit, limit_stiffness, limit_smoothing: rad, rad, N m/rad, rad: beyond a limit the torque grows by
+        a parabola of the length of the smoothing, then at this stiffness.
+
+    All but the places may change in ms.simulate, one value a step or at the ends of steps.
+
+    >>> import numpy as np
+    >>> import magshell as ms
+    >>> rod = ms.Rigid(mass=1.0, inertia=1 / 12, center=(0.5, 0, 0))
+    >>> hinge = ms.Revolute(rod, origin=(0, 0, 0), axis=(0, 1, 0))
+    >>> scene = ms.Scene(ms.Skeleton([rod], [hinge]), gravity=(0, 0, -9.81))
+    >>> move = ms.simulate(scene, steps=100, time_step=5e-3)
+    >>> bool(abs(np.linalg.norm(move[rod].center[-1]) - 0.5) < 1e-12)
+    True
+    """
+
+    _kind = "revolute"
+    _defaults: ClassVar[dict[str, float]] = {
+        "spring_stiffness": 0.0,
+        "rest_angle": 0.0,
+        "torque": 0.0,
+        "target_angle": 0.0,
+        "servo_stiffness": 0.0,
+        "torque_limit": _FAR,
+        "lower_limit": -_FAR,
+        "upper_limit": _FAR,
+        "limit_stiffness": 0.0,
+        "limit_smoothing": 1.0,
+    }
+
+    def __init__(
+        self,
+        child: Rigid,
+        parent: Rigid | None = None,
+        *,
+        origin,
+        axis,
+        spring_stiffness=None,
+        rest_angle=None,
+        torque=None,
+        target_angle=None,
+        servo_stiffness=None,
+        torque_limit=None,
+        lower_limit=None,
+        upper_limit=None,
+        limit_stiffness=None,
+        limit_smoothing=None,
+    ):
+        law = {name: value for name, value in locals().items() if name in self._defaults}
+        super().__init__(child, parent, origin, axis, **law)
+
+
+class Prismatic(Joint):
+    """Slides a link along an axis. Its displacement [m] is zero at rest.
+
+    As Revolute, with lengths for angles and forces [N] for torques: spring_stiffness N/m, rest_displacement m, force N,
+    target_displacement m, servo_stiffness N/m, force_limit N, lower_limit, upper_limit m, limit_stiffness N/m,
+    limit_smoothing m.
+    """
+
+    _kind = "prismatic"
+    _defaults: ClassVar[dict[str, float]] = {
+        "spring_stiffness": 0.0,
+        "rest_displacement": 0.0,
+        "force": 0.0,
+        "target_displacement": 0.0,
+        "servo_stiffness": 0.0,
+        "force_limit": _FAR,
+        "lower_limit": -_FAR,
+        "upper_limit": _FAR,
+        "limit_stiffness": 0.0,
+        "limit_smoothing": 1.0,
+    }
+
+    def __init__(
+        self,
+        child: Rigid,
+        parent: Rigid | None = None,
+        *,
+        origin,
+        axis,
+        spring_stiffness=None,
+        rest_displacement=None,
+        force=None,
+        target_displacement=None,
+        servo_stiffness=None,
+        force_limit=None,
+        lower_limit=None,
+        upper_limit=None,
+        limit_stiffness=None,
+        limit_smoothing=None,
+    ):
+        law = {name: value for name, value in locals().items() if name in self._defaults}
+        super().__init__(child, parent, origin, axis, **law)
+
+
+class Ball(Joint):
+    """Turns a link about a point, any way.
+
+    spring_stiffness: N m/rad, pulls the rotation, as one angle, back to none.
+    upper_limit, limit_stiffness, limit_smoothing: rad, N m/rad, rad: of that angle, below pi.
+    """
+
+    _kind = "ball"
+    _defaults: ClassVar[dict[str, float]] = {
+        "spring_stiffness": 0.0,
+        "upper_limit": _FAR,
+        "limit_stiffness": 0.0,
+        "limit_smoothing": 1.0,
+    }
+
+    def __init__(
+        self,
+        child: Rigid,
+        parent: Rigid | None = None,
+        *,
+        origin,
+        spring_stiffness=None,
+        upper_limit=None,
+        limit_stiffness=None,
+        limit_smoothing=None,
+    ):
+        law = {name: value for name, value in locals().items() if name in self._defaults}
+        super().__init__(child, parent, origin, **law)
+        if upper_limit is not None and not 1e-3 <= float(upper_limit) < np.pi:
+            raise ValueError(f"upper_limit [rad] of a Ball must be from 1e-3 to pi, got {upper_limit:g}")
+
+
+class Closure(Joint):
+    """Closes a loop: pulls a point of one link, and the same place on another or in the world, together.
+
+    origin: (3,) m, the place at rest. stiffness: N/m; the gap is the force over it, and `result[closure].gap` says it.
+    """
+
+    _kind = "closure"
+    _defaults: ClassVar[dict[str, float]] = {"stiffness": 0.0}
+
+    def __init__(self, child: Rigid, parent: Rigid | None = None, *, origin, stiffness):
+        super().__init__(child, parent, origin, stiffness=positive("stiffness", "N/m", stiffness))

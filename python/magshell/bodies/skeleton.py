@@ -1,0 +1,104 @@
+"""Skeletons: rigid links in trees of joints [Qiao21, 4]."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.checked_list import checked_list
+from .joints import Closure, Joint
+from .rigid import Rigid
+
+
+class Skeleton:
+    """Links and the joints between them: one tree, or several. One of the bodies of a scene, and so are its links.
+
+    links: Link (or Rigid) objects: vertices of a body that they carry, or numbers alone, or both.
+    joints: Fixed, Revolute, Prismatic and Ball objects, each leading to a link; a link to which none leads is free.
+        Closure objects close loops.
+
+    Soft material around a link rides on it by its vertices, Link(vertices=..., body=solid). Joints hold to round-off, also
+    over many steps. Values of joints go by the joint, values={hinge: {"torque": ...}}, and may change in time;
+    `result[hinge].angle` and `result[link]` tell how it moves. ms.simulate takes it by TRBDF2 or ImplicitEuler.
+    Places and axes of joints have no gradient.
+
+    >>> import numpy as np
+    >>> import magshell as ms
+    >>> upper, lower = (ms.Link(mass=1.0, center=(0, 0, -z), inertia=1e-3) for z in (0.5, 1.5))
+    >>> shoulder = ms.Revolute(upper, origin=(0, 0, 0), axis=(0, 1, 0), torque=-2.0, spring_stiffness=10.0)
+    >>> elbow = ms.Revolute(lower, upper, origin=(0, 0, -1.0), axis=(0, 1, 0), spring_stiffness=1.0)
+    >>> rest = ms.equilibrium(ms.Scene(ms.Skeleton([upper, lower], [shoulder, elbow]), gravity=(0, 0, -9.81)))
+    >>> bool(0 < abs(float(rest[shoulder].angle)) < 0.2)
+    True
+    """
+
+    def __init__(self, links, joints=()):
+        self.links: tuple[Rigid, ...] = checked_list("links", links, (Rigid,))
+        self.joints: tuple[Joint, ...] = checked_list("joints", joints, (Joint,))
+        if not self.links:
+            raise ValueError("links must hold at least one Link")
+        for name, items in (("links", self.links), ("joints", self.joints)):
+            if len({id(item) for item in items}) < len(items):
+                raise ValueError(f"{name} must differ, but one is there twice")
+        self._leading: dict[int, Joint] = {}
+        for k, joint in enumerate(self.joints):
+            self._check(k, joint)
+        self._order = self._in_order()
+
+    def _check(self, k: int, joint: Joint) -> None:
+        for role in ("child", "parent"):
+            link = getattr(joint, role)
+            if link is not None and not any(link is each for each in self.links):
+                raise ValueError(f"the {role} of joint {k} is not among the links of the skeleton")
+        if isinstance(joint, Closure):
+            return
+        if id(joint.child) in self._leading:
+            raise ValueError(
+                f"two joints lead to one link (joint {k} is the second): in a tree one does; close a loop by a Closure"
+            )
+        self._leading[id(joint.child)] = joint
+
+    def _in_order(self) -> list[int]:
+        """The numbers of the links, parents first."""
+        number = {id(link): k for k, link in enumerate(self.links)}
+        order: list[int] = []
+        waiting = list(range(len(self.links)))
+        while waiting:
+            now = [k for k in waiting if (p := self.parent_of(k)) is None or number[id(p)] in order]
+            if not now:
+                raise ValueError(
+                    f"joints must make trees, but links {waiting} make a loop: close it by a Closure instead"
+                )
+            order += now
+            waiting = [k for k in waiting if k not in now]
+        return order
+
+    def parent_of(self, number: int) -> Rigid | None:
+        joint = self.joint_to(self.links[number])
+        return None if joint is None else joint.parent
+
+    def reach(self, link: Rigid, center: np.ndarray) -> float:
+        """How far from a point of a link its joints are, m."""
+        places = [joint.origin for joint in self.joints if link is joint.child or link is joint.parent]
+        return max((float(np.linalg.norm(place - center)) for place in places), default=0.0)
+
+    def held(self, link: Rigid) -> bool:
+        """Whether joints lead from a link to the world."""
+        joint = self._leading.get(id(link))
+        while joint is not None and joint.parent is not None:
+            joint = self._leading.get(id(joint.parent))
+        return joint is not None
+
+    @property
+    def in_order(self) -> tuple[Rigid, ...]:
+        """The links, parents first."""
+        return tuple(self.links[k] for k in self._order)
+
+    def joint_to(self, link: Rigid) -> Joint | None:
+        """The joint that leads to a link; None where it is free."""
+        return self._leading.get(id(link))
+
+    def __repr__(self) -> str:
+        def count(items, word):
+            return f"{len(items)} {word}{'s' * (len(items) != 1)}"
+
+        return f"Skeleton({count(self.links, 'link')}, {count(self.joints, 'joint')})"

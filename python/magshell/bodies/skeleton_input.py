@@ -1,0 +1,45 @@
+"""Skeletons as the core takes them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .joints import Closure, Joint
+from .skeleton import Skeleton
+
+
+def skeleton_inputs(bodies, labels: list[tuple[object, str]]) -> dict[str, list[dict]]:
+    """Of a scene's Bodies. labels: the core's name of every object."""
+    part = {id(link): k for k, link in enumerate(bodies.rigid)}
+    label = {id(item): name for item, name in labels if isinstance(item, Joint)}
+    closures = [joint for joint in bodies.joints if isinstance(joint, Closure)]
+    return {
+        "skeletons": [_skeleton(each, part, label) for each in bodies.skeletons],
+        "closures": [
+            {
+                "owner": label[id(each)],
+                "parent": -1 if each.parent is None else part[id(each.parent)],
+                "child": part[id(each.child)],
+                "place": each.origin,
+            }
+            for each in closures
+        ],
+    }
+
+
+def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -> dict:
+    links = skeleton.in_order
+    place = {id(link): k for k, link in enumerate(links)}
+    joints = [skeleton.joint_to(link) for link in links]
+    return {
+        "links": [part[id(link)] for link in links],
+        "joints": [_joint(each, place) for each in joints],
+        "owners": [label[id(each)] if each is not None and each.acts else "" for each in joints],
+    }
+
+
+def _joint(joint: Joint | None, place: dict[int, int]) -> dict:
+    if joint is None:
+        return {"kind": "free", "parent": -1, "origin": np.zeros(3), "axis": np.zeros(3)}
+    parent = -1 if joint.parent is None else place[id(joint.parent)]
+    return {"kind": joint._kind, "parent": parent, "origin": joint.origin, "axis": joint.axis}
