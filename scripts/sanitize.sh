@@ -34,10 +34,12 @@ run=()
 if [ "$sanitizers" = thread ]; then  # it wants its part of the address space where it was compiled to be
     setarch "$(uname -m)" -R true 2>/dev/null && run=(setarch "$(uname -m)" -R)
     [ $# -gt 0 ] || set -- tests/hard/test_concurrency.py \
-        tests/test_{threads,linalg,invariance,adjoint,statics,dynamics,surroundings_invariance}.py -k "thread or same_time"
+        tests/test_{threads,linalg,invariance,adjoint,statics,dynamics,surroundings_invariance,solid_core,skins,ties,rigid_parts}.py \
+        -k "thread or same_time"
 else
     [ $# -gt 0 ] || set -- tests/test_{linalg,derivatives,field,mesh,bad_input,statics,dynamics}.py \
-        tests/test_{obstacles,contact,friction,water_kernel,water_motion,surroundings_adjoint}.py
+        tests/test_{obstacles,contact,friction,water_kernel,water_motion,surroundings_adjoint}.py \
+        tests/test_{lane_functions,solid_kernels,solid_core,solids,skins,skin_cases,ties,rigid_parts,weld}.py
 fi
 
 # Fresh memory is full of NaN, so that a number read before it is written spoils a result. Leaks are not looked for:

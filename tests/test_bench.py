@@ -5,12 +5,15 @@ import subprocess
 import sys
 from itertools import product
 
+import numpy as np
 import pytest
 from bench_figures import is_a_picture
 
 import magshell as ms
 from magshell.bench.__main__ import PARTS, main
-from magshell.bench.cases import CASES
+from magshell.bench.cases import CASES, SOLID_CASES
+from magshell.bench.cases.solids import pulled_end
+from magshell.bench.ratios import collected
 from magshell.bench.report import print_table
 from magshell.bench.work_precision import STUDIES, measure, print_points
 
@@ -76,7 +79,7 @@ def test_whole_quick_run_draws_a_figure(tmp_path, capsys) -> None:
     picture = tmp_path / "accuracy.png"
     assert main(["accuracy", "--quick", "--figure", str(picture)]) == 0
     printed = capsys.readouterr().out
-    assert all(case.name in printed for case in CASES)
+    assert all(case.name in printed for case in (*CASES, *SOLID_CASES))
     assert "Order of convergence" in printed and "MISSED" in printed  # coarse meshes do miss
     assert is_a_picture(picture)
 
@@ -190,3 +193,24 @@ def test_all_parts_into_no_folder(tmp_path, capsys) -> None:
     with pytest.raises(SystemExit):
         main(["all", str(tmp_path / "file")])
     assert "cannot write" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("element", ["linear", "quadratic"])
+def test_a_force_on_the_end_of_a_solid_bends_it_as_a_traction_does(element) -> None:
+    mesh = ms.meshes.box((2, 1, 1), cells=(2, 2, 2), diagonals="crossed")
+    solid = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1.0, poisson_ratio=0.3), element=element)
+    load = pulled_end(solid, 2.0, (0.0, 0.0, 3.0))
+    x, forces = solid.mesh.rest_positions[load.vertices], np.asarray(load.force)
+    np.testing.assert_allclose(forces.sum(axis=0), (0, 0, 3.0), atol=1e-14)
+    np.testing.assert_allclose(forces[:, 2] @ x, 3.0 * np.array([2.0, 0.5, 0.5]), rtol=1e-12)
+    assert np.all(x[:, 0] == 2.0) and np.all(forces[:, 2] > 0)
+
+
+def test_quick_run_of_solids_shows_both_elements(capsys) -> None:
+    with collected() as notes:
+        assert main(["accuracy", "--quick", "--only", "T4a", "M3a", "--threads", "1"]) == 0
+    printed = capsys.readouterr().out
+    assert "linear" in printed and "quadratic" in printed and "Cook's membrane" in printed
+    errors = {ratio.name: ratio.value for ratio in notes}
+    of_cook = [errors[f"T4a, {element}: u_y, nu = 0.499"] for element in ("quadratic", "linear")]
+    assert of_cook[0] < 0.02 < 0.1 < of_cook[1]

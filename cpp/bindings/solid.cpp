@@ -1,6 +1,9 @@
 #include "bindings/solid.h"
 
+#include <algorithm>
+
 #include "bindings/arrays.h"
+#include "magshell/core/pack_functions.h"
 #include "magshell/scene/model.h"
 
 namespace magshell::bindings {
@@ -53,11 +56,28 @@ std::vector<SkinInput> skins_of(const py::list& given) {
     return skins;
 }
 
+// In whole packs, the last one filled up.
+py::array_t<double> lane_logarithms(const Array& numbers) {
+    py::array_t<double> out(numbers.size());
+    const double* from = numbers.data();
+    double* to = out.mutable_data();
+    for (py::ssize_t first = 0; first < numbers.size(); first += Pack::width) {
+        Pack pack(1.0);
+        const int lanes = static_cast<int>(std::min<py::ssize_t>(Pack::width, numbers.size() - first));
+        for (int lane = 0; lane < lanes; ++lane) pack.set(lane, from[first + lane]);
+        pack = log(pack);
+        for (int lane = 0; lane < lanes; ++lane) to[first + lane] = pack[lane];
+    }
+    return out;
+}
+
 void register_solid(py::module_& module) {
     module.def(
         "solid_point_states", &point_states, py::arg("model"), py::arg("solid"), py::arg("q"),
         "(F, Cauchy stress [Pa], rest volumes [m3]) at the points of integration of a solid's elements: "
         "(n_t, p, 3, 3) twice and (n_t, p).");
+    module.def("lane_logarithms", &lane_logarithms, py::arg("numbers"),
+               "ln of an array's numbers as the element kernels take it, to be tested.");
 }
 
 }  // namespace magshell::bindings

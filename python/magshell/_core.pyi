@@ -50,6 +50,7 @@ __all__: list[str] = [
     "find_equilibrium",
     "first_order_change",
     "follow_path",
+    "lane_logarithms",
     "num_threads",
     "pull_back",
     "pull_back_motion",
@@ -811,6 +812,11 @@ def follow_path(
     until: typing.Any = None,
     progress: typing.Any = None,
 ) -> PathResult: ...
+def lane_logarithms(numbers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+    """
+    ln of an array's numbers as the element kernels take it, to be tested.
+    """
+
 def num_threads() -> int: ...
 def pull_back(
     model: Model,

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from answers import above, at_rest, both, holds, near, refused
+from answers import above, at_rest, below, both, holds, near, refused
 from registry import case
 
 import magshell as ms
+from magshell.bench.solid_scaling import costs, exponents
 from magshell.bodies.solid_states import states_of
 
 TINY = 1e-9
@@ -220,3 +221,16 @@ def twisted_tube():
     flat = found.positions[middle]
     angle = np.arctan2(x * flat[:, 1] - y * flat[:, 0], x * flat[:, 0] + y * flat[:, 1])
     return both(at_rest(found), near("turn half way", angle.mean(), np.pi / 6, rel=1e-3))
+
+
+@case("time and memory in proportion to the elements, from 648 to 24,000")
+def scaling():
+    """What `python -m magshell.bench scaling` measures up to 500,000: assembly goes by elements, L by their power 4/3."""
+    small, large = (costs(cells, rounds=1) for cells in ((12, 3, 3), (40, 10, 10)))
+    grown = exponents([small, large])
+    return both(
+        below("exponent of the assembly", grown["assembly"], 1.35),
+        below("of the model's memory", grown["model"], 1.05),
+        below("of the entries of L", grown["entries"], 1.5),
+        below("of an iteration's time", grown["iteration"], 2.0),
+    )

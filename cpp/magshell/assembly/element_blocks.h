@@ -1,7 +1,9 @@
-// The blocks of an element's Hessian, from those of all its nodes but the first.
+// The blocks of an element's Hessian, from those of all its nodes but the first, and the way round that the matrix
+// takes them.
 #pragma once
 
 #include "magshell/assembly/lanes.h"
+#include "magshell/core/pack_functions.h"
 
 namespace magshell {
 
@@ -30,6 +32,17 @@ void complete_blocks(Pack33 h[]) {
     Pack33 sum = h[lower_index(1, 0)];
     for (int k = 2; k < N; ++k) sum += h[lower_index(k, 0)];
     h[0] = -sum;
+}
+
+/// Transposes a block in these lanes, a bit each.
+inline void transpose_in(unsigned lanes, Pack33& block) {
+    const auto chosen = lanes_with_bits(lanes);
+    for (int r = 1; r < 3; ++r)
+        for (int c = 0; c < r; ++c) {
+            const Pack::Lanes below = block.at[3 * r + c].lanes, above = block.at[3 * c + r].lanes;
+            block.at[3 * r + c].lanes = chosen ? above : below;
+            block.at[3 * c + r].lanes = chosen ? below : above;
+        }
 }
 
 }  // namespace magshell

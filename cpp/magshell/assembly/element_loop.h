@@ -2,7 +2,10 @@
 // blocks to them.
 #pragma once
 
-#include "magshell/assembly/lanes.h"
+#include <cstdint>
+#include <utility>
+
+#include "magshell/assembly/element_blocks.h"
 #include "magshell/assembly/schedule.h"
 
 namespace magshell {
@@ -15,16 +18,29 @@ class ElementLoop {
         : elements_(static_cast<Index>(nodes.size())), nodes_(&nodes), chunks_(chunks) {
         slots_.reserve(elements_);
         for (const std::array<Index, N>& each : nodes) slots_.push_back(pair_slots<N>(matrix, each));
+        turned_.resize(packs(), {});
+        for (Index pack = 0; pack < packs(); ++pack)
+            for (std::size_t pair = 0; pair < turned_[pack].size(); ++pair)
+                for (int lane = 0; lane < lanes_in(pack); ++lane)
+                    turned_[pack][pair] |= (slots_[element(pack, lane)][pair] & 1) << lane;
     }
 
     Index packs() const { return packs_for(elements_); }
     int lanes_in(Index pack) const { return std::min(Pack::width, elements_ - pack * Pack::width); }
     Index element(Index pack, int lane) const { return element_of(pack, lane, elements_); }
 
+    // Whole vectors are put together in registers: lanes written one by one would have to wait in memory for each other.
     void gather(Index pack, const double* q, Pack3 x[N]) const {
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const std::array<Index, N>& at = (*nodes_)[element(pack, lane)];
-            for (int k = 0; k < N; ++k) set_lane(x[k], lane, q + 3 * at[k]);
+        const std::array<Index, N>* at[Pack::width];
+        for (int lane = 0; lane < Pack::width; ++lane) at[lane] = &(*nodes_)[element(pack, lane)];
+        for (int k = 0; k < N; ++k) {
+            const double* from[Pack::width];
+            for (int lane = 0; lane < Pack::width; ++lane) from[lane] = q + 3 * (*at[lane])[k];
+            const auto component = [&]<std::size_t... lane>(int c, std::index_sequence<lane...>) {
+                return Pack(Pack::Lanes{from[lane][c]...});
+            };
+            constexpr std::make_index_sequence<Pack::width> lanes;
+            x[k] = {component(0, lanes), component(1, lanes), component(2, lanes)};
         }
     }
 
@@ -33,10 +49,28 @@ class ElementLoop {
             for (int k = 0; k < N; ++k) scatter_node(out, (*nodes_)[element(pack, lane)][k], g[k], lane);
     }
 
-    void scatter(Index pack, const Pack33 h[N * (N + 1) / 2], SystemMatrix& out) const {
+    /// Adds the lower blocks (row, column), at lower_index(row, column). Those of them that go into the upper
+    /// triangle of the matrix come back transposed.
+    void scatter(Index pack, Pack33 h[N * (N + 1) / 2], SystemMatrix& out) const {
+        for (int i = 1; i < N; ++i)
+            for (int j = 0; j < i; ++j)
+                transpose_in(turned_[pack][lower_index(i - 1, j)], h[lower_index(i, j)]);
         for (int lane = 0; lane < lanes_in(pack); ++lane) {
             const Index e = element(pack, lane);
-            scatter_blocks<N>(out, (*nodes_)[e], slots_[e], h, lane);
+            const std::array<Index, N>& nodes = (*nodes_)[e];
+            Index length[N];
+            for (int i = 0; i < N; ++i) length[i] = out.column_length(nodes[i]);
+            for (int i = 0; i < N; ++i) {
+                out.add_diagonal_block(nodes[i], h[lower_index(i, i)], lane);
+                for (int j = 0; j < i; ++j) {
+                    const SystemMatrix::Slot slot = slots_[e][lower_index(i - 1, j)];
+                    const Pack33& block = h[lower_index(i, j)];
+                    if (slot == same_node)
+                        out.add_block_and_transpose(nodes[i], block, lane);
+                    else  // the length without a branch: whether a block is turned over is as good as random
+                        out.add_lower_block(slot >> 1, length[j + (i - j) * (slot & 1)], block, lane);
+                }
+            }
         }
     }
 
@@ -71,13 +105,15 @@ class ElementLoop {
         });
     }
 
-    std::size_t bytes() const { return bytes_of(slots_); }
+    std::size_t bytes() const { return bytes_of(slots_) + bytes_of(turned_); }
 
   private:
     Index elements_;
     const std::vector<std::array<Index, N>>* nodes_;
     const ChunkLoop& chunks_;
     std::vector<PairSlots<N>> slots_;
+    // Per pack and pair of nodes: the lanes, a bit each, whose block has its rows at the node with the lower number.
+    std::vector<std::array<std::uint8_t, N*(N - 1) / 2>> turned_;
 };
 
 }  // namespace magshell

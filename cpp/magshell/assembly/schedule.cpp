@@ -8,11 +8,16 @@
 namespace magshell {
 namespace {
 
-// Elements of a chunk: 512 faces are about 600 kB of Hessian, slots and element data, tetrahedra of four nodes
-// less; small bodies are to have a few chunks of each colour, too. Whole packs.
-Index part_length(Index elements) {
-    constexpr Index shortest = 128, longest = 512, chunks = 8;
-    return std::clamp(elements / chunks / Pack::width * Pack::width, shortest, longest);
+// Elements of a chunk: 512 faces are about 600 kB of Hessian, slots and element data; small bodies are to have a few
+// chunks of each colour, too. Tetrahedra of four nodes take a quarter of a face's memory, and share more nodes with the
+// chunks beside theirs, so theirs are longer where there are enough of them. Whole packs.
+Index part_length(const Body& of) {
+    constexpr Index shortest = 128, longest = 512, chunks = 8, longest_of_four = 2048, chunks_of_four = 32;
+    const Index elements = of.n_elements();
+    Index length = std::clamp(elements / chunks, shortest, longest);
+    if (elements > 0 && of.n_folds() == 0 && of.nodes_of(0).size() == 4)
+        length = std::max(length, std::min(elements / chunks_of_four, longest_of_four));
+    return length / Pack::width * Pack::width;
 }
 
 }  // namespace
@@ -24,7 +29,7 @@ Schedule::Schedule(Index nodes, const std::vector<const Body*>& bodies) : loops_
 
 void Schedule::cut(const Body& of, Index body) {
     Index fold = 0;
-    const Index elements = of.n_elements(), folds = of.n_folds(), length = part_length(elements);
+    const Index elements = of.n_elements(), folds = of.n_folds(), length = part_length(of);
     for (Index first = 0; first < elements; first += length) {
         const Index last = std::min(elements, first + length);
         const Index first_fold = fold;

@@ -69,6 +69,19 @@ class SystemMatrix {
         }
     }
 
+    /// Adds lane `lane` of a block that needs no transposing at its position, in columns of that length.
+    void add_lower_block(Index position, Index length, const Pack33& block, int lane) {
+        const double* from = reinterpret_cast<const double*>(&block) + lane;
+        constexpr int w = Pack::width;
+        double* to = values_.data() + position;
+        for (int column = 0; column < 3; ++column) {
+            to[0] += from[column * w];
+            to[1] += from[(3 + column) * w];
+            to[2] += from[(6 + column) * w];
+            to += length - 1 - column;
+        }
+    }
+
     /// Adds lane `lane` of a symmetric block on the diagonal of a node.
     void add_diagonal_block(Index node, const Pack33& block, int lane) {
         const double* from = reinterpret_cast<const double*>(&block) + lane;

@@ -42,7 +42,8 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
     void evaluate(const double* q, const Controls&, Residual& out) override {
         state_.assign(q, q + 3 * n_nodes_);
         if (this->history_.shift) viscous_.resize(this->elements(), points);
-        loop_.scatter_packs([&](Index pack) {
+        // Flattened: packs that go from function to function through memory cost a third of the time.
+        loop_.scatter_packs([&](Index pack) __attribute__((flatten)) {
             const State state(*this, pack, q);
             Pack3 g[N], force[N];
             for (int p = 0; p < points; ++p) {
@@ -65,7 +66,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
                   SystemMatrix& out) const override {
         const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
         const Strains& viscous = extrapolated_stress ? viscous_.extrapolated : viscous_.own;
-        ElementLoop<N>::over_packs(chunk, [&](Index pack) {
+        ElementLoop<N>::over_packs(chunk, [&](Index pack) __attribute__((flatten)) {
             State state(*this, pack, q);
             if constexpr (measures_)
                 if (extrapolated_stress) state.take_measures(*this, pack, extrapolated_.at(pack));

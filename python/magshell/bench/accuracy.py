@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import magshell as ms
 
-from .cases import CASES, Case, Comparison, Outcome
+from . import solid_accuracy
+from .cases import CASES, SOLID_CASES, Case, Comparison, Outcome
 from .cases.hemisphere import large_deflection
 from .cases.magnetic_strip import field_across
 from .cases.shear_strip import end_shear
@@ -26,7 +27,7 @@ SINGLE_SOLVES: dict[str, tuple[Callable[[], Outcome], int]] = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    names = [case.name for case in CASES]
+    names = [case.name for case in (*CASES, *SOLID_CASES)]
     parser.add_argument(
         "--only", nargs="+", choices=names, metavar="CASE", help=f"some of {', '.join(names)}"
     )
@@ -44,8 +45,11 @@ def run(options: argparse.Namespace) -> dict:
     curves = [curve for curve in CURVES if options.only is None or curve.name in options.only]
     coarse = options.quick and not options.usual_meshes
     outcomes = {case.name: {b: _outcome(case, b, coarse) for b in BENDINGS} for case in cases}
-    _print_cases(cases, outcomes)
+    if cases:
+        _print_cases(cases, outcomes)
     results: dict = {"cases": {name: _plain(each) for name, each in outcomes.items()}}
+    of_solids = [case for case in SOLID_CASES if options.only is None or case.name in options.only]
+    results["solids"] = solid_accuracy.measure(of_solids, coarse)
     if options.only is None:
         results["single solves"] = _single_solves()
         meshes = COARSE_MESHES if options.quick else MESHES
@@ -54,7 +58,8 @@ def run(options: argparse.Namespace) -> dict:
         }
         results["convergence"] = _print_orders(studies)
     points = measure(curves, quick=options.quick, rounds=options.rounds)
-    print_points(points)
+    if points:
+        print_points(points)
     results["error against time"] = [point._asdict() for point in points]
     return results
 

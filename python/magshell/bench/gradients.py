@@ -13,6 +13,7 @@ from .ratios import note
 from .report import add_rounds, chosen, print_table
 
 FACES, QUICK_FACES = 8192, 128
+CELLS, QUICK_CELLS = (24, 6, 6), (8, 2, 2)  # of the solid
 ALLOWED_SHARE = 0.10  # of the equilibrium's time
 
 
@@ -26,7 +27,10 @@ def run(options: argparse.Namespace) -> dict:
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if faces < 2:
         raise SystemExit("--faces must be at least 2")
-    results = {bending: _cost(faces, options.rounds, bending) for bending in ("midedge", "hinge")}
+    results = {
+        **{bending: _cost(*_sheet(faces, bending), options.rounds) for bending in ("midedge", "hinge")},
+        "solid, linear": _cost(*_solid(QUICK_CELLS if options.quick else CELLS), options.rounds),
+    }
     for bending, cost in results.items():
         note("count", f"{bending}: factorizations", cost["factorizations"])
         note("time", f"{bending}: equilibrium, s", cost["equilibrium"])
@@ -34,7 +38,7 @@ def run(options: argparse.Namespace) -> dict:
             "share", f"{bending}: with tensors over without", cost["equilibrium"] / cost["plain equilibrium"]
         )
     rows = [
-        [bending, f"{cost['faces']} faces", cost["factorizations"]]
+        [bending, cost["size"], cost["factorizations"]]
         + [f"{1e3 * cost[name]:.1f}" for name in ("plain equilibrium", "equilibrium", "gradient")]
         + [
             f"{100 * cost['share']:.1f} %"
@@ -43,8 +47,8 @@ def run(options: argparse.Namespace) -> dict:
         for bending, cost in results.items()
     ]
     headings = [
-        "bending",
-        "sheet",
+        "bending, or solid",
+        "size",
         "factorizations",
         "without tensors, ms",
         "equilibrium, ms",
@@ -55,11 +59,9 @@ def run(options: argparse.Namespace) -> dict:
     return results
 
 
-def _cost(faces: int, rounds: int, bending: str) -> dict:
+def _cost(scene: ms.Scene, inputs: dict, values: dict, rounds: int) -> dict:
     """The best of some rounds of each, s of processor time."""
     import torch
-
-    scene, inputs, values = _sheet(faces, bending)
 
     def tensors(arrays: dict) -> dict:
         return {name: torch.tensor(array, requires_grad=True) for name, array in arrays.items()}
@@ -79,13 +81,19 @@ def _cost(faces: int, rounds: int, bending: str) -> dict:
         loss.backward()
         pulled.append(time.process_time() - began)
     return {
-        "faces": scene.mesh.n_faces,
+        "size": _size(scene.bodies[0]),
         "factorizations": found.factorizations,
         "plain equilibrium": min(plain),
         "equilibrium": min(solved),
         "gradient": min(pulled),
         "share": min(pulled) / min(solved),
     }
+
+
+def _size(body: ms.Shell | ms.Solid) -> str:
+    if isinstance(body, ms.Solid):
+        return f"{body.mesh.n_tetrahedra} tetrahedra"
+    return f"{body.mesh.n_faces} faces"
 
 
 def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict, dict]:
@@ -111,5 +119,37 @@ def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict, dict]:
         clamp: {"displacement": np.array((0.0, 0.0, 1e-3)), "rotation": np.array((0.0, -0.02, 0.0))},
         load: {"force_per_length": np.array((0.0, 0.0, 0.005))},
         dipoles: {"positions": np.array(dipoles.positions), "moments": np.array(dipoles.moments)},
+    }
+    return scene, inputs, values
+
+
+def _solid(cells: tuple[int, int, int]) -> tuple[ms.Scene, dict, dict]:
+    """A beam with every kind of input: bent by a field, gravity and forces, its end turned on the way."""
+    mesh = ms.meshes.box((0.1, 0.025, 0.025), cells=cells)
+    count, x = mesh.n_tetrahedra, mesh.rest_positions[:, 0]
+    solid = ms.Solid(
+        mesh,
+        material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.45),
+        mass_density=1e3,
+        element="linear",
+        remanent_magnetization=(2e4, 0.0, 0.0),
+    )
+    pin = ms.Pin(np.flatnonzero(x < x.min() + 1e-9), displacement=(0.0, 0.0, 1e-3))
+    end = np.flatnonzero(x > x.max() - 1e-9)
+    load = ms.PointLoad(end, (0.0, 0.0, 0.3 / len(end)))
+    scene = ms.Scene(solid, supports=[pin], loads=[load], field=[ms.UniformField()], gravity=(0.0, 0.0, -1.0))
+    inputs = {
+        "applied_flux_density": np.array((0.0, 0.0, 0.01)),
+        **{f"{name}_factor": np.array(1.0) for name in ("load", "gravity", "field", "motion")},
+    }
+    values = {
+        solid: {
+            "young_modulus": np.full(count, 1e5),
+            "poisson_ratio": np.full(count, 0.45),
+            "mass_density": np.full(count, 1e3),
+            "remanent_magnetization": np.tile((2e4, 0.0, 0.0), (count, 1)),
+        },
+        pin: {"displacement": np.array((0.0, 0.0, 1e-3))},
+        load: {"force": np.tile((0.0, 0.0, 0.3 / len(end)), (len(end), 1))},
     }
     return scene, inputs, values

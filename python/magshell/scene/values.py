@@ -72,7 +72,13 @@ class Values:
         return np.array_equal(self.numbers, other.numbers)
 
     def gradients(self, owner, gradient: Gradient) -> dict[str, np.ndarray]:
-        """By the values of one object of the scene, from the core's gradients; a row for each of its parts."""
+        """By the values of one object of the scene, from the core's gradients; a row for each of its parts. Found once
+        for all names of an object."""
+        if owner not in gradient.of_owners:
+            gradient.of_owners[owner] = self._gradients(owner, gradient)
+        return gradient.of_owners[owner]
+
+    def _gradients(self, owner, gradient: Gradient) -> dict[str, np.ndarray]:
         if owner is not self.scene:
             labels = [label for each, label in self.scene._labels if each is owner]
             return self.current(owner).gradients(labels[0], self, gradient)
@@ -185,6 +191,7 @@ class Gradient:
     def __init__(self, scene, values: np.ndarray, controls: np.ndarray, others: dict | None = None):
         self._scene, self._values, self._controls = scene, values, controls
         self.others = others or {}
+        self.of_owners: dict = {}  # by the values of objects, as they were asked for
 
     def has(self, owner: str, name: str) -> bool:
         return (owner, name) in self._scene._value_layout

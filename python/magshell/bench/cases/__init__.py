@@ -15,6 +15,7 @@ from .outcome import Comparison, Outcome
 from .plates import circular_plate, even_plate, square_plate
 from .rolled_strip import end_moment
 from .shear_strip import end_shear
+from .solids import SOLID_CASES
 
 
 @dataclass(frozen=True)
@@ -46,4 +47,4 @@ CASES = (
     Case("C4", "field and end shear", magnetic_end_shear, (40, 4), (20, 2)),
 )
 
-__all__ = ["CASES", "Case", "Comparison", "Outcome"]
+__all__ = ["CASES", "SOLID_CASES", "Case", "Comparison", "Outcome"]
