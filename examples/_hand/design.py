@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 import torch
+from _solid_designs.transfer import transferred
 
 import magshell as ms
 
@@ -59,13 +60,34 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Design:
-    """remanent_magnetization: (k, 3) A/m, of the skin's faces. positions: of its equilibrium. history: ms.Record each."""
+class State:
+    """A hand at rest in the field. remanent_magnetization: (k, 3) A/m, of the skin's faces. positions: (n_v, 3) m."""
 
     body: Body
     gesture: str
     remanent_magnetization: np.ndarray
     positions: np.ndarray
+
+    @property
+    def anchors(self) -> Anchors:
+        return self.body.anchors(self.gesture)
+
+    @property
+    def misses(self) -> np.ndarray:
+        """(k,) m, of the anchors from their targets."""
+        anchors = self.anchors
+        return np.linalg.norm(self.positions[anchors.vertices] - anchors.targets, axis=1)
+
+    @property
+    def miss(self) -> float:
+        """Root mean square, m."""
+        return rms(self.misses)
+
+
+@dataclass(frozen=True)
+class Design(State):
+    """The best that was found. history: ms.Record each, whose `terms` hold the mean square miss."""
+
     history: list
 
     @property
@@ -77,35 +99,27 @@ class Design:
         return (self.history[-1].seconds - self.history[0].seconds) / max(1, self.iterations)
 
     @property
-    def misses(self) -> np.ndarray:
-        return misses(self.positions, self.body.anchors(self.gesture))
-
-    @property
-    def miss(self) -> float:
-        return rms(self.misses)
-
-
-def misses(positions: np.ndarray, anchors: Anchors) -> np.ndarray:
-    """(k,) m, of the anchors from their targets."""
-    return np.linalg.norm(positions[anchors.vertices] - anchors.targets, axis=1)
+    def rms_history(self) -> np.ndarray:
+        """m, at every iteration."""
+        return REACH * np.sqrt([float(record.terms["miss"]) for record in self.history])
 
 
 def rms(distances: np.ndarray) -> float:
     return float(np.sqrt(np.mean(distances**2)))
 
 
-def designed(
-    body: Body, gesture: str, iterations: int, start: np.ndarray | None = None, progress: bool = False
-) -> Design:
-    """start: (k, 3) A/m, to begin with; by default no magnetization."""
+def on(body: Body, design: Design) -> State:
+    """What a design does on another mesh of the hand, when the field is turned on."""
+    magnetization = transferred(design.remanent_magnetization, design.body.solid, body.solid)
+    return State(body, design.gesture, magnetization, body.equilibrium(magnetization).positions)
+
+
+def designed(body: Body, gesture: str, iterations: int, progress: bool = False) -> Design:
+    """The best of so many iterations of L-BFGS, from no magnetization."""
     anchors, skin = body.anchors(gesture), body.solid.skin
     faces, targets = torch.tensor(body.faces), torch.tensor(anchors.targets)
     count = int(faces.max()) + 1
-    shares = torch.zeros((count, 3), dtype=torch.float64)
-    if start is not None:
-        given = torch.tensor(start) / LARGEST_MAGNETIZATION
-        shares.index_copy_(0, faces, given / (1 - (given**2).sum(1, keepdim=True)).sqrt())
-    shares.requires_grad_()
+    shares = torch.zeros((count, 3), dtype=torch.float64, requires_grad=True)
     areas = torch.zeros(count, dtype=torch.float64)
     areas.index_add_(0, faces, torch.tensor(body.solid.mesh.surface.face_areas[skin.faces]))
     areas /= areas.sum()

@@ -10,15 +10,9 @@ from .shape import FINGERS, Finger
 
 # Degrees at the fingertip: (towards the palm, sideways: positive towards the thumb's side for the four fingers).
 GESTURES = {
-    "pointing": {"thumb": (60, 0), "index": (0, 0), "middle": (105, 0), "ring": (105, 0), "little": (105, 0)},
-    "victory": {"thumb": (60, 0), "index": (0, 12), "middle": (0, -12), "ring": (105, 0), "little": (105, 0)},
-    "ring of thumb and index": {
-        "thumb": (40, 0),
-        "index": (95, 0),
-        "middle": (20, 0),
-        "ring": (0, 0),
-        "little": (-15, 0),
-    },
+    "pointing": {"thumb": (30, 0), "index": (0, 0), "middle": (95, 0), "ring": (90, 0), "little": (70, 0)},
+    "victory": {"thumb": (30, 0), "index": (0, 8), "middle": (0, -12), "ring": (90, 0), "little": (70, 0)},
+    "ring": {"thumb": (30, 0), "index": (90, 0), "middle": (25, 0), "ring": (10, 0), "little": (0, 0)},
 }
 STATIONS = (0.4, 0.6, 0.8, 0.95)  # of a finger's length, where its anchors are
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)

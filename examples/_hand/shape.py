@@ -44,7 +44,14 @@ class Finger:
 
 UNIT = 0.6e-3  # m, a hundredth of the hand's height
 FINGERS = (
-    Finger("thumb", (18 * UNIT, -4 * UNIT, 25 * UNIT), (43 * UNIT, -11 * UNIT, 47 * UNIT), 5.8 * UNIT, 4.7 * UNIT, (-0.6, -0.8, 0)),
+    Finger(
+        "thumb",
+        (18 * UNIT, -4 * UNIT, 25 * UNIT),
+        (43 * UNIT, -11 * UNIT, 47 * UNIT),
+        5.8 * UNIT,
+        4.7 * UNIT,
+        (-0.65, -0.65, 0.53),
+    ),
     Finger("index", (17.5 * UNIT, 0, 52 * UNIT), (26 * UNIT, 0, 89 * UNIT), 4.7 * UNIT, 4.0 * UNIT),
     Finger("middle", (6 * UNIT, 0, 55 * UNIT), (8 * UNIT, 0, 97 * UNIT), 4.8 * UNIT, 4.1 * UNIT),
     Finger("ring", (-6 * UNIT, 0, 54 * UNIT), (-9.5 * UNIT, 0, 92 * UNIT), 4.7 * UNIT, 4.0 * UNIT),
@@ -58,7 +65,9 @@ def hand() -> ms.shapes.Shape:
     """The wrist ends at z = 0."""
     knuckles = ms.shapes.capsule((-15 * UNIT, 0, 46 * UNIT), (15 * UNIT, 0, 49 * UNIT), 6.2 * UNIT)
     palm = ms.shapes.box((41 * UNIT, 13 * UNIT, 36 * UNIT), (0, 0, 32 * UNIT), rounding=6 * UNIT)
-    ball_of_thumb = ms.shapes.capsule((8 * UNIT, -2 * UNIT, 18 * UNIT), (17 * UNIT, -3 * UNIT, 28 * UNIT), 7.5 * UNIT)
+    ball_of_thumb = ms.shapes.capsule(
+        (8 * UNIT, -2 * UNIT, 18 * UNIT), (17 * UNIT, -3 * UNIT, 28 * UNIT), 7.5 * UNIT
+    )
     wrist = ms.shapes.capsule((0, 0, -10 * UNIT), (0, 0, 15 * UNIT), 10.5 * UNIT)
     thumb, *others = (finger.shape for finger in FINGERS)
     body = ms.shapes.smooth_union(palm, knuckles, ball_of_thumb, wrist, thumb, radius=FILLET)
