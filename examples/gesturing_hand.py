@@ -16,8 +16,9 @@ four nodes each it is too stiff, so that a design found with them overshoots in 
 
 What the paper does not say, and is chosen here: the shape (a signed distance) and its size, 6 cm; the gestures; a bound on
 the magnetization (the paper has none), 300 kA/m, as in dense composites of NdFeB. Fingers curl to 90 degrees and less: a
-torque spread evenly along a finger bends it most at the knuckle, and the targets are bent so; in a field along z nothing
-turns about z, and the thumb's target does not ask for it. Fingers do not feel each other here.
+torque spread evenly along a finger bends it most at the knuckle, and the targets are bent so. A field along z turns nothing
+about z, so that the thumb, which leans, cannot fold over the palm without twisting: it misses most. Fingers do not feel each
+other here.
 
 Run it: prints a summary and writes pictures into out/.
 """

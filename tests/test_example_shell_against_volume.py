@@ -38,7 +38,9 @@ def test_against_the_reference_numbers(result) -> None:
     for row in rows(result, "twisted", "across"):
         assert row["volume"] == pytest.approx(-0.002544433453, rel=1e-9)
     for row in rows(result, "twisted, sheared", "normal"):
-        assert row["accumulated"] == pytest.approx(0.1786047902, rel=0.01)  # M2 has other diagonals
+        assert row["volume"] == pytest.approx(0.001590270908, rel=1e-9)
+        assert row["shell"] == pytest.approx(0.001551084985, rel=3e-3)  # M2's faces have other diagonals,
+        assert row["accumulated"] == pytest.approx(0.1786047902, rel=0.02)  # and other columns
 
 
 def test_along_the_normal_the_difference_is_the_cells(result) -> None:
