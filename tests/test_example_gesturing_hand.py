@@ -7,7 +7,7 @@ from test_examples import load
 
 import magshell as ms
 
-GESTURE = "ring"
+GESTURE = "pinch"
 
 
 @pytest.fixture(scope="module")

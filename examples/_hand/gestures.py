@@ -12,7 +12,7 @@ from .shape import FINGERS, Finger
 GESTURES = {
     "pointing": {"thumb": (30, 0), "index": (0, 0), "middle": (95, 0), "ring": (90, 0), "little": (70, 0)},
     "victory": {"thumb": (30, 0), "index": (0, 8), "middle": (0, -12), "ring": (90, 0), "little": (70, 0)},
-    "ring": {"thumb": (30, 0), "index": (90, 0), "middle": (25, 0), "ring": (10, 0), "little": (0, 0)},
+    "pinch": {"thumb": (30, 0), "index": (90, 0), "middle": (25, 0), "ring": (10, 0), "little": (0, 0)},
 }
 STATIONS = (0.4, 0.6, 0.8, 0.95)  # of a finger's length, where its anchors are
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
