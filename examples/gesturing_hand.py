@@ -1,26 +1,26 @@
 """Hands whose magnetized skin makes gestures in one vertical field, after [Chen22] section 6.4 and Figure 14.
 
 A soft hand (neo-Hookean, Y = 1 MPa, nu = 0.45) with a magnetized skin stands on its wrist in 50 mT along z. Which
-magnetization of its skin makes it point, show a V, or bow index and thumb as if to pinch? It is found by gradient, from none,
-so that anchors on every finger come to where the gesture has them.
+magnetization of its skin makes it point, show a V, or bow index and thumb as if to pinch? It is found by gradient, from
+none, so that anchors on every finger come to where the gesture has them.
 
 Three designs of each gesture, all with three numbers a face of the four-node mesh:
 
     linear                       the paper's element and about its 4975 tetrahedra: as much work
-    linear, the paper's faces    about its 3320 faces: as many places to magnetize; 12,000 tetrahedra here, where the mesh
-                                 has nodes inside, which the paper's has not
+    linear, the paper's faces    about its 3320 faces: as many places to magnetize; 12,000 tetrahedra here, where the
+                                 mesh has nodes inside, which the paper's has not
     quadratic                    ten-node tetrahedra, of the first mesh
 
-and what the first and the last do on a converged mesh, quadratic and finer: a finger has two tetrahedra through it, and with
-four nodes each it is too stiff, so that a design found with them overshoots in a hand that bends as the material does: anchors
-that were 1.0 to 1.3 mm (rms) from their targets are 2.3 to 3.2 mm off there, with the design of quadratic elements 0.9 to 1.1 mm,
-of 7 to 12 mm to go.
+and what the first and the last do on a converged mesh, quadratic and finer. A finger has two tetrahedra through it, and
+with four nodes each it is too stiff, so that a design found with them overshoots in a hand that bends as the material does:
+of 7 to 12 mm (rms) to go, anchors miss by 1.0 to 1.3 mm where they were designed and by 2.3 to 3.2 mm there; with the
+design of quadratic elements by 0.8 to 0.9, and there by 0.9 to 1.1 mm.
 
 What the paper does not say, and is chosen here: the shape (a signed distance) and its size, 6 cm; the gestures; a bound on
-the magnetization (the paper has none), 300 kA/m, as in dense composites of NdFeB. Fingers curl to 90 degrees and less: a
+the magnetization (the paper has none), 300 kA/m, as in dense composites of NdFeB. Fingers curl to 95 degrees and less: a
 torque spread evenly along a finger bends it most at the knuckle, and the targets are bent so. A field along z turns nothing
-about z, so that the thumb, which leans, cannot fold over the palm without twisting: it misses most. Fingers do not feel each
-other here.
+about z, so that the thumb, which leans, cannot fold over the palm without twisting: it misses most. Fingers do not feel
+each other here.
 
 Run it: prints a summary and writes pictures into out/.
 """
