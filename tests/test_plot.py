@@ -172,6 +172,26 @@ def test_labels_carry_units(result) -> None:
 # What it is made of
 
 
+@pytest.mark.parametrize("width", [1050, 1200, 1600])
+def test_the_colour_bar_leaves_room_for_what_arrows_mean(mesh, width) -> None:
+    """Of a tall picture, where the scale bar is long."""
+    across = mesh.rest_positions[:, [2, 1, 0]]
+    picture = ms.plot(
+        mesh,
+        positions=across,
+        remanent_magnetization=(3e5, 0, 0),
+        color="displacement",
+        view=(0, 0),
+        width=width,
+        backend="matplotlib",
+    )
+    strip = picture.figure.axes[-1]
+    (bar,) = strip.images
+    (meaning,) = (text for text in strip.texts if "M_r" in text.get_text())
+    left = strip.transData.transform((bar.get_extent()[0], 0.0))[0]
+    assert meaning.get_window_extent().x1 < left
+
+
 def test_magnetization_turns_with_the_sheet(mesh, bent) -> None:
     state = State(mesh, bent, np.broadcast_to(MAGNETIZATION, (mesh.n_faces, 3)))
     angle = mesh.face_barycenters[:, 0] * np.pi / 0.2

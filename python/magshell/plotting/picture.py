@@ -21,6 +21,7 @@ DPI = 200
 LEGEND, TITLE, MARGIN = 0.72, 0.26, 0.08  # inches
 FLATTEST, TALLEST = 0.16, 1.1  # of a panel's height to its width
 TEXT = 8.0  # points
+NARROWEST = 0.8  # inches, of a colour bar
 _WITHOUT_WINDOWS = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}  # of matplotlib's backends
 
 
@@ -212,9 +213,10 @@ def _legend(axes, drawing: Drawing, inches: float, inches_per_meter: float) -> N
             (x, y),
             arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0},
         )
-        axes.text(x + 0.38, y, text, ha="left", va="center", fontsize=TEXT, color=colors.OUTLINE)
+        written = axes.text(x + 0.38, y, text, ha="left", va="center", fontsize=TEXT, color=colors.OUTLINE)
+        end = max(end, written.get_window_extent().x1 / axes.figure.dpi)
     if drawing.scalar is not None:
-        _color_bar(axes, drawing.scalar, inches)
+        _color_bar(axes, drawing.scalar, inches, room=inches - end - 0.6)
 
 
 def _triad(axes, drawing: Drawing, origin: np.ndarray) -> None:
@@ -238,11 +240,12 @@ def _triad(axes, drawing: Drawing, origin: np.ndarray) -> None:
         axes.text(*place, name, ha="center", va="center", fontsize=TEXT - 1, color=colors.OUTLINE)
 
 
-def _color_bar(axes, scalar: Scalar, inches: float) -> None:
+def _color_bar(axes, scalar: Scalar, inches: float, room: float) -> None:
+    """At the right end; room: inches that nothing else has, of which it takes what it needs to be read at least."""
     from matplotlib.ticker import MaxNLocator
 
     low, high = scalar.limits
-    width = min(2.4, 0.32 * inches)
+    width = max(min(2.4, 0.32 * inches, room), NARROWEST)
     left, right = inches - width - 0.3, inches - 0.3
     shades = scale_colors(scalar.scale, np.linspace(low, high, 256), (low, high))
     axes.imshow(shades[None], extent=(left, right, 0.30, 0.42), aspect="auto", interpolation="bilinear")
