@@ -12,6 +12,7 @@ from .design import Design
 from .task import FLUX_DENSITY
 
 PERIOD, CONTRACTING = 0.8, 0.3  # s: 75 beats a minute, and how long in each the field contracts the heart
+EXPANDING = 0.4  # of the field, the other way: where it is much stronger, magnets that lie against it turn over
 SWITCHING = 0.04  # s, that the field takes to turn over
 TIME_STEP = 0.01  # s; [Chen22] takes 1e-4
 DAMPING = 0.2  # N s/m, [Chen22] Table 1, taken as the whole heart's, shared by its vertices as its mass is
@@ -22,7 +23,8 @@ def field_at(time: float) -> np.ndarray:
     """(3,) T: contracting at first and expanding then, with straight lines between."""
     into = time % PERIOD
     ends = [0.0, SWITCHING, CONTRACTING, CONTRACTING + 2 * SWITCHING, PERIOD - SWITCHING, PERIOD]
-    return float(np.interp(into, ends, [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])) * FLUX_DENSITY
+    shares = [0.0, 1.0, 1.0, -EXPANDING, -EXPANDING, 0.0]
+    return float(np.interp(into, ends, shares)) * FLUX_DENSITY
 
 
 @dataclass(frozen=True)
