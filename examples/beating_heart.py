@@ -37,12 +37,18 @@ from _solid_designs.transfer import transferred
 import magshell as ms
 
 AREAS = ("lower_half", "ribbon")
-FINE = 4000  # tetrahedra with ten nodes: converged
-WITH_FACES = 3300  # tetrahedra, for a mesh with the paper's number of faces
+FINE = 6000  # tetrahedra with ten nodes: converged
+WITH_FACES = 4050  # tetrahedra, for a mesh with the number of faces of the paper
 
 
 def main(
-    areas=AREAS, n_tetrahedra=TETRAHEDRA, fine=FINE, with_faces=WITH_FACES, iterations=20, beats=3, progress=False
+    areas=AREAS,
+    n_tetrahedra=TETRAHEDRA,
+    fine=FINE,
+    with_faces=WITH_FACES,
+    iterations=20,
+    beats=3,
+    progress=False,
 ) -> dict:
     """{"heart": Heart, "hearts": {area: {"linear": Design, "quadratic": Design, "outcomes": [Outcome], "volumes",
     "beating": Beating}}}; volumes: of the chamber, contracted, over that at rest, one an outcome."""

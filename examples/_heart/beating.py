@@ -12,7 +12,9 @@ from .design import Design
 from .task import FLUX_DENSITY
 
 PERIOD, CONTRACTING = 0.8, 0.3  # s: 75 beats a minute, and how long in each the field contracts the heart
-EXPANDING = 0.4  # of the field, the other way: where it is much stronger, magnets that lie against it turn over
+EXPANDING = (
+    0.4  # of the field, the other way: where it is much stronger, magnets that lie against it turn over
+)
 SWITCHING = 0.04  # s, that the field takes to turn over
 TIME_STEP = 0.01  # s; [Chen22] takes 1e-4
 DAMPING = 0.2  # N s/m, [Chen22] Table 1, taken as the whole heart's, shared by its vertices as its mass is

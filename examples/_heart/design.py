@@ -37,44 +37,52 @@ class Design:
         return self.task.miss(self.rest.positions)
 
 
-def designed(task: Task, iterations: int, progress: bool = False) -> Design:
-    """The best of so many iterations of L-BFGS, from a skin without magnetization."""
-    at_rest = ms.WarmStart(task.scene)
-    edge_faces, edge_lengths = _edges_within(task)
-    numbers = torch.zeros(task.n_designed, 3, dtype=torch.float64, requires_grad=True)
+class Search:
+    """The objective of a skin's magnetization, and the equilibria from design to design."""
 
-    def solved(numbers: torch.Tensor) -> ms.Equilibrium:
-        of_skin = task.of_skin(LARGEST_MAGNETIZATION * capped(numbers))
-        return at_rest(
+    def __init__(self, task: Task):
+        self.task = task
+        self._at_rest = ms.WarmStart(task.scene)
+        self._edge_faces, self._edge_lengths = _edges_within(task)
+
+    def equilibrium(self, numbers: torch.Tensor) -> ms.Equilibrium:
+        """numbers: (n_designed, 3), of which each face's magnetization is made."""
+        of_skin = self.task.of_skin(LARGEST_MAGNETIZATION * capped(numbers))
+        return self._at_rest(
             applied_flux_density=FLUX_DENSITY,
-            values={task.solid.skin: {"remanent_magnetization": of_skin}},
+            values={self.task.solid.skin: {"remanent_magnetization": of_skin}},
         )
 
-    def objective(numbers: torch.Tensor) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        square = task.square(solved(numbers).positions) / task.way**2
-        jumps = ms.objectives.total_variation(capped(numbers), edge_faces, edge_lengths, SMOOTHING)
-        return square + ROUGHNESS_PRICE * jumps / edge_lengths.sum(), {"square": square.detach()}
+    def objective(self, numbers: torch.Tensor) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+        """The mean square distance over that at rest, and the price on jumps."""
+        square = self.task.square(self.equilibrium(numbers).positions) / self.task.way**2
+        jumps = ms.objectives.total_variation(
+            capped(numbers), self._edge_faces, self._edge_lengths, SMOOTHING
+        )
+        return square + ROUGHNESS_PRICE * jumps / self._edge_lengths.sum(), {"square": square.detach()}
 
-    found = ms.minimize(
-        objective,
-        [numbers],
-        ms.optim.LBFGS([numbers], lower=-FARTHEST, upper=FARTHEST),
-        max_iterations=iterations,
-        progress=progress,
-    )
-    with torch.no_grad(), at_rest.accept_jumps():
-        best = found.parameters[0].detach()
-        magnetization = LARGEST_MAGNETIZATION * capped(best).numpy()
-        rest = solved(best)
-    last = found.history[-1]
-    return Design(
-        task,
-        task.of_skin(magnetization),
-        rest,
-        task.way * np.sqrt([record.terms["square"] for record in found.history]),
-        last.iteration,
-        (last.seconds - found.history[0].seconds) / max(1, last.iteration),
-    )
+    def design(self, numbers: torch.Tensor, history: list) -> Design:
+        numbers = numbers.detach()
+        with self._at_rest.accept_jumps():
+            rest = self.equilibrium(numbers)
+        last = history[-1]
+        return Design(
+            self.task,
+            self.task.of_skin(LARGEST_MAGNETIZATION * capped(numbers).numpy()),
+            rest,
+            self.task.way * np.sqrt([record.terms["square"] for record in history]),
+            last.iteration,
+            (last.seconds - history[0].seconds) / max(1, last.iteration),
+        )
+
+
+def designed(task: Task, iterations: int, progress: bool = False) -> Design:
+    """The best of so many iterations of L-BFGS, from a skin without magnetization."""
+    search = Search(task)
+    numbers = torch.zeros(task.n_designed, 3, dtype=torch.float64, requires_grad=True)
+    optimizer = ms.optim.LBFGS([numbers], lower=-FARTHEST, upper=FARTHEST)
+    found = ms.minimize(search.objective, [numbers], optimizer, max_iterations=iterations, progress=progress)
+    return search.design(found.parameters[0], found.history)
 
 
 def capped(numbers: torch.Tensor) -> torch.Tensor:

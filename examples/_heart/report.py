@@ -62,7 +62,6 @@ def picture(found: dict, area: str) -> ms.Picture:
         titles=[f"{NAMES[area]}, {name}" for name in states],
         view=VIEW,
         columns=3,
-        rest=True,
     )
 
 
@@ -73,7 +72,6 @@ def movie(found: dict, area: str, path: Path, **options) -> Path:
         **_colors(found["quadratic"]),
         title=NAMES[area],
         view=VIEW,
-        rest=True,
         progress=False,
         **({"width": 600, "speed": 0.5, "fps": 20.0} | options),
     )
@@ -88,24 +86,25 @@ def _colors(design: Design) -> dict:
 
 
 def summary(result: dict) -> str:
-    lines = []
-    for area, found in result["hearts"].items():
-        design, beats = found["quadratic"], found["beating"]
-        lines += [
-            f"{NAMES[area]}: {design.task.n_designed} faces, {3 * design.task.n_designed} unknowns; the surface is to go "
-            f"{1e3 * design.task.way:.3f} mm (rms)",
-            table(found["outcomes"]),
-            "   chamber, contracted over at rest: "
-            + ", ".join(f"{each.what} {100 * volume:.1f} %" for each, volume in zip(found["outcomes"], found["volumes"], strict=True)),
-            f"   beating: {100 * beats.volumes.min() / beats.at_rest:.1f} to {100 * beats.volumes.max() / beats.at_rest:.1f} % of the "
-            f"volume at rest, a stroke of {100 * beats.stroke:.1f} %; {beats.motion.wall_time / beats.motion.steps_done:.2f} s a step",
-            "",
-        ]
-    mesh = result["heart"].mesh
-    fields = f"{1e3 * FLUX_DENSITY[1]:g} mT contract, {-1e3 * EXPANDING * FLUX_DENSITY[1]:g} mT expand, {60 / PERIOD:.0f} beats a minute"
-    lines += [
-        f"{fields}.",
-        f"{mesh.n_tetrahedra} tetrahedra, {mesh.n_faces} faces; [Chen22] Table 1: {TETRAHEDRA} and {FACES}. An iteration took "
-        f"{SECONDS[0]:.0f} and {SECONDS[1]:.0f} s there.",
-    ]
-    return "\n".join(lines)
+    parts = [_of_area(area, found) for area, found in result["hearts"].items()]
+    mesh, (top, bottom) = result["heart"].mesh, SECONDS
+    away = -EXPANDING * FLUX_DENSITY[1]
+    parts.append(
+        f"{1e3 * FLUX_DENSITY[1]:g} mT contract, {1e3 * away:g} mT expand, {60 / PERIOD:.0f} beats a minute.\n"
+        f"{mesh.n_tetrahedra} tetrahedra, {mesh.n_faces} faces; [Chen22] Table 1: {TETRAHEDRA}, {FACES}, "
+        f"and an iteration took {top:.0f} and {bottom:.0f} s."
+    )
+    return "\n\n".join(parts)
+
+
+def _of_area(area: str, found: dict) -> str:
+    design, beats = found["quadratic"], found["beating"]
+    volumes = ", ".join(f"{100 * volume:.1f}" for volume in found["volumes"])
+    shares = 100 * beats.volumes / beats.at_rest
+    seconds = beats.motion.wall_time / beats.motion.steps_done
+    return (
+        f"{NAMES[area]}: the surface is to go {1e3 * design.task.way:.3f} mm (rms)\n{table(found['outcomes'])}\n"
+        f"  the contracted chamber, in this order: {volumes} % of its volume at rest\n"
+        f"  beating: {shares.min():.1f} to {shares.max():.1f} %, a stroke of {100 * beats.stroke:.1f} %; "
+        f"{seconds:.2f} s a step"
+    )

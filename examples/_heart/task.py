@@ -15,13 +15,15 @@ from .shape import UNIT, Chamber, Heart
 YOUNG_MODULUS, POISSON_RATIO, MASS_DENSITY = 1e5, 0.45, 1e3  # Pa, 1, kg/m3: [Chen22] Table 1
 THICKNESS = 1e-3  # m, of the skin: what [Chen22] has for sheets
 FLUX_DENSITY = np.array([0.0, 0.05, 0.0])  # T, from front to back: as strong as [Chen22]'s strongest
-LARGEST_MAGNETIZATION = 4e5  # A/m: a residual flux density of 0.5 T, as of flexible magnets; [Chen22] has no limit
+LARGEST_MAGNETIZATION = (
+    4e5  # A/m: a residual flux density of 0.5 T, as of flexible magnets; [Chen22] has no limit
+)
 THINNER, WIDER, LONGER = 0.2, 0.03, 0.04  # shares of y, x and z: the most contracted shape
 BASE, WAIST = 36.0, 0.0  # units: held above the base; the contraction grows from there to the waist
 
 
 def contracted(points: np.ndarray) -> np.ndarray:
-    """(n, 3) m: where points at rest are in the most contracted shape, flatter from front to back and longer below the base."""
+    """(n, 3) m: where points at rest are in the most contracted shape: flatter from front to back, longer below."""
     x, y, z = np.moveaxis(points / UNIT, -1, 0)
     share = np.clip((BASE - z) / (BASE - WAIST), 0, 1)
     share = share**2 * (3 - 2 * share)
