@@ -37,7 +37,7 @@ from _solid_designs.transfer import transferred
 import magshell as ms
 
 AREAS = ("lower_half", "ribbon")
-FINE = 6000  # tetrahedra with ten nodes: converged
+FINE = 4000  # tetrahedra with ten nodes: converged
 WITH_FACES = 4050  # tetrahedra, for a mesh with the number of faces of the paper
 
 
@@ -46,8 +46,8 @@ def main(
     n_tetrahedra=TETRAHEDRA,
     fine=FINE,
     with_faces=WITH_FACES,
-    iterations=20,
-    beats=3,
+    iterations=10,
+    beats=2,
     progress=False,
 ) -> dict:
     """{"heart": Heart, "hearts": {area: {"linear": Design, "quadratic": Design, "outcomes": [Outcome], "volumes",
