@@ -1,0 +1,40 @@
+"""What a design does: on the mesh it was found with, on a converged one, and when it is found with better elements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import magshell as ms
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One line of the table.
+
+    what: a few words. solid: what was solved. miss: the distance from the target, or any other number of merit.
+    iterations, seconds_per_iteration: of the search; None where a design found elsewhere was only looked at.
+    """
+
+    what: str
+    solid: ms.Solid
+    miss: float
+    iterations: int | None = None
+    seconds_per_iteration: float | None = None
+
+
+def table(outcomes: Iterable[Outcome], miss: str = "rms distance [mm]", scale: float = 1e3) -> str:
+    """miss: what the number of merit is called; scale: from its SI unit to that of its name."""
+    outcomes = list(outcomes)
+    wide = max(len(each.what) for each in outcomes)
+    lines = [
+        f"{'':{wide}s}  element      tetrahedra    faces   unknowns   {miss}   iterations   s/iteration",
+    ]
+    for each in outcomes:
+        searched = "" if each.iterations is None else f"   {each.iterations:10d}   {each.seconds_per_iteration:11.2f}"
+        lines.append(
+            f"{each.what:{wide}s}  {each.solid.element:9s}    {each.solid.mesh.n_tetrahedra:10d}   "
+            f"{len(each.solid.skin.faces):6d}   {3 * each.solid.mesh.n_vertices:8d}   "
+            f"{scale * each.miss:{len(miss)}.3f}{searched}"
+        )
+    return "\n".join(lines)
