@@ -31,7 +31,11 @@ def table(outcomes: Iterable[Outcome], miss: str = "rms distance [mm]", scale: f
         f"{'':{wide}s}  element      tetrahedra    faces   unknowns   {miss}   iterations   s/iteration",
     ]
     for each in outcomes:
-        searched = "" if each.iterations is None else f"   {each.iterations:10d}   {each.seconds_per_iteration:11.2f}"
+        searched = (
+            ""
+            if each.iterations is None
+            else f"   {each.iterations:10d}   {each.seconds_per_iteration:11.2f}"
+        )
         lines.append(
             f"{each.what:{wide}s}  {each.solid.element:9s}    {each.solid.mesh.n_tetrahedra:10d}   "
             f"{len(each.solid.skin.faces):6d}   {3 * each.solid.mesh.n_vertices:8d}   "

@@ -20,6 +20,8 @@ def transferred(values: np.ndarray, designed: ms.Solid, other: ms.Solid) -> np.n
     """
     values = np.asarray(values)
     if len(values) != len(designed.skin.faces):
-        raise ValueError(f"values must have a row for each of {len(designed.skin.faces)} faces, got {values.shape}")
+        raise ValueError(
+            f"values must have a row for each of {len(designed.skin.faces)} faces, got {values.shape}"
+        )
     _, nearest = cKDTree(face_centers(designed)).query(face_centers(other))
     return values[nearest]
