@@ -1,0 +1,157 @@
+"""The field of every step, so that the starfish jumps over a bar: [Chen22] 6.4."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import torch
+
+import magshell as ms
+
+from .body import MASS_DENSITY, shape, starfish
+
+STEPS, TIME_STEP = 400, 5e-4  # [Chen22] 6.4 and Table 1; s
+FIELD_LIMIT = 50e-3  # T, of every component, the same
+CONTACT_STIFFNESS, FRICTION = 1e4, 0.6  # N/m and 1, the same
+SMOOTHING, STICKING_SPEED = 20e-6, 5e-3  # m and m/s
+GRAVITY = (0.0, 0.0, -9.81)
+
+BAR, BAR_WIDTH, BAR_HEIGHT = 15.5e-3, 1e-3, 1.5e-3  # m: its middle along x, and the size of its section
+OVER_TIME, OVER = 0.09, (16e-3, 0.0, 18e-3)  # s, m: when and where the mass center is asked to be above it
+DOWN_TIME, DOWN = 0.15, (33e-3, 0.0, 4e-3)  # s, m: and where it is to come down
+
+BLUR = 4.0  # steps: the field is a running mean of the unknowns, one a step and component, with a Gaussian so wide
+TOLERANCE = 1e-6  # of a step, relative
+
+
+@dataclass(frozen=True)
+class Design:
+    """What is asked for. mass_density: kg/m3. cost: m2/T2, of the field's mean square.
+
+    rise, fall: s, how long the field of the guess points up, growing as a quarter of a sine, and down; strength,
+    forward: T, of its parts along z and x.
+    """
+
+    mass_density: float
+    cost: float
+    strength: float
+    forward: float
+    rise: float = 20e-3
+    fall: float = 6e-3
+
+    def guess(self, steps: int = STEPS) -> np.ndarray:
+        """(steps, 3) T."""
+        ends = TIME_STEP * np.arange(1, steps + 1)
+        field = np.zeros((steps, 3))
+        field[:, 2] = np.where(
+            ends < self.rise, self.strength * np.sin(0.5 * np.pi * ends / self.rise), -self.strength
+        )
+        field[:, 0] = self.forward
+        field[ends > self.rise + self.fall] = 0.0
+        return field
+
+
+DESIGNS = {
+    "heavy": Design(3 * MASS_DENSITY, cost=3e-3, strength=48e-3, forward=30e-3),
+    "light": Design(MASS_DENSITY, cost=3e-3, strength=20e-3, forward=24e-3),
+    "light, cheap field": Design(MASS_DENSITY, cost=3e-5, strength=20e-3, forward=24e-3),
+}
+
+
+@dataclass
+class Jump:
+    """A design's starfish on the ground. mesh: of four-node tetrahedra; the element is made of them."""
+
+    design: Design
+    mesh: ms.TetMesh
+    element: str
+    steps: int = STEPS
+    tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        self.solid = starfish(self.mesh, self.element, self.design.mass_density)
+        ground = ms.Contact(
+            ms.obstacles.Plane(),
+            contact_stiffness=CONTACT_STIFFNESS,
+            friction_coefficient=FRICTION,
+            smoothing=SMOOTHING,
+            sticking_speed=STICKING_SPEED,
+        )
+        self.scene = ms.Scene(
+            self.solid,
+            contacts=[ground],
+            field=ms.UniformField(),
+            gravity=GRAVITY,
+            allow_rigid_motions=True,
+        )
+
+    def move(self, field, **options) -> ms.Trajectory:
+        """In a field a step, (steps, 3) T, from rest."""
+        return ms.simulate(
+            self.scene,
+            steps=self.steps,
+            time_step=TIME_STEP,
+            applied_flux_density=field,
+            integrator=ms.ImplicitEuler(),
+            solver=ms.MixedNewton(tolerance=self.tolerance),
+            progress=False,
+            **options,
+        )
+
+    def center(self, positions):
+        """Of mass, (n, 3) m; positions (n, n_v, 3) m."""
+        return ms.control.track(positions, np.arange(self.solid.mesh.n_vertices), self.solid.vertex_masses)
+
+    @cached_property
+    def asked(self) -> tuple[np.ndarray, torch.Tensor]:
+        """The frames (2,) and places (2, 3) m of the mass center that count, or the first of them in short motions."""
+        frames = np.rint(np.array([OVER_TIME, DOWN_TIME]) / TIME_STEP).astype(int)
+        within = frames <= self.steps
+        return frames[within], torch.tensor([OVER, DOWN], dtype=torch.float64)[within]
+
+    def miss(self, center):
+        """How far the center (n, 3) m is from these places, mean square, m2."""
+        frames, places = self.asked
+        return ms.control.path_following(center[frames], places) / len(frames)
+
+    def objective(self, unknowns: torch.Tensor) -> dict[str, torch.Tensor]:
+        """Terms in m2."""
+        field = blurred(unknowns)
+        return {
+            "miss": self.miss(self.center(self.move(field, keep="stages").positions)),
+            "strength": self.design.cost * ms.control.field_strength(field),
+        }
+
+    def solve(
+        self, start: np.ndarray, iterations: int, progress: bool = False
+    ) -> tuple[np.ndarray, ms.Minimum]:
+        """Unknowns to begin with, and found, (steps, 3) T; and how."""
+        unknowns = torch.tensor(start, requires_grad=True)
+        optimizer = ms.optim.LBFGS(
+            [unknowns],
+            lower=-FIELD_LIMIT,
+            upper=FIELD_LIMIT,
+            scale=0.4 * FIELD_LIMIT,
+            first_step=0.1,
+            max_evaluations=3,
+        )
+        found = ms.minimize(
+            self.objective, [unknowns], optimizer, max_iterations=iterations, progress=progress
+        )
+        return unknowns.detach().numpy(), found
+
+
+def blurred(unknowns: torch.Tensor) -> torch.Tensor:
+    """The field (steps, 3) T: a mean of the unknowns (steps, 3) T around each step, so that the bounds of these hold.
+
+    What a search by gradients changes is then smooth in time; steps by themselves make it stop early.
+    """
+    steps = np.arange(len(unknowns))
+    weights = np.exp(-0.5 * ((steps[:, None] - steps) / BLUR) ** 2)
+    return torch.tensor(weights / weights.sum(axis=1, keepdims=True)) @ unknowns
+
+
+def made(element: str, spacing: float | None = None, n_tetrahedra: int | None = None) -> ms.TetMesh:
+    return ms.meshes.from_distance(shape(), spacing, n_tetrahedra=n_tetrahedra)

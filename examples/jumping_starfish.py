@@ -1,0 +1,167 @@
+"""A soft starfish pushes itself off the ground and jumps over a bar, driven by a magnetic field in time."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from _run import run
+from _starfish.body import TETRAHEDRA, shape
+from _starfish.jump import BAR, BAR_HEIGHT, BAR_WIDTH, DESIGNS, STEPS, TIME_STEP, Jump, blurred
+from _starfish.report import (
+    COLORS,
+    draw_convergence,
+    draw_field,
+    draw_height,
+    draw_jump,
+    draw_take_off,
+    movie,
+    summary,
+)
+
+import magshell as ms
+
+ITERATIONS, AGAIN = 8, 2  # of the search with linear elements, and with quadratic ones from its field
+TAKE_OFF = 50  # steps, as many as [Chen22] Fig. 17 shows
+COARSE, FINE = (
+    1.7e-3,
+    1.3e-3,
+)  # m, the spacing of the quadratic elements that a design is found with and looked at
+
+
+def main(
+    designs=tuple(DESIGNS),
+    iterations: int = ITERATIONS,
+    again: int = AGAIN,
+    steps: int = STEPS,
+    spacings=(None, COARSE, FINE),
+    progress=False,
+) -> dict[str, dict]:
+    """A design's numbers each, in SI units. spacings: m, of the meshes with linear elements (None: as many tetrahedra as
+    the paper has), of quadratic ones to search with, and of finer ones; the last two may be None to go without."""
+    torch.set_num_threads(1)
+    linear, coarse, fine = spacings
+    papers = ms.meshes.from_distance(shape(), linear, n_tetrahedra=TETRAHEDRA if linear is None else None)
+    results = {}
+    for name in designs:
+        design = DESIGNS[name]
+        jump = Jump(design, papers, "linear", steps)
+        start = design.guess(steps)
+        result = results[name] = {"design": design, "guess": measured(jump, start)}
+        result["found"] = searched(jump, start, iterations, progress)
+        if fine is not None:
+            finer = Jump(design, ms.meshes.from_distance(shape(), fine), "quadratic", steps)
+            result["converged"] = measured(finer, result["found"]["unknowns"])
+        if coarse is not None:
+            better = Jump(design, ms.meshes.from_distance(shape(), coarse), "quadratic", steps)
+            result["again"] = searched(better, result["found"]["unknowns"], again, progress)
+        if fine is not None and coarse is not None:
+            result["again converged"] = measured(finer, result["again"]["unknowns"])
+    return results
+
+
+def searched(jump: Jump, start: np.ndarray, iterations: int, progress: bool) -> dict:
+    began = time.process_time()
+    unknowns, found = jump.solve(start, iterations, progress)
+    spent = time.process_time() - began
+    return measured(jump, unknowns) | {
+        "history": found.history,
+        "iterations": found.iterations,
+        "evaluations": found.history[-1].evaluations,
+        "reason": found.reason,
+        "processor_time": spent,
+    }
+
+
+def measured(jump: Jump, unknowns: np.ndarray) -> dict:
+    """What a field does. over: m, the lowest that any of the starfish is above the bar, infinite if it never is there;
+    clears: whether that is higher than the bar, and all of it is beyond at the end."""
+    field = blurred(torch.tensor(unknowns)).numpy()
+    began = time.process_time()
+    move = jump.move(field)
+    spent = time.process_time() - began
+    x, z = move.positions[..., 0], move.positions[..., 2]
+    over = np.where(np.abs(x - BAR) < 0.5 * BAR_WIDTH, z, np.inf).min()
+    center = jump.center(move.positions).numpy()
+    return {
+        "jump": jump,
+        "unknowns": unknowns,
+        "field": field,
+        "times": TIME_STEP * np.arange(jump.steps + 1),
+        "positions": move.positions,
+        "center": center,
+        "lowest": z.min(axis=1),
+        "miss": float(jump.miss(torch.tensor(center))) ** 0.5,
+        "over": float(over),
+        "clears": bool(over > BAR_HEIGHT and x[-1].min() > BAR),
+        "rms": float(np.sqrt((field**2).sum(axis=1).mean())),
+        "strongest": float(np.abs(field).max()),
+        "halved": len(move.halved),
+        "newton": move.iterations / jump.steps,
+        "motion_time": spent,
+    }
+
+
+def plot(results: dict[str, dict]):
+    """A column a design: its jump, height, field, the field of the first steps with four pictures, and the search."""
+    from matplotlib import pyplot as plt
+
+    figure = plt.figure(figsize=(5.2 * len(results), 15.5), layout="constrained")
+    for part, (name, result) in zip(
+        np.ravel(figure.subfigures(1, len(results))), results.items(), strict=True
+    ):
+        part.suptitle(name, fontweight="bold", x=0.05, ha="left")
+        found = result["found"]
+        grid = part.add_gridspec(6, 2, height_ratios=[1.7, 1.5, 1.2, 1.2, 1.5, 1.1])
+        draw_jump(part.add_subplot(grid[0, :]), result, name)
+        rows = [part.add_subplot(grid[k, :]) for k in (1, 2, 3, 5)]
+        draw_height(rows[0], result, name)
+        draw_field(rows[1], found)
+        draw_field(rows[2], found, TAKE_OFF)
+        draw_convergence(rows[3], result, name)
+        inner = grid[4, :].subgridspec(2, 2)
+        for number, frame in enumerate(take_off_frames(found)):
+            axes = part.add_subplot(inner[number // 2, number % 2])
+            draw_take_off(axes, found, COLORS[name], frame, "abcd"[number])
+            rows[2].axvline(1e3 * found["times"][frame], color="k", lw=0.6, ls=":")
+            rows[2].text(
+                1e3 * found["times"][frame], rows[2].get_ylim()[1], "abcd"[number], fontsize=8, va="bottom"
+            )
+        for axes in rows:
+            axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def take_off_frames(motion: dict) -> list[int]:
+    """Four of the first steps: the field begins to turn down at the second, as far down as it goes at the third."""
+    down = motion["field"][:, 2]
+    last = min(TAKE_OFF, len(down) - 1)
+    lowest = int(np.argmin(down[:last]))
+    highest = int(np.argmax(down[: max(lowest, 1)]))
+    return [highest // 2, highest, lowest, last]
+
+
+def write(outcome: dict, out: Path) -> None:
+    ms.Picture(plot(outcome)).save(out / "jumping_starfish.png", dpi=110)
+    for name, result in outcome.items():
+        movie(result, name, out / f"jumping_starfish_{name.replace(',', '').replace(' ', '_')}.gif")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--designs", nargs="+", choices=list(DESIGNS), default=list(DESIGNS))
+    parser.add_argument("--iterations", type=int, default=ITERATIONS)
+    parser.add_argument("--again", type=int, default=AGAIN, help="iterations with quadratic elements")
+    parser.add_argument("--linear-only", action="store_true")
+    asked = parser.parse_args()
+    spacings = (None, None, None) if asked.linear_only else (None, COARSE, FINE)
+    run(
+        lambda: main(asked.designs, asked.iterations, asked.again, spacings=spacings, progress=True),
+        summary,
+        write,
+    )
