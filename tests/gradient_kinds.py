@@ -16,6 +16,7 @@ from gradient_kinds_bodies import (
     two_sheets_in_motion,
 )
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
+from gradient_kinds_skeletons import skeleton_at_rest, skeleton_in_motion
 from gradient_scenes import Kind
 from gradient_world import (
     BEGIN,
@@ -259,6 +260,11 @@ MAKERS = {
     "in motion, with rigid parts, tr_bdf2": lambda: rigid_in_motion(
         ms.TRBDF2(), keep="checkpoints", memory_budget=2e4, stiffness_damping=1e-3
     ),
+    "at rest, with a skeleton": skeleton_at_rest,
+    "in motion, with a skeleton": lambda: skeleton_in_motion(
+        ms.TRBDF2(), keep="checkpoints", memory_budget=2e4
+    ),
+    "in motion, with a skeleton, euler": lambda: skeleton_in_motion(ms.ImplicitEuler()),
     "onto a Plane": lambda: thrown(ob.Plane),
     "onto a Plane, rubbing": lambda: thrown(ob.Plane, **RUBS),
     "onto a Plane, rubbing late": lambda: thrown(ob.Plane, lagged_friction=True, face_samples=1, **RUBS),

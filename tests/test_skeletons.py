@@ -9,8 +9,8 @@ import torch
 import magshell as ms
 
 G = 9.81
-# Reference set of the project, cases K1: angles [rad] from the downward vertical, computed to 1e-21, at t = 1 and 2 s of chains
-# of links of 1 m and 1 kg that start horizontal and at rest.
+# Reference set of the project, cases K1: angles [rad] from the downward vertical, computed to 1e-21, at t = 1 and 2 s, of
+# chains of links of 1 m and 1 kg that start horizontal and at rest.
 CHAINS = {
     "1rod": {1: (-1.562621718,), 2: (1.538098984,)},
     "2rod": {1: (-1.207716238, -0.8143910231), 2: (-0.08275830682, 0.4073620749)},
@@ -67,7 +67,9 @@ def test_joints_hold_to_round_off_over_ten_thousand_steps():
 def test_hinge_in_balance():
     """A rod on a spring hinge under its weight and a torque: k theta = tau + m g l/2 sin(...), to round-off."""
     rod = ms.Link(mass=2.0, inertia=0.1, center=(0.5, 0, 0))
-    hinge = ms.Revolute(rod, origin=(0, 0, 0), axis=(0, -1, 0), spring_stiffness=30.0, rest_angle=0.3, torque=4.0)
+    hinge = ms.Revolute(
+        rod, origin=(0, 0, 0), axis=(0, -1, 0), spring_stiffness=30.0, rest_angle=0.3, torque=4.0
+    )
     rest = ms.equilibrium(ms.Scene(ms.Skeleton([rod], [hinge]), gravity=(0, 0, -G)))
     theta = float(rest[hinge].angle)
     assert 30.0 * (theta - 0.3) == pytest.approx(4.0 - 2.0 * G * 0.5 * np.cos(theta), rel=1e-9)
@@ -136,7 +138,9 @@ def test_slider_crank_closes_its_loop():
 
 def test_skeleton_in_jelly_keeps_its_bones_and_bends_the_bar():
     mesh = ms.meshes.box((0.4, 0.05, 0.05), cells=(16, 2, 2))
-    bar = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=2e4, poisson_ratio=0.3), mass_density=1e3, element="linear")
+    bar = ms.Solid(
+        mesh, material=ms.NeoHookean(young_modulus=2e4, poisson_ratio=0.3), mass_density=1e3, element="linear"
+    )
     x = mesh.rest_positions[:, 0]
     bones = [
         ms.Link(vertices=np.flatnonzero((x > a + 1e-9) & (x < b - 1e-9)), body=bar)
@@ -193,7 +197,10 @@ def test_gradient_of_a_motion_by_torques_in_time():
         (lambda a, b: ms.Link(mass=1.0), "center"),
         (lambda a, b: ms.Scene([ms.Skeleton([a]), a], allow_rigid_motions=True), "one Rigid"),
         (lambda a, b: ms.Scene(ms.Skeleton([ms.Link(mass=1.0, inertia=1.0, center=(0, 0, 0))])), "free"),
-        (lambda a, b: ms.Scene(ms.Skeleton([a], [ms.Ball(a, origin=(0, 0, 1))])), "nothing tells how it turns"),
+        (
+            lambda a, b: ms.Scene(ms.Skeleton([a], [ms.Ball(a, origin=(0, 0, 1))])),
+            "nothing tells how it turns",
+        ),
     ],
 )
 def test_bad_input(wrong, message):

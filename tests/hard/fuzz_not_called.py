@@ -9,6 +9,8 @@ NOT_CALLED = {
     "Interrupted": "an error",
     "BodyResult": "a result",
     "RigidResult": "a result",
+    "Joint": "abstract",
+    "JointResult": "a result",
     "LinearResponse": "a result",
     "Minimum": "a result",
     "Multistart": "a result",

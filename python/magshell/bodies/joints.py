@@ -21,7 +21,6 @@ class Joint(Owner):
     """
 
     _kind: ClassVar[str] = ""
-    _may_jump = True  # what varies in time may have one value a step
     _defaults: ClassVar[dict[str, float]] = {}  # by name: where it does not act
 
     def __init__(self, child: Rigid, parent: Rigid | None, origin, axis=None, **law):
@@ -43,7 +42,8 @@ class Joint(Owner):
         for name, value in self._given.items():
             self._given[name] = self._checked(name, value)
         self._check_together()
-        self._replaceable = self._in_time = tuple(self._given)
+        self._replaceable = tuple(self._given)  # what it was made without, a solve cannot give it
+        self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
 
     def __getattr__(self, name: str):
         given = self.__dict__.get("_given", {})
@@ -161,6 +161,7 @@ class Revolute(Joint):
         "limit_stiffness": 0.0,
         "limit_smoothing": 1.0,
     }
+    _replaceable = _in_time = tuple(_defaults)
 
     def __init__(
         self,
@@ -205,6 +206,7 @@ class Prismatic(Joint):
         "limit_stiffness": 0.0,
         "limit_smoothing": 1.0,
     }
+    _replaceable = _in_time = tuple(_defaults)
 
     def __init__(
         self,
@@ -242,6 +244,7 @@ class Ball(Joint):
         "limit_stiffness": 0.0,
         "limit_smoothing": 1.0,
     }
+    _replaceable = _in_time = tuple(_defaults)
 
     def __init__(
         self,
@@ -268,6 +271,7 @@ class Closure(Joint):
 
     _kind = "closure"
     _defaults: ClassVar[dict[str, float]] = {"stiffness": 0.0}
+    _replaceable = tuple(_defaults)
 
     def __init__(self, child: Rigid, parent: Rigid | None = None, *, origin, stiffness):
         super().__init__(child, parent, origin, stiffness=positive("stiffness", "N/m", stiffness))

@@ -7,6 +7,8 @@ import numpy as np
 from .._checks.scalars import positive
 from ..mesh.triangle_mesh import TriangleMesh
 from .rigid import Rigid
+from .shell import Shell
+from .solid import Solid
 
 
 class Link(Rigid):
@@ -21,31 +23,51 @@ class Link(Rigid):
     Skeleton(1 link, 1 joint)
     """
 
-    def __init__(self, vertices=None, *, shape: TriangleMesh | None = None, **values):
+    def __init__(
+        self,
+        vertices=None,
+        *,
+        shape: TriangleMesh | None = None,
+        mass=None,
+        inertia=None,
+        center=None,
+        magnetic_moment=None,
+        velocity=None,
+        angular_velocity=None,
+        body: Shell | Solid | None = None,
+    ):
         if shape is not None and not isinstance(shape, TriangleMesh):
             raise ValueError(f"shape of a Link must be a TriangleMesh, got {shape!r:.60}")
         self.shape = shape
-        super().__init__(vertices, **values)
+        super().__init__(
+            vertices,
+            mass=mass,
+            inertia=inertia,
+            center=center,
+            magnetic_moment=magnetic_moment,
+            velocity=velocity,
+            angular_velocity=angular_velocity,
+            body=body,
+        )
 
     def _check_free(self) -> None:
         if self.center is None:
             raise ValueError("a Link without vertices needs its center [m]: Link(center=...)")
 
     @classmethod
-    def of(cls, shape: TriangleMesh, mass_density: float, **values) -> Link:
+    def of(cls, shape: TriangleMesh, mass_density: float, **others) -> Link:
         """The one that fills a closed surface, faces outwards: mass [kg], inertia and center by its density [kg/m3].
+        others: of a Link's arguments.
 
         Raises ValueError where the surface is open, or turned inside out.
         """
         density = positive("mass_density", "kg/m3", mass_density)
         volume, center, second = _moments(shape)
         inertia = density * (np.trace(second) * np.eye(3) - second)
-        return cls(shape=shape, mass=density * volume, center=center, inertia=inertia, **values)
+        return cls(shape=shape, mass=density * volume, center=center, inertia=inertia, **others)
 
-    def replaced(self, **values) -> Link:
-        plain = super().replaced(**values)
-        own = {name: getattr(plain, name) for name in self._replaceable}
-        return Link(self.vertices, shape=self.shape, body=self.body, **own)
+    def _again(self, values: dict) -> Link:
+        return Link(self.vertices, shape=self.shape, body=self.body, **values)
 
 
 def _moments(shape: TriangleMesh) -> tuple[float, np.ndarray, np.ndarray]:

@@ -102,7 +102,10 @@ class Rigid(Owner):
         for name in values:
             if own[name] is None and not (name in ("velocity", "angular_velocity") and self.vertices is None):
                 raise ValueError(f"the Rigid was made without {name}: give it one in the scene, zero will do")
-        return Rigid(self.vertices, body=self.body, **{**own, **values})
+        return self._again({**own, **values})
+
+    def _again(self, values: dict) -> Rigid:
+        return Rigid(self.vertices, body=self.body, **values)
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         if self.magnetic_moment is not None:

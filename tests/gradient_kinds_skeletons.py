@@ -1,0 +1,89 @@
+"""Kinds of scene with skeletons, for gradient_kinds.py."""
+
+import numpy as np
+from gradient_kinds_bodies import CORNER
+from gradient_scenes import Kind
+from gradient_world import EXACT, FACTORS, IN_TIME, MIDDLE, REACH, RNG, STEPS
+from test_adjoint import DEFAULTS, DIPOLES, MESH, N_V
+
+import magshell as ms
+
+_LIMITS = {"lower_limit": -2e-3, "upper_limit": 1e-3, "limit_stiffness": 1e-2, "limit_smoothing": 5e-3}
+
+
+def _carried_skeleton(free: bool):
+    """On the free end of a sheet: a hinge, a slide, a ball joint, a link held fast, and a loop through the world."""
+    base = MESH.rest_positions[CORNER].mean(axis=0)
+
+    def link(*off, **own):
+        own = {"mass": 2e-3, "inertia": (4e-7, 5e-7, 6e-7), "magnetic_moment": (1e-3, 2e-3, 5e-3), **own}
+        return ms.Link(center=base + np.array(off), **own)
+
+    root = ms.Link(CORNER, mass=1e-3, inertia=1e-7, center=(*base, 0.001, 0, 0.002))
+    spin = {"velocity": (0.02, 0.01, -0.1), "angular_velocity": (2.0, 5.0, -1.0)} if free else {}
+    arm, slider, bob = link(0.02, 0, 0.01, **spin), link(0.0, 0.02, 0.01), link(0.04, 0.0, 0.02)
+    stone = link(0.02, 0, 0.03)
+    springs = {"spring_stiffness": 3e-3, "servo_stiffness": 2e-3}
+    hinge = ms.Revolute(
+        arm,
+        root,
+        origin=(*base, 0.005, 0, 0),
+        axis=(0.1, 1, 0.3),
+        rest_angle=0.02,
+        torque=1e-5,
+        target_angle=0.05,
+        torque_limit=2e-4,
+        **springs,
+        **_LIMITS,
+    )
+    slide = ms.Prismatic(
+        slider,
+        root,
+        origin=base,
+        axis=(0.2, 1, 0),
+        rest_displacement=1e-3,
+        force=1e-3,
+        target_displacement=2e-3,
+        force_limit=1e-2,
+        spring_stiffness=5.0,
+        servo_stiffness=3.0,
+        lower_limit=-1e-2,
+        upper_limit=1e-5,
+        limit_stiffness=2.0,
+        limit_smoothing=1e-3,
+    )
+    ball = ms.Ball(
+        bob,
+        arm,
+        origin=(*base, 0.03, 0, 0.01),
+        spring_stiffness=2e-3,
+        upper_limit=1e-2,
+        limit_stiffness=1e-3,
+        limit_smoothing=1e-2,
+    )
+    loop = ms.Closure(bob, origin=(*base, 0.05, 0.001, 0.02), stiffness=0.5)
+    skeleton = ms.Skeleton([arm, root, slider, bob, stone], [hinge, slide, ball, ms.Fixed(stone, arm), loop])
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    return ms.Scene(
+        [sheet, skeleton],
+        supports=[ms.Clamp(MESH.edges_at(x=0.0))],
+        field=[ms.UniformField(), DIPOLES],
+        gravity=(0.1, 0.2, -2.0),
+        allow_rigid_motions=free,
+    )
+
+
+def skeleton_at_rest() -> Kind:
+    return Kind(_carried_skeleton(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=REACH)
+
+
+def skeleton_in_motion(integrator, **options) -> Kind:
+    scene = _carried_skeleton(True)
+    turning = np.cross([2.0, 5.0, -1.0], MESH.rest_positions - MIDDLE)
+    moves = np.array([0.02, 0.01, -0.1]) + turning + 0.05 * RNG.standard_normal((N_V, 3))
+    moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
+    controls = {**IN_TIME, "velocities": moves, "time_step": 3e-3}
+    fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
+    reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0}
+    in_time = {"in_time": STEPS} if "keep" in options else {}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach, **in_time)
