@@ -14,6 +14,7 @@ Their figure shows small differences and does not say why there are any. The ans
   (Kirchhoff-Love) is not the model of that plate.
 
 "Accumulated" is the paper's measure, the sum of the differences of cells over the whole energy; "total" lets them cancel.
+Of the twisted plate with its normal magnetized the whole energy passes through zero near 115 degrees: hence the peak there.
 
 Run it: prints a table and writes pictures into out/.
 """
