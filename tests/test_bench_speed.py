@@ -58,9 +58,9 @@ def test_statics(tmp_path, capsys) -> None:
 
 def test_gradients(tmp_path, capsys) -> None:
     pytest.importorskip("torch")
-    results = run("gradients", tmp_path, "--faces", "32")
+    results = run("gradients", tmp_path, "--faces", "32", "--quick")
     assert "The gradient by all inputs at once" in capsys.readouterr().out
-    assert results.keys() == {"midedge", "hinge"}
+    assert results.keys() == {"midedge", "hinge", "solid, linear"}
     assert all(cost["share"] == cost["gradient"] / cost["equilibrium"] for cost in results.values())
 
 
@@ -74,6 +74,8 @@ def test_dynamics(tmp_path, capsys) -> None:
     assert 0 < results["memory"]["checkpoints, 100"]["bytes"] < 1e6
     assert results["long run"]["TRBDF2"]["steps"] == 200
     assert "With contact and friction" in printed
+    assert "A step of implicit Euler" in printed and results["solid steps"][0]["tetrahedra"] == 648
+    assert [each["kept"] for each in results["solid gradients"]] == ["factors", "checkpoints"]
     (surroundings,) = results["surroundings"].values()
     assert min(row["step"] for row in surroundings.values()) > 0
     assert surroundings["contact"]["way"] != surroundings["contact, friction"]["way"]
@@ -92,6 +94,7 @@ def test_scaling(tmp_path, capsys) -> None:
     assert small["entries"] < small["factor"] < large["factor"] and small["model"] < large["model"]
     assert results["exponents"].keys() == TIMES.keys() | MEMORIES.keys()
     assert 0.9 < results["exponents"]["model"] < 1.1
+    assert [size["tetrahedra"] for size in results["solids"]] == [192, 1536]
     assert results["busy machine"]["company"].keys() == COMPANY.keys()
     assert all(name in printed for name in COMPANY)
     assert all(min(times.values()) > 0 for times in results["busy machine"]["company"].values())

@@ -34,8 +34,8 @@ def draw(results: dict, setting: dict) -> Figure:
     axes.margins(x=0.1)
     tidy(axes, grid="x")
     axes.tick_params(axis="y", length=0, labelsize=9.5)
-    faces = next(iter(results.values()))["faces"]
     panel_title(axes, "A gradient beside its equilibrium", f"ms; at most {100 * ALLOWED_SHARE:.0f} % of it")
     axes.legend(frameon=False, fontsize=8.5, labelcolor=INK, loc="lower right")
-    note(figure, f"{faces} faces; {machine(setting)}")
+    sizes = ", ".join(dict.fromkeys(cost["size"] for cost in results.values()))
+    note(figure, f"{sizes}; {machine(setting)}")
     return figure
