@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 from _heart.beating import beating
 from _heart.design import Design, designed
 from _heart.report import draw_search, draw_volumes, movie, picture, summary
@@ -85,7 +84,7 @@ def outcome(what: str, design: Design, elsewhere: Task | None) -> tuple[Outcome,
     else:
         of_skin = transferred(design.remanent_magnetization, design.task.solid, elsewhere.solid)
         positions, task, search = elsewhere.at_rest(of_skin).positions, elsewhere, (None, None)
-    volumes = [task.chamber.volume(np.array(x)) for x in (positions, task.solid.mesh.rest_positions)]
+    volumes = [task.chamber.volume(x) for x in (positions, task.solid.mesh.rest_positions)]
     return Outcome(what, task.solid, task.miss(positions), *search), float(volumes[0] / volumes[1])
 
 
