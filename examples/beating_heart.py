@@ -14,7 +14,7 @@ What comes out, after 10 iterations of L-BFGS: the surface is to go 0.582 mm (ro
 
 in brackets the volume of the contracted chamber, of that at rest. A beat moves 16 and 9 % of it.
 
-- Linear elements are too stiff: their designs contract the true heart twice as far as they say, and beyond the target.
+- Linear elements are too stiff: their designs contract the true heart twice as far as they say. The target has 89.8 %.
   Those of quadratic elements do what they say.
 - An iteration takes 0.05 to 0.1 s with linear elements, 0.5 to 0.7 s with quadratic ones, on one core that others use too.
 - The paper gives the numbers of faces and tetrahedra, Young's modulus, Poisson's ratio and damping (Table 1). It does not
