@@ -4,8 +4,19 @@
 remanent magnetization of each face there is designed, at rest and by the gradient, so that a constant field pulls the
 heart into its most contracted shape; then the field switches to and fro.
 
-RESULTS
+What comes out, after 10 iterations of L-BFGS: the surface is to go 0.582 mm (root mean square), and misses its target by
 
+                                            lower half             ribbon
+    found with linear elements              0.346 mm  (90.8 %)     0.452 mm  (96.1 %)
+      on a converged mesh                   0.399     (82.6 %)     0.435     (91.5 %)
+    found with quadratic elements           0.339     (86.7 %)     0.424     (92.8 %)
+      on a converged mesh                   0.344     (87.4 %)     0.427     (92.2 %)
+
+in brackets the volume of the contracted chamber, of that at rest. A beat moves 16 and 9 % of it.
+
+- Linear elements are too stiff: their designs contract the true heart twice as far as they say. The target has 89.8 %.
+  Those of quadratic elements do what they say.
+- An iteration takes 0.05 to 0.1 s with linear elements, 0.5 to 0.7 s with quadratic ones, on one core that others use too.
 - The paper gives the numbers of faces and tetrahedra, Young's modulus, Poisson's ratio and damping (Table 1). It does not
   give, and chosen here are: the shape, which here is hollow and open at its vessel; its height, 19 mm, as of a rat's; a
   skin of 1 mm with at most 0.4 MA/m (the paper has no limit); a uniform field of 50 mT from front to back, the strongest
@@ -24,7 +35,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 from _heart.beating import beating
 from _heart.design import Design, designed
 from _heart.report import draw_search, draw_volumes, movie, picture, summary
@@ -85,7 +95,7 @@ def outcome(what: str, design: Design, elsewhere: Task | None) -> tuple[Outcome,
     else:
         of_skin = transferred(design.remanent_magnetization, design.task.solid, elsewhere.solid)
         positions, task, search = elsewhere.at_rest(of_skin).positions, elsewhere, (None, None)
-    volumes = [task.chamber.volume(np.array(x)) for x in (positions, task.solid.mesh.rest_positions)]
+    volumes = [task.chamber.volume(x) for x in (positions, task.solid.mesh.rest_positions)]
     return Outcome(what, task.solid, task.miss(positions), *search), float(volumes[0] / volumes[1])
 
 

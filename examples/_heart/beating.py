@@ -59,4 +59,4 @@ def beating(design: Design, beats: int, time_step: float = TIME_STEP, progress: 
         progress=progress,
     )
     volumes = task.chamber.volume(motion.positions).numpy()
-    return Beating(motion, volumes, float(task.chamber.volume(task.solid.mesh.rest_positions.copy())))
+    return Beating(motion, volumes, float(task.chamber.volume(task.solid.mesh.rest_positions)))

@@ -90,6 +90,11 @@ class Chamber:
 
     def volume(self, positions) -> torch.Tensor:
         """m3, of positions (..., n_v, 3) m. Seen from the mouth's center the fan spans none of it."""
-        positions = torch.as_tensor(positions)
+        positions = as_tensor(positions)
         seen = positions - positions[..., self._mouth, :].mean(dim=-2, keepdim=True)
         return -torch.linalg.det(seen[..., self._faces, :]).sum(dim=-1) / 6
+
+
+def as_tensor(positions) -> torch.Tensor:
+    """A tensor as it is; of an array, which may be read-only, a copy."""
+    return positions if isinstance(positions, torch.Tensor) else torch.tensor(np.array(positions))

@@ -10,7 +10,7 @@ import torch
 
 import magshell as ms
 
-from .shape import UNIT, Chamber, Heart
+from .shape import UNIT, Chamber, Heart, as_tensor
 
 YOUNG_MODULUS, POISSON_RATIO, MASS_DENSITY = 1e5, 0.45, 1e3  # Pa, 1, kg/m3: [Chen22] Table 1
 THICKNESS = 1e-3  # m, of the skin: what [Chen22] has for sheets
@@ -96,7 +96,7 @@ class Task:
 
     def miss(self, positions) -> float:
         """m: root mean square distance of the surface from the target."""
-        return float(self.square(torch.as_tensor(np.array(positions)))) ** 0.5
+        return float(self.square(as_tensor(positions))) ** 0.5
 
     def at_rest(self, of_skin: np.ndarray, flux_density=FLUX_DENSITY) -> ms.Equilibrium:
         """With the field turned on over the heart at rest. of_skin: (k, 3) A/m; flux_density: (3,) T."""
