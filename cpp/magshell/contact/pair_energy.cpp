@@ -37,10 +37,11 @@ void add_outer(const PairVectors& one, const PairVectors& other, double scale, P
 
 PairEnergy::PairEnergy(const ContactPair& pair, const PairPlaces& x, const BarrierLaw& law)
     : pair_(pair),
-      law_(law),
-      acts_(proximity_within(pair.kind, x, law.reach + law.thickness, near_)),
+      share_(pair.share(law)),
+      law_(pair.scaled(law)),
+      acts_(proximity_within(pair.kind, x, law_.reach + law_.thickness, near_)),
       edges_(x, acts_ && pair.kind == PairKind::edge_edge ? pair.parallel : 0.0),
-      barrier_(acts_ ? near_.distance - law.thickness : law.reach, law) {
+      barrier_(acts_ ? near_.distance - law_.thickness : law_.reach, law_) {
     const double scale = pair.area * law.stiffness;
     energy_ = scale * barrier_.energy;
     slope_ = scale * barrier_.slope;
@@ -148,10 +149,20 @@ PairEnergy::ByLaw PairEnergy::vjp(const PairVectors& lambda, double by_normal_fo
                   (edges_.by_one.dot(lambda[1] - lambda[0]) + edges_.by_two.dot(lambda[3] - lambda[2]));
     along *= edges_.factor;
     const double area = pair_.area, scale = area * law_.stiffness;
-    return {area * (along * barrier_.slope + turning * barrier_.energy),
-            scale * (along * barrier_.slope_by_reach + turning * barrier_.energy_by_reach),
-            -scale * (along * barrier_.curvature + turning * barrier_.slope),
-            scale * (along * barrier_.slope_by_smoothing + turning * barrier_.energy_by_smoothing)};
+    ByLaw by{area * (along * barrier_.slope + turning * barrier_.energy),
+             scale * (along * barrier_.slope_by_reach + turning * barrier_.energy_by_reach),
+             -scale * (along * barrier_.curvature + turning * barrier_.slope),
+             scale * (along * barrier_.slope_by_smoothing + turning * barrier_.energy_by_smoothing)};
+    if (share_ < 1.0) {
+        // Its own numbers are a share of the law's, which is room / (reach + thickness).
+        const double both = law_.reach + law_.thickness;
+        const double by_share =
+            by.reach * law_.reach + by.thickness * law_.thickness + by.smoothing * law_.smoothing;
+        by.reach = share_ * (by.reach - by_share / both);
+        by.thickness = share_ * (by.thickness - by_share / both);
+        by.smoothing *= share_;
+    }
+    return by;
 }
 
 }  // namespace magshell

@@ -21,12 +21,35 @@ namespace magshell {
 struct ContactPair {
     PairKind kind = PairKind::point_triangle;
     std::array<Index, 4> nodes{-1, -1, -1, -1};
-    double area = 0.0;  // A [m2]; negative where it takes back what other pairs count twice (contact/pairs.h)
+    double area = 0.0;  // A [m2]; negative where it takes back what other pairs count twice
     double parallel =
         0.0;  // of two edges: a thousandth of the product of the squares of their rest lengths [m4]
+    /// What reach and thickness together are scaled down to [m]: for neighbours on a surface, that its mesh puts nearer
+    /// than they may be.
+    double room = std::numeric_limits<double>::infinity();
 
+    /// The share of a law's reach and thickness that this pair has.
+    double share(const BarrierLaw& law) const {
+        const double both = law.reach + law.thickness;
+        return both > room ? room / both : 1.0;
+    }
+    /// The law that holds for it.
+    BarrierLaw scaled(BarrierLaw law) const {
+        const double s = share(law);
+        law.reach *= s;
+        law.thickness *= s;
+        law.smoothing *= s;
+        return law;
+    }
     bool operator==(const ContactPair&) const = default;
 };
+
+/// The nodes' vectors, out of all that there are, three numbers each.
+inline PairPlaces places_of(const ContactPair& pair, const double* all) {
+    PairPlaces x;
+    for (int k = 0; k < nodes_of(pair.kind); ++k) x[k] = Eigen::Map<const Vec3>(all + 3 * pair.nodes[k]);
+    return x;
+}
 
 /// A vector for each node of a pair.
 using PairVectors = std::array<Vec3, 4>;
@@ -41,6 +64,7 @@ class PairEnergy {
     bool acts() const { return acts_; }
     double energy() const { return edges_.factor * energy_; }
     const Proximity& near() const { return near_; }
+    int count() const { return nodes_of(pair_.kind); }
     /// N = - dE/dd [N], the force that pushes them apart.
     double normal_force() const { return -edges_.factor * slope_; }
     /// dN/dx [N/m]
@@ -59,7 +83,8 @@ class PairEnergy {
     void add_parallel(bool cautious, PairBlocks& blocks) const;
 
     ContactPair pair_;
-    BarrierLaw law_;
+    double share_;
+    BarrierLaw law_;  // its own
     Proximity near_;
     bool acts_;
     ParallelEdges edges_;

@@ -30,7 +30,7 @@ enum class PairKind : std::uint8_t {
     point_point,     // point; point
 };
 
-/// How many nodes a pair has: 4, 4, 3, 2. What stands for the others does not matter, as long as it is finite.
+/// How many nodes a pair has: 4, 4, 3, 2. What stands for the others is not read.
 constexpr int nodes_of(PairKind kind) {
     return kind == PairKind::point_point ? 2 : kind == PairKind::point_edge ? 3 : 4;
 }
@@ -47,12 +47,6 @@ struct Proximity {
     Vec3 normal;           // n, of length 1; zero where the parts touch with fewer than two free places
     Vec3 along[2];         // f_a
     PairWeights slide[2];  // w_a' [1/m]; zero from `free` on
-
-    /// The weighted sum of a vector at each node: of velocities, that of the first part relative to the second.
-    Vec3 at(const PairPlaces& vectors) const {
-        return weights[0] * vectors[0] + weights[1] * vectors[1] + weights[2] * vectors[2] +
-               weights[3] * vectors[3];
-    }
 };
 
 /// The closest points of a pair. Degenerate triangles and edges, and parallel edges, are as good as others.
