@@ -11,6 +11,7 @@ PYBIND11_MODULE(_core, module) {
     b::register_field(module);
     b::register_obstacle(module);  // meshes are obstacles too
     b::register_force(module);
+    b::register_contact(module);
     b::register_face_energies(module);
     b::register_model(module);
     b::register_solid(module);
