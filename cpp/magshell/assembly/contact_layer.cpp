@@ -14,17 +14,14 @@ bool ContactLayer::couples(const Group& group) const {
     return true;
 }
 
-void ContactLayer::couple(std::vector<Group> groups, bool forget) {
+void ContactLayer::couple(std::vector<Group> groups) {
+    constexpr std::size_t too_many = 3;  // times those that are needed now
     std::sort(groups.begin(), groups.end());
     groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
-    if (forget) {
-        groups_ = std::move(groups);
-    } else {
-        std::vector<Group> all;
-        all.reserve(groups_.size() + groups.size());
-        std::set_union(groups_.begin(), groups_.end(), groups.begin(), groups.end(), std::back_inserter(all));
-        groups_ = std::move(all);
-    }
+    std::vector<Group> all;
+    all.reserve(groups_.size() + groups.size());
+    std::set_union(groups_.begin(), groups_.end(), groups.begin(), groups.end(), std::back_inserter(all));
+    groups_ = all.size() > too_many * groups.size() ? std::move(groups) : std::move(all);
     std::vector<std::span<const Index>> cliques;
     cliques.reserve(groups_.size());
     for (const Group& group : groups_)

@@ -22,8 +22,8 @@ class ContactLayer {
 
     /// Whether all nodes of a group are coupled.
     bool couples(const Group& group) const;
-    /// Couples these groups from now on, and those that it couples already, unless they are to be forgotten.
-    void couple(std::vector<Group> groups, bool forget);
+    /// Couples these groups from now on, and those that it couples already, as long as they are not too many more.
+    void couple(std::vector<Group> groups);
     /// How often that has changed its pattern; at first it couples nothing.
     std::int64_t version() const { return version_; }
 

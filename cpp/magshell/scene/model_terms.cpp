@@ -6,6 +6,7 @@
 #include "magshell/strain/fold_angle.h"
 #include "magshell/term/bending_term.h"
 #include "magshell/term/body_contact_term.h"
+#include "magshell/term/body_friction_term.h"
 #include "magshell/term/couple_term.h"
 #include "magshell/term/friction_term.h"
 #include "magshell/term/load_term.h"
@@ -145,6 +146,14 @@ void Model::add_body_contacts(const SceneInput& input) {
         nodes(), input.contact_surfaces, input.body_contacts, *layer_, registry_);
     body_contact_ = contact.get();
     terms_.push_back(std::move(contact));
+    std::vector<bool> rubs, lagged;
+    for (const BodyContactInput& each : input.body_contacts) {
+        rubs.push_back(each.rubs);
+        lagged.push_back(each.lagged);
+    }
+    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
+        forces_.push_back(
+            std::make_unique<BodyFrictionTerm>(*body_contact_, std::move(rubs), std::move(lagged)));
 }
 
 }  // namespace magshell

@@ -10,7 +10,7 @@
 #include "magshell/body/solid.h"
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
-#include "magshell/term/body_contact_term.h"
+#include "magshell/term/body_contact_input.h"
 #include "magshell/term/contact_term.h"
 #include "magshell/term/face_energy.h"
 #include "magshell/term/solid_term.h"

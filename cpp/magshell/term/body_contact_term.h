@@ -3,17 +3,16 @@
 //
 //   E = sum A k m b(d - d_min)                                             [J]    contact/pair_energy.h
 //
-// Where a pair would have no gap there is no energy: the term refuses such states, and steps that lead through them.
+// Where a pair has no gap there is no energy: the term refuses such states, and steps that lead through them.
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "magshell/assembly/contact_layer.h"
-#include "magshell/body/nodes.h"
 #include "magshell/contact/pair_energy.h"
-#include "magshell/term/near_pairs.h"
+#include "magshell/force/friction.h"
+#include "magshell/term/contact_candidates.h"
 #include "magshell/term/term.h"
 
 namespace magshell {
@@ -22,34 +21,32 @@ class BodyContactTerm final : public Term {
   public:
     /// A pair that touches.
     struct Touch {
-        Index contact;
-        ContactPair pair;
+        NearPair near;
         PairEnergy at;
         double far;  // [m] its largest coordinate
     };
-    /// Numbers of friction.
-    struct Rubbing {
-        double kinetic, fixed, sticking_speed;  // fixed: of what sticks
-    };
 
-    /// The layer gets what of its Hessian there is.
+    /// What of its Hessian there is goes to the layer.
     BodyContactTerm(const Nodes& nodes, const std::vector<ContactSurfaceInput>& surfaces,
                     const std::vector<BodyContactInput>& contacts, ContactLayer& layer, Registry& registry);
 
-    /// The pairs that touch at the last evaluated state, in the order of contacts.
-    const std::vector<Touch>& touching() const { return touching_; }
+    /// The pairs that touch at q, always in the same order; and those at the last evaluated state.
     std::vector<Touch> touches(const double* q) const;
-    const Rubbing& rubbing(Index contact) const { return rubbing_[contact]; }
+    const std::vector<Touch>& touching() const { return touching_; }
+    const FrictionLaw& friction(const Touch& touch) const { return friction_[touch.near.contact]; }
 
-    /// Which faces are in the way of a step p from q.
+    /// Which faces are in the way of a step p from q, in words.
     std::string blocking(const double* q, const double* p) const;
     /// Whether what is negative of the Hessians of pairs is left out from now on.
     void be_cautious(bool cautious) { cautious_ = cautious; }
     /// Adds the magnitude of forces that cancel inside those between pairs at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
-    /// By the law of a contact: adds what PairEnergy::vjp says.
-    void add_vjp(Index contact, const PairEnergy::ByLaw& by, VectorXd& by_values) const;
-    const Slot& friction_slot(Index contact, int which) const { return slots_[contact].friction[which]; }
+    /// Adds the gradient by the numbers of a pair's contact.
+    void add_vjp(const Touch& touch, const PairEnergy::ByLaw& by, const FrictionLaw& by_friction,
+                 VectorXd& by_values) const;
+    ContactLayer& layer() const { return layer_; }
+    /// The layer couples these as well, whether they still touch or not, until others take their place.
+    void keep_coupled(const std::vector<Touch>& touches);
 
     std::string_view name() const override { return "body contact"; }
     bool set_values(const Values& values) override;
@@ -64,28 +61,23 @@ class BodyContactTerm final : public Term {
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
     std::size_t bytes() const override;
 
-    static PairPlaces places(const ContactPair& pair, const double* all) {
-        PairPlaces x;
-        for (int k = 0; k < nodes_of(pair.kind); ++k)
-            x[k] = Eigen::Map<const Vec3>(all + 3 * pair.nodes[k]);
-        return x;
-    }
-
   private:
     struct Slots {
-        Slot stiffness, reach, distance, smoothing;
-        Slot friction[3];  // kinetic, of what sticks, sticking speed
+        Slot stiffness, reach, distance, smoothing, kinetic, fixed, sticking_speed;
     };
 
-    /// What no state goes below: a penalty lets more in than its minimal distance.
-    double least(Index contact) const { return laws_[contact].penalty ? 0.0 : laws_[contact].thickness; }
+    /// Calls found(pair, share) where a pair lets a step go less far than all before it.
+    template <class Found>
+    void each_limit(const double* q, const double* p, const Found& found) const;
 
     std::vector<Slots> slots_;
     std::vector<BarrierLaw> laws_;
-    std::vector<Rubbing> rubbing_;
-    NearPairs near_;
+    std::vector<FrictionLaw> friction_;
+    std::vector<double> least_;  // of each contact, what no distance goes below [m]
+    mutable ContactCandidates candidates_;
     ContactLayer& layer_;
     std::vector<Touch> touching_;
+    std::vector<ContactLayer::Group> kept_;
     bool cautious_ = false;
 };
 
