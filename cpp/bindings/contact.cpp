@@ -1,4 +1,5 @@
 // Contact of surfaces, looked at pair by pair: scenes take it whole.
+#include <limits>
 #include <string>
 
 #include "bindings/arrays.h"
@@ -61,11 +62,13 @@ struct Pairs {
     BarrierLaw law;
 };
 
-Pairs pairs_of(const std::string& kind, double area, double parallel, const py::dict& law) {
+Pairs pairs_of(const std::string& kind, double area, double parallel, const py::dict& law,
+               double room = std::numeric_limits<double>::infinity()) {
     Pairs pairs;
     pairs.pair.kind = kind_of(kind);
     pairs.pair.area = area;
     pairs.pair.parallel = parallel;
+    pairs.pair.room = room;
     pairs.law = {law["stiffness"].cast<double>(), law["reach"].cast<double>(),
                  law["thickness"].cast<double>(), law["smoothing"].cast<double>(),
                  law["penalty"].cast<bool>()};
@@ -74,8 +77,8 @@ Pairs pairs_of(const std::string& kind, double area, double parallel, const py::
 
 // energy (n,), gradient (n, 4, 3), Hessian (n, 12, 12), normal force (n,) and its derivative by places (n, 4, 3).
 py::dict energies(const std::string& kind, const Array& places, double area, double parallel,
-                  const py::dict& law, bool cautious) {
-    const Pairs with = pairs_of(kind, area, parallel, law);
+                  const py::dict& law, bool cautious, double room) {
+    const Pairs with = pairs_of(kind, area, parallel, law, room);
     const PairRows x(places, "places [m]");
     const py::ssize_t n = x.count();
     Array energy(n), force(n), gradient({n, py::ssize_t{4}, py::ssize_t{3}}),
@@ -105,8 +108,8 @@ py::dict energies(const std::string& kind, const Array& places, double area, dou
 
 // The derivatives of lambda . gradient + by_normal_force . normal force by stiffness, reach, thickness, smoothing: (n, 4).
 Array by_law(const std::string& kind, const Array& places, double area, double parallel, const py::dict& law,
-             const Array& lambda, const Array& by_normal_force) {
-    const Pairs with = pairs_of(kind, area, parallel, law);
+             const Array& lambda, const Array& by_normal_force, double room) {
+    const Pairs with = pairs_of(kind, area, parallel, law, room);
     const PairRows x(places, "places [m]"), along(lambda, "lambda");
     if (along.count() != x.count() || by_normal_force.size() != x.count())
         throw InvalidInput("lambda and by_normal_force must be as many as places");
@@ -236,11 +239,13 @@ void register_contact(py::module_& module) {
     module.def(
         "pair_energies", &energies, py::arg("kind"), py::arg("places"), py::arg("area"), py::arg("parallel"),
         py::arg("law"), py::arg("cautious") = false,
+        py::arg("room") = std::numeric_limits<double>::infinity(),
         "energy (n,), gradient (n, 4, 3), hessian (n, 12, 12), normal_force (n,) and normal_force_by_place "
         "(n, 4, 3) of pairs with nodes at (n, 4, 3) [m].");
     module.def(
         "pair_energies_by_law", &by_law, py::arg("kind"), py::arg("places"), py::arg("area"),
         py::arg("parallel"), py::arg("law"), py::arg("lambda_"), py::arg("by_normal_force"),
+        py::arg("room") = std::numeric_limits<double>::infinity(),
         "Derivatives of lambda . gradient + by_normal_force * normal_force by stiffness, reach, thickness, "
         "smoothing: (n, 4).");
     module.def("pair_free_shares", &free_shares, py::arg("kind"), py::arg("from_"), py::arg("to"),

@@ -6,7 +6,9 @@
 // A point above a flat mesh has as many triangles near it as there are around the vertex or edge below it, at the same
 // distance. What they count too often is taken back by pairs of the point and an edge (- 1 for two triangles) and of the
 // point and a vertex (+ 1 for a closed fan), with negative areas, so that a flat mesh is as good as a plane [Li et al.
-// 2023, convergent incremental potential contact]. The sum is never less than what one of them gives.
+// 2023, convergent incremental potential contact]. The sum is what the nearest gives or more where all that is near hangs
+// together without a hole, as it does around any place that a point touches, so that it grows without bound there; a ring
+// of faces around a point counts less.
 //
 // Areas: of a point and a triangle half of the vertex's, as the other side has its vertices too; of two edges a quarter
 // of the smaller one's, so that a coarse edge across many fine ones counts no more than it covers.
