@@ -51,6 +51,7 @@ from .statics.equilibrium import Equilibrium
 from .statics.path import CriticalPoint, Path, follow
 from .statics.solve import equilibrium
 from .statics.warm_start import WarmStart
+from .surroundings.body_contact import BodyContact, SelfContact
 from .surroundings.contact import Contact
 from .surroundings.face_energies import SurfaceTension
 from .surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
@@ -63,6 +64,7 @@ __all__ = [
     "TRBDF2",
     "AppliedField",
     "AreaLoad",
+    "BodyContact",
     "BodyResult",
     "Buckling",
     "Clamp",
@@ -105,6 +107,7 @@ __all__ = [
     "RigidResult",
     "SampledField",
     "Scene",
+    "SelfContact",
     "Shell",
     "Skin",
     "Solid",

@@ -21,7 +21,7 @@ Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorX
     if (reduction.moves()) {
         model.assemble(q, controls, false);
         VectorXd reaction(q.size());
-        model.matrix().multiply(lambda.data(), reaction.data());
+        model.multiply(lambda, reaction);
         reaction += by_state;
         reduction.vjp(reaction, controls, gradient);
     }

@@ -21,6 +21,17 @@ void Remainder::add_product(const VectorXd& p, bool transposed, VectorXd& out) c
                            each.block.rightCols<3>() * at[2];
         for (int k = 0; k < 3; ++k) out.segment<3>(3 * each.nodes[k]) += each.weights[k] * force;
     }
+    for (const Pair& each : pairs_)
+        for (int i = 0; i < 4; ++i)
+            for (int j = 0; j < 4; ++j) {
+                if (each.nodes[i] < 0 || each.nodes[j] < 0) continue;
+                const Mat3& block = each.blocks[4 * i + j];
+                if (transposed)
+                    out.segment<3>(3 * each.nodes[j]) +=
+                        block.transpose() * p.segment<3>(3 * each.nodes[i]);
+                else
+                    out.segment<3>(3 * each.nodes[i]) += block * p.segment<3>(3 * each.nodes[j]);
+            }
 }
 
 }  // namespace magshell

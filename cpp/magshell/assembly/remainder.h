@@ -19,15 +19,24 @@ class Remainder {
         Mat39 block;
     };
 
+    /// Blocks of up to four nodes: (i, j) at 4 i + j. Negative: no node.
+    struct Pair {
+        std::array<Index, 4> nodes;
+        std::array<Mat3, 16> blocks;
+    };
+
     void clear() {
         points_.clear();
         shared_.clear();
+        pairs_.clear();
     }
-    bool empty() const { return points_.empty() && shared_.empty(); }
+    bool empty() const { return points_.empty() && shared_.empty() && pairs_.empty(); }
 
     /// A block of one node.
     void add(Index node, const Mat3& block) { points_.push_back({node, block}); }
     void add(const Shared& shared) { shared_.push_back(shared); }
+    /// One more, for the caller to fill before the next call.
+    Pair& add_pair() { return pairs_.emplace_back(); }
     /// So many more, for the caller to fill before the next call.
     Shared* extend(std::size_t count) {
         shared_.resize(shared_.size() + count);
@@ -44,6 +53,7 @@ class Remainder {
     };
     std::vector<Point> points_;
     std::vector<Shared> shared_;
+    std::vector<Pair> pairs_;
 };
 
 }  // namespace magshell

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "magshell/assembly/contact_layer.h"
 #include "magshell/assembly/face_loop.h"
 #include "magshell/assembly/reduction.h"
 #include "magshell/body/membrane_faces.h"
@@ -22,11 +23,14 @@
 
 namespace magshell {
 
+class BodyContactTerm;
+
 class Model {
   public:
     explicit Model(const SceneInput& input);
     Model(const Model&) = delete;
     Model& operator=(const Model&) = delete;
+    ~Model();
 
     /// What its terms read: the lists of values and of controls.
     const Registry& registry() const { return registry_; }
@@ -45,6 +49,11 @@ class Model {
     const MembraneFaces& membrane_faces(Index body) const { return *membrane_faces_[body]; }
     const Reduction& reduction() const { return reduction_; }
     SystemMatrix& matrix() { return matrix_; }
+    /// Of matrix() and what touching bodies add to it: its product with x, its diagonal, its free rows and columns.
+    void multiply(const VectorXd& x, VectorXd& out) const;
+    VectorXd diagonal() const;
+    void reduce_matrix(LargeVector<double>& values);
+    SystemMatrix* contact_matrix();
     const Residual& residual() const { return residual_; }
     Index size() const { return nodes().n_unknowns(); }
     Index n_coordinates() const { return nodes().n_coordinates(); }
@@ -67,8 +76,8 @@ class Model {
     void evaluate(const VectorXd& q, const Controls& controls);
     /// Which term's force is not finite at q, and on which vertex; empty if all are.
     std::string not_finite(const VectorXd& q, const Controls& controls);
-    /// The Hessian at the last evaluated state, in matrix().
-    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
+    /// The Hessian at the last evaluated state, in matrix(). Cautious: what touching bodies add is nowhere negative.
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, bool cautious = false);
     void extrapolate(const VectorXd& p);
     /// How fast the gradient at q changes while the controls, now `at`, change at this rate: exact for those that it is
     /// linear in, by differences of fourth order for what varies. Leaves the model as evaluated elsewhere.
@@ -82,6 +91,9 @@ class Model {
     bool has_forces() const { return !forces_.empty(); }
     void begin_step(const VectorXd& q, const Controls& controls);
     bool has_contact() const { return contact_ != nullptr; }
+    /// Whether bodies keep each other, or themselves, out.
+    bool has_body_contact() const { return body_contact_ != nullptr; }
+    const BodyContactTerm* body_contact() const { return body_contact_; }
     /// Why a step from q to `end` cannot be: a point would be on the other side of an obstacle. Else empty.
     std::string blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
                         const Controls& controls_at_end) const;
@@ -110,6 +122,11 @@ class Model {
     bool refuses_states() const { return !refusing_.empty(); }
     double largest_share(const VectorXd& q, const VectorXd& p) const;
     std::string refusal(const VectorXd& q) const;
+    /// How much of a step may be taken: so far towards the first element that would be turned inside out, or the first
+    /// bodies that would pass through each other.
+    double share_of_step(const VectorXd& q, const VectorXd& p) const;
+    /// Why a step cannot be taken, in words.
+    std::string stuck(const VectorXd& q, const VectorXd& p) const;
 
     /// The elastic term of a solid.
     const SolidTerm& solid_term(Index solid) const { return *solid_terms_[solid]; }
@@ -144,6 +161,7 @@ class Model {
     void add_solids(const SceneInput& input);
     void add_couples(const SceneInput& input);
     void add_contacts(const SceneInput& input);
+    void add_body_contacts(const SceneInput& input);
     void share_out_columns();
     void hand_out_values();
     template <class Function>
@@ -166,6 +184,9 @@ class Model {
     std::vector<const Term*> refusing_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
     const ContactTerm* contact_ = nullptr;
+    BodyContactTerm* body_contact_ = nullptr;
+    std::unique_ptr<ContactLayer> layer_;  // nullptr: no bodies touch each other
+    std::int64_t coupled_ = 0;             // the version of it that the reduced pattern has
     // By chunk: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
     std::vector<std::vector<Index>> first_nodes_, first_rotations_;
     Values values_;

@@ -33,9 +33,8 @@ constexpr double shrinking = 0.7;
 // A residual that shrinks less makes the next step a cautious one.
 constexpr double contracting = 0.5;
 
-// So far towards the first element that would be turned inside out a step goes at most; a shorter one than that
-// leads nowhere.
-constexpr double of_way_to_inversion = 0.8, shortest_share = 1e-4;
+// A shorter share of a step than that leads nowhere; a search along it may take very short ones.
+constexpr double shortest_share = 1e-4, shortest_searched = 1e-9;
 
 // How exactly to solve for a Newton step with an unsymmetric matrix: what its quadratic convergence deserves,
 // and no more than the end needs.
@@ -112,9 +111,10 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
 }
 
 FactorReport Newton::factorize_assembled(const VectorXd& q, const Anchor& anchor) {
-    if (!factor_) factor_ = model_.new_factor([this] { watch(watched_); });
+    if (!factor_ || factor_->pattern() != model_.reduction().pattern())
+        factor_ = model_.new_factor([this] { watch(watched_); });
     LargeVector<double>& values = factor_->values();
-    model_.reduction().matrix(model_.matrix(), values);
+    model_.reduce_matrix(values);
     if (anchor.weights) model_.reduction().add_weights(*anchor.weights, values);
     if (model_.reduction().carries()) model_.reduction().add_curvature(gradient(q, anchor), values);
     ++factorizations_;
@@ -136,7 +136,7 @@ void Newton::evaluate(const VectorXd& q, const Controls& controls, const Anchor&
 
 void Newton::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
                       const Anchor& anchor, bool cautious) {
-    model_.assemble(q, controls, extrapolated_stress);
+    model_.assemble(q, controls, extrapolated_stress, cautious);
     const bool forces = anchor.motion && model_.has_forces();
     if (forces) model_.assemble_forces(controls, cautious);
     unsymmetric_ = forces && !model_.remainder().empty();
@@ -155,7 +155,7 @@ FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool
         if (moves.col(k).isZero(0.0)) continue;
         const VectorXd move = moves.col(k);
         VectorXd pull(move.size());
-        model_.matrix().multiply(move.data(), pull.data());
+        model_.multiply(move, pull);
         if (unsymmetric_) model_.remainder().add_product(move, false, pull);
         moves.col(k) = pull;
     }
@@ -167,9 +167,7 @@ GmresReport Newton::solve_nearby(const VectorXd& q, const Controls& controls, co
     assemble(q, controls, false, anchor);
     const Stopwatch running(linear_time_);
     const Reduction& reduction = model_.reduction();
-    const SystemMatrix& matrix = model_.matrix();
-    VectorXd stiffness(matrix.size()), whole(matrix.size());
-    for (Index k = 0; k < matrix.size(); ++k) stiffness[k] = matrix.values()[matrix.column_starts()[k]];
+    VectorXd stiffness = model_.diagonal(), whole(model_.size());
     if (anchor.weights) stiffness += *anchor.weights;
     // Forces of different kinds count alike, whatever their units.
     const VectorXd scale = reduction.weights(stiffness).unaryExpr(
@@ -177,7 +175,7 @@ GmresReport Newton::solve_nearby(const VectorXd& q, const Controls& controls, co
     const VectorXd forces = reduction.carries() ? gradient(q, anchor) : VectorXd();
     const auto assembled = [&](const VectorXd& x) {
         const VectorXd full = reduction.expand(x);
-        matrix.multiply(full.data(), whole.data());
+        model_.multiply(full, whole);
         if (anchor.weights) whole += anchor.weights->cwiseProduct(full);
         if (unsymmetric_) model_.remainder().add_product(full, true, whole);
         VectorXd image = reduction.vector(whole);
@@ -237,7 +235,18 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
 }
 
 NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations) {
-    return iterate(q, controls, anchor, max_iterations, options_.mixed);
+    if (!model_.has_body_contact()) return iterate(q, controls, anchor, max_iterations, options_.mixed);
+    constexpr int searched = 5;  // times as many iterations
+    const VectorXd from = q;
+    const Model::Turns turns = model_.turns();
+    NewtonReport report = iterate(q, controls, anchor, max_iterations, options_.mixed);
+    if (report.converged) return report;
+    const int iterations = report.iterations;
+    q = from;
+    model_.set_turns(turns);
+    report = solve_searching(q, controls, anchor, searched * max_iterations);
+    report.iterations += iterations;
+    return report;
 }
 
 NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor) {
@@ -250,7 +259,8 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
     constexpr int most_rounds = 12, most_steps = 20, last_steps = 8;
     constexpr double least_gain = 1e-2;  // than a round began, it ends at least
     NewtonReport report;
-    q += model_.reduction().prescribed_increment(q, controls);
+    VectorXd move = model_.reduction().prescribed_increment(q, controls);
+    if (!move.isZero(0.0) && advance(q, move, 1.0, report) < 0.0) return report;
     evaluate(q, controls, anchor);
     for (int round = 0; round < most_rounds; ++round) {
         const double enough = std::max(options_.tolerance, least_gain * relative_residual(q, anchor));
@@ -297,7 +307,7 @@ bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor
             return std::sqrt(p.dot(anchor.weights->cwiseProduct(p)));
         };
         const double whole = length(step);
-        for (double share = 1.0;; share *= 0.5) {
+        for (double share = model_.has_body_contact() ? model_.share_of_step(q, step) : 1.0;; share *= 0.5) {
             q = from;
             model_.reduction().advance(q, share * step);
             evaluate(q, controls, anchor);
@@ -306,6 +316,78 @@ bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor
         }
     }
     return true;
+}
+
+double Newton::advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report) {
+    const double share = model_.share_of_step(q, step);
+    if (share < shortest) {
+        report.reason = model_.stuck(q, step);
+        return -1.0;
+    }
+    if (share < 1.0) step *= share;
+    model_.reduction().advance(q, step);
+    return share;
+}
+
+NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, const Anchor& anchor,
+                                     int max_iterations) {
+    constexpr double falling = 0.5, least = 0.1;  // of the slope along a step: where it may end
+    constexpr int most_cuts = 12;
+    NewtonReport report;
+    report.reason = model_.refusal(q);
+    if (!report.reason.empty()) return report;
+    VectorXd move = model_.reduction().prescribed_increment(q, controls);
+    double last_residual = std::numeric_limits<double>::infinity(), share = 1.0;
+    evaluate(q, controls, anchor);
+    for (;; ++report.iterations, ++iterations_) {
+        report.residual = relative_residual(q, anchor);
+        watch(report.residual);
+        if (!std::isfinite(report.residual)) {
+            report.reason = "the iteration diverged";
+            return report;
+        }
+        if (move.isZero(0.0) && report.residual <= options_.tolerance) {
+            report.converged = true;
+            return report;
+        }
+        if (report.iterations == max_iterations) {
+            report.reason = "no convergence in " + std::to_string(max_iterations) + " iterations";
+            return report;
+        }
+        const bool cautious = share < 1.0 || report.residual > contracting * last_residual;
+        last_residual = report.residual;
+        Eigen::MatrixXd pull = move;
+        report.factor = factorize(q, controls, false, anchor, pull, cautious);
+        if (!report.factor.succeeded) {
+            report.reason = report.factor.reason;
+            return report;
+        }
+        const VectorXd force = -gradient(q, anchor), from = q;
+        VectorXd step = move + solve_with_factor(force - pull.col(0),
+                                                 deserved(report.residual, options_.tolerance));
+        const bool in_place = move.isZero(0.0);
+        const double slope = force.dot(step);
+        if (in_place && !(slope > 0.0)) {
+            report.reason = "the energy does not fall along the step";
+            return report;
+        }
+        share = advance(q, step, shortest_searched, report);
+        if (share < 0.0) return report;
+        move *= 1.0 - share;
+        evaluate(q, controls, anchor);
+        if (!in_place) continue;
+        // Secants, where the energy has risen again at the end.
+        double part = 1.0;
+        for (int cut = 0; cut < most_cuts; ++cut) {
+            const double there = -gradient(q, anchor).dot(step) / share;
+            if (there >= -falling * slope) break;
+            part *= std::clamp(slope / (slope - there), least, falling);
+            q = from;
+            model_.reduction().advance(q, part * step);
+            evaluate(q, controls, anchor);
+        }
+        share *= part;
+    }
 }
 
 bool Newton::factor_serves(double contraction, double residual, double last_step) const {
@@ -363,16 +445,9 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         }
         VectorXd step = move + solve_with_factor(-gradient(q, anchor) - pull.col(0),
                                                  deserved(report.residual, options_.tolerance));
-        if (model_.refuses_states()) {
-            const double share = model_.largest_share(q, step / of_way_to_inversion);
-            if (share < shortest_share)
-                return fail("elements cannot follow: " +
-                            model_.refusal(q + 1.01 / of_way_to_inversion * share * step));
-            step *= share;
-            move *= 1.0 - share;
-        } else {
-            move.setZero();
-        }
+        const double share = advance(q, step, shortest_share, report);
+        if (share < 0.0) return report;
+        move *= 1.0 - share;
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())
@@ -381,7 +456,6 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         extrapolated = true;
         last_step = length;
         moved += length;
-        model_.reduction().advance(q, step);
         evaluate(q, controls, anchor);
     }
 }

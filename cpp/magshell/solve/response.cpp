@@ -17,7 +17,7 @@ VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, cons
     if (!change.isZero(0.0)) {
         model.assemble(q, to, false);
         VectorXd pull(q.size());
-        model.matrix().multiply(change.data(), pull.data());
+        model.multiply(change, pull);
         force += pull;
     }
     VectorXd reduced = -reduction.vector(force);

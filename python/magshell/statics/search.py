@@ -20,6 +20,7 @@ from ..methods.solvers import MixedNewton, Newton
 from ..scene.inputs import Inputs
 from ..scene.replacements import SHELL_NAMES, requested
 from ..scene.scene import Scene
+from ..surroundings.contact_inputs import check_apart
 from .diagnosis import why_not
 from .equilibrium import Equilibrium
 from .start import starting_point
@@ -65,6 +66,8 @@ def find(
     options = search.options()
     options.start_at_rest = at_rest
     options.keep_factor = keep_factor
+    with inputs.in_core():
+        check_apart(scene, state)
     return solve(inputs, state, turns, from_, inputs.controls, options, search.progress)
 
 
