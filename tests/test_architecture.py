@@ -94,6 +94,7 @@ OPTIONAL_MODULES = [
     "meshio",
     "gmsh",
     "magpylib",
+    "ipctk",
     "distributed",
     "cloudpickle",
 ]

@@ -70,7 +70,9 @@ def test_every_pair_that_is_near_is_found_once(contact, margin) -> None:
         assert len(set(got)) == len(got)
         assert set(got) == near_pairs(KINDS[kind], nodes, positions, margin)
     # The faces and the side are those of the parts.
-    for nodes, kind, faces, swapped in zip(found["nodes"], found["kind"], found["faces"], found["swapped"]):
+    for nodes, kind, faces, swapped in zip(
+        found["nodes"], found["kind"], found["faces"], found["swapped"], strict=True
+    ):
         one, other = contact[::-1] if swapped else contact
         assert set(nodes[: 2 if kind == EDGE_EDGE else 1]) <= set(surfaces[one][faces[0]])
         if kind == POINT_TRIANGLE:
@@ -122,7 +124,7 @@ def test_what_is_found_does_not_depend_on_threads_nor_on_what_was_asked_before()
 def pressure_on(columns, positions, law):
     """Energy and force up on everything of pairs, of points and triangles and what takes back double counts."""
     energy, forces = 0.0, np.zeros_like(positions)
-    for kind, nodes, area in zip(columns["kind"], columns["nodes"], columns["area"]):
+    for kind, nodes, area in zip(columns["kind"], columns["nodes"], columns["area"], strict=True):
         if kind == EDGE_EDGE:
             continue
         at = _core.pair_energies(KINDS[kind], positions[nodes][None], area, 0.0, law)
@@ -193,7 +195,10 @@ def test_neighbours_on_a_sheet_leave_each_other_room_and_layers_do_not() -> None
     along_one = layers & (np.ptp(fold[found["nodes"]][:, :, 2], axis=1) < 1e-9)
     assert across.sum() > 50 and np.isinf(found["room"][across]).all()
     distances = np.array(
-        [_core.pair_proximities(KINDS[k], fold[n][None])[0][0] for k, n in zip(found["kind"], found["nodes"])]
+        [
+            _core.pair_proximities(KINDS[k], fold[n][None])[0][0]
+            for k, n in zip(found["kind"], found["nodes"], strict=True)
+        ]
     )
     assert along_one.sum() > 50
     assert np.allclose(found["room"][along_one], 0.5 * distances[along_one])
@@ -202,7 +207,7 @@ def test_neighbours_on_a_sheet_leave_each_other_room_and_layers_do_not() -> None
     plain = broad_phase(flat, [mesh.faces], [(0, 0)])
     plain.make_room(flat, [0.012])
     found = plain.near(flat, [0.012])
-    for kind, nodes, room in zip(found["kind"], found["nodes"], found["room"]):
+    for kind, nodes, room in zip(found["kind"], found["nodes"], found["room"], strict=True):
         at = _core.pair_energies(KINDS[kind], flat[nodes][None], 1.0, 0.0, law, room=room)
         assert at["energy"][0] == 0.0  # a flat sheet at rest is free, thicker than its cells or not
 
@@ -231,7 +236,7 @@ def test_crossings_are_those_of_ipctk(seed) -> None:
             bool(swapped),
             tuple(surfaces[(((0, 1), (0, 0), (1, 1))[number])[0 if swapped else 1]][faces[1]]),
         )
-        for number, swapped, faces in zip(found["contact"], found["swapped"], found["faces"])
+        for number, swapped, faces in zip(found["contact"], found["swapped"], found["faces"], strict=True)
     }
     if seed:  # in one plane everything that lies on each other crosses, of which theirs tells nothing
         assert got == expected

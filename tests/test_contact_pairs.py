@@ -70,7 +70,7 @@ def test_energies_are_those_of_ipctk(kind, thickness, gap) -> None:
     parallel = PARALLEL if kind == "edge_edge" else 0.0
     ours = _core.pair_energies(kind, x, AREA, parallel, law)
     energy, gradient, hessian = (
-        np.array(each) for each in zip(*(by_ipctk(kind, p, law, parallel) for p in x))
+        np.array(each) for each in zip(*(by_ipctk(kind, p, law, parallel) for p in x), strict=True)
     )
     assert relative(ours["energy"], energy) < 1e-8
     assert relative(ours["gradient"].reshape(-1, 12), gradient) < 1e-8
@@ -83,7 +83,7 @@ def test_degenerate_pairs_have_the_gradients_of_ipctk(kind) -> None:
     x, _ = hard_pairs(kind, 0.05)
     parallel = 1e-3 if kind == "edge_edge" else 0.0
     ours = _core.pair_energies(kind, x, AREA, parallel, LAW)
-    for got, each in zip(ours["gradient"].reshape(-1, 12), x):
+    for got, each in zip(ours["gradient"].reshape(-1, 12), x, strict=True):
         expected = by_ipctk(kind, each, LAW, parallel)[1]
         if kind == "point_triangle" and not each[1:].any():
             continue  # a triangle that is a point has no distance there
@@ -241,7 +241,7 @@ def test_friction_is_that_of_ipctk_where_it_sticks_and_slides() -> None:
         * np.geomspace(1e-3, 1e1, len(x))[:, None, None]
     )
     at = _core.pair_frictions("edge_edge", x, AREA, 0.0, LAW, v, (0.5, 0.5, 0.1), v)
-    distances, weights, normals, _ = _core.pair_proximities("edge_edge", x)
+    _, weights, normals, _ = _core.pair_proximities("edge_edge", x)
     force = _core.pair_energies("edge_edge", x, AREA, 0.0, LAW)["normal_force"]
     relative_velocity = np.einsum("ni,nik->nk", weights, v)
     tangential = relative_velocity - (relative_velocity * normals).sum(1)[:, None] * normals

@@ -29,7 +29,7 @@ def test_never_later_than_the_first_contact_of_ipctk(kind) -> None:
     begin, end = ways(kind, 600)
     ours = _core.pair_free_shares(kind, begin, end, 0.0, 1e-3)
     hits, ratios = 0, []
-    for a, b, share in zip(begin, end, ours):
+    for a, b, share in zip(begin, end, ours, strict=True):
         hit, first = getattr(oracle, f"{kind}_ccd")(*a, *b)[:2]
         if not hit:
             ratios.append(share)

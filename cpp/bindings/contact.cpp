@@ -106,6 +106,34 @@ py::dict energies(const std::string& kind, const Array& places, double area, dou
                     py::arg("normal_force") = force, py::arg("normal_force_by_place") = by_place);
 }
 
+// The sums over pairs of their gradients (4, 3) and of the lower blocks of their Hessians (10, 3, 3): what they cost.
+py::tuple sums(const std::string& kind, const Array& places, double area, double parallel,
+               const py::dict& law, bool cautious) {
+    const Pairs with = pairs_of(kind, area, parallel, law);
+    const PairRows x(places, "places [m]");
+    Array gradient({py::ssize_t{4}, py::ssize_t{3}}),
+        hessian({py::ssize_t{10}, py::ssize_t{3}, py::ssize_t{3}});
+    PairVectors slope;
+    PairBlocks sum;
+    slope.fill(Vec3::Zero());
+    sum.fill(Mat3::Zero());
+    const int count = nodes_of(with.pair.kind);
+    for (py::ssize_t k = 0; k < x.count(); ++k) {
+        const PairEnergy at(with.pair, x[k], with.law);
+        if (!at.acts()) continue;
+        const PairVectors by = at.gradient();
+        PairBlocks blocks;
+        at.hessian(cautious, blocks);
+        for (int i = 0; i < count; ++i) slope[i] += by[i];
+        for (int b = 0; b < count * (count + 1) / 2; ++b) sum[b] += blocks[b];
+    }
+    copy_rows(slope, gradient.mutable_data());
+    for (int b = 0; b < 10; ++b)
+        for (int r = 0; r < 3; ++r)
+            for (int c = 0; c < 3; ++c) hessian.mutable_at(b, r, c) = sum[b](r, c);
+    return py::make_tuple(gradient, hessian);
+}
+
 // The derivatives of lambda . gradient + by_normal_force . normal force by stiffness, reach, thickness, smoothing: (n, 4).
 Array by_law(const std::string& kind, const Array& places, double area, double parallel, const py::dict& law,
              const Array& lambda, const Array& by_normal_force, double room) {
@@ -248,6 +276,10 @@ void register_contact(py::module_& module) {
         py::arg("room") = std::numeric_limits<double>::infinity(),
         "Derivatives of lambda . gradient + by_normal_force * normal_force by stiffness, reach, thickness, "
         "smoothing: (n, 4).");
+    module.def(
+        "pair_sums", &sums, py::arg("kind"), py::arg("places"), py::arg("area"), py::arg("parallel"),
+        py::arg("law"), py::arg("cautious") = false,
+        "Sums over pairs of their gradients (4, 3) and of the lower blocks of their Hessians (10, 3, 3).");
     module.def("pair_free_shares", &free_shares, py::arg("kind"), py::arg("from_"), py::arg("to"),
                py::arg("thickness"), py::arg("keep"),
                "Shares (n,) of the ways of pairs from (n, 4, 3) to (n, 4, 3) [m] on which they keep that "
