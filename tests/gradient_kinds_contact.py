@@ -29,6 +29,7 @@ def sheets_at_rest_on_each_other(**contact) -> Kind:
         ],
         contacts=[touch],
         gravity=(0.2, 0.1, -9.81),
+        allow_rigid_motions=True,
     )
     return Kind(scene, {"gravity_factor": 0.9, "motion_factor": 0.8}, fixed=EXACT, step=1e-5, reach=REACH)
 

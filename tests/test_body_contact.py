@@ -25,7 +25,9 @@ def two_sheets(height=1.15e-3, rubbing=None, **contact):
         ms.Pin(upper.mesh.vertices_at(x=1e-3), body=upper),
     ]
     touch = ms.Contact(lower, upper, friction_coefficient=rubbing, **contact)
-    return ms.Scene([lower, upper], supports=supports, contacts=[touch], gravity=DOWN)
+    return ms.Scene(
+        [lower, upper], supports=supports, contacts=[touch], gravity=DOWN, allow_rigid_motions=True
+    )
 
 
 def state_in_contact(scene, seed=0, low=7e-5):
@@ -61,7 +63,7 @@ def test_reduced_hessian_is_that_of_the_free_unknowns():
     turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]])
     mesh = PLATE.transformed(rotation=turn)
     lower, upper = ms.Shell(mesh, **SOFT), above(1.15e-3, mesh)
-    stiff = ms.Rigid(PLATE.vertices_at(x=0.02), mass=1e-3, inertia=1e-8, body=upper)
+    stiff = ms.Rigid(PLATE.vertices_where(lambda x: x[:, 0] > 0.014), mass=1e-3, inertia=1e-8, body=upper)
     mirror = ms.SymmetryPlane(turn[:, 0], body=lower)
     held = ms.Pin(PLATE.vertices_at(x=0.0), body=upper)
     scene = ms.Scene(
@@ -96,7 +98,7 @@ def test_sheets_at_rest_on_each_other():
     lower = slice(0, PLATE.n_vertices)
     np.testing.assert_allclose(forces[lower].sum(0), -forces[PLATE.n_vertices :].sum(0), atol=1e-12)
     weight = 9.81 * 1e3 * 1e-3 * 0.02**2
-    assert 0.1 * weight < touching.normal_force < weight
+    assert touching.normal_force > 0.5 * weight
 
 
 def test_upper_sheet_lies_on_the_lower_with_its_whole_weight():
