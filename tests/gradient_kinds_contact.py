@@ -24,7 +24,7 @@ def sheets_at_rest_on_each_other(**contact) -> Kind:
     scene = ms.Scene(
         [lower, upper],
         supports=[
-            ms.Clamp(MESH.edges_at(x=0.0), displacement=(1e-4, 0, 2e-4), body=lower),
+            ms.Clamp(MESH.edges_at(x=0.0), displacement=(1e-4, 0, 2e-4), rotation=(0, 0.02, 0), body=lower),
             ms.Pin(ABOVE.vertices_at(x=0.113), body=upper),
         ],
         contacts=[touch],
@@ -39,7 +39,9 @@ def sheets_rubbing(integrator, **contact) -> Kind:
     lower, upper, touch = _two_sheets(**{**RUBS, **contact})
     scene = ms.Scene(
         [lower, upper],
-        supports=[ms.Clamp(MESH.edges_at(x=0.0), displacement=(1e-4, 0, 2e-4), body=lower)],
+        supports=[
+            ms.Clamp(MESH.edges_at(x=0.0), displacement=(1e-4, 0, 2e-4), rotation=(0, 0.02, 0), body=lower)
+        ],
         contacts=[touch],
         gravity=(0.2, 0.1, -9.81),
         allow_rigid_motions=True,
