@@ -89,6 +89,8 @@ class SolidModel:
             loads=False,
             field_sources=[],
             contacts=[],
+            contact_surfaces=[],
+            body_contacts=[],
             obstacles=[],
             water=None,
         )

@@ -20,6 +20,7 @@ FLOORS = {
     "magshell/linalg": 1,
     "magshell/strain": 2,
     "magshell/energy": 2,
+    "magshell/contact": 2,
     "magshell/force": 2,
     "magshell/field": 2,
     "magshell/obstacle": 2,
@@ -93,6 +94,7 @@ OPTIONAL_MODULES = [
     "meshio",
     "gmsh",
     "magpylib",
+    "ipctk",
     "distributed",
     "cloudpickle",
 ]

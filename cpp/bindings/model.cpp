@@ -47,6 +47,27 @@ std::vector<ContactInput> contacts_of(const py::list& given) {
     return contacts;
 }
 
+std::vector<ContactSurfaceInput> contact_surfaces_of(const py::list& given) {
+    std::vector<ContactSurfaceInput> surfaces;
+    for (const py::handle each : given) {
+        ContactSurfaceInput& surface = surfaces.emplace_back();
+        surface.name = each["name"].cast<std::string>();
+        surface.numbers = each["numbers"].cast<std::vector<Index>>();
+        const IndexArray faces = each["faces"].cast<IndexArray>();
+        for (py::ssize_t f = 0; f < faces.shape(0); ++f)
+            surface.faces.push_back({faces.at(f, 0), faces.at(f, 1), faces.at(f, 2)});
+    }
+    return surfaces;
+}
+
+std::vector<BodyContactInput> body_contacts_of(const py::list& given) {
+    std::vector<BodyContactInput> contacts;
+    for (const py::handle each : given)
+        contacts.push_back({each["a"].cast<Index>(), each["b"].cast<Index>(), each["penalty"].cast<bool>(),
+                            each["rubs"].cast<bool>(), each["lagged"].cast<bool>()});
+    return contacts;
+}
+
 std::vector<SheetInput> sheets_of(const py::list& given) {
     std::vector<SheetInput> sheets;
     for (const py::handle each : given) {
@@ -142,6 +163,8 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     for (const py::handle source : given["field_sources"])
         input.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
     input.contacts = contacts_of(given["contacts"]);
+    input.contact_surfaces = contact_surfaces_of(given["contact_surfaces"]);
+    input.body_contacts = body_contacts_of(given["body_contacts"]);
     for (const py::handle obstacle : given["obstacles"])
         input.obstacles.push_back(obstacle.cast<std::shared_ptr<Obstacle>>());
     input.water = given["water"].cast<std::shared_ptr<Water>>();
@@ -175,6 +198,7 @@ py::dict energies(const Model& model, const VectorXd& q, const Controls& control
 // The lower triangle as (size, column starts, rows, values): of all unknowns, or of the free ones.
 py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, bool reduced) {
     LargeVector<double> values;
+    std::vector<Index> starts, rows;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
@@ -182,14 +206,14 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
         model.assemble(q, controls, false);
         model.require_symmetric();
         if (reduced) {
-            model.reduction().matrix(model.matrix(), values);
+            model.reduce_matrix(values);
             model.reduction().add_curvature(model.residual().gradient, values);
-        } else
-            values = model.matrix().values();
+            starts = model.reduction().pattern()->column_starts;
+            rows = model.reduction().pattern()->rows;
+        } else {
+            merge(model.matrix(), model.contact_matrix(), starts, rows, values);
+        }
     }
-    const SparsePattern& pattern = *model.reduction().pattern();
-    const auto& starts = reduced ? pattern.column_starts : model.matrix().column_starts();
-    const auto& rows = reduced ? pattern.rows : model.matrix().rows();
     return py::make_tuple(starts.size() - 1, py::array_t<Index>(starts.size(), starts.data()),
                           py::array_t<Index>(rows.size(), rows.data()),
                           py::array_t<double>(values.size(), values.data()));
@@ -317,6 +341,8 @@ void register_model(py::module_& module) {
                                    return names;
                                })
         .def("energies", &energies)
+        .def("refusal", &Model::refusal, "What is wrong with a state, in words; empty where nothing is.",
+             py::call_guard<py::gil_scoped_release>())
         .def(
             "gradient",
             [](Model& model, const VectorXd& q, const Controls& controls) {

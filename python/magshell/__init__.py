@@ -46,6 +46,7 @@ from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
 from .methods.solvers import MixedNewton, Newton
 from .plotting import Picture, animate, plot, write_page
 from .scene.scene import Scene
+from .scene.touching import Touching
 from .starts.multistart import multistart
 from .starts.sampling import random_starts
 from .starts.starts import Multistart
@@ -55,6 +56,7 @@ from .statics.equilibrium import Equilibrium
 from .statics.path import CriticalPoint, Path, follow
 from .statics.solve import equilibrium
 from .statics.warm_start import WarmStart
+from .surroundings.body_contact import BodyContact, SelfContact
 from .surroundings.contact import Contact
 from .surroundings.face_energies import SurfaceTension
 from .surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
@@ -69,6 +71,7 @@ __all__ = [
     "AppliedField",
     "AreaLoad",
     "Ball",
+    "BodyContact",
     "BodyResult",
     "Buckling",
     "Clamp",
@@ -119,6 +122,7 @@ __all__ = [
     "RigidResult",
     "SampledField",
     "Scene",
+    "SelfContact",
     "Shell",
     "Skeleton",
     "Skin",
@@ -130,6 +134,7 @@ __all__ = [
     "SymmetryPlane",
     "TetMesh",
     "Tie",
+    "Touching",
     "Trajectory",
     "TriangleMesh",
     "UniformField",

@@ -13,6 +13,7 @@ import numpy.typing
 __all__: list[str] = [
     "AppliedField",
     "AttackCurve",
+    "BroadPhase",
     "CriticalKind",
     "CriticalPoint",
     "CuboidMagnet",
@@ -52,6 +53,12 @@ __all__: list[str] = [
     "follow_path",
     "lane_logarithms",
     "num_threads",
+    "pair_energies",
+    "pair_energies_by_law",
+    "pair_free_shares",
+    "pair_frictions",
+    "pair_proximities",
+    "pair_sums",
     "pull_back",
     "pull_back_motion",
     "sample_fields",
@@ -299,6 +306,44 @@ class Water:
         drag_curve: AttackCurve,
         thrust_curve: AttackCurve,
     ) -> None: ...
+
+class BroadPhase:
+    def __init__(
+        self,
+        rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        surfaces: collections.abc.Sequence[
+            collections.abc.Sequence[
+                typing.Annotated[
+                    collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"
+                ]
+            ]
+        ],
+        contacts: collections.abc.Sequence[
+            typing.Annotated[
+                collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"
+            ]
+        ],
+    ) -> None: ...
+    def crossings(self, positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict: ...
+    def make_room(
+        self,
+        rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        near_at_rest: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> None: ...
+    def near(
+        self,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        margins: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> dict:
+        """
+        Columns of the pairs that are nearer than the margins [m].
+        """
+    def near_on_the_way(
+        self,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        margins: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> dict: ...
 
 class FaceEnergy:
     pass
@@ -818,6 +863,77 @@ def lane_logarithms(numbers: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     """
 
 def num_threads() -> int: ...
+def pair_energies(
+    kind: str,
+    places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    area: typing.SupportsFloat | typing.SupportsIndex,
+    parallel: typing.SupportsFloat | typing.SupportsIndex,
+    law: dict,
+    cautious: bool = False,
+    room: typing.SupportsFloat | typing.SupportsIndex = ...,
+) -> dict:
+    """
+    energy (n,), gradient (n, 4, 3), hessian (n, 12, 12), normal_force (n,) and normal_force_by_place (n, 4, 3) of pairs with nodes at (n, 4, 3) [m].
+    """
+
+def pair_energies_by_law(
+    kind: str,
+    places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    area: typing.SupportsFloat | typing.SupportsIndex,
+    parallel: typing.SupportsFloat | typing.SupportsIndex,
+    law: dict,
+    lambda_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    by_normal_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    room: typing.SupportsFloat | typing.SupportsIndex = ...,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Derivatives of lambda . gradient + by_normal_force * normal_force by stiffness, reach, thickness, smoothing: (n, 4).
+    """
+
+def pair_free_shares(
+    kind: str,
+    from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    thickness: typing.SupportsFloat | typing.SupportsIndex,
+    keep: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Shares (n,) of the ways of pairs from (n, 4, 3) to (n, 4, 3) [m] on which they keep that share of what their distance is above the thickness.
+    """
+
+def pair_frictions(
+    kind: str,
+    places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    area: typing.SupportsFloat | typing.SupportsIndex,
+    parallel: typing.SupportsFloat | typing.SupportsIndex,
+    law: dict,
+    velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.Annotated[
+        collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+    ],
+    lambda_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> dict:
+    """
+    force (n, 4, 3) of pairs that act, with friction = (kinetic, fixed, sticking speed), its derivatives, and those of lambda . force.
+    """
+
+def pair_proximities(kind: str, places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple:
+    """
+    (distances (n,), weights (n, 4), normals (n, 3), free places (n,)) of pairs with nodes at (n, 4, 3) [m].
+    """
+
+def pair_sums(
+    kind: str,
+    places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    area: typing.SupportsFloat | typing.SupportsIndex,
+    parallel: typing.SupportsFloat | typing.SupportsIndex,
+    law: dict,
+    cautious: bool = False,
+) -> tuple:
+    """
+    Sums over pairs of their gradients (4, 3) and of the lower blocks of their Hessians (10, 3, 3).
+    """
+
 def pull_back(
     model: Model,
     equilibrium: StaticsResult,

@@ -216,7 +216,7 @@ class Backward {
             model_.assemble(stage.q, controls, false);
             if (model_.has_forces()) model_.assemble_forces(controls);
             VectorXd reaction(model_.size());
-            model_.matrix().multiply(lambda.data(), reaction.data());
+            model_.multiply(lambda, reaction);
             model_.remainder().add_product(lambda, true, reaction);
             reaction += by_x;
             model_.reduction().vjp(reaction, controls, scene_);
@@ -247,7 +247,7 @@ class Backward {
         const Controls controls = input_.controls_at(0, 0.0);
         const VectorXd lambda = RotationsAtRest(model_, q, controls).adjoint(g_.positions);
         VectorXd reaction(model_.size());
-        model_.matrix().multiply(lambda.data(), reaction.data());
+        model_.multiply(lambda, reaction);
         g_.positions += reaction;
         scene_.controls.setZero();
         model_.vjp(q, controls, lambda, scene_);

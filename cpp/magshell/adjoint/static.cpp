@@ -22,7 +22,7 @@ Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorX
     model.vjp(q, controls, lambda, gradient);
     if (reduction.moves()) {
         VectorXd reaction(q.size());
-        model.matrix().multiply(lambda.data(), reaction.data());
+        model.multiply(lambda, reaction);
         model.remainder().add_product(lambda, true, reaction);
         reaction += by_state;
         reduction.vjp(reaction, controls, gradient);

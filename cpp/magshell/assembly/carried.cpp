@@ -23,16 +23,20 @@ Carried::Carried(Carriers carriers, const SystemMatrix& matrix)
     }
 }
 
-void Carried::couple(const SystemMatrix& matrix, const std::vector<Index>& reduced, Index free) {
+void Carried::couple(const std::vector<const SystemMatrix*>& matrices, const std::vector<Index>& reduced,
+                     Index free) {
     free_ = free;
-    for (Index column = 0; column < matrix.size(); ++column)
-        for (Index k = matrix.column_starts()[column]; k < matrix.column_starts()[column + 1]; ++k) {
-            const Index row = matrix.rows()[k], of_row = carrier_of_[row], of_column = carrier_of_[column];
-            if (of_row >= 0 && reduced[column] >= 0) coupled_[reduced[column]].insert(of_row);
-            if (of_column >= 0 && reduced[row] >= 0) coupled_[reduced[row]].insert(of_column);
-            if (of_row >= 0 && of_column >= 0 && of_row != of_column)
-                chunks_[std::min(of_row, of_column)].across[std::max(of_row, of_column)];
-        }
+    for (Chunk& chunk : chunks_) chunk.later.clear();
+    for (const SystemMatrix* matrix : matrices)
+        for (Index column = 0; column < matrix->size(); ++column)
+            for (Index k = matrix->column_starts()[column]; k < matrix->column_starts()[column + 1]; ++k) {
+                const Index row = matrix->rows()[k], of_row = carrier_of_[row],
+                            of_column = carrier_of_[column];
+                if (of_row >= 0 && reduced[column] >= 0) coupled_[reduced[column]].insert(of_row);
+                if (of_column >= 0 && reduced[row] >= 0) coupled_[reduced[row]].insert(of_column);
+                if (of_row >= 0 && of_column >= 0 && of_row != of_column)
+                    chunks_[std::min(of_row, of_column)].later.insert(std::max(of_row, of_column));
+            }
 }
 
 void Carried::append_rows(Index free, std::vector<Index>& rows) const {
@@ -48,46 +52,62 @@ void Carried::append_columns(SparsePattern& pattern) const {
         for (Index j = 0; j < chunk.carrier->coordinates(); ++j) {
             for (Index i = j; i < chunk.carrier->coordinates(); ++i)
                 pattern.rows.push_back(free_ + chunk.first + i);
-            for (const auto& [other, entries] : chunk.across)
+            for (const Index other : chunk.later)
                 for (Index i = 0; i < chunks_[other].carrier->coordinates(); ++i)
                     pattern.rows.push_back(free_ + chunks_[other].first + i);
             pattern.column_starts.push_back(static_cast<Index>(pattern.rows.size()));
         }
 }
 
-void Carried::find_places(const SystemMatrix& matrix, const std::vector<Index>& reduced,
+namespace {
+
+Index place_in(const SparsePattern& pattern, Index column, Index row) {
+    Index k = pattern.column_starts[column];
+    while (pattern.rows[k] != row) ++k;
+    return k;
+}
+
+}  // namespace
+
+void Carried::find_places(const std::vector<const SystemMatrix*>& matrices, const std::vector<Index>& reduced,
                           const SparsePattern& pattern) {
-    const auto place = [&](Index column, Index row) {
-        Index k = pattern.column_starts[column];
-        while (pattern.rows[k] != row) ++k;
-        return k;
-    };
-    for (Chunk& chunk : chunks_)
+    for (Chunk& chunk : chunks_) {
+        chunk.own.clear();
+        chunk.beside.clear();
+        chunk.places.assign(matrices.size(), {});
         for (Index j = 0; j < chunk.carrier->coordinates(); ++j) {
             const Index column = free_ + chunk.first + j;
-            chunk.own.push_back(place(column, column));
-            for (const auto& [other, entries] : chunk.across)
-                chunk.beside[other].push_back(place(column, free_ + chunks_[other].first));
+            chunk.own.push_back(place_in(pattern, column, column));
+            for (const Index other : chunk.later)
+                chunk.beside[other].push_back(place_in(pattern, column, free_ + chunks_[other].first));
         }
+    }
+    for (std::size_t which = 0; which < matrices.size(); ++which)
+        find_places(which, *matrices[which], reduced, pattern);
+    coupled_.clear();
+}
+
+void Carried::find_places(std::size_t which, const SystemMatrix& matrix, const std::vector<Index>& reduced,
+                          const SparsePattern& pattern) {
+    const auto of = [&](Index carrier) -> Places& { return chunks_[carrier].places[which]; };
     for (Index column = 0; column < matrix.size(); ++column)
         for (Index k = matrix.column_starts()[column]; k < matrix.column_starts()[column + 1]; ++k) {
             const Index row = matrix.rows()[k], of_row = carrier_of_[row], of_column = carrier_of_[column];
             if (of_row >= 0 && of_column >= 0) {
                 if (of_row == of_column)
-                    chunks_[of_row].inner.push_back({k, row_of_[row], row_of_[column]});
+                    of(of_row).inner.push_back({k, row_of_[row], row_of_[column]});
                 else if (of_row > of_column)
-                    chunks_[of_column].across[of_row].push_back({k, row_of_[row], row_of_[column]});
+                    of(of_column).across[of_row].push_back({k, row_of_[row], row_of_[column]});
                 else
-                    chunks_[of_row].across[of_column].push_back({k, row_of_[column], row_of_[row]});
+                    of(of_row).across[of_column].push_back({k, row_of_[column], row_of_[row]});
             } else if (of_row >= 0 && reduced[column] >= 0) {
-                const Index to = place(reduced[column], free_ + chunks_[of_row].first);
-                chunks_[of_row].mixed.push_back({k, row_of_[row], to});
+                const Index to = place_in(pattern, reduced[column], free_ + chunks_[of_row].first);
+                of(of_row).mixed.push_back({k, row_of_[row], to});
             } else if (of_column >= 0 && reduced[row] >= 0) {
-                const Index to = place(reduced[row], free_ + chunks_[of_column].first);
-                chunks_[of_column].mixed.push_back({k, row_of_[column], to});
+                const Index to = place_in(pattern, reduced[row], free_ + chunks_[of_column].first);
+                of(of_column).mixed.push_back({k, row_of_[column], to});
             }
         }
-    coupled_.clear();
 }
 
 void Carried::linearize(const VectorXd& q) {
@@ -103,20 +123,21 @@ void Carried::add_lower(const Chunk& chunk, const MatrixXd& block, double* value
         for (Index i = j; i < block.rows(); ++i) values[chunk.own[j] + i - j] += block(i, j);
 }
 
-void Carried::add_matrix(const SystemMatrix& full, double* values) const {
+void Carried::add_matrix(std::size_t which, const SystemMatrix& full, double* values) const {
     const double* entries = full.values().data();
     for (const Chunk& chunk : chunks_) {
+        const Places& places = chunk.places[which];
         const MatrixXd& b = chunk.jacobian;
         const Index n = chunk.carrier->coordinates();
-        for (const Mixed& each : chunk.mixed)
+        for (const Mixed& each : places.mixed)
             for (Index j = 0; j < n; ++j) values[each.to + j] += entries[each.from] * b(each.row, j);
         MatrixXd hb = MatrixXd::Zero(b.rows(), n);
-        for (const Inner& each : chunk.inner) {
+        for (const Inner& each : places.inner) {
             hb.row(each.row) += entries[each.from] * b.row(each.column);
             if (each.row != each.column) hb.row(each.column) += entries[each.from] * b.row(each.row);
         }
         add_lower(chunk, b.transpose() * hb, values);
-        for (const auto& [other, across] : chunk.across) {
+        for (const auto& [other, across] : places.across) {
             const MatrixXd& beside = chunks_[other].jacobian;
             MatrixXd block = MatrixXd::Zero(beside.cols(), n);
             for (const Inner& each : across)
@@ -206,8 +227,9 @@ void Carried::append_points(const std::vector<Vec3>& full, std::vector<Vec3>& po
 std::size_t Carried::bytes() const {
     std::size_t total = (carrier_of_.capacity() + row_of_.capacity()) * sizeof(Index);
     for (const Chunk& chunk : chunks_)
-        total += chunk.mixed.capacity() * sizeof(Mixed) + chunk.inner.capacity() * sizeof(Inner) +
-                 chunk.jacobian.size() * sizeof(double);
+        for (const Places& places : chunk.places)
+            total += places.mixed.capacity() * sizeof(Mixed) + places.inner.capacity() * sizeof(Inner);
+    for (const Chunk& chunk : chunks_) total += chunk.jacobian.size() * sizeof(double);
     return total;
 }
 

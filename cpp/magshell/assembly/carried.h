@@ -23,19 +23,20 @@ class Carried {
     Index coordinates() const { return coordinates_; }
     bool carries(Index unknown) const { return carrier_of_[unknown] >= 0; }
 
-    /// While the reduced pattern is built, in this order. `reduced`: of each unknown, negative where it is held or
-    /// carried; of the free ones there are so many.
-    void couple(const SystemMatrix& matrix, const std::vector<Index>& reduced, Index free);
+    /// While the reduced pattern is built, in this order. The matrix is the sum of a few. `reduced`: of each unknown,
+    /// negative where it is held or carried; of the free ones there are so many.
+    void couple(const std::vector<const SystemMatrix*>& matrices, const std::vector<Index>& reduced,
+                Index free);
     void append_rows(Index free, std::vector<Index>& rows) const;
     void append_columns(SparsePattern& pattern) const;
-    void find_places(const SystemMatrix& matrix, const std::vector<Index>& reduced,
+    void find_places(const std::vector<const SystemMatrix*>& matrices, const std::vector<Index>& reduced,
                      const SparsePattern& pattern);
 
     /// From now on B is that at q.
     void linearize(const VectorXd& q);
 
-    /// Adds B^T H B; the same of a diagonal; and the curvature under a gradient.
-    void add_matrix(const SystemMatrix& full, double* values) const;
+    /// Adds B^T H B of one of the matrices; the same of a diagonal; and the curvature under a gradient.
+    void add_matrix(std::size_t which, const SystemMatrix& full, double* values) const;
     void add_weights(const VectorXd& weights, double* values) const;
     void add_curvature(const VectorXd& gradient, double* values) const;
     void add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const;
@@ -68,18 +69,24 @@ class Carried {
     struct Inner {
         Index from, row, column;
     };
+    struct Places {  // of one of the matrices
+        std::vector<Mixed> mixed;
+        std::vector<Inner> inner;
+        std::map<Index, std::vector<Inner>> across;  // rows of a later carrier
+    };
     struct Chunk {
         std::unique_ptr<Carrier> carrier;
         Index first = 0;  // among the carriers' coordinates
         Eigen::MatrixXd jacobian;
         Eigen::LDLT<Eigen::MatrixXd> normal;
-        std::vector<Mixed> mixed;
-        std::vector<Inner> inner;
-        std::map<Index, std::vector<Inner>> across;  // rows of a later carrier
+        std::vector<Places> places;
+        std::set<Index> later;                       // carriers after it that it is coupled with
         std::vector<Index> own;                      // where each column's rows of this carrier begin
         std::map<Index, std::vector<Index>> beside;  // and those of a later one
     };
 
+    void find_places(std::size_t which, const SystemMatrix& matrix, const std::vector<Index>& reduced,
+                     const SparsePattern& pattern);
     void add_lower(const Chunk& chunk, const Eigen::MatrixXd& block, double* values) const;
 
     std::vector<Chunk> chunks_;

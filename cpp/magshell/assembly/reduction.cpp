@@ -34,40 +34,47 @@ Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, con
     }
 
     if (!carriers.empty()) carried_ = std::make_unique<Carried>(std::move(carriers), matrix);
-    std::vector<Index> reduced(matrix.size(), -1);
     for (Index u = 0; u < matrix.size(); ++u)
-        if (!is_held[u] && !(carried_ && carried_->carries(u))) {
-            reduced[u] = static_cast<Index>(free_unknowns_.size());
-            free_unknowns_.push_back(u);
-        }
-    SparsePattern pattern;
+        if (!is_held[u] && !(carried_ && carried_->carries(u))) free_unknowns_.push_back(u);
+    set_pattern(matrix, nullptr);
+    if (carried_) carried_->linearize(rest_state(nodes));
+}
+
+void Reduction::Pieces::add(Index from, Index to) {
+    if (!all.empty() && all.back().from + all.back().count == from && all.back().to + all.back().count == to)
+        ++all.back().count;
+    else
+        all.push_back({from, to, 1});
+}
+
+void Reduction::set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer) {
+    std::vector<Index> reduced(full_size_, -1);
     const Index free = static_cast<Index>(free_unknowns_.size());
+    for (Index k = 0; k < free; ++k) reduced[free_unknowns_[k]] = k;
+    std::vector<const SystemMatrix*> matrices = {&matrix};
+    if (layer) matrices.push_back(layer);
+    pieces_.all.clear();
+    layer_pieces_.all.clear();
+    SparsePattern pattern;
     pattern.size = free + (carried_ ? carried_->coordinates() : 0);
-    if (carried_) carried_->couple(matrix, reduced, free);
-    pattern.column_starts.reserve(free_unknowns_.size() + 1);
-    pattern.rows.reserve(matrix.rows().size());
+    if (carried_) carried_->couple(matrices, reduced, free);
+    pattern.column_starts.reserve(pattern.size + 1);
+    pattern.rows.reserve(matrix.rows().size() + (layer ? layer->rows().size() : 0));
     pattern.column_starts.push_back(0);
     for (const Index u : free_unknowns_) {
-        for (Index k = matrix.column_starts()[u]; k < matrix.column_starts()[u + 1]; ++k) {
-            const Index row = reduced[matrix.rows()[k]];
-            if (row < 0) continue;
+        each_entry(matrix, layer, u, [&](Index unknown, Index k, Index l) {
+            const Index row = reduced[unknown], to = static_cast<Index>(pattern.rows.size());
+            if (row < 0) return;
+            if (k >= 0) pieces_.add(k, to);
+            if (l >= 0) layer_pieces_.add(l, to);
             pattern.rows.push_back(row);
-            const bool gap =
-                carried_ && pieces_.size() > 0 &&
-                piece_to_.back() + pieces_.back().count + 1 != static_cast<Index>(pattern.rows.size());
-            if (pieces_.empty() || gap || pieces_.back().from + pieces_.back().count != k) {
-                pieces_.push_back({k, 0});
-                if (carried_) piece_to_.push_back(static_cast<Index>(pattern.rows.size()) - 1);
-            }
-            ++pieces_.back().count;
-        }
+        });
         if (carried_) carried_->append_rows(reduced[u], pattern.rows);
         pattern.column_starts.push_back(static_cast<Index>(pattern.rows.size()));
     }
     if (carried_) {
         carried_->append_columns(pattern);
-        carried_->find_places(matrix, reduced, pattern);
-        carried_->linearize(rest_state(nodes));
+        carried_->find_places(matrices, reduced, pattern);
     }
     pattern_ = std::make_shared<const SparsePattern>(std::move(pattern));
 }
@@ -211,19 +218,21 @@ void Reduction::turn_blocks(SystemMatrix& full) const {
     }
 }
 
-void Reduction::matrix(SystemMatrix& full, LargeVector<double>& values) const {
-    if (!frame_of_.empty()) turn_blocks(full);
-    values.resize(pattern_->rows.size());
-    if (carried_) {
-        std::fill(values.begin(), values.end(), 0.0);
-        for (std::size_t k = 0; k < pieces_.size(); ++k)
-            std::copy_n(full.values().data() + pieces_[k].from, pieces_[k].count,
-                        values.data() + piece_to_[k]);
-        carried_->add_matrix(full, values.data());
-        return;
+void Reduction::matrix(SystemMatrix& full, SystemMatrix* layer, LargeVector<double>& values) const {
+    if (!frame_of_.empty()) {
+        turn_blocks(full);
+        if (layer) turn_blocks(*layer);
     }
-    double* to = values.data();
-    for (const Piece& piece : pieces_) to = std::copy_n(full.values().data() + piece.from, piece.count, to);
+    values.resize(pattern_->rows.size());
+    if (carried_ || layer) std::fill(values.begin(), values.end(), 0.0);
+    for (const Pieces::Piece& piece : pieces_.all)
+        std::copy_n(full.values().data() + piece.from, piece.count, values.data() + piece.to);
+    if (carried_) carried_->add_matrix(0, full, values.data());
+    if (!layer) return;
+    for (const Pieces::Piece& piece : layer_pieces_.all)
+        for (Index k = 0; k < piece.count; ++k)
+            values[piece.to + k] += layer->values()[piece.from + k];
+    if (carried_) carried_->add_matrix(1, *layer, values.data());
 }
 
 void Reduction::add_weights(const VectorXd& full, LargeVector<double>& values) const {
@@ -293,7 +302,7 @@ VectorXd Reduction::expand(const VectorXd& reduced) const {
 }
 
 std::size_t Reduction::bytes() const {
-    return pieces_.capacity() * sizeof(Piece) +
+    return (pieces_.all.capacity() + layer_pieces_.all.capacity()) * sizeof(Pieces::Piece) +
            (frame_of_.capacity() + held_at_.capacity() + free_unknowns_.capacity() +
             pattern_->rows.capacity() + pattern_->column_starts.capacity()) *
                sizeof(Index) +

@@ -41,6 +41,8 @@ class Reduction {
 
     Index size() const { return pattern_->size; }
     const std::shared_ptr<const SparsePattern>& pattern() const { return pattern_; }
+    /// From now on the matrix is the sum of two: nodes that the first does not couple, the other one may.
+    void set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer);
 
     /// Where the supports want their nodes, less where they are: zero elsewhere.
     VectorXd prescribed_increment(const VectorXd& q, const Controls& controls) const;
@@ -63,8 +65,9 @@ class Reduction {
         if (carried_) carried_->linearize(q);
     }
 
-    /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first.
-    void matrix(SystemMatrix& full, LargeVector<double>& values) const;
+    /// The free rows and columns, in the order of pattern(). Turns blocks of framed nodes in place first. `layer`: as
+    /// in set_pattern.
+    void matrix(SystemMatrix& full, SystemMatrix* layer, LargeVector<double>& values) const;
     /// Adds a diagonal of all unknowns, the same along the three axes of a node, which no frame changes: masses, areas.
     void add_weights(const VectorXd& full, LargeVector<double>& values) const;
     /// Adds what a gradient of all unknowns says of the coordinates of carriers, as nodes move along curves.
@@ -130,12 +133,16 @@ class Reduction {
     std::vector<Index> free_unknowns_;  // reduced -> full, ascending
     std::shared_ptr<const SparsePattern> pattern_;
     // What is left of the full matrix, in pieces without a gap: supports take little away.
-    struct Piece {
-        Index from, count;
+    struct Pieces {
+        struct Piece {
+            Index from, to, count;
+        };
+        std::vector<Piece> all;
+
+        void add(Index from, Index to);
     };
-    std::vector<Piece> pieces_;
+    Pieces pieces_, layer_pieces_;
     std::unique_ptr<Carried> carried_;  // nullptr: nothing is
-    std::vector<Index> piece_to_;       // with carriers, whose rows stand between: where each piece goes
 };
 
 }  // namespace magshell

@@ -27,6 +27,17 @@ void Remainder::add_product(const VectorXd& p, bool transposed, VectorXd& out) c
         out.segment<3>(3 * a) += axis.cross(Vec3(p.segment<3>(3 * b)));
         if (a != b) out.segment<3>(3 * b) += axis.cross(Vec3(p.segment<3>(3 * a)));
     }
+    for (const Pair& each : pairs_)
+        for (int i = 0; i < 4; ++i)
+            for (int j = 0; j < 4; ++j) {
+                if (each.nodes[i] < 0 || each.nodes[j] < 0) continue;
+                const Mat3& block = each.blocks[4 * i + j];
+                if (transposed)
+                    out.segment<3>(3 * each.nodes[j]) +=
+                        block.transpose() * p.segment<3>(3 * each.nodes[i]);
+                else
+                    out.segment<3>(3 * each.nodes[i]) += block * p.segment<3>(3 * each.nodes[j]);
+            }
 }
 
 }  // namespace magshell

@@ -27,20 +27,29 @@ class Remainder {
         Vec3 axis;
     };
 
+    /// Blocks of up to four nodes: (i, j) at 4 i + j. Negative: no node.
+    struct Pair {
+        std::array<Index, 4> nodes;
+        std::array<Mat3, 16> blocks;
+    };
+
     void clear() {
         points_.clear();
         shared_.clear();
         skews_.clear();
+        pairs_.clear();
     }
     bool empty() const { return !of_motion() && skews_.empty(); }
     /// Whether there are blocks of forces that act within time steps only.
-    bool of_motion() const { return !points_.empty() || !shared_.empty(); }
+    bool of_motion() const { return !points_.empty() || !shared_.empty() || !pairs_.empty(); }
     const std::vector<Skew>& skews() const { return skews_; }
 
     /// A block of one node.
     void add(Index node, const Mat3& block) { points_.push_back({node, block}); }
     void add(const Shared& shared) { shared_.push_back(shared); }
     void add(const Skew& skew) { skews_.push_back(skew); }
+    /// One more, for the caller to fill before the next call.
+    Pair& add_pair() { return pairs_.emplace_back(); }
     /// So many more, for the caller to fill before the next call.
     Shared* extend(std::size_t count) {
         shared_.resize(shared_.size() + count);
@@ -58,6 +67,7 @@ class Remainder {
     std::vector<Point> points_;
     std::vector<Shared> shared_;
     std::vector<Skew> skews_;
+    std::vector<Pair> pairs_;
 };
 
 }  // namespace magshell

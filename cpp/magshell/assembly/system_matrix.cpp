@@ -114,8 +114,17 @@ Index SystemMatrix::rotations_slot(Index a, Index b) const {
     return find(3 * nodes_ + std::min(a, b), 3 * nodes_ + std::max(a, b));
 }
 
-void SystemMatrix::multiply(const double* x, double* y) const {
-    std::fill(y, y + size(), 0.0);
+bool SystemMatrix::couples(Index i, Index j) const {
+    const Index column = 3 * std::min(i, j), row = 3 * std::max(i, j), at = find(column, row);
+    return at < column_starts_[column + 1] && rows_[at] == row;
+}
+
+void SystemMatrix::add_diagonal(VectorXd& out) const {
+    for (Index k = 0; k < size(); ++k)
+        if (column_starts_[k] < column_starts_[k + 1]) out[k] += values_[column_starts_[k]];
+}
+
+void SystemMatrix::add_product(const double* x, double* y) const {
     // A node's three columns at once: their rows are the same.
     for (Index j = 0; j < 3 * nodes_; j += 3) {
         const Index start = column_starts_[j], length = column_starts_[j + 1] - start;

@@ -40,8 +40,10 @@ class SystemMatrix {
     void clear_rotation(Index rotation) { clear(3 * nodes_ + rotation, 3 * nodes_ + rotation + 1); }
     std::size_t bytes() const;
 
-    /// The slot of the block with rows at node i and columns at node j.
+    /// The slot of the block with rows at node i and columns at node j, two nodes that are coupled.
     Slot node_slot(Index i, Index j) const;
+    /// Whether two nodes are coupled.
+    bool couples(Index i, Index j) const;
     /// The position of (rotation, first component of node).
     Index rotation_slot(Index rotation, Index node) const;
     /// The position of (a, b), two rotations.
@@ -50,7 +52,14 @@ class SystemMatrix {
     Index column_length(Index node) const { return column_starts_[3 * node + 1] - column_starts_[3 * node]; }
 
     /// y = A x with the symmetric matrix.
-    void multiply(const double* x, double* y) const;
+    void multiply(const double* x, double* y) const {
+        std::fill(y, y + size(), 0.0);
+        add_product(x, y);
+    }
+    /// y += A x.
+    void add_product(const double* x, double* y) const;
+    /// Adds its diagonal, of all unknowns.
+    void add_diagonal(VectorXd& out) const;
 
     /// Adds lane `lane` of block (i, j), i != j; `length` is the column length of the node whose columns the
     /// slot is in.
@@ -97,6 +106,25 @@ class SystemMatrix {
         to[length - 1] += from[8 * w];
     }
 
+    /// Adds block (i, j), i != j; and a symmetric block on the diagonal of a node.
+    void add_block(Slot slot, Index length, const Mat3& block) {
+        const bool transposed = slot & 1;
+        double* to = values_.data() + (slot >> 1);
+        for (int column = 0; column < 3; ++column) {
+            for (int row = 0; row < 3; ++row) to[row] += transposed ? block(column, row) : block(row, column);
+            to += length - 1 - column;
+        }
+    }
+    void add_diagonal_block(Index node, const Mat3& block) {
+        double* to = values_.data() + column_starts_[3 * node];
+        const Index length = column_length(node);
+        for (int row = 0; row < 3; ++row) to[row] += block(row, 0);
+        to += length;
+        to[0] += block(1, 1);
+        to[1] += block(2, 1);
+        to[length - 1] += block(2, 2);
+    }
+
     /// Adds lane `lane` of the block (i, j) of two places i > j of an element that are both taken by one
     /// node, and of its transpose, the block (j, i).
     void add_block_and_transpose(Index node, const Pack33& block, int lane) {
@@ -113,6 +141,7 @@ class SystemMatrix {
     }
 
     void add(Index position, double value) { values_[position] += value; }
+    void clear() { std::fill(values_.begin(), values_.end(), 0.0); }
 
   private:
     Index find(Index column, Index row) const;
@@ -125,5 +154,21 @@ class SystemMatrix {
     std::vector<Index> column_starts_, rows_;
     LargeVector<double> values_;
 };
+
+/// visit(row, place in the first, place in the other) for the entries of a column of the sum of two matrices; a place is
+/// negative where that one has none. There may be no other one.
+template <class Visit>
+void each_entry(const SystemMatrix& matrix, const SystemMatrix* other, Index column, const Visit& visit) {
+    Index k = matrix.column_starts()[column], l = other ? other->column_starts()[column] : 0;
+    const Index end = matrix.column_starts()[column + 1],
+                other_end = other ? other->column_starts()[column + 1] : 0;
+    while (k < end || l < other_end) {
+        const bool first = k < end && (l == other_end || matrix.rows()[k] <= other->rows()[l]),
+                   second = l < other_end && (k == end || other->rows()[l] <= matrix.rows()[k]);
+        visit(first ? matrix.rows()[k] : other->rows()[l], first ? k : -1, second ? l : -1);
+        k += first;
+        l += second;
+    }
+}
 
 }  // namespace magshell

@@ -91,6 +91,7 @@ class Factor {
     virtual std::unique_ptr<Factor> sibling() const = 0;
 
     virtual std::string name() const = 0;
+    const std::shared_ptr<const SparsePattern>& pattern() const { return pattern_; }
     Index size() const { return pattern_->size; }
     virtual std::int64_t nonzeros() const = 0;  // entries of L, its diagonal included
     virtual double flops() const = 0;           // of one factorization, additions and multiplications

@@ -6,6 +6,7 @@
 
 #include "magshell/assembly/skeleton_carrier.h"
 #include "magshell/core/errors.h"
+#include "magshell/term/body_contact_term.h"
 
 namespace magshell {
 namespace {
@@ -72,6 +73,8 @@ Model::Model(const SceneInput& input)
     }
     share_out_columns();
 }
+
+Model::~Model() = default;
 
 void Model::set_values(const VectorXd& in_user_order) {
     values_.set(registry_.values, registry_.values.to_core(in_user_order));
@@ -166,8 +169,9 @@ StrainSet Model::stresses(const StrainSet& strains) const {
 }
 
 std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
-    if (spare_) return std::exchange(spare_, nullptr);
-    if (!analysed_) {
+    if (spare_ && spare_->pattern() == reduction_.pattern()) return std::exchange(spare_, nullptr);
+    spare_ = nullptr;
+    if (!analysed_ || analysed_->pattern() != reduction_.pattern()) {
         analysed_ = analyze(reduction_.pattern(), {.points = free_points(), .watch = watch});
         ++analyses_;
     }
@@ -177,6 +181,7 @@ std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
 void Model::keep_spare(std::shared_ptr<Factor> factor) {
     constexpr std::size_t large = std::size_t{1} << 28;
     if (!factor || factor.use_count() > 1 || factor->bytes() > large) return;
+    if (factor->pattern() != reduction_.pattern()) return;
     factor->forget();
     spare_ = std::move(factor);
 }
@@ -223,14 +228,19 @@ std::string Model::not_finite(const VectorXd& q, const Controls& controls) {
     return {};
 }
 
-void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress) {
+void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, bool cautious) {
     const auto clear = [&](std::size_t chunk) {
         for (const Index node : first_nodes_[chunk]) matrix_.clear_node(node);
         for (const Index rotation : first_rotations_[chunk]) matrix_.clear_rotation(rotation);
     };
     clear(first_nodes_.size() - 1);
     // All terms of a chunk before the next chunk: its share of the matrix is cleared and filled in the cache.
+    if (body_contact_) body_contact_->be_cautious(cautious);
     for (const std::unique_ptr<Term>& term : terms_) term->prepare_assembly(q.data(), controls);
+    if (layer_ && layer_->version() != coupled_) {
+        reduction_.set_pattern(matrix_, &layer_->matrix());
+        coupled_ = layer_->version();
+    }
     schedule_.scatter([&](const Chunk& chunk) {
         clear(chunk.number);
         for (const Term* term : of_body_[chunk.body])
@@ -238,6 +248,26 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
     });
     for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
     add_remainders(q, controls);
+}
+
+SystemMatrix* Model::contact_matrix() {
+    return coupled_ > 0 ? &layer_->matrix() : nullptr;
+}
+
+void Model::multiply(const VectorXd& x, VectorXd& out) const {
+    matrix_.multiply(x.data(), out.data());
+    if (coupled_ > 0) layer_->matrix().add_product(x.data(), out.data());
+}
+
+VectorXd Model::diagonal() const {
+    VectorXd sum = VectorXd::Zero(size());
+    matrix_.add_diagonal(sum);
+    if (coupled_ > 0) layer_->matrix().add_diagonal(sum);
+    return sum;
+}
+
+void Model::reduce_matrix(LargeVector<double>& values) {
+    reduction_.matrix(matrix_, contact_matrix(), values);
 }
 
 void Model::share_out_columns() {
@@ -271,6 +301,26 @@ std::string Model::refusal(const VectorXd& q) const {
     for (const Term* term : refusing_)
         if (std::string reason = term->refusal(q.data()); !reason.empty()) return reason;
     return {};
+}
+
+double Model::share_of_step(const VectorXd& q, const VectorXd& p) const {
+    constexpr double of_way = 0.8, shortest = 1e-12;
+    if (!refuses_states()) return 1.0;
+    double share = largest_share(q, p / of_way);
+    if (!reduction_.carries()) return share;
+    for (; share > shortest; share *= 0.5) {  // what is carried moves along a curve
+        VectorXd there = q;
+        reduction_.advance(there, share * p);
+        if (largest_share(q, there - q) >= 1.0) return share;
+    }
+    return 0.0;
+}
+
+std::string Model::stuck(const VectorXd& q, const VectorXd& p) const {
+    const double share = largest_share(q, p);
+    if (body_contact_ && body_contact_->largest_share(q.data(), p.data()) <= share)
+        return "bodies cannot follow: " + body_contact_->blocking(q.data(), p.data());
+    return "elements cannot follow: " + refusal(q + 1.01 * share * p);
 }
 
 void Model::extrapolate(const VectorXd& p) {

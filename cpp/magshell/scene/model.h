@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "magshell/assembly/contact_layer.h"
 #include "magshell/assembly/face_loop.h"
 #include "magshell/assembly/reduction.h"
 #include "magshell/body/membrane_faces.h"
@@ -22,11 +23,14 @@
 
 namespace magshell {
 
+class BodyContactTerm;
+
 class Model {
   public:
     explicit Model(const SceneInput& input);
     Model(const Model&) = delete;
     Model& operator=(const Model&) = delete;
+    ~Model();
 
     /// What its terms read: the lists of values and of controls.
     const Registry& registry() const { return registry_; }
@@ -45,6 +49,11 @@ class Model {
     const MembraneFaces& membrane_faces(Index body) const { return *membrane_faces_[body]; }
     const Reduction& reduction() const { return reduction_; }
     SystemMatrix& matrix() { return matrix_; }
+    /// Of matrix() and what touching bodies add to it: its product with x, its diagonal, its free rows and columns.
+    void multiply(const VectorXd& x, VectorXd& out) const;
+    VectorXd diagonal() const;
+    void reduce_matrix(LargeVector<double>& values);
+    SystemMatrix* contact_matrix();
     const Residual& residual() const { return residual_; }
     Index size() const { return nodes().n_unknowns(); }
     Index n_coordinates() const { return nodes().n_coordinates(); }
@@ -67,8 +76,8 @@ class Model {
     void evaluate(const VectorXd& q, const Controls& controls);
     /// Which term's force is not finite at q, and on which vertex; empty if all are.
     std::string not_finite(const VectorXd& q, const Controls& controls);
-    /// The Hessian at the last evaluated state, in matrix().
-    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress);
+    /// The Hessian at the last evaluated state, in matrix(). Cautious: what touching bodies add is nowhere negative.
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, bool cautious = false);
     /// Whether loads follow the bodies, which may make the Hessian unsymmetric; and whether, as assembled last, it is, for
     /// what is free to move: then it is matrix() and remainder(), and there is no energy.
     bool follows() const { return follows_; }
@@ -88,6 +97,9 @@ class Model {
     bool has_forces() const { return !forces_.empty(); }
     void begin_step(const VectorXd& q, const Controls& controls);
     bool has_contact() const { return contact_ != nullptr; }
+    /// Whether bodies keep each other, or themselves, out.
+    bool has_body_contact() const { return body_contact_ != nullptr; }
+    const BodyContactTerm* body_contact() const { return body_contact_; }
     /// Why a step from q to `end` cannot be: a point would be on the other side of an obstacle. Else empty.
     std::string blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
                         const Controls& controls_at_end) const;
@@ -116,6 +128,11 @@ class Model {
     bool refuses_states() const { return !refusing_.empty(); }
     double largest_share(const VectorXd& q, const VectorXd& p) const;
     std::string refusal(const VectorXd& q) const;
+    /// How much of a step may be taken: so far towards the first element that would be turned inside out, or the first
+    /// bodies that would pass through each other.
+    double share_of_step(const VectorXd& q, const VectorXd& p) const;
+    /// Why a step cannot be taken, in words.
+    std::string stuck(const VectorXd& q, const VectorXd& p) const;
 
     /// That of a sheet, "membrane" or "bending".
     const ElasticTerm& elastic_term(Index sheet, std::string_view name) const;
@@ -153,6 +170,7 @@ class Model {
     void add_solids(const SceneInput& input);
     void add_couples(const SceneInput& input);
     void add_contacts(const SceneInput& input);
+    void add_body_contacts(const SceneInput& input);
     void share_out_columns();
     void add_remainders(const VectorXd& q, const Controls& controls);
     void hand_out_values();
@@ -177,6 +195,9 @@ class Model {
     std::vector<std::unique_ptr<ForceTerm>> forces_;
     const ContactTerm* contact_ = nullptr;
     bool follows_ = false, unsymmetric_ = false;
+    BodyContactTerm* body_contact_ = nullptr;
+    std::unique_ptr<ContactLayer> layer_;  // nullptr: no bodies touch each other
+    std::int64_t coupled_ = 0;             // the version of it that the reduced pattern has
     // By chunk: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
     std::vector<std::vector<Index>> first_nodes_, first_rotations_;
     Values values_;

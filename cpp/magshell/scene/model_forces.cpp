@@ -4,6 +4,7 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/scene/model.h"
+#include "magshell/term/body_contact_term.h"
 
 namespace magshell {
 
@@ -55,6 +56,7 @@ void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const S
 
 void Model::add_cancelling_contact_forces(bool in_motion, VectorXd& out) const {
     if (contact_) contact_->add_cancelling_normal_forces(out);
+    if (body_contact_) body_contact_->add_cancelling_normal_forces(out);
     if (!in_motion) return;
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_cancelling_forces(kinematics_, out);
 }

@@ -5,6 +5,8 @@
 #include "magshell/scene/model.h"
 #include "magshell/strain/fold_angle.h"
 #include "magshell/term/bending_term.h"
+#include "magshell/term/body_contact_term.h"
+#include "magshell/term/body_friction_term.h"
 #include "magshell/term/couple_term.h"
 #include "magshell/term/friction_term.h"
 #include "magshell/term/joint_term.h"
@@ -77,6 +79,7 @@ void Model::add_terms(const SceneInput& input) {
     if (input.loads) terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));
     if (!input.couples.empty()) add_couples(input);
     if (!input.contacts.empty()) add_contacts(input);
+    if (!input.body_contacts.empty()) add_body_contacts(input);
     if (input.water)
         for (Index k = 0; k < count + static_cast<Index>(input.solids.size()); ++k)
             forces_.push_back(std::make_unique<WaterTerm>(*bodies_.faces()[k].surface, *loops_[k],
@@ -160,6 +163,22 @@ void Model::add_contacts(const SceneInput& input) {
     }
     if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
         forces_.push_back(std::make_unique<FrictionTerm>(*contact_, std::move(rubs), std::move(lagged)));
+}
+
+void Model::add_body_contacts(const SceneInput& input) {
+    layer_ = std::make_unique<ContactLayer>(matrix_.nodes(), matrix_.rotations());
+    std::unique_ptr<BodyContactTerm> contact = std::make_unique<BodyContactTerm>(
+        nodes(), input.contact_surfaces, input.body_contacts, *layer_, registry_);
+    body_contact_ = contact.get();
+    terms_.push_back(std::move(contact));
+    std::vector<bool> rubs, lagged;
+    for (const BodyContactInput& each : input.body_contacts) {
+        rubs.push_back(each.rubs);
+        lagged.push_back(each.lagged);
+    }
+    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
+        forces_.push_back(
+            std::make_unique<BodyFrictionTerm>(*body_contact_, std::move(rubs), std::move(lagged)));
 }
 
 }  // namespace magshell

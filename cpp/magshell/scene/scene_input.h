@@ -11,6 +11,7 @@
 #include "magshell/body/solid.h"
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
+#include "magshell/term/body_contact_input.h"
 #include "magshell/term/contact_term.h"
 #include "magshell/term/face_energy.h"
 #include "magshell/term/pressure_term.h"
@@ -102,6 +103,8 @@ struct SceneInput {
     bool gravity = false, loads = false;
     std::vector<std::shared_ptr<const AppliedField>> field_sources;
     std::vector<ContactInput> contacts;
+    std::vector<ContactSurfaceInput> contact_surfaces;
+    std::vector<BodyContactInput> body_contacts;
     std::vector<std::shared_ptr<const Obstacle>> obstacles;
     std::shared_ptr<const Water> water;
 };

@@ -122,6 +122,7 @@ class Follower {
         double parameter = base.parameter + step * along.parameter;
         VectorXd increment = step * along.state;
         for (iterations = 0;; ++iterations, newton_.count_iteration()) {
+            if (model_.has_body_contact()) increment *= model_.share_of_step(q, increment);
             if (newton_.options().mixed) model_.extrapolate(increment);
             model_.reduction().advance(q, increment);
             const Controls at = controls(parameter);

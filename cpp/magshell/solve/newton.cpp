@@ -34,9 +34,8 @@ constexpr double shrinking = 0.7;
 // A residual that shrinks less makes the next step a cautious one.
 constexpr double contracting = 0.5;
 
-// So far towards the first element that would be turned inside out a step goes at most; a shorter one than that
-// leads nowhere.
-constexpr double of_way_to_inversion = 0.8, shortest_share = 1e-4;
+// A shorter share of a step than that leads nowhere.
+constexpr double shortest_share = 1e-4;
 
 // How exactly to solve for a Newton step with an unsymmetric matrix: what its quadratic convergence deserves,
 // and no more than the end needs.
@@ -110,9 +109,10 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
 }
 
 FactorReport Newton::factorize_assembled(const VectorXd& q, const Anchor& anchor) {
-    if (!factor_) factor_ = model_.new_factor([this] { watch(watched_); });
+    if (!factor_ || factor_->pattern() != model_.reduction().pattern())
+        factor_ = model_.new_factor([this] { watch(watched_); });
     LargeVector<double>& values = factor_->values();
-    model_.reduction().matrix(model_.matrix(), values);
+    model_.reduce_matrix(values);
     if (anchor.weights) model_.reduction().add_weights(*anchor.weights, values);
     if (model_.reduction().carries()) model_.reduction().add_curvature(gradient(q, anchor), values);
     ++factorizations_;
@@ -134,7 +134,7 @@ void Newton::evaluate(const VectorXd& q, const Controls& controls, const Anchor&
 
 void Newton::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
                       const Anchor& anchor, bool cautious) {
-    model_.assemble(q, controls, extrapolated_stress);
+    model_.assemble(q, controls, extrapolated_stress, cautious);
     if (anchor.motion && model_.has_forces()) model_.assemble_forces(controls, cautious);
     unsymmetric_ = model_.unsymmetric();
 }
@@ -152,7 +152,7 @@ FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool
         if (moves.col(k).isZero(0.0)) continue;
         const VectorXd move = moves.col(k);
         VectorXd pull(move.size());
-        model_.matrix().multiply(move.data(), pull.data());
+        model_.multiply(move, pull);
         model_.remainder().add_product(move, false, pull);
         moves.col(k) = pull;
     }
@@ -164,9 +164,7 @@ GmresReport Newton::solve_nearby(const VectorXd& q, const Controls& controls, co
     assemble(q, controls, false, anchor);
     const Stopwatch running(linear_time_);
     const Reduction& reduction = model_.reduction();
-    const SystemMatrix& matrix = model_.matrix();
-    VectorXd stiffness(matrix.size()), whole(matrix.size());
-    for (Index k = 0; k < matrix.size(); ++k) stiffness[k] = matrix.values()[matrix.column_starts()[k]];
+    VectorXd stiffness = model_.diagonal(), whole(model_.size());
     if (anchor.weights) stiffness += *anchor.weights;
     // Forces of different kinds count alike, whatever their units.
     const VectorXd scale = reduction.weights(stiffness).unaryExpr(
@@ -174,7 +172,7 @@ GmresReport Newton::solve_nearby(const VectorXd& q, const Controls& controls, co
     const VectorXd forces = reduction.carries() ? gradient(q, anchor) : VectorXd();
     const auto assembled = [&](const VectorXd& x) {
         const VectorXd full = reduction.expand(x);
-        matrix.multiply(full.data(), whole.data());
+        model_.multiply(full, whole);
         if (anchor.weights) whole += anchor.weights->cwiseProduct(full);
         if (unsymmetric_) model_.remainder().add_product(full, true, whole);
         VectorXd image = reduction.vector(whole);
@@ -224,7 +222,18 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
 }
 
 NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations) {
-    return iterate(q, controls, anchor, max_iterations, options_.mixed);
+    if (!model_.has_body_contact()) return iterate(q, controls, anchor, max_iterations, options_.mixed);
+    constexpr int searched = 5;  // times as many iterations
+    const VectorXd from = q;
+    const Model::Turns turns = model_.turns();
+    NewtonReport report = iterate(q, controls, anchor, max_iterations, options_.mixed);
+    if (report.converged) return report;
+    const int iterations = report.iterations;
+    q = from;
+    model_.set_turns(turns);
+    report = solve_searching(q, controls, anchor, searched * max_iterations);
+    report.iterations += iterations;
+    return report;
 }
 
 NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor) {
@@ -237,7 +246,8 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
     constexpr int most_rounds = 12, most_steps = 20, last_steps = 8;
     constexpr double least_gain = 1e-2;  // than a round began, it ends at least
     NewtonReport report;
-    q += model_.reduction().prescribed_increment(q, controls);
+    VectorXd move = model_.reduction().prescribed_increment(q, controls);
+    if (!move.isZero(0.0) && advance(q, move, 1.0, report) < 0.0) return report;
     evaluate(q, controls, anchor);
     for (int round = 0; round < most_rounds; ++round) {
         const double enough = std::max(options_.tolerance, least_gain * relative_residual(q, anchor));
@@ -284,7 +294,7 @@ bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor
             return std::sqrt(p.dot(anchor.weights->cwiseProduct(p)));
         };
         const double whole = length(step);
-        for (double share = 1.0;; share *= 0.5) {
+        for (double share = model_.has_body_contact() ? model_.share_of_step(q, step) : 1.0;; share *= 0.5) {
             q = from;
             model_.reduction().advance(q, share * step);
             evaluate(q, controls, anchor);
@@ -353,16 +363,9 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         VectorXd step =
             move + (anchor.motion ? solve_with_factor(force, deserved(report.residual, options_.tolerance))
                                   : solve_with_factor(force));
-        if (model_.refuses_states()) {
-            const double share = model_.largest_share(q, step / of_way_to_inversion);
-            if (share < shortest_share)
-                return fail("elements cannot follow: " +
-                            model_.refusal(q + 1.01 / of_way_to_inversion * share * step));
-            step *= share;
-            move *= 1.0 - share;
-        } else {
-            move.setZero();
-        }
+        const double share = advance(q, step, shortest_share, report);
+        if (share < 0.0) return report;
+        move *= 1.0 - share;
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())
@@ -371,7 +374,6 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         extrapolated = true;
         last_step = length;
         moved += length;
-        model_.reduction().advance(q, step);
         evaluate(q, controls, anchor);
     }
 }

@@ -66,6 +66,11 @@ class Newton {
     /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity), in rounds
     /// of held normal forces: slower, and sure of foot where contacts open and close, stick and slip.
     NewtonReport solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor);
+    /// With plain steps that end where the energy along them has stopped falling fast, from matrices that are nowhere
+    /// negative where bodies touch: what bodies in contact need, far from the solution. solve() ends with it where it
+    /// fails.
+    NewtonReport solve_searching(VectorXd& q, const Controls& controls, const Anchor& anchor,
+                                 int max_iterations);
 
     /// The residual's parts at q, with the forces of a time step.
     void evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor);
@@ -111,6 +116,13 @@ class Newton {
   private:
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                          bool mixed);
+    /// As far along a step as there are states; the share of it, negative where that leads nowhere, and the report
+    /// says why.
+    double advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
+    /// From the end of a step, last evaluated, back towards `from` by secants where the energy has risen again there,
+    /// which fell at `slope` [J] at the beginning; the share of the step that is left.
+    double search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
+                  const VectorXd& step, double slope);
     /// Shortened steps with held normal forces, from the last evaluated state until the residual is small
     /// enough or so many are done; false where none can be taken, and the report says why.
     bool descend(VectorXd& q, const Controls& controls, const Anchor& anchor, double enough, int most_steps,

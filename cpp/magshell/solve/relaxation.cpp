@@ -20,12 +20,15 @@ class Relaxation {
   public:
     Relaxation(Newton& newton, VectorXd& q, const Controls& controls)
         : newton_(newton), model_(newton.model()), q_(q), controls_(controls) {
-        q_ += model_.reduction().prescribed_increment(q_, controls);
+        const VectorXd move = model_.reduction().prescribed_increment(q_, controls);
+        if (model_.has_body_contact() && model_.largest_share(q_, move) < 1.0)
+            report_.reason = model_.stuck(q_, move);
+        q_ += move;
         energy_ = model_.energy(q_, controls);
     }
 
     RelaxationReport run(int max_steps) {
-        report_.reason = model_.refusal(q_);
+        if (report_.reason.empty()) report_.reason = model_.refusal(q_);
         if (!report_.reason.empty()) return report_;
         for (; report_.steps < max_steps; ++report_.steps) {
             if (!prepare()) return report_;
@@ -82,12 +85,11 @@ class Relaxation {
 
     // Of the last assembled Hessian, per area: a rate like it holds every vertex where it is.
     double largest_stiffness() const {
-        const SystemMatrix& matrix = model_.matrix();
+        const VectorXd stiffness = model_.diagonal();
         double largest = 0.0;
         for (Index k = 0; k < model_.n_coordinates(); ++k)
             if (model_.metric()[k] > 0.0)
-                largest = std::max(largest,
-                                   std::abs(matrix.values()[matrix.column_starts()[k]]) / model_.metric()[k]);
+                largest = std::max(largest, std::abs(stiffness[k]) / model_.metric()[k]);
         return largest;
     }
 
@@ -96,7 +98,9 @@ class Relaxation {
         ++report_.saddles_left;
         for (double amplitude = settled * model_.extent(); amplitude < model_.extent(); amplitude *= 2.0) {
             VectorXd trial = saddle;
-            model_.reduction().advance(trial, amplitude * mode.shape);
+            const VectorXd push = amplitude * mode.shape;
+            if (model_.has_body_contact() && model_.largest_share(saddle, push) < 1.0) break;
+            model_.reduction().advance(trial, push);
             const double energy = model_.energy(trial, controls_);
             // The first push may be too small for the energy to tell, but must be made.
             if (amplitude > settled * model_.extent() && !(energy < energy_)) break;

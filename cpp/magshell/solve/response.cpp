@@ -19,7 +19,7 @@ VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, cons
     if (moves || model.follows()) model.assemble(q, to, false);
     if (moves) {
         VectorXd pull(q.size());
-        model.matrix().multiply(change.data(), pull.data());
+        model.multiply(change, pull);
         model.remainder().add_product(change, false, pull);
         force += pull;
     }

@@ -73,11 +73,13 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         // As fast as until now; what has no velocity begins where it was.
         q.head(coordinates) = x_hat.head(coordinates) +
                               step.stage_time() * (i == 0 ? state.v : rates.back().v).head(coordinates);
-        if (model.reduction().carries()) {
+        if (model.reduction().carries() || model.has_body_contact()) {
             VectorXd ahead = q - state.q;
             ahead.tail(q.size() - coordinates).setZero();
             const VectorXd others = q.tail(q.size() - coordinates);
             q = state.q;
+            // Short of what is in the way, if anything is.
+            if (model.has_body_contact()) ahead *= model.share_of_step(q, ahead);
             model.reduction().advance(q, ahead);
             q.tail(others.size()) = others;
         }
@@ -91,7 +93,8 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         const VectorXd predicted = q;
         const Model::Turns turns = model.turns();
         NewtonReport report = newton_.solve(q, controls[i + 1], anchor);
-        if (!report.converged && (model.has_contact() || newton_.options().mixed)) {
+        if (!report.converged && !model.has_body_contact() &&
+            (model.has_contact() || newton_.options().mixed)) {
             q = predicted;
             model.set_turns(turns);
             report = model.has_contact() ? newton_.solve_damped(q, controls[i + 1], anchor)

@@ -1,5 +1,5 @@
-"""python -m magshell.bench kernels: what a gradient and a Hessian cost, a face, by bending and magnetization; and a
-tetrahedron."""
+"""python -m magshell.bench kernels: what a gradient and a Hessian cost, a face, by bending and magnetization; a
+tetrahedron and a contact."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 import magshell as ms
 from magshell.scene.values import Values
 
+from .contact_kernels import contacts
 from .ratios import note
 from .report import add_rounds, chosen, print_table
 from .solid_kernels import solids
@@ -78,11 +79,13 @@ def run(options: argparse.Namespace) -> dict:
         rows,
     )
     of_solids = solids(options.quick, options.rounds)
+    of_contacts = contacts(options.quick, options.rounds)
     gain = two_threads(SHEETS[0], sizes[0], options.rounds)
     _print_targets(costs[SHEETS[0].name], gain)
     return {
         "sheets": {name: [each._asdict() for each in of_sheet] for name, of_sheet in costs.items()},
         "solids": of_solids,
+        "contacts": of_contacts,
         "two threads": gain,
     }
 

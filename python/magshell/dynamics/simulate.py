@@ -20,6 +20,7 @@ from ..scene.courses import over_time
 from ..scene.inputs import Inputs
 from ..scene.replacements import requested
 from ..scene.scene import Scene
+from ..surroundings.contact_inputs import check_apart
 from .inputs import MotionInputs
 from .trajectory import MotionState, Trajectory
 
@@ -168,6 +169,7 @@ def simulate(
     )
     began = time.perf_counter()
     with inputs.in_core(), progress_bar("simulate", 1.0, shown=progress, delay=2.0, bar_format=_BAR) as bar:
+        check_apart(scene, asked.start.state)
         found = _core.simulate(
             scene._model, asked.core, bool(inputs.leaves), int(memory_budget), asked.keep, _advance(bar)
         )
@@ -251,7 +253,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
                 values.touching(contact),
                 scene._bodies,
             )
-            for contact in scene.contacts
+            for contact in scene._obstacle_contacts
         ],
         _own_points=points[:, n_v:] if rigid else None,
         _own_velocities=velocities[:, n_v:] if rigid else None,

@@ -24,6 +24,8 @@ from ..mesh.crossings import told
 from ..methods.clock import Clock, clock_of
 from ..methods.integrators import Integrator
 from ..scene.scene import Scene
+from ..scene.touching import Touching, touching_in
+from ..surroundings.body_contact import BodyContact
 from ..surroundings.contact_inputs import near_kinks
 
 
@@ -195,6 +197,10 @@ class Trajectory:
         before = 3 * self.scene._bodies.n_points
         state[before : before + self._directions.shape[1]] = self._directions[index]
         return state
+
+    def touching(self, contact: BodyContact, index: int = -1) -> Touching:
+        """The pairs of a contact of bodies that touch in a recorded state, by default the last, and their forces."""
+        return touching_in(self.scene, self._values, contact, self._state_at(index))
 
     def self_intersections(self, index: int = -1) -> np.ndarray:
         """The faces that pass through each other in a recorded state, as in TriangleMesh.self_intersections, (k, 2)."""

@@ -25,8 +25,9 @@ from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
 from ..surroundings.constraints import Constraints, free_rigid_motions, gather
+from ..surroundings.body_contact import BodyContact
 from ..surroundings.contact import Contact
-from ..surroundings.contact_inputs import contact_inputs, obstacles_of
+from ..surroundings.contact_inputs import body_contact_inputs, contact_inputs, obstacles_of, split_contacts
 from ..surroundings.face_energies import FaceEnergy
 from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..surroundings.pressure import Pressure
@@ -51,7 +52,8 @@ class Scene:
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     gravity: (3,), m/s2; needs the mass density of all bodies.
-    contacts: Contact objects, each with the obstacles that it is about.
+    contacts: Contact objects, each with the obstacles or the bodies that it is about, and SelfContact objects. Bodies pass
+        through each other, and themselves, where no contact says otherwise.
     water: what the sheet moves through, in ms.simulate only.
     allow_rigid_motions: accept a scene that supports do not hold entirely, because a field or gravity does.
 
@@ -92,8 +94,9 @@ class Scene:
         self.supports = checked_list("supports", supports, _SUPPORTS)
         self.loads = checked_list("loads", loads, _LOADS)
         self.fields = () if field is None else checked_list("field", field, (AppliedField,))
-        self.contacts = checked_list("contacts", contacts, (Contact,))
-        self.obstacles = obstacles_of(self.contacts)
+        self.contacts = checked_list("contacts", contacts, (Contact, BodyContact))
+        self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
+        self.obstacles = obstacles_of(self._obstacle_contacts)
         if water is not None and not isinstance(water, Water):
             raise ValueError(f"water must be a Water, got {type(water).__name__}")
         self.water = water
@@ -155,6 +158,7 @@ class Scene:
                 "field or gravity does"
             )
         n_directions, n_couples = len(constraints.directions), len(edges)
+        surfaces, body_contacts = body_contact_inputs(self._body_contacts, bodies)
         self._constraints, self._couple_edges = constraints, edges
         self._turn, self._solving = threading.RLock(), False
         self._warned_of_caps = False
@@ -186,7 +190,9 @@ class Scene:
             ],
             loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
-            contacts=contact_inputs(self.contacts, bodies),
+            contacts=contact_inputs(self._obstacle_contacts, bodies),
+            contact_surfaces=surfaces,
+            body_contacts=body_contacts,
             obstacles=[each._core for each in self.obstacles],
             water=None if self.water is None else self.water._core,
         )
@@ -270,7 +276,8 @@ class Scene:
             ("support", self.supports),
             ("load", self.loads),
             ("field", self._sources),
-            ("contact", self.contacts),
+            ("contact", self._obstacle_contacts),
+            ("body contact", self._body_contacts),
             ("obstacle", self.obstacles),
         )
         labels = [(each, f"{kind} {k}") for kind, objects in kinds for k, each in enumerate(objects)]

@@ -8,10 +8,12 @@ from .._checks.checked_list import checked_list
 from .._checks.owner import Owner
 from .._checks.scalars import not_negative, positive
 from .._checks.selections import indices, selection
-from ..bodies.bodies import checked_body, joined, on_body
+from ..bodies.bodies import BODIES, checked_body, joined, on_body
+from ..bodies.rigid import Rigid
 from ..bodies.shell import Shell
 from ..mesh.triangle_mesh import TriangleMesh
 from ..obstacles import Obstacle
+from .body_contact import BodyContact
 
 _FACE_POINTS = {  # barycentric coordinates of the points on a face
     0: np.zeros((0, 3)),
@@ -25,6 +27,8 @@ _STICKING = 1e-2  # of the largest sheet's extent, a second
 
 class Contact(Owner):
     """Keeps points of a sheet out of obstacles, with friction if wanted [Chen22, 6.1; Geilinger et al. 2020].
+
+    Of two bodies, ms.Contact(a, b, ...) makes a BodyContact, which keeps them out of each other.
 
     obstacles: one of ms.obstacles, or several.
     contact_stiffness: N/m, of every point: a force that grows with the depth, from a short parabola on.
@@ -52,6 +56,13 @@ class Contact(Owner):
     """
 
     _replaceable = ("contact_stiffness", "smoothing", "offset", "friction_coefficient", "sticking_speed")
+
+    def __new__(cls, *given, **options):
+        if given and isinstance(given[0], (*BODIES, Rigid)):
+            return BodyContact(*given, **options)
+        if {"a", "b"} & set(options):
+            return BodyContact(*given, **options)
+        return super().__new__(cls)
 
     def __init__(
         self,

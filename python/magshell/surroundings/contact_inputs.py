@@ -4,12 +4,67 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._checks.selections import indices
+from ..bodies.rigid import Rigid
 from ..bodies.solid import Solid
+from .body_contact import BodyContact, mesh_of
 
 
 def obstacles_of(contacts) -> tuple:
     """Every obstacle once, in the order in which contacts name them."""
     return tuple({id(each): each for contact in contacts for each in contact.obstacles}.values())
+
+
+def split_contacts(contacts) -> tuple[tuple, tuple]:
+    """Those with obstacles, and those of bodies."""
+    of_bodies = tuple(each for each in contacts if isinstance(each, BodyContact))
+    return tuple(each for each in contacts if not isinstance(each, BodyContact)), of_bodies
+
+
+def body_contact_inputs(contacts, bodies) -> tuple[list[dict], list[dict]]:
+    """What of the contacts of bodies no solve can change: surfaces, and which of them touch."""
+    sides = list({id(side): side for contact in contacts for side in contact.sides}.values())
+    numbers = {id(side): k for k, side in enumerate(sides)}
+    return [_surface(side, bodies) for side in sides], [
+        {
+            "a": numbers[id(contact.a)],
+            "b": numbers[id(contact.b)],
+            "penalty": contact.law == "penalty",
+            "rubs": contact.friction_coefficient is not None,
+            "lagged": contact.lagged_friction,
+        }
+        for contact in contacts
+    ]
+
+
+def _surface(side, bodies) -> dict:
+    """The faces of a body, or those between the vertices of a rigid part: (k, 3), the scene's vertices."""
+    body = mesh_of(side)
+    try:
+        number = bodies.number(body)
+        rigid = bodies.rigid_number(side) if isinstance(side, Rigid) else -1
+    except ValueError:
+        raise ValueError(f"a Contact is about a body that is not in the scene: {side!r}") from None
+    span = bodies.spans[number]
+    faces, chosen = body.mesh.faces, np.arange(body.mesh.n_faces)
+    if rigid >= 0:
+        own = indices("Rigid vertices", side.vertices, body.mesh.n_vertices)
+        chosen = np.flatnonzero(np.isin(faces, own).all(axis=1))
+        if not chosen.size:
+            raise ValueError(
+                f"rigid part {rigid} touches nothing, as no face of its body has all corners among its vertices"
+            )
+    return {
+        "name": f"body {number}",
+        "faces": bodies.original[faces[chosen] + span.first_vertex].astype(np.int32),
+        "numbers": chosen.astype(np.int32),
+    }
+
+
+def check_apart(scene, state: np.ndarray) -> None:
+    """Bodies in contact that intersect, or are nearer than they may be, cannot start so."""
+    if scene._body_contacts and (reason := scene._model.refusal(state)):
+        raise ValueError(f"the start cannot be: {reason}")
 
 
 def contact_inputs(contacts, bodies) -> list[dict]:
@@ -62,13 +117,13 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
 def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
     """A sheet that starts deeper in an obstacle than half its thickness would be shot out of it, or a solid that starts
     deeper than a hundredth of its size."""
-    if not scene.contacts:
+    if not scene._obstacle_contacts:
         return
     allowed = np.empty(scene.mesh.n_vertices)
     for span, sheet in zip(scene._bodies.spans, values.sheets, strict=True):
         solid = isinstance(sheet, Solid)
         allowed[span.vertices] = 0.01 * sheet.mesh.size if solid else 0.5 * np.max(sheet.thickness)
-    for contact in scene.contacts:
+    for contact in scene._obstacle_contacts:
         vertices, weights = scene._bodies.contact_points(contact)
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])
         offset = values.current(contact).offset

@@ -1,0 +1,55 @@
+#include "magshell/assembly/contact_layer.h"
+
+#include <algorithm>
+#include <iterator>
+#include <span>
+#include <utility>
+
+namespace magshell {
+
+bool ContactLayer::couples(const Group& group) const {
+    for (int i = 0; i < 4 && group[i] >= 0; ++i)
+        for (int j = 0; j < i; ++j)
+            if (!matrix_.couples(group[i], group[j])) return false;
+    return true;
+}
+
+void ContactLayer::couple(std::vector<Group> groups) {
+    constexpr std::size_t too_many = 3;  // times those that are needed now
+    std::sort(groups.begin(), groups.end());
+    groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+    std::vector<Group> all;
+    all.reserve(groups_.size() + groups.size());
+    std::set_union(groups_.begin(), groups_.end(), groups.begin(), groups.end(), std::back_inserter(all));
+    groups_ = all.size() > too_many * groups.size() ? std::move(groups) : std::move(all);
+    std::vector<std::span<const Index>> cliques;
+    cliques.reserve(groups_.size());
+    for (const Group& group : groups_)
+        cliques.emplace_back(group.data(), std::find_if(group.begin(), group.end(), [](Index node) {
+                                               return node < 0;
+                                           }) - group.begin());
+    matrix_ = SystemMatrix(matrix_.nodes(), matrix_.rotations(), {}, cliques);
+    ++version_;
+}
+
+void merge(const SystemMatrix& matrix, const SystemMatrix* layer, std::vector<Index>& column_starts,
+           std::vector<Index>& rows, LargeVector<double>& values) {
+    if (!layer) {
+        column_starts = matrix.column_starts();
+        rows = matrix.rows();
+        values = matrix.values();
+        return;
+    }
+    column_starts.assign(1, 0);
+    rows.clear();
+    values.clear();
+    for (Index column = 0; column < matrix.size(); ++column) {
+        each_entry(matrix, layer, column, [&](Index row, Index k, Index l) {
+            rows.push_back(row);
+            values.push_back((k >= 0 ? matrix.values()[k] : 0.0) + (l >= 0 ? layer->values()[l] : 0.0));
+        });
+        column_starts.push_back(static_cast<Index>(rows.size()));
+    }
+}
+
+}  // namespace magshell

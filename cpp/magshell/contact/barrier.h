@@ -1,0 +1,67 @@
+// What keeps two surfaces apart, as a function of their gap g = d - d_min: an energy a unit of area and of stiffness.
+//
+//   barrier   b(g) = - (r - g)^2 ln(g/r) / r          up to g = r, 0 beyond                      [m]
+//   penalty   b(g) = S(r - g) / r                     energy/contact.h                           [m]
+//
+// r is the reach (d_hat, of the gap). The barrier is that of Li et al. 2020 (IPC) on the distance itself rather than
+// its square, over r: its slope is a number, so that the stiffness that it is multiplied with is a pressure, that at
+// about half the reach (- b'(r/2) = 1.19), whatever the mesh and the time step. It is C2, and grows without bound.
+// The penalty's slope is C1, 1 at g = 0 at most: a larger pressure pushes through.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "magshell/energy/contact.h"
+
+namespace magshell {
+
+/// What all pairs of a contact share.
+struct BarrierLaw {
+    double stiffness = 0.0;  // [Pa]
+    double reach = 0.0;      // r [m], > 0
+    double thickness = 0.0;  // d_min [m], the distance that is left where the gap is none
+    double smoothing = 0.0;  // [m], of the penalty, > 0
+    bool penalty = false;    // else the barrier
+};
+
+/// b and its derivatives at a gap [m], for a stiffness of one. Without end where a barrier's gap is none.
+struct Barrier {
+    double energy = 0.0, slope = 0.0, curvature = 0.0;   // b [m], db/dg, d2b/dg2 [1/m]
+    double energy_by_reach = 0.0, slope_by_reach = 0.0;  // at the same gap
+    double energy_by_smoothing = 0.0, slope_by_smoothing = 0.0;
+
+    Barrier(double gap, const BarrierLaw& law) {
+        const double per_reach = 1.0 / law.reach, y = gap * per_reach, rest = 1.0 - y;
+        if (rest <= 0.0) return;
+        if (law.penalty) {
+            const Penalty at(law.reach - gap, law.smoothing);
+            energy = per_reach * at.energy;
+            slope = -per_reach * at.force;
+            curvature = per_reach * at.stiffness;
+            energy_by_reach = per_reach * (at.force - energy);
+            slope_by_reach = -per_reach * (at.stiffness + slope);
+            // S = e^2 s(depth/e) with s homogeneous: S_e = (2 S - depth S')/e
+            const double depth = law.reach - gap;
+            energy_by_smoothing = per_reach * (2.0 * at.energy - depth * at.force) / law.smoothing;
+            slope_by_smoothing = -per_reach * at.force_by_smoothing;
+            return;
+        }
+        if (!(y > 0.0)) {
+            constexpr double endless = std::numeric_limits<double>::infinity();
+            energy = curvature = endless;
+            slope = -endless;
+            return;
+        }
+        const double log = std::log(y), ratio = rest / y;
+        const double value = -rest * rest * log, first = rest * (2.0 * log - ratio);
+        const double second = -2.0 * log + ratio * (4.0 + ratio);
+        energy = law.reach * value;
+        slope = first;
+        curvature = per_reach * second;
+        energy_by_reach = value - y * first;
+        slope_by_reach = -y * per_reach * second;
+    }
+};
+
+}  // namespace magshell

@@ -1,0 +1,225 @@
+#include "magshell/contact/broad_phase.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "magshell/contact/edge_through_triangle.h"
+#include "magshell/contact/neighbours.h"
+#include "magshell/contact/recount.h"
+#include "magshell/core/parallel.h"
+
+namespace magshell {
+namespace {
+
+constexpr double parallel_share = 1e-3;  // of the squares of both rest lengths: contact/parallel_edges.h
+constexpr std::size_t block_of_pairs = 1024;
+
+std::uint64_t key_of(Index first, Index second) {
+    return static_cast<std::uint64_t>(first) << 32 | static_cast<std::uint32_t>(second);
+}
+Index first_of(std::uint64_t key) {
+    return static_cast<Index>(key >> 32);
+}
+Index second_of(std::uint64_t key) {
+    return static_cast<Index>(key & 0xffffffffu);
+}
+
+template <class Nodes>
+bool has(const Nodes& nodes, Index node) {
+    return std::find(nodes.begin(), nodes.end(), node) != nodes.end();
+}
+
+}  // namespace
+
+BroadPhase::BroadPhase(std::vector<ContactSurface> surfaces, std::vector<SurfacePair> contacts)
+    : surfaces_(std::move(surfaces)), contacts_(std::move(contacts)), rooms_(contacts_.size()) {
+    boxes_.reserve(surfaces_.size());
+    for (const ContactSurface& surface : surfaces_) boxes_.emplace_back(surface);
+}
+
+void BroadPhase::fit(const NodeWays& ways) {
+    for (FaceBoxes& each : boxes_) each.fit(ways);
+}
+
+BroadPhase::Keys BroadPhase::find(Index contact, const NodeWays& ways, double margin) const {
+    const Index of_a = contacts_[contact].a, of_b = contacts_[contact].b;
+    const ContactSurface &a = surfaces_[of_a], &b = surfaces_[of_b];
+    std::vector<Keys> found;
+    const auto points = [&](const ContactSurface& one, Index f, const FaceBoxes& boxes,
+                            const ContactSurface& other, Index g, std::vector<Key>& keys) {
+        const ContactSurface::Brought& brought = one.brought[f];
+        for (int k = 0; k < brought.n_vertices; ++k) {
+            const Index v = brought.vertices[k], node = one.vertices[v];
+            if (has(other.faces[g], node)) continue;
+            if (ways.around({&node, 1}).meets(boxes.box(g), margin)) keys.push_back(key_of(v, g));
+        }
+    };
+    near_faces(
+        boxes_[of_a], boxes_[of_b], margin, [&](int tasks) { found.resize(tasks); },
+        [&](int task, Index f, Index g) {
+            Keys& keys = found[task];
+            points(a, f, boxes_[of_b], b, g, keys.of[0]);
+            points(b, g, boxes_[of_a], a, f, keys.of[of_a == of_b ? 0 : 1]);
+            const ContactSurface::Brought &one = a.brought[f], &two = b.brought[g];
+            for (int k = 0; k < one.n_edges; ++k) {
+                const ContactSurface::Edge& edge = a.edges[one.edges[k]];
+                const Bounds around = ways.around(edge);
+                for (int l = 0; l < two.n_edges; ++l) {
+                    const ContactSurface::Edge& other = b.edges[two.edges[l]];
+                    if (has(other, edge[0]) || has(other, edge[1]) ||
+                        !around.meets(ways.around(other), margin))
+                        continue;
+                    auto [first, second] = std::pair(one.edges[k], two.edges[l]);
+                    if (of_a == of_b && first > second) std::swap(first, second);
+                    keys.of[2].push_back(key_of(first, second));
+                }
+            }
+        });
+    Keys all;
+    for (int sort = 0; sort < 3; ++sort) {
+        for (const Keys& part : found)
+            all.of[sort].insert(all.of[sort].end(), part.of[sort].begin(), part.of[sort].end());
+        std::sort(all.of[sort].begin(), all.of[sort].end());
+    }
+    return all;
+}
+
+NearPair BroadPhase::pair_of(Index contact, Sort sort, Key key) const {
+    const bool swapped = sort == Sort::of_b_on_a;
+    const ContactSurface& a = surfaces_[swapped ? contacts_[contact].b : contacts_[contact].a];
+    const ContactSurface& b = surfaces_[swapped ? contacts_[contact].a : contacts_[contact].b];
+    const Index first = first_of(key), second = second_of(key);
+    NearPair near{contact, {}, 0, 0, swapped};
+    if (sort == Sort::edges) {
+        const ContactSurface::Edge &one = a.edges[first], &two = b.edges[second];
+        const double product = a.edge_lengths[first] * b.edge_lengths[second];
+        near.pair = {PairKind::edge_edge,
+                     {one[0], one[1], two[0], two[1]},
+                     0.25 * std::min(a.edge_areas[first], b.edge_areas[second]),
+                     parallel_share * product * product};
+        near.first_face = a.edge_faces[first];
+        near.second_face = b.edge_faces[second];
+    } else {
+        const ContactSurface::Face& face = b.faces[second];
+        near.pair = {PairKind::point_triangle,
+                     {a.vertices[first], face[0], face[1], face[2]},
+                     0.5 * a.vertex_areas[first]};
+        near.first_face = a.vertex_faces[first];
+        near.second_face = second;
+    }
+    const auto& rooms = rooms_[contact].of[static_cast<int>(sort)];
+    const auto at =
+        std::lower_bound(rooms.begin(), rooms.end(), key,
+                         [](const std::pair<Key, double>& room, Key k) { return room.first < k; });
+    if (at != rooms.end() && at->first == key) near.pair.room = at->second;
+    return near;
+}
+
+std::vector<NearPair> BroadPhase::near(const double* q, const std::vector<double>& margins) {
+    const NodeWays ways(q);
+    fit(ways);
+    std::vector<NearPair> all;
+    for (Index contact = 0; contact < static_cast<Index>(contacts_.size()); ++contact) {
+        const Keys keys = find(contact, ways, margins[contact]);
+        for (int sort = 0; sort < 3; ++sort) {
+            const std::vector<Key>& of = keys.of[sort];
+            std::vector<std::vector<NearPair>> parts((of.size() + block_of_pairs - 1) / block_of_pairs);
+            parallel_for(static_cast<int>(parts.size()), [&](int part) {
+                const std::size_t end = std::min(of.size(), (part + 1) * block_of_pairs);
+                for (std::size_t k = part * block_of_pairs; k < end; ++k) {
+                    NearPair near = pair_of(contact, static_cast<Sort>(sort), of[k]);
+                    if (pair_distance(near.pair.kind, places_of(near.pair, q)) < margins[contact])
+                        parts[part].push_back(near);
+                }
+            });
+            const std::size_t first = all.size();
+            for (const std::vector<NearPair>& part : parts) all.insert(all.end(), part.begin(), part.end());
+            if (sort < 2) add_recounts(first, q, margins[contact], all);
+        }
+    }
+    return all;
+}
+
+std::vector<NearPair> BroadPhase::near_on_the_way(const double* q, const double* end,
+                                                  const std::vector<double>& margins) {
+    const NodeWays ways(q, end);
+    fit(ways);
+    std::vector<NearPair> all;
+    for (Index contact = 0; contact < static_cast<Index>(contacts_.size()); ++contact) {
+        const Keys keys = find(contact, ways, margins[contact]);
+        for (int sort = 0; sort < 3; ++sort)
+            for (Key key : keys.of[sort]) all.push_back(pair_of(contact, static_cast<Sort>(sort), key));
+    }
+    return all;
+}
+
+void BroadPhase::make_room(const std::vector<Vec3>& rest, const std::vector<double>& near_at_rest) {
+    rooms_.assign(contacts_.size(), {});
+    Rows3 places(rest.size(), 3);
+    for (std::size_t k = 0; k < rest.size(); ++k) places.row(k) = rest[k].transpose();
+    const NodeWays ways(places.data());
+    fit(ways);
+    Neighbours neighbours(surfaces_, rest);
+    for (Index contact = 0; contact < static_cast<Index>(contacts_.size()); ++contact) {
+        if (!neighbours.connected(contacts_[contact].a, contacts_[contact].b)) continue;
+        const Keys keys = find(contact, ways, near_at_rest[contact]);
+        for (int sort = 0; sort < 3; ++sort)
+            for (Key key : keys.of[sort]) {
+                const NearPair near = pair_of(contact, static_cast<Sort>(sort), key);
+                const double distance = pair_distance(near.pair.kind, places_of(near.pair, places.data()));
+                if (distance < near_at_rest[contact] && neighbours.are(near.pair, distance))
+                    rooms_[contact].of[sort].push_back({key, 0.5 * distance});
+            }
+    }
+}
+
+std::vector<NearPair> BroadPhase::crossings(const double* q) {
+    fit(NodeWays(q));
+    std::vector<NearPair> all;
+    for (Index contact = 0; contact < static_cast<Index>(contacts_.size()); ++contact) {
+        const Index of_a = contacts_[contact].a, of_b = contacts_[contact].b;
+        std::vector<std::vector<NearPair>> found;
+        const auto edges_through = [&](const ContactSurface& one, Index f, const ContactSurface& other,
+                                       Index g, bool swapped, std::vector<NearPair>& out) {
+            const ContactSurface::Brought& brought = one.brought[f];
+            const ContactSurface::Face& face = other.faces[g];
+            for (int k = 0; k < brought.n_edges; ++k) {
+                const ContactSurface::Edge& edge = one.edges[brought.edges[k]];
+                if (has(face, edge[0]) || has(face, edge[1])) continue;
+                const auto at = [&](Index node) { return Vec3(Eigen::Map<const Vec3>(q + 3 * node)); };
+                if (!passes_through({at(edge[0]), at(edge[1])}, {at(face[0]), at(face[1]), at(face[2])}))
+                    continue;
+                NearPair& near = out.emplace_back();
+                near.contact = contact;
+                near.first_face = f;
+                near.second_face = g;
+                near.swapped = swapped;
+            }
+        };
+        near_faces(
+            boxes_[of_a], boxes_[of_b], 0.0, [&](int tasks) { found.resize(tasks); },
+            [&](int task, Index f, Index g) {
+                edges_through(surfaces_[of_a], f, surfaces_[of_b], g, false, found[task]);
+                edges_through(surfaces_[of_b], g, surfaces_[of_a], f, of_a != of_b, found[task]);
+            });
+        const std::size_t first = all.size();
+        for (const std::vector<NearPair>& part : found) all.insert(all.end(), part.begin(), part.end());
+        const auto order = [](const NearPair& near) {
+            return std::tuple(near.swapped, near.first_face, near.second_face);
+        };
+        std::sort(all.begin() + first, all.end(),
+                  [&](const NearPair& one, const NearPair& other) { return order(one) < order(other); });
+        all.erase(std::unique(all.begin() + first, all.end()), all.end());
+    }
+    return all;
+}
+
+std::size_t BroadPhase::bytes() const {
+    std::size_t sum = 0;
+    for (const FaceBoxes& each : boxes_) sum += each.bytes();
+    for (const Rooms& each : rooms_)
+        for (const auto& of : each.of) sum += of.capacity() * sizeof(of[0]);
+    return sum;
+}
+
+}  // namespace magshell

@@ -1,0 +1,174 @@
+#include "magshell/contact/proximity.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace magshell {
+namespace {
+
+/// A square of a sine, below which two directions count as one: what is nearest is at an end as well, to a share of
+/// 1e-16 of any distance above 1e-5 of their lengths.
+constexpr double parallel = 1e-22;
+
+/// The closest points found so far: weights, and what moves them (a node to weigh less, one to weigh more).
+struct Closest {
+    double squared = std::numeric_limits<double>::infinity();
+    PairWeights weights{};
+    int free = 0;
+    int less[2] = {0, 0}, more[2] = {0, 0};
+};
+
+/// A point `p` of one part against the edge from node a to node b of the other; sign of the edge's weights.
+void try_point_edge(const PairPlaces& x, int p, int a, int b, double sign, Closest& best) {
+    const Vec3 along = x[b] - x[a], to = x[p] - x[a];
+    const double squared_length = along.squaredNorm(), projected = along.dot(to);
+    double s = 0.0;
+    bool free = false;
+    if (projected > 0.0 && squared_length > 0.0) {
+        s = projected / squared_length;
+        free = s < 1.0;
+        if (!free) s = 1.0;
+    }
+    const double squared = (s < 1.0 ? Vec3(to - s * along) : Vec3(x[p] - x[b])).squaredNorm();
+    if (squared >= best.squared) return;
+    best = {};
+    best.squared = squared;
+    best.weights[p] = -sign;
+    best.weights[a] = sign * (1.0 - s);
+    best.weights[b] = sign * s;
+    best.free = free ? 1 : 0;
+    // Along the edge the weights of a second part, which are negative, move the other way.
+    best.less[0] = sign > 0.0 ? a : b;
+    best.more[0] = sign > 0.0 ? b : a;
+}
+
+Closest closest_point_triangle(const PairPlaces& x) {
+    Closest best;
+    const Vec3 one = x[2] - x[1], two = x[3] - x[1], to = x[0] - x[1];
+    const Vec3 normal = one.cross(two);
+    const double squared_area = normal.squaredNorm();
+    if (squared_area > parallel * one.squaredNorm() * two.squaredNorm()) {
+        const double s = to.cross(two).dot(normal), t = one.cross(to).dot(normal);
+        if (s > 0.0 && t > 0.0 && s + t < squared_area) {
+            const double u = s / squared_area, v = t / squared_area, height = normal.dot(to);
+            best.squared = height * height / squared_area;
+            best.weights = {1.0, u + v - 1.0, -u, -v};
+            best.free = 2;
+            best.less[0] = 2;
+            best.more[0] = 1;
+            best.less[1] = 3;
+            best.more[1] = 1;
+            return best;
+        }
+    }
+    try_point_edge(x, 0, 1, 2, -1.0, best);
+    try_point_edge(x, 0, 2, 3, -1.0, best);
+    try_point_edge(x, 0, 3, 1, -1.0, best);
+    return best;
+}
+
+Closest closest_edge_edge(const PairPlaces& x) {
+    Closest best;
+    const Vec3 one = x[1] - x[0], two = x[3] - x[2], to = x[2] - x[0];
+    const Vec3 normal = one.cross(two);
+    const double squared_area = normal.squaredNorm();
+    if (squared_area > parallel * one.squaredNorm() * two.squaredNorm()) {
+        const double s = to.cross(two).dot(normal), t = to.cross(one).dot(normal);
+        if (s > 0.0 && s < squared_area && t > 0.0 && t < squared_area) {
+            const double u = s / squared_area, v = t / squared_area, height = normal.dot(to);
+            best.squared = height * height / squared_area;
+            best.weights = {1.0 - u, u, v - 1.0, -v};
+            best.free = 2;
+            best.less[0] = 0;
+            best.more[0] = 1;
+            best.less[1] = 3;
+            best.more[1] = 2;
+            return best;
+        }
+    }
+    try_point_edge(x, 0, 2, 3, -1.0, best);
+    try_point_edge(x, 1, 2, 3, -1.0, best);
+    try_point_edge(x, 2, 0, 1, 1.0, best);
+    try_point_edge(x, 3, 0, 1, 1.0, best);
+    return best;
+}
+
+Closest closest(PairKind kind, const PairPlaces& x) {
+    if (kind == PairKind::point_triangle) return closest_point_triangle(x);
+    if (kind == PairKind::edge_edge) return closest_edge_edge(x);
+    Closest best;
+    if (kind == PairKind::point_edge) {
+        try_point_edge(x, 0, 1, 2, -1.0, best);
+        return best;
+    }
+    best.squared = (x[0] - x[1]).squaredNorm();
+    best.weights = {1.0, -1.0, 0.0, 0.0};
+    return best;
+}
+
+/// A direction across n, of length 1.
+Vec3 across(const Vec3& n) {
+    int smallest;
+    n.cwiseAbs().minCoeff(&smallest);
+    return n.cross(Vec3::Unit(smallest)).normalized();
+}
+
+Proximity completed(PairKind kind, const PairPlaces& x, const Closest& at) {
+    Proximity near;
+    near.weights = at.weights;
+    near.free = at.free;
+    near.slide[0] = near.slide[1] = {};
+    Vec3 difference = Vec3::Zero();
+    for (int i = 0; i < nodes_of(kind); ++i) difference += at.weights[i] * x[i];
+    // Gram and Schmidt, on dP/ds_a = x[more] - x[less] and with it on dw/ds_a.
+    for (int a = 0; a < at.free; ++a) {
+        Vec3 way = x[at.more[a]] - x[at.less[a]];
+        PairWeights& slide = near.slide[a];
+        slide[at.more[a]] = 1.0;
+        slide[at.less[a]] = -1.0;
+        if (a == 1) {
+            const double share = way.dot(near.along[0]);
+            way -= share * near.along[0];
+            for (int i = 0; i < 4; ++i) slide[i] -= share * near.slide[0][i];
+        }
+        const double per_length = 1.0 / way.norm();
+        near.along[a] = per_length * way;
+        for (int i = 0; i < 4; ++i) slide[i] *= per_length;
+        difference -= near.along[a].dot(difference) * near.along[a];
+    }
+    if (at.free == 2) {
+        // More accurate than the difference of two points that are close to each other.
+        near.normal = near.along[0].cross(near.along[1]).normalized();
+        near.distance = near.normal.dot(difference);
+        if (near.distance < 0.0) {
+            near.distance = -near.distance;
+            near.normal = -near.normal;
+        }
+        return near;
+    }
+    near.distance = difference.norm();
+    near.normal = near.distance > 0.0 ? Vec3(difference / near.distance) : Vec3(Vec3::Zero());
+    if (at.free == 0) near.along[0] = across(near.normal);
+    near.along[1] = near.normal.cross(near.along[0]);
+    return near;
+}
+
+}  // namespace
+
+Proximity proximity(PairKind kind, const PairPlaces& x) {
+    return completed(kind, x, closest(kind, x));
+}
+
+bool proximity_within(PairKind kind, const PairPlaces& x, double reach, Proximity& near) {
+    const Closest at = closest(kind, x);
+    if (!(at.squared < reach * reach)) return false;
+    near = completed(kind, x, at);
+    return near.distance < reach;
+}
+
+double pair_distance(PairKind kind, const PairPlaces& x) {
+    return std::sqrt(closest(kind, x).squared);
+}
+
+}  // namespace magshell

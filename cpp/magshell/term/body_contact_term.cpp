@@ -1,0 +1,206 @@
+#include "magshell/term/body_contact_term.h"
+
+#include <algorithm>
+#include <sstream>
+#include <utility>
+
+#include "magshell/contact/continuous.h"
+#include "magshell/core/parallel.h"
+
+namespace magshell {
+namespace {
+
+constexpr Index block_length = 256;  // pairs a task
+constexpr double kept = 0.1;         // of a gap, at the end of the longest step
+
+}  // namespace
+
+BodyContactTerm::BodyContactTerm(const Nodes& nodes, const std::vector<ContactSurfaceInput>& surfaces,
+                                 const std::vector<BodyContactInput>& contacts, ContactLayer& layer,
+                                 Registry& registry)
+    : laws_(contacts.size()),
+      friction_(contacts.size()),
+      least_(contacts.size(), 0.0),
+      candidates_(nodes, surfaces, contacts),
+      layer_(layer) {
+    for (std::size_t c = 0; c < contacts.size(); ++c) {
+        const std::string owner = "body contact " + std::to_string(c);
+        const auto number = [&](const char* name, const char* unit) {
+            return registry.values.add(owner, name, unit, 1, 1);
+        };
+        slots_.push_back({number("contact_stiffness", "Pa"), number("reach", "m"),
+                          number("minimal_distance", "m"), number("smoothing", "m"),
+                          number("friction_coefficient", "1"), number("static_friction_coefficient", "1"),
+                          number("sticking_speed", "m/s")});
+        laws_[c].penalty = contacts[c].penalty;
+    }
+}
+
+bool BodyContactTerm::set_values(const Values& values) {
+    std::vector<double> distances;
+    for (std::size_t c = 0; c < laws_.size(); ++c) {
+        const Slots& slots = slots_[c];
+        BarrierLaw& law = laws_[c];
+        law.stiffness = values.number(slots.stiffness);
+        law.reach = values.number(slots.reach);
+        law.thickness = values.number(slots.distance);
+        law.smoothing = values.number(slots.smoothing);
+        friction_[c] = {values.number(slots.kinetic), values.number(slots.fixed),
+                        values.number(slots.sticking_speed)};
+        if (!law.penalty) least_[c] = law.thickness;  // a penalty lets more in
+        distances.push_back(law.reach + law.thickness);
+    }
+    candidates_.set_distances(distances);
+    return false;  // none of its forces cancel in add_cancelling_forces
+}
+
+std::vector<BodyContactTerm::Touch> BodyContactTerm::touches(const double* q) const {
+    const std::vector<NearPair>& near = candidates_.near(q);
+    const Index count = static_cast<Index>(near.size());
+    std::vector<std::vector<Touch>> found((count + block_length - 1) / block_length);
+    parallel_for(static_cast<int>(found.size()), [&](int block) {
+        const Index first = block * block_length, last = std::min(count, first + block_length);
+        for (Index k = first; k < last; ++k) {
+            const PairPlaces x = places_of(near[k].pair, q);
+            const PairEnergy at(near[k].pair, x, laws_[near[k].contact]);
+            if (!at.acts()) continue;
+            double far = 0.0;
+            for (int i = 0; i < at.count(); ++i) far = std::max(far, x[i].lpNorm<Eigen::Infinity>());
+            found[block].push_back({near[k], at, far});
+        }
+    });
+    std::vector<Touch> all;
+    for (const std::vector<Touch>& part : found) all.insert(all.end(), part.begin(), part.end());
+    return all;
+}
+
+double BodyContactTerm::energy(const double* q, const Controls&) const {
+    double total = 0.0;
+    for (const Touch& touch : touches(q)) total += touch.at.energy();
+    return total;
+}
+
+void BodyContactTerm::evaluate(const double* q, const Controls&, Residual& out) {
+    touching_ = touches(q);
+    for (const Touch& touch : touching_) {
+        const PairVectors gradient = touch.at.gradient();
+        for (int k = 0; k < touch.at.count(); ++k)
+            for (int axis = 0; axis < 3; ++axis)
+                out.add(3 * touch.near.pair.nodes[k] + axis, gradient[k][axis]);
+    }
+}
+
+void BodyContactTerm::keep_coupled(const std::vector<Touch>& touches) {
+    kept_.clear();
+    for (const Touch& touch : touches) kept_.push_back(touch.near.pair.nodes);
+}
+
+void BodyContactTerm::prepare_assembly(const double* q, const Controls&) {
+    const bool coupled =
+        std::all_of(touching_.begin(), touching_.end(),
+                    [&](const Touch& touch) { return layer_.couples(touch.near.pair.nodes); }) &&
+        std::all_of(kept_.begin(), kept_.end(),
+                    [&](const ContactLayer::Group& group) { return layer_.couples(group); });
+    if (!coupled) {
+        std::vector<ContactLayer::Group> groups = kept_;
+        for (const NearPair& each : candidates_.near(q)) groups.push_back(each.pair.nodes);
+        layer_.couple(std::move(groups));
+    }
+    layer_.matrix().clear();
+}
+
+void BodyContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix&) const {
+    for (const Touch& touch : touching_) {
+        PairBlocks blocks;
+        touch.at.hessian(cautious_, blocks);
+        layer_.add(touch.near.pair.nodes,
+                   [&](int i, int j) -> const Mat3& { return blocks[i * (i + 1) / 2 + j]; });
+    }
+}
+
+void BodyContactTerm::vjp(const double*, const Controls&, const double* lambda, Gradient& out) {
+    for (const Touch& touch : touching_)
+        add_vjp(touch, touch.at.vjp(places_of(touch.near.pair, lambda)), {}, out.values);
+}
+
+void BodyContactTerm::add_vjp(const Touch& touch, const PairEnergy::ByLaw& by, const FrictionLaw& by_friction,
+                              VectorXd& by_values) const {
+    const Slots& slots = slots_[touch.near.contact];
+    by_values[slots.stiffness.first] += by.stiffness;
+    by_values[slots.reach.first] += by.reach;
+    by_values[slots.distance.first] += by.thickness;
+    by_values[slots.smoothing.first] += by.smoothing;
+    by_values[slots.kinetic.first] += by_friction.kinetic;
+    by_values[slots.fixed.first] += by_friction.fixed;
+    by_values[slots.sticking_speed.first] += by_friction.sticking_speed;
+}
+
+void BodyContactTerm::add_cancelling_normal_forces(VectorXd& out) const {
+    for (const Touch& touch : touching_) {
+        const PairVectors stiffness = touch.at.normal_force_by_place();
+        for (int k = 0; k < touch.at.count(); ++k)
+            out.segment<3>(3 * touch.near.pair.nodes[k]).array() += stiffness[k].norm() * touch.far;
+    }
+}
+
+template <class Found>
+void BodyContactTerm::each_limit(const double* q, const double* p, const Found& found) const {
+    double share = std::min(1.0, candidates_.longest_way() / candidates_.longest_move(p));
+    if (!(share > 0.0)) return found(nullptr, 0.0);
+    if (share < 1.0) found(nullptr, share);
+    for (const NearPair& each : candidates_.on_the_way(q, p, share, least_)) {
+        const PairPlaces from = places_of(each.pair, q);
+        PairPlaces to = places_of(each.pair, p);
+        for (int k = 0; k < nodes_of(each.pair.kind); ++k) to[k] = from[k] + share * to[k];
+        const double least = each.pair.share(laws_[each.contact]) * least_[each.contact];
+        const double own = free_share(each.pair.kind, from, to, least, kept);
+        if (own >= 1.0) continue;
+        share *= own;
+        found(&each, share);
+    }
+}
+
+double BodyContactTerm::largest_share(const double* q, const double* p) const {
+    double share = 1.0;
+    each_limit(q, p, [&](const NearPair*, double limit) { share = limit; });
+    return share;
+}
+
+std::string BodyContactTerm::blocking(const double* q, const double* p) const {
+    std::string names = "a step is not finite";
+    each_limit(q, p, [&](const NearPair* pair, double) {
+        if (pair) names = candidates_.names(*pair) + " are in each other's way";
+    });
+    return names;
+}
+
+std::string BodyContactTerm::refusal(const double* q) const {
+    const std::vector<NearPair> crossing = candidates_.crossings(q);
+    if (!crossing.empty()) {
+        const std::string more =
+            crossing.size() > 1 ? ", the first of " + std::to_string(crossing.size()) + " such pairs" : "";
+        return candidates_.names(crossing.front()) + " pass through each other" + more;
+    }
+    const NearPair* worst = nullptr;
+    double gap = 0.0, distance = 0.0, least = 0.0;
+    for (const NearPair& each : candidates_.near(q)) {
+        const double at = pair_distance(each.pair.kind, places_of(each.pair, q)),
+                     may_be = each.pair.share(laws_[each.contact]) * least_[each.contact];
+        if (at - may_be > gap || (worst && at - may_be == gap)) continue;
+        worst = &each;
+        gap = at - may_be;
+        distance = at;
+        least = may_be;
+    }
+    if (!worst) return {};
+    std::ostringstream text;
+    text << candidates_.names(*worst) << " are " << distance << " m apart, but must be farther than " << least
+         << " m from each other";
+    return text.str();
+}
+
+std::size_t BodyContactTerm::bytes() const {
+    return candidates_.bytes() + layer_.bytes() + touching_.capacity() * sizeof(Touch);
+}
+
+}  // namespace magshell

@@ -1,0 +1,84 @@
+// Contact of bodies with each other and with themselves: pairs of a vertex and a face, and of two edges, that are nearer
+// than they may be.
+//
+//   E = sum A k m b(d - d_min)                                             [J]    contact/pair_energy.h
+//
+// Where a pair has no gap there is no energy: the term refuses such states, and steps that lead through them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "magshell/assembly/contact_layer.h"
+#include "magshell/contact/pair_energy.h"
+#include "magshell/force/friction.h"
+#include "magshell/term/contact_candidates.h"
+#include "magshell/term/term.h"
+
+namespace magshell {
+
+class BodyContactTerm final : public Term {
+  public:
+    /// A pair that touches.
+    struct Touch {
+        NearPair near;
+        PairEnergy at;
+        double far;  // [m] its largest coordinate
+    };
+
+    /// What of its Hessian there is goes to the layer.
+    BodyContactTerm(const Nodes& nodes, const std::vector<ContactSurfaceInput>& surfaces,
+                    const std::vector<BodyContactInput>& contacts, ContactLayer& layer, Registry& registry);
+
+    /// The pairs that touch at q, always in the same order; and those at the last evaluated state.
+    std::vector<Touch> touches(const double* q) const;
+    const std::vector<Touch>& touching() const { return touching_; }
+    const FrictionLaw& friction(const Touch& touch) const { return friction_[touch.near.contact]; }
+
+    /// Which faces are in the way of a step p from q, in words.
+    std::string blocking(const double* q, const double* p) const;
+    /// Whether what is negative of the Hessians of pairs is left out from now on.
+    void be_cautious(bool cautious) { cautious_ = cautious; }
+    /// Adds the magnitude of forces that cancel inside those between pairs at the last evaluated state.
+    void add_cancelling_normal_forces(VectorXd& out) const;
+    /// Adds the gradient by the numbers of a pair's contact.
+    void add_vjp(const Touch& touch, const PairEnergy::ByLaw& by, const FrictionLaw& by_friction,
+                 VectorXd& by_values) const;
+    ContactLayer& layer() const { return layer_; }
+    /// The layer couples these as well, whether they still touch or not, until others take their place.
+    void keep_coupled(const std::vector<Touch>& touches);
+
+    std::string_view name() const override { return "body contact"; }
+    bool set_values(const Values& values) override;
+    bool refuses_states() const override { return true; }
+    double largest_share(const double* q, const double* p) const override;
+    std::string refusal(const double* q) const override;
+    bool driven() const override { return false; }
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void prepare_assembly(const double* q, const Controls& controls) override;
+    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    struct Slots {
+        Slot stiffness, reach, distance, smoothing, kinetic, fixed, sticking_speed;
+    };
+
+    /// Calls found(pair, share) where a pair lets a step go less far than all before it; nullptr: its length does.
+    template <class Found>
+    void each_limit(const double* q, const double* p, const Found& found) const;
+
+    std::vector<Slots> slots_;
+    std::vector<BarrierLaw> laws_;
+    std::vector<FrictionLaw> friction_;
+    std::vector<double> least_;  // of each contact, what no distance goes below [m]
+    mutable ContactCandidates candidates_;
+    ContactLayer& layer_;
+    std::vector<Touch> touching_;
+    std::vector<ContactLayer::Group> kept_;
+    bool cautious_ = false;
+};
+
+}  // namespace magshell

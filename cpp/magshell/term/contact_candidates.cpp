@@ -1,0 +1,101 @@
+#include "magshell/term/contact_candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace magshell {
+namespace {
+
+constexpr double margin_of_edges = 0.3, way_of_edges = 20.0;  // of the mean rest length
+
+std::vector<ContactSurface> surfaces_of(const Nodes& nodes, const std::vector<ContactSurfaceInput>& given) {
+    std::vector<ContactSurface> surfaces;
+    for (const ContactSurfaceInput& each : given) {
+        std::vector<ContactSurface::Face> faces = each.faces;
+        for (ContactSurface::Face& face : faces)
+            for (Index& node : face) node = nodes.vertices.core[node];
+        surfaces.emplace_back(std::move(faces), nodes.rest);
+    }
+    return surfaces;
+}
+
+std::vector<SurfacePair> pairs_of(const std::vector<BodyContactInput>& contacts) {
+    std::vector<SurfacePair> pairs;
+    for (const BodyContactInput& each : contacts) pairs.push_back({each.a, each.b});
+    return pairs;
+}
+
+}  // namespace
+
+ContactCandidates::ContactCandidates(const Nodes& nodes, const std::vector<ContactSurfaceInput>& surfaces,
+                                     const std::vector<BodyContactInput>& contacts)
+    : nodes_(nodes), contacts_(contacts), phase_(surfaces_of(nodes, surfaces), pairs_of(contacts)) {
+    for (const ContactSurfaceInput& each : surfaces) names_.push_back({each.name, each.numbers});
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (const ContactSurface& surface : phase_.surfaces()) {
+        for (const double length : surface.edge_lengths) sum += length;
+        count += surface.edge_lengths.size();
+        touching_nodes_.insert(touching_nodes_.end(), surface.vertices.begin(), surface.vertices.end());
+    }
+    margin_ = margin_of_edges * sum / static_cast<double>(count);
+    longest_way_ = way_of_edges * sum / static_cast<double>(count);
+    std::sort(touching_nodes_.begin(), touching_nodes_.end());
+    touching_nodes_.erase(std::unique(touching_nodes_.begin(), touching_nodes_.end()), touching_nodes_.end());
+}
+
+void ContactCandidates::set_distances(const std::vector<double>& distances) {
+    std::vector<double> at_rest = distances, with_margin = distances;
+    for (double& each : at_rest) each *= 2.0;
+    for (double& each : with_margin) each += margin_;
+    if (with_margin == distances_) return;
+    phase_.make_room(nodes_.rest, at_rest);
+    distances_ = std::move(with_margin);
+    looked_at_.resize(0);
+}
+
+const std::vector<NearPair>& ContactCandidates::near(const double* q) {
+    const Index count = static_cast<Index>(touching_nodes_.size());
+    const auto at = [&](Index k) { return Eigen::Map<const Vec3>(q + 3 * touching_nodes_[k]); };
+    if (looked_at_.size() > 0) {
+        double moved = 0.0;
+        for (Index k = 0; k < count; ++k)
+            moved = std::max(moved, (at(k) - looked_at_.segment<3>(3 * k)).squaredNorm());
+        if (4.0 * moved <= margin_ * margin_) return near_;
+    }
+    looked_at_.resize(3 * count);
+    for (Index k = 0; k < count; ++k) looked_at_.segment<3>(3 * k) = at(k);
+    near_ = phase_.near(q, distances_);
+    return near_;
+}
+
+double ContactCandidates::longest_move(const double* p) const {
+    double longest = 0.0;
+    for (const Index node : touching_nodes_) {
+        const double squared = Eigen::Map<const Vec3>(p + 3 * node).squaredNorm();
+        if (!std::isfinite(squared)) return std::numeric_limits<double>::infinity();
+        longest = std::max(longest, squared);
+    }
+    return std::sqrt(longest);
+}
+
+std::vector<NearPair> ContactCandidates::on_the_way(const double* q, const double* p, double share,
+                                                    const std::vector<double>& distances) {
+    VectorXd end(3 * nodes_.n_nodes());
+    for (Index k = 0; k < end.size(); ++k) end[k] = q[k] + share * p[k];
+    return phase_.near_on_the_way(q, end.data(), distances);
+}
+
+std::string ContactCandidates::names(const NearPair& pair) const {
+    const BodyContactInput& of = contacts_[pair.contact];
+    const Name &one = names_[pair.swapped ? of.b : of.a], &other = names_[pair.swapped ? of.a : of.b];
+    return "face " + std::to_string(one.faces[pair.first_face]) + " of " + one.body + " and face " +
+           std::to_string(other.faces[pair.second_face]) + " of " + other.body;
+}
+
+std::size_t ContactCandidates::bytes() const {
+    return phase_.bytes() + near_.capacity() * sizeof(NearPair) + looked_at_.size() * sizeof(double);
+}
+
+}  // namespace magshell

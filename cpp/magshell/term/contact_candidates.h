@@ -1,0 +1,59 @@
+// Pairs that may touch, kept as long as no node has moved far.
+//
+// They are found within a margin beyond what matters. Until two nodes could have come so much nearer, nothing else can
+// touch. Which pairs touch, and in which order, does not depend on when they were looked for.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "magshell/body/nodes.h"
+#include "magshell/contact/broad_phase.h"
+#include "magshell/term/body_contact_input.h"
+
+namespace magshell {
+
+class ContactCandidates {
+  public:
+    /// The nodes have to outlive it.
+    ContactCandidates(const Nodes& nodes, const std::vector<ContactSurfaceInput>& surfaces,
+                      const std::vector<BodyContactInput>& contacts);
+
+    /// Of each contact, the distance within which pairs touch [m].
+    void set_distances(const std::vector<double>& distances);
+
+    /// Those that touch at q, and others.
+    const std::vector<NearPair>& near(const double* q);
+    /// Points and triangles, and edges, that may come nearer than that, one a contact, on straight ways from q to
+    /// q + share p.
+    std::vector<NearPair> on_the_way(const double* q, const double* p, double share,
+                                     const std::vector<double>& distances);
+    /// The longest of what p moves them by [m].
+    double longest_move(const double* p) const;
+    /// Faces that pass through each other at q.
+    std::vector<NearPair> crossings(const double* q) { return phase_.crossings(q); }
+
+    /// As far as a step lets a node go at most [m]: what may be met on a longer way would be nearly everything.
+    double longest_way() const { return longest_way_; }
+    /// The faces of a pair, in words.
+    std::string names(const NearPair& pair) const;
+    std::size_t bytes() const;
+
+  private:
+    struct Name {
+        std::string body;
+        std::vector<Index> faces;
+    };
+
+    const Nodes& nodes_;
+    std::vector<BodyContactInput> contacts_;
+    std::vector<Name> names_;  // of each surface
+    BroadPhase phase_;
+    double margin_, longest_way_;    // [m]
+    std::vector<double> distances_;  // with the margin
+    std::vector<Index> touching_nodes_;
+    std::vector<NearPair> near_;
+    VectorXd looked_at_;  // where those nodes were; empty: nowhere
+};
+
+}  // namespace magshell

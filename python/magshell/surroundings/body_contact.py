@@ -1,0 +1,280 @@
+"""Contact of bodies with each other and with themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.owner import Owner
+from .._checks.scalars import flag, not_negative, positive
+from ..bodies.bodies import BODIES
+from ..bodies.rigid import Rigid
+from ..bodies.shell import Shell
+from ..bodies.solid import Solid
+
+_REACH_OF_SHEETS = 0.1  # of the thickness
+_REACH_OF_SOLIDS = 0.05  # of the mean edge on the surface
+_STICKING = 1e-2  # of the larger body's extent, a second
+_SMOOTHING = 0.1  # of the reach
+LAWS = ("barrier", "penalty")
+
+
+class BodyContact(Owner):
+    """Two bodies that do not pass through each other: what ms.Contact(a, b, ...) makes.
+
+    a, b: a Shell, a Solid, or a Rigid with vertices and a body, of which the faces between its vertices touch.
+    minimal_distance: m, that is always left between them, as sheets are thick: by default half the largest thickness of
+        each. Solids have none.
+    reach: m, beyond the minimal distance, from which on they push each other apart; by default a tenth of the thickness, or
+        a twentieth of the mean edge on the surface of solids, the smaller of the two bodies'. What touches lightly rests at
+        nearly all of it.
+    contact_stiffness: Pa, the pressure with which they push at about half the reach; by default Young's modulus, the smaller
+        of the two bodies'. Forces depend neither on the mesh nor on a time step.
+    law: "barrier", which grows without bound: nothing ever passes, whatever presses; or "penalty", softer and cheaper,
+        which `contact_stiffness` bounds: what presses more is let into the minimal distance, and steps still do not pass.
+    smoothing: m, of a penalty, as of contacts with obstacles; by default a tenth of the reach.
+    friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
+    static_friction_coefficient: of what sticks, where it is larger; by default there is but one.
+    sticking_speed: m/s, below which friction holds, as of contacts with obstacles.
+    lagged_friction: as there.
+
+    Pairs are vertices and faces, and edges and edges, whatever side they come from. No step of a solve passes a pair; a
+    start in which faces intersect, or are nearer than the minimal distance, is refused with their numbers. Defaults are
+    taken from the bodies as they are here: a solve with another thickness or modulus keeps them.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(4, 4))
+    >>> lower = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> upper = ms.Shell(mesh.transformed(translation=(1e-3, 5e-4, 2e-3)), thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> held = ms.Clamp(mesh.boundary_edges, body=lower)
+    >>> scene = ms.Scene(
+    ...     [lower, upper],
+    ...     supports=[held],
+    ...     contacts=[ms.Contact(lower, upper)],
+    ...     gravity=(0, 0, -9.81),
+    ...     allow_rigid_motions=True,
+    ... )
+    >>> fall = ms.simulate(scene, steps=40, time_step=1e-3)
+    >>> gap = fall[upper].positions[-1, :, 2].min() - fall[lower].positions[-1, :, 2].max()
+    >>> bool(1e-3 < gap < 1.2e-3)
+    True
+    """
+
+    body = None
+    for_all = True
+    _replaceable = (
+        "contact_stiffness",
+        "reach",
+        "minimal_distance",
+        "smoothing",
+        "friction_coefficient",
+        "static_friction_coefficient",
+        "sticking_speed",
+    )
+
+    def __init__(
+        self,
+        a,
+        b,
+        *,
+        minimal_distance=None,
+        reach=None,
+        contact_stiffness=None,
+        law: str = "barrier",
+        smoothing=None,
+        friction_coefficient=None,
+        static_friction_coefficient=None,
+        sticking_speed=None,
+        lagged_friction: bool = False,
+    ):
+        self.a, self.b = checked_side("a", a), checked_side("b", b)
+        if self.a is self.b:
+            raise ValueError("a and b are one body: SelfContact(body) is contact of a body with itself")
+        self._take(
+            minimal_distance=minimal_distance,
+            reach=reach,
+            contact_stiffness=contact_stiffness,
+            law=law,
+            smoothing=smoothing,
+            friction_coefficient=friction_coefficient,
+            static_friction_coefficient=static_friction_coefficient,
+            sticking_speed=sticking_speed,
+            lagged_friction=lagged_friction,
+        )
+
+    def _take(self, *, law, lagged_friction, **given) -> None:
+        if law not in LAWS:
+            raise ValueError(f'law must be "barrier" or "penalty", got {law!r:.60}')
+        self.law, self.lagged_friction = law, flag("lagged_friction", lagged_friction)
+        bodies = [mesh_of(side) for side in self.sides]
+
+        def number(name, unit, default, check=positive):
+            return default if given[name] is None else check(name, unit, given[name])
+
+        self.minimal_distance = number("minimal_distance", "m", self._distance(bodies), not_negative)
+        self.reach = number("reach", "m", self._reach(bodies))
+        self.contact_stiffness = number("contact_stiffness", "Pa", min(map(_modulus, bodies)))
+        self.smoothing = number("smoothing", "m", _SMOOTHING * self.reach)
+        self.friction_coefficient = number("friction_coefficient", "1", None, not_negative)
+        self.static_friction_coefficient = number("static_friction_coefficient", "1", None, not_negative)
+        if self.static_friction_coefficient is not None:
+            if self.friction_coefficient is None:
+                raise ValueError(
+                    "static_friction_coefficient [1] was given without a friction_coefficient [1]"
+                )
+            if self.static_friction_coefficient < self.friction_coefficient:
+                raise ValueError(
+                    "static_friction_coefficient [1] must not be smaller than friction_coefficient, "
+                    f"{self.friction_coefficient:g}, got {self.static_friction_coefficient:g}"
+                )
+        extent = max(body.mesh.size for body in bodies)
+        self.sticking_speed = number("sticking_speed", "m/s", _STICKING * extent)
+
+    def _distance(self, bodies) -> float:
+        return sum(0.5 * _thickness(body) for body in bodies)
+
+    def _reach(self, bodies) -> float:
+        return min(map(_reach, bodies))
+
+    @property
+    def sides(self) -> tuple:
+        return self.a, self.b
+
+    @property
+    def _numbers(self) -> dict:
+        """What `replaced` begins with."""
+        own = {name: getattr(self, name) for name in self._replaceable}
+        return {**own, "law": self.law, "lagged_friction": self.lagged_friction}
+
+    def _checked_names(self, values: dict) -> dict:
+        """Of `replaced`: what a contact was made without, no solve gives it."""
+        for name in ("friction_coefficient", "static_friction_coefficient"):
+            if getattr(self, name) is None and name in values:
+                raise ValueError(
+                    f"a Contact without {name} cannot get one in a solve: give it one, and zero will do for friction"
+                )
+        return values
+
+    def replaced(self, **values) -> BodyContact:
+        """The same contact with other numbers of its law."""
+        return BodyContact(self.a, self.b, **{**self._numbers, **self._checked_names(values)})
+
+    @property
+    def _one_coefficient(self) -> bool:
+        return self.static_friction_coefficient is None
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        for name in self._replaceable:
+            numbers[label, name] = getattr(self, name) or 0.0
+        if self._one_coefficient:
+            numbers[label, "static_friction_coefficient"] = numbers[label, "friction_coefficient"]
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        found = super().gradients(label, values, gradient)
+        if self._one_coefficient:
+            found["friction_coefficient"] = (
+                found["friction_coefficient"] + found["static_friction_coefficient"]
+            )
+        return found
+
+    def __repr__(self) -> str:
+        friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
+        return (
+            f"{type(self).__name__}({' and '.join(type(side).__name__ for side in self.sides)}; {self.law}, "
+            f"{self.contact_stiffness:g} Pa within {self.reach:g} m beyond {self.minimal_distance:g} m{friction})"
+        )
+
+
+class SelfContact(BodyContact):
+    """A body that does not pass through itself.
+
+    a: a Shell or a Solid. The others are as in BodyContact, which ms.Contact(a, b, ...) makes, but that by default a sheet
+    keeps its whole thickness from itself. Neighbours along the surface that are nearer at rest than twice minimal distance
+    and reach keep half of what they have there, in the proportion of the two.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> ms.SelfContact(strip)
+    SelfContact(Shell; barrier, 1e+06 Pa within 0.0001 m beyond 0.001 m)
+    """
+
+    def __init__(
+        self,
+        a,
+        *,
+        minimal_distance=None,
+        reach=None,
+        contact_stiffness=None,
+        law: str = "barrier",
+        smoothing=None,
+        friction_coefficient=None,
+        static_friction_coefficient=None,
+        sticking_speed=None,
+        lagged_friction: bool = False,
+    ):
+        if not isinstance(a, BODIES):
+            raise ValueError(f"a must be a Shell or Solid of the scene, got {a!r:.60}")
+        self.a = self.b = a
+        self._take(
+            minimal_distance=minimal_distance,
+            reach=reach,
+            contact_stiffness=contact_stiffness,
+            law=law,
+            smoothing=smoothing,
+            friction_coefficient=friction_coefficient,
+            static_friction_coefficient=static_friction_coefficient,
+            sticking_speed=sticking_speed,
+            lagged_friction=lagged_friction,
+        )
+
+    def _distance(self, bodies) -> float:
+        return _thickness(self.a)
+
+    @property
+    def sides(self) -> tuple:
+        return (self.a,)
+
+    def replaced(self, **values) -> SelfContact:
+        """The same contact with other numbers of its law."""
+        return SelfContact(self.a, **{**self._numbers, **self._checked_names(values)})
+
+
+def checked_side(name: str, side):
+    """A body in contact, as it was given."""
+    if isinstance(side, BODIES):
+        return side
+    if not isinstance(side, Rigid):
+        raise ValueError(f"{name} must be a Shell, a Solid or a Rigid of the scene, got {side!r:.60}")
+    if side.vertices is None:
+        raise ValueError(
+            f"{name} is a free Rigid, which has no faces to touch with: make it of the vertices of a body"
+        )
+    if side.body is None:
+        raise ValueError(f"{name} is a Rigid that does not say of which body it is: Rigid(..., body=...)")
+    return side
+
+
+def mesh_of(side) -> Shell | Solid:
+    """The body whose mesh it touches with."""
+    return side.body if isinstance(side, Rigid) else side
+
+
+def _thickness(body) -> float:
+    return float(np.max(body.thickness)) if isinstance(body, Shell) else 0.0
+
+
+def _modulus(body) -> float:
+    if isinstance(body, Solid):
+        return float(np.min(body.material.wave_modulus(body.mesh.n_tetrahedra)))
+    return float(np.min(body.young_modulus))
+
+
+def _reach(body) -> float:
+    if isinstance(body, Shell):
+        return _REACH_OF_SHEETS * float(np.min(body.thickness))
+    return _REACH_OF_SOLIDS * _mean_edge(body.mesh)
+
+
+def _mean_edge(mesh) -> float:
+    corners = mesh.rest_positions[mesh.faces]
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
