@@ -24,8 +24,8 @@ from ..bodies.solid import Solid
 from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
-from ..surroundings.constraints import Constraints, free_rigid_motions, gather
 from ..surroundings.body_contact import BodyContact
+from ..surroundings.constraints import free_rigid_motions, gather
 from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import body_contact_inputs, contact_inputs, obstacles_of, split_contacts
 from ..surroundings.face_energies import FaceEnergy
@@ -33,6 +33,7 @@ from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, Point
 from ..surroundings.pressure import Pressure
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane, continuations
 from ..surroundings.water import Water
+from .core_inputs import body_inputs, face_inputs
 from .layout import Layout
 from .values import Values
 
@@ -166,13 +167,7 @@ class Scene:
         self._model = _core.Model(
             n_vertices=mesh.n_vertices,
             original=bodies.original if bodies.ties else [],
-            sheets=self._sheets(constraints),
-            solids=self._solids(),
-            skins=self._skins(),
-            rigid=[
-                place.as_input(f"rigid {k}", bool(self.fields) and part.magnetic_moment is not None)
-                for k, (part, place) in enumerate(zip(self.rigid_parts, self._rigid, strict=True))
-            ],
+            **body_inputs(self, constraints.directed_edges),
             **skeleton_inputs(bodies, self._labels),
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
@@ -182,12 +177,7 @@ class Scene:
                 [*bodies.sheets_of(edges), n_directions - n_couples + np.arange(n_couples)], axis=1
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
-            face_energies=self._face_energies(),
-            pressures=[
-                load._core_input(label, self._bodies)
-                for load, label in self._labels
-                if isinstance(load, Pressure)
-            ],
+            **face_inputs(self),
             loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
             contacts=contact_inputs(self._obstacle_contacts, bodies),
@@ -210,56 +200,6 @@ class Scene:
             if self._bodies.held_by_joints(part)
         ]
         return np.concatenate([np.zeros(0, dtype=np.int64), *held])
-
-    def _sheets(self, constraints: Constraints) -> list[dict]:
-        """The bodies as the core takes them."""
-        of, edges = self._bodies.split(constraints.directed_edges[:, 0])
-        pairs = np.stack([edges, constraints.directed_edges[:, 1]], axis=1).astype(np.int32)
-        return [
-            {
-                "owner": f"body {k}",
-                "mesh": span.mesh._core,
-                "vertices": self._bodies.original[span.vertices],
-                "curvature_scale": shell.curvature_scale,
-                "directors": shell.bending == "midedge",
-                "magnetic": bool(self.fields),
-                "directed_edges": pairs[of == k],
-            }
-            for k, (shell, span) in enumerate(zip(self.bodies, self._bodies.spans, strict=True))
-            if isinstance(shell, Shell)
-        ]
-
-    def _solids(self) -> list[dict]:
-        """The solids as the core takes them."""
-        loaded = [self._bodies.of(load).bodies.start for load in self.loads if isinstance(load, FaceEnergy)]
-        return [
-            {
-                **body._core_input(f"body {k}", self._bodies.original[span.vertices]),
-                "surface_acts": self.water is not None or k in loaded,
-            }
-            for k, (body, span) in enumerate(zip(self.bodies, self._bodies.spans, strict=True))
-            if isinstance(body, Solid)
-        ]
-
-    def _skins(self) -> list[dict]:
-        """Those of the solids as the core takes them."""
-        skinned = [
-            (body, span)
-            for body, span in zip(self.bodies, self._bodies.spans, strict=True)
-            if isinstance(body, Solid) and body.skin is not None
-        ]
-        return [
-            body.skin._core_input(f"skin {k}", body.mesh, self._bodies.original[span.vertices])
-            for k, (body, span) in enumerate(skinned)
-        ]
-
-    def _face_energies(self) -> list[dict]:
-        """As the core takes them."""
-        return [
-            {"owner": label, "body": self._bodies.core_number(self._bodies.of(load)), "energy": load._core}
-            for load, label in self._labels
-            if isinstance(load, FaceEnergy)
-        ]
 
     @property
     def _sources(self) -> list[AppliedField]:
