@@ -30,6 +30,7 @@ os.environ.setdefault("MAGSHELL_NUM_THREADS", "2")
 import numpy as np
 from fuzz_calls import Call, Sample, calls
 from fuzz_contact_calls import contact_calls
+from fuzz_rigid_calls import rigid_calls
 from fuzz_solid_calls import solid_calls
 from fuzz_values import junk, spoilt
 
@@ -70,7 +71,13 @@ def everything(folder: Path) -> list[Call]:
     from fuzz_torch_calls import torch_calls
 
     sample = Sample(folder)
-    return [*calls(sample), *contact_calls(sample), *solid_calls(sample), *torch_calls(sample)]
+    return [
+        *calls(sample),
+        *contact_calls(sample),
+        *rigid_calls(sample),
+        *solid_calls(sample),
+        *torch_calls(sample),
+    ]
 
 
 def spoil(table: list[Call], number: int) -> tuple[Call, dict, str]:

@@ -13,6 +13,7 @@ import pytest
 from fuzz_calls import Sample, calls
 from fuzz_contact_calls import contact_calls
 from fuzz_not_called import NOT_CALLED
+from fuzz_rigid_calls import rigid_calls
 from fuzz_solid_calls import solid_calls
 
 import magshell as ms
@@ -47,7 +48,13 @@ def table(tmp_path):
     from fuzz_torch_calls import torch_calls
 
     sample = Sample(tmp_path)
-    return [*calls(sample), *contact_calls(sample), *solid_calls(sample), *torch_calls(sample)]
+    return [
+        *calls(sample),
+        *contact_calls(sample),
+        *rigid_calls(sample),
+        *solid_calls(sample),
+        *torch_calls(sample),
+    ]
 
 
 def test_every_public_name_is_called(table):
