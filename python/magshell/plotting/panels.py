@@ -23,6 +23,7 @@ SOLID_CREASE = np.cos(
 )  # of closed surfaces, where coarse triangles turn by more on what is round
 LINE = 0.0022  # width, in sizes of the drawing
 LONGEST_FIELD = 0.2  # arrow of a uniform field, in sizes of the drawing
+FLESH = 0.45  # the opacity of what has bones inside
 PALEST = 0.8  # the way to white of the first of many states that fade
 
 
@@ -170,7 +171,9 @@ def _seen(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
 def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, options: Options) -> list[Solid]:
     mesh, eye = state.mesh, view.axes[2]
     step = float(mesh.edge_lengths.mean())
-    solids = [sheet(state.positions, mesh.faces, shades)]
+    skin = sheet(state.positions, mesh.faces, shades)
+    bones = [sheet(*each, rgb(colors.BONE)) for each in state.bones]
+    solids = [*bones, replace(skin, opacity=FLESH) if bones else skin]
     if options.mesh_lines:
         edges = mesh.edges[_seen(state, np.arange(mesh.n_edges), eye)]
         solids.append(ribbons(state.positions[edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))

@@ -24,6 +24,7 @@ from ..obstacles import Obstacle
 from ..scene.scene import Scene
 from ..statics.equilibria import Equilibria
 from ..statics.path import Path
+from .bones import bones_at_rest, bones_of, joined, mesh_of
 from .units import clock
 
 
@@ -35,6 +36,7 @@ class State:
     flux_density: (3,), T, the uniform field, or None without one.
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
     title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
+    bones: surfaces of links inside, vertices (n, 3) m and faces (m, 3) each.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
     """
 
@@ -49,6 +51,7 @@ class State:
     elements: Callable[[], list[tuple[int, TriangleMesh | TetMesh, SolidStates | ShellStresses]]] | None = (
         None
     )
+    bones: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     @property
     def magnetization(self) -> np.ndarray:
@@ -109,14 +112,18 @@ def states_of(
     if isinstance(what, Shell | Solid):
         return _states(what.mesh, _magnetized(given, [what]))
     if isinstance(what, Scene):
-        return _states(what.mesh, _with_own(given, what), what.fields)
+        bones = bones_at_rest(what)
+        if bones and not what.bodies:
+            return _states(mesh_of(bones), _with_own(given, what), what.fields)
+        states = _states(what.mesh, _with_own(given, what), what.fields)
+        return [replace(state, bones=tuple(bones)) for state in states]
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
     if is_result and not isinstance(what, Equilibria):
         own = _held_by(what)
         merged = {name: own.get(name) if value is None else value for name, value in given.items()}
         merged = _with_own(merged, what.scene, getattr(what, "_obstacles", None))
         states = _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
-        states = _with_elements(what, states, positions)
+        states = _with_elements(what, _with_bones(what, states, positions), positions)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
@@ -129,6 +136,20 @@ def states_of(
         raise ValueError("there is nothing to draw: the list is empty")
     kinds = "a mesh, a Shell, a Solid, a Scene, a result, or a list of them"
     raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
+
+
+def _with_bones(result, states: list[State], positions) -> list[State]:
+    """With its skeletons, where the states are those that it has itself; without flesh they are all that there is."""
+    if positions is not None or not result.scene._bodies.skeletons:
+        return states
+    bones = bones_of(result)
+    if result.scene.bodies:
+        return [replace(state, bones=tuple(each)) for state, each in zip(states, bones, strict=True)]
+    mesh = mesh_of(bones_at_rest(result.scene))
+    return [
+        replace(state, mesh=mesh, positions=joined(each)[0])
+        for state, each in zip(states, bones, strict=True)
+    ]
 
 
 def _with_elements(result, states: list[State], positions) -> list[State]:

@@ -1,0 +1,75 @@
+"""The links of skeletons as surfaces: their shapes, or rods between their joints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.tensors import detached
+from ..bodies.skeleton import Skeleton
+from ..mesh.triangle_mesh import TriangleMesh
+from ..obstacles import Capsule, Sphere
+
+_THICK = 0.06  # the radius of a rod, in its length
+_KNOB = 1.4  # and of its ends, in that
+
+
+def surface_of(skeleton: Skeleton, link, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """At rest: vertices (n, 3) m, faces (m, 3). center: (3,) m, of the link."""
+    shape = getattr(link, "shape", None)
+    if shape is not None:
+        return shape.rest_positions, shape.faces
+    ends = [joint.origin for joint in skeleton.joints if link is joint.child or link is joint.parent]
+    ends = [*ends, center] if len(ends) < 2 else ends
+    middle = np.mean(ends, axis=0)
+    rods = [(middle, end) for end in ends] if len(ends) > 2 else [tuple(ends)] if len(ends) == 2 else []
+    lengths = [np.linalg.norm(b - a) for a, b in rods]
+    radius = _THICK * (max(lengths, default=0.0) or skeleton.reach(link, center) or 1e-3)
+    parts = [_knob(end, _KNOB * radius) for end in ends]
+    parts += [_rod(a, b, radius) for (a, b), length in zip(rods, lengths, strict=True) if length > 0]
+    return joined(parts)
+
+
+def joined(parts) -> tuple[np.ndarray, np.ndarray]:
+    """Several surfaces as one."""
+    first = np.cumsum([0, *(len(points) for points, _ in parts)])
+    faces = [faces + start for (_, faces), start in zip(parts, first[:-1], strict=True)]
+    return np.concatenate([points for points, _ in parts]), np.concatenate(faces)
+
+
+def _knob(center: np.ndarray, radius: float):
+    return Sphere(radius, center=center).surface()
+
+
+def _rod(a: np.ndarray, b: np.ndarray, radius: float):
+    return Capsule(np.stack([a, b]), radius=radius).surface()
+
+
+def bones_of(result) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+    """Of every state of a result (one, or k of them), the surfaces of its links, where they are."""
+    found: list[list[tuple[np.ndarray, np.ndarray]]] = []
+    for skeleton in result.scene._bodies.skeletons:
+        for link in skeleton.links:
+            of = result[link]
+            points, faces = surface_of(skeleton, link, of._place.center)
+            turns, centers = np.asarray(detached(of.rotation)), np.asarray(detached(of.center))
+            around = points - of._place.center
+            moved = np.einsum("kij,nj->kni", turns.reshape(-1, 3, 3), around) + centers.reshape(-1, 1, 3)
+            found = found or [[] for _ in moved]
+            for state, positions in zip(found, moved, strict=True):
+                state.append((positions, faces))
+    return found
+
+
+def bones_at_rest(scene) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of a scene: the surfaces of its links."""
+    places = dict(zip(map(id, scene.rigid_parts), scene._rigid, strict=True))
+    return [
+        surface_of(skeleton, link, places[id(link)].center)
+        for skeleton in scene._bodies.skeletons
+        for link in skeleton.links
+    ]
+
+
+def mesh_of(bones: list[tuple[np.ndarray, np.ndarray]]) -> TriangleMesh:
+    """Of skeletons without flesh, for pictures: the bones as a sheet."""
+    return TriangleMesh(*joined(bones))
