@@ -19,8 +19,8 @@ SMOOTHING, STICKING_SPEED = 20e-6, 5e-3  # m and m/s
 GRAVITY = (0.0, 0.0, -9.81)
 
 BAR, BAR_WIDTH, BAR_HEIGHT = 15.5e-3, 1e-3, 1.5e-3  # m: its middle along x, and the size of its section
-OVER_TIME, OVER = 0.09, (16e-3, 0.0, 18e-3)  # s, m: when and where the mass center is asked to be above it
-DOWN_TIME, DOWN = 0.15, (33e-3, 0.0, 4e-3)  # s, m: and where it is to come down
+OVER_TIME, OVER = 0.09, (17e-3, 0.0, 21e-3)  # s, m: when and where the mass center is asked to be above it
+DOWN_TIME, DOWN = 0.15, (35e-3, 0.0, 4e-3)  # s, m: and where it is to come down
 
 BLUR = 4.0  # steps: the field is a running mean of the unknowns, one a step and component, with a Gaussian so wide
 TOLERANCE = 1e-6  # of a step, relative
@@ -54,7 +54,7 @@ class Design:
 
 
 DESIGNS = {
-    "heavy": Design(3 * MASS_DENSITY, cost=3e-3, strength=48e-3, forward=30e-3),
+    "heavy": Design(3 * MASS_DENSITY, cost=3e-3, strength=50e-3, forward=36e-3),
     "light": Design(MASS_DENSITY, cost=3e-3, strength=20e-3, forward=24e-3),
     "light, cheap field": Design(MASS_DENSITY, cost=3e-5, strength=20e-3, forward=24e-3),
 }
