@@ -1,4 +1,4 @@
-"""Contact of bodies with each other and with themselves: nothing passes, forces balance, derivatives are those of the energy."""
+"""Contact of bodies with each other and with themselves: nothing passes, forces balance, derivatives fit the energy."""
 
 import numpy as np
 import pytest
@@ -164,6 +164,26 @@ def test_strip_folds_onto_itself():
     assert move.touching(touch).smallest_distance > 0.9 * touch.minimal_distance
 
 
+def test_a_path_goes_through_the_closing_of_a_contact():
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    lower = ms.Shell(mesh, thickness=1e-3, young_modulus=1e8)
+    upper = ms.Shell(mesh.transformed(translation=(1.3e-3, 7e-4, 3e-3)), thickness=1e-3, young_modulus=1e7)
+    touch = ms.Contact(lower, upper)
+    scene = ms.Scene(
+        [lower, upper],
+        supports=[
+            ms.Clamp(mesh.edges_at(x=0.0), body=lower),
+            ms.Clamp(mesh.edges_at(x=0.0), body=upper),
+        ],
+        contacts=[touch],
+        loads=[ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, -0.06), body=upper)],
+    )
+    path = ms.follow(scene, start=ms.equilibrium(scene, load_factor=0.0), progress=False)
+    rest = ms.equilibrium(scene)
+    assert path.parameters[-1] == 1.0 and rest.touching(touch).normal_force > 1e-4
+    np.testing.assert_allclose(path.positions[-1], rest.positions, atol=1e-9)
+
+
 REFUSED = [
     (lambda s, o: ms.Contact(s, s), "one body"),
     (lambda s, o: ms.Contact(s, o, law="hard"), "law must be"),
@@ -218,7 +238,7 @@ def test_supports_that_push_bodies_through_each_other_are_told():
         supports=[ms.Pin(all_of, body=lower), ms.Pin(all_of, displacement=(0, 0, -4e-3), body=upper)],
         contacts=[ms.Contact(lower, upper)],
     )
-    with pytest.raises(ms.NotConverged, match="bodies cannot follow: face .* in each other's way"):
+    with pytest.raises(ms.NotConverged, match=r"bodies cannot follow: face .* in each other's way"):
         ms.equilibrium(scene)
 
 
