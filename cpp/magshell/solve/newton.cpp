@@ -338,6 +338,7 @@ NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, cons
     if (!report.reason.empty()) return report;
     VectorXd move = model_.reduction().prescribed_increment(q, controls);
     double last_residual = std::numeric_limits<double>::infinity(), share = 1.0;
+    bool cautious = false;
     evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);
@@ -354,7 +355,8 @@ NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, cons
             report.reason = "no convergence in " + std::to_string(max_iterations) + " iterations";
             return report;
         }
-        const bool cautious = share < 1.0 || report.residual > contracting * last_residual;
+        // A whole step of the cautious matrix only creeps on: the exact one is tried again after it.
+        cautious = share < 1.0 || (!cautious && report.residual > contracting * last_residual);
         last_residual = report.residual;
         Eigen::MatrixXd pull = move;
         report.factor = factorize(q, controls, false, anchor, pull, cautious);
