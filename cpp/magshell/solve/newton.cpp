@@ -370,6 +370,10 @@ NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, cons
         const bool in_place = move.isZero(0.0);
         const double slope = force.dot(step);
         if (in_place && !(slope > 0.0)) {
+            if (!cautious) {
+                share = 0.0;  // so that the next one is
+                continue;
+            }
             report.reason = "the energy does not fall along the step";
             return report;
         }
