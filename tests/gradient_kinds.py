@@ -15,6 +15,7 @@ from gradient_kinds_bodies import (
     two_sheets_at_rest,
     two_sheets_in_motion,
 )
+from gradient_kinds_contact import CONTACT_MAKERS
 from gradient_scenes import Kind
 from gradient_world import (
     BEGIN,
@@ -240,6 +241,7 @@ MAKERS = {
     "at rest on a Plane, its law given": lambda: resting_on(
         ob.Plane, step=1e-4, smoothing=4e-4, offset=5e-4, face_samples=3
     ),
+    **CONTACT_MAKERS,
     "a solid at rest": solid_at_rest,
     "a solid in motion": solid_in_motion,
     "a magnetized solid at rest": magnetized_solid_at_rest,

@@ -19,7 +19,8 @@ IN_TIME = ", in time"
 # Keywords of a solve that are no numbers to differentiate by.
 SETTINGS = {"scene", "values", "solver", "progress"}
 SETTINGS_OF = {
-    ms.equilibrium: SETTINGS | {"require_stable", "start"},  # wherever the search began: a tensor is refused
+    ms.equilibrium: SETTINGS
+    | {"require_stable", "at_rest", "start"},  # wherever the search began: a tensor is refused
     ms.simulate: SETTINGS | {"steps", "integrator", "record_every", "memory_budget", "keep"},
 }
 
@@ -195,6 +196,13 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
     elif isinstance(owner, ms.Contact):
         values = dict(zip(names, owner.law(*scene._values.touching(owner)), strict=True))
         absent = set() if scene.has_forces_of_motion else {"friction_coefficient"}
+    elif isinstance(owner, ms.BodyContact):
+        values = {name: getattr(owner, name) for name in names}
+        absent = {name for name in names if values[name] is None}
+        if owner.law == "barrier":
+            absent.add("smoothing")
+        if not moving:
+            absent |= {"friction_coefficient", "static_friction_coefficient", "sticking_speed"}
     elif isinstance(owner, ms.Pin | ms.Clamp):
         motion = owner.held(scene._bodies.of(owner).mesh)[0].move
         values = {} if motion is None else {**motion._asdict(), "displacement": motion.translation}

@@ -1,6 +1,10 @@
 // The extension module: errors first, then one register function a family.
 #include "bindings/bindings.h"
 
+namespace magshell::bindings {
+void register_body_contact(py::module_& module);
+}
+
 PYBIND11_MODULE(_core, module) {
     namespace b = magshell::bindings;
     module.doc() = "The C++ core of magshell; use the functions of the package, not this module.";
@@ -14,6 +18,7 @@ PYBIND11_MODULE(_core, module) {
     b::register_contact(module);
     b::register_face_energies(module);
     b::register_model(module);
+    b::register_body_contact(module);  // of models
     b::register_solid(module);
     b::register_statics(module);
     b::register_adjoint(module);       // takes what a solve found

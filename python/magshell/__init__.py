@@ -42,6 +42,7 @@ from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
 from .methods.solvers import MixedNewton, Newton
 from .plotting import Picture, animate, plot, write_page
 from .scene.scene import Scene
+from .scene.touching import Touching
 from .starts.multistart import multistart
 from .starts.sampling import random_starts
 from .starts.starts import Multistart
@@ -118,6 +119,7 @@ __all__ = [
     "SymmetryPlane",
     "TetMesh",
     "Tie",
+    "Touching",
     "Trajectory",
     "TriangleMesh",
     "UniformField",

@@ -77,6 +77,32 @@ def _in_scenes(s: Sample) -> Iterator[Call]:
         "face_samples": 1,
     }
     yield Call("Contact", lambda **a: moved(contacts=ms.Contact(**a)), touch)
+    other = ms.Shell(
+        s.mesh.transformed(translation=(0, 0, 5e-3)), thickness=1e-3, young_modulus=1e6, mass_density=1e3
+    )
+    law = {
+        "minimal_distance": 1e-3,
+        "reach": 1e-4,
+        "contact_stiffness": 1e5,
+        "law": "penalty",
+        "smoothing": 1e-5,
+        "friction_coefficient": 0.3,
+        "static_friction_coefficient": 0.5,
+        "sticking_speed": 1e-3,
+        "lagged_friction": False,
+    }
+
+    def together(make, **a):
+        scene = ms.Scene(
+            [s.shell, other],
+            supports=[ms.Clamp(s.mesh.edges_at(x=0.0), body=s.shell)],
+            contacts=make(**a),
+            allow_rigid_motions=True,
+        )
+        return ms.simulate(scene, steps=1, time_step=1e-3, progress=False)
+
+    yield Call("BodyContact", lambda **a: together(ms.BodyContact, **a), {"a": s.shell, "b": other, **law})
+    yield Call("SelfContact", lambda **a: together(ms.SelfContact, **a), {"a": other, **law})
     table = (np.linspace(0.0, np.pi / 2, 4), np.arange(4.0))
     flow = {
         "fluid_density": 1e3,

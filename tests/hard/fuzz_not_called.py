@@ -18,6 +18,7 @@ NOT_CALLED = {
     "ObjectiveFailed": "an error",
     "Path": "a result",
     "Picture": "a result",
+    "Touching": "a result",
     "Trajectory": "a result",
     "Strains": "a result",
     "LargeStrainWarning": "a warning",

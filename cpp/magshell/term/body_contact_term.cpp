@@ -63,7 +63,10 @@ std::vector<BodyContactTerm::Touch> BodyContactTerm::touches(const double* q) co
         for (Index k = first; k < last; ++k) {
             const PairPlaces x = places_of(near[k].pair, q);
             const PairEnergy at(near[k].pair, x, laws_[near[k].contact]);
-            if (at.acts()) found[block].push_back({near[k], at, x[0].lpNorm<Eigen::Infinity>()});
+            if (!at.acts()) continue;
+            double far = 0.0;
+            for (int i = 0; i < at.count(); ++i) far = std::max(far, x[i].lpNorm<Eigen::Infinity>());
+            found[block].push_back({near[k], at, far});
         }
     });
     std::vector<Touch> all;
@@ -142,29 +145,33 @@ void BodyContactTerm::add_cancelling_normal_forces(VectorXd& out) const {
 
 template <class Found>
 void BodyContactTerm::each_limit(const double* q, const double* p, const Found& found) const {
-    double share = 1.0;
-    for (const NearPair& each : candidates_.on_the_way(q, p, least_)) {
+    double share = std::min(1.0, candidates_.longest_way() / candidates_.longest_move(p));
+    if (!(share > 0.0)) return found(nullptr, 0.0);
+    if (share < 1.0) found(nullptr, share);
+    for (const NearPair& each : candidates_.on_the_way(q, p, share, least_)) {
         const PairPlaces from = places_of(each.pair, q);
         PairPlaces to = places_of(each.pair, p);
-        for (int k = 0; k < 4; ++k) to[k] = from[k] + share * to[k];
+        for (int k = 0; k < nodes_of(each.pair.kind); ++k) to[k] = from[k] + share * to[k];
         const double least = each.pair.share(laws_[each.contact]) * least_[each.contact];
         const double own = free_share(each.pair.kind, from, to, least, kept);
         if (own >= 1.0) continue;
         share *= own;
-        found(each, share);
+        found(&each, share);
     }
 }
 
 double BodyContactTerm::largest_share(const double* q, const double* p) const {
     double share = 1.0;
-    each_limit(q, p, [&](const NearPair&, double limit) { share = limit; });
+    each_limit(q, p, [&](const NearPair*, double limit) { share = limit; });
     return share;
 }
 
 std::string BodyContactTerm::blocking(const double* q, const double* p) const {
-    std::string names;
-    each_limit(q, p, [&](const NearPair& pair, double) { names = candidates_.names(pair); });
-    return names.empty() ? names : names + " are in each other's way";
+    std::string names = "a step is not finite";
+    each_limit(q, p, [&](const NearPair* pair, double) {
+        if (pair) names = candidates_.names(*pair) + " are in each other's way";
+    });
+    return names;
 }
 
 std::string BodyContactTerm::refusal(const double* q) const {

@@ -66,7 +66,7 @@ class BodyContactTerm final : public Term {
         Slot stiffness, reach, distance, smoothing, kinetic, fixed, sticking_speed;
     };
 
-    /// Calls found(pair, share) where a pair lets a step go less far than all before it.
+    /// Calls found(pair, share) where a pair lets a step go less far than all before it; nullptr: its length does.
     template <class Found>
     void each_limit(const double* q, const double* p, const Found& found) const;
 

@@ -1,12 +1,13 @@
 #include "magshell/term/contact_candidates.h"
 
 #include <algorithm>
-#include <iterator>
+#include <cmath>
+#include <limits>
 
 namespace magshell {
 namespace {
 
-constexpr double margin_of_edges = 0.3;  // of the mean rest length
+constexpr double margin_of_edges = 0.3, way_of_edges = 20.0;  // of the mean rest length
 
 std::vector<ContactSurface> surfaces_of(const Nodes& nodes, const std::vector<ContactSurfaceInput>& given) {
     std::vector<ContactSurface> surfaces;
@@ -39,6 +40,7 @@ ContactCandidates::ContactCandidates(const Nodes& nodes, const std::vector<Conta
         touching_nodes_.insert(touching_nodes_.end(), surface.vertices.begin(), surface.vertices.end());
     }
     margin_ = margin_of_edges * sum / static_cast<double>(count);
+    longest_way_ = way_of_edges * sum / static_cast<double>(count);
     std::sort(touching_nodes_.begin(), touching_nodes_.end());
     touching_nodes_.erase(std::unique(touching_nodes_.begin(), touching_nodes_.end()), touching_nodes_.end());
 }
@@ -68,10 +70,20 @@ const std::vector<NearPair>& ContactCandidates::near(const double* q) {
     return near_;
 }
 
-std::vector<NearPair> ContactCandidates::on_the_way(const double* q, const double* p,
+double ContactCandidates::longest_move(const double* p) const {
+    double longest = 0.0;
+    for (const Index node : touching_nodes_) {
+        const double squared = Eigen::Map<const Vec3>(p + 3 * node).squaredNorm();
+        if (!std::isfinite(squared)) return std::numeric_limits<double>::infinity();
+        longest = std::max(longest, squared);
+    }
+    return std::sqrt(longest);
+}
+
+std::vector<NearPair> ContactCandidates::on_the_way(const double* q, const double* p, double share,
                                                     const std::vector<double>& distances) {
     VectorXd end(3 * nodes_.n_nodes());
-    for (Index k = 0; k < end.size(); ++k) end[k] = q[k] + p[k];
+    for (Index k = 0; k < end.size(); ++k) end[k] = q[k] + share * p[k];
     return phase_.near_on_the_way(q, end.data(), distances);
 }
 

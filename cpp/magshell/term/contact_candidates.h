@@ -24,11 +24,17 @@ class ContactCandidates {
 
     /// Those that touch at q, and others.
     const std::vector<NearPair>& near(const double* q);
-    /// Points and triangles, and edges, that may come nearer than that, one a contact, on straight ways from q to q + p.
-    std::vector<NearPair> on_the_way(const double* q, const double* p, const std::vector<double>& distances);
+    /// Points and triangles, and edges, that may come nearer than that, one a contact, on straight ways from q to
+    /// q + share p.
+    std::vector<NearPair> on_the_way(const double* q, const double* p, double share,
+                                     const std::vector<double>& distances);
+    /// The longest of what p moves them by [m].
+    double longest_move(const double* p) const;
     /// Faces that pass through each other at q.
     std::vector<NearPair> crossings(const double* q) { return phase_.crossings(q); }
 
+    /// As far as a step lets a node go at most [m]: what may be met on a longer way would be nearly everything.
+    double longest_way() const { return longest_way_; }
     /// The faces of a pair, in words.
     std::string names(const NearPair& pair) const;
     std::size_t bytes() const;
@@ -43,7 +49,7 @@ class ContactCandidates {
     std::vector<BodyContactInput> contacts_;
     std::vector<Name> names_;  // of each surface
     BroadPhase phase_;
-    double margin_;                  // [m]
+    double margin_, longest_way_;    // [m]
     std::vector<double> distances_;  // with the margin
     std::vector<Index> touching_nodes_;
     std::vector<NearPair> near_;

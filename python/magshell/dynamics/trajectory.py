@@ -24,6 +24,8 @@ from ..mesh.crossings import told
 from ..methods.clock import Clock, clock_of
 from ..methods.integrators import Integrator
 from ..scene.scene import Scene
+from ..scene.touching import Touching, touching_in
+from ..surroundings.body_contact import BodyContact
 from ..surroundings.contact_inputs import near_kinks
 
 
@@ -185,12 +187,20 @@ class Trajectory:
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face in a recorded state, by default the last."""
+        return strains_of(self.scene, self._state_at(index), self._thickness)
+
+    def _state_at(self, index: int) -> np.ndarray:
+        """Of all unknowns."""
         positions, rotations = (detached(each)[index] for each in (self.positions, self.edge_rotations))
         model = self.scene._model
         state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
         before = 3 * self.scene._bodies.n_points
         state[before : before + self._directions.shape[1]] = self._directions[index]
-        return strains_of(self.scene, state, self._thickness)
+        return state
+
+    def touching(self, contact: BodyContact, index: int = -1) -> Touching:
+        """The pairs of a contact of bodies that touch in a recorded state, by default the last, and their forces."""
+        return touching_in(self.scene, self._values, contact, self._state_at(index))
 
     def self_intersections(self, index: int = -1) -> np.ndarray:
         """The faces that pass through each other in a recorded state, as in TriangleMesh.self_intersections, (k, 2)."""

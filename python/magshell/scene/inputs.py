@@ -40,7 +40,8 @@ class Inputs:
     magnetization: (n_f of all, 3) A/m, where it was an argument.
 
     `replaced`: {object of the scene: {name: value}}. `leaves`: the tensors that a gradient goes back to; without
-    `differentiable` they are refused. `moving`: the solve is in time.
+    `differentiable` they are refused. `moving`: the solve is in time. `without_forces_of_motion`: friction and water, if
+    there are, are left out.
     """
 
     def __init__(
@@ -52,14 +53,15 @@ class Inputs:
         replaced: dict[object, dict] | None = None,
         differentiable: bool = False,
         moving: bool = False,
+        without_forces_of_motion: bool = False,
         **factors,
     ):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
-        if scene.has_forces_of_motion and not moving:
+        if scene.has_forces_of_motion and not (moving or without_forces_of_motion):
             raise ValueError(
                 "the scene has friction or water, which act on what moves: use ms.simulate, with some damping until it "
-                "rests, or leave them out of this scene (friction_coefficient=None, water=None)"
+                "rests, or ms.equilibrium(..., at_rest=True), which leaves them out"
             )
         self.scene = scene
         self.given = []

@@ -75,4 +75,5 @@ def _part_of(search: Search, k: int, count: int) -> Search:
         search.solver,
         search.require_stable,
         lambda progress, residual: search.progress((k + progress) / count, residual),
+        search.at_rest,
     )

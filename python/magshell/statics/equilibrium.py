@@ -18,6 +18,8 @@ from ..bodies.solid_result import SolidResult, told_strains
 from ..bodies.strains import Largest, Strains, strains_of
 from ..mesh.crossings import told
 from ..scene.scene import Scene
+from ..scene.touching import Touching, touching_in
+from ..surroundings.body_contact import BodyContact
 
 
 @dataclass(frozen=True, repr=False)
@@ -104,6 +106,10 @@ class Equilibrium:
         array([0.105, 0.   ])
         """
         return strains_of(self.scene, self._state, self._values.whole.thickness)
+
+    def touching(self, contact: BodyContact) -> Touching:
+        """The pairs of a contact of bodies that touch, and their forces."""
+        return touching_in(self.scene, self._values, contact, self._state)
 
     def self_intersections(self) -> np.ndarray:
         """The faces that pass through each other, as in TriangleMesh.self_intersections, (k, 2)."""

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from .._checks.scalars import flag
 from .._checks.tensors import dtype_like, is_tensor, like
 from .._machine.keywords import FACTORS
 from ..adjoint.static import Adjoint
@@ -36,17 +37,19 @@ class Solution(NamedTuple):
 
 @dataclass(frozen=True)
 class Search:
-    """How to look. Raises ValueError where an option is no such thing."""
+    """How to look. Raises ValueError where an option is no such thing. at_rest: without forces of motion."""
 
     solver: Newton = field(default_factory=MixedNewton)
     require_stable: bool = True
     progress: Callable[[float, float], None] | None = None
+    at_rest: bool = False
 
     def __post_init__(self):
         if not isinstance(self.solver, Newton):
             raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(self.solver).__name__}")
         if not isinstance(self.require_stable, bool):
             raise ValueError(f"require_stable must be True or False, got {self.require_stable!r}")
+        flag("at_rest", self.at_rest)
         if self.progress is not None and not callable(self.progress):
             raise ValueError(f"progress must be a function of (progress, residual), got {self.progress!r}")
 
@@ -61,7 +64,7 @@ def find(
 ) -> Solution:
     """The equilibrium at the arguments of ms.equilibrium, cases apart. Raises as it does."""
     search = Search() if search is None else search
-    inputs = inputs_of(scene, arguments)
+    inputs = inputs_of(scene, arguments, search.at_rest)
     state, turns, from_, at_rest = starting_point(scene, start, inputs)
     options = search.options()
     options.start_at_rest = at_rest
@@ -71,7 +74,7 @@ def find(
     return solve(inputs, state, turns, from_, inputs.controls, options, search.progress)
 
 
-def inputs_of(scene: Scene, arguments: dict) -> Inputs:
+def inputs_of(scene: Scene, arguments: dict, at_rest: bool = False) -> Inputs:
     """The arguments of ms.equilibrium, checked against the scene."""
     given = dict(arguments)
     shell = {name: given.pop(name, None) for name in SHELL_NAMES}
@@ -82,7 +85,15 @@ def inputs_of(scene: Scene, arguments: dict) -> Inputs:
     factors = {name: given.pop(name, 1.0) for name in FACTORS}
     if given:
         raise TypeError(f"equilibrium() got an unexpected keyword argument {next(iter(given))!r}")
-    return Inputs(scene, magnetization, flux_density, replaced=replaced, differentiable=True, **factors)
+    return Inputs(
+        scene,
+        magnetization,
+        flux_density,
+        replaced=replaced,
+        differentiable=True,
+        without_forces_of_motion=at_rest,
+        **factors,
+    )
 
 
 def solve(inputs: Inputs, state: np.ndarray, turns: list, from_, to, options, progress=None) -> Solution:

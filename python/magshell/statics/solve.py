@@ -34,6 +34,7 @@ def equilibrium(
     values: dict | None = None,
     start: Equilibrium | Equilibria | np.ndarray | None = None,
     require_stable: bool = True,
+    at_rest: bool = False,
     solver: Newton | None = None,
     progress: Callable[[float, float], None] | None = None,
 ) -> Equilibrium | Equilibria:
@@ -54,6 +55,8 @@ def equilibrium(
     start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
         (n_v, 3) m. By default the rest shape, unloaded. Load cases may have Equilibria, one each.
     require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.
+    at_rest: of a scene with friction or water, the equilibrium without them, which act on what moves only. By default such
+        a scene is refused: with friction, where it comes to rest depends on how it got there, which ms.simulate tells.
     solver: MixedNewton() by default.
     progress: called now and then with how far the controls have come (0 to 1) and the residual.
 
@@ -72,7 +75,7 @@ def equilibrium(
     >>> rest.stable, bool(rest.positions[:, 2].max() > 0.01)
     (True, True)
     """
-    search = Search(MixedNewton() if solver is None else solver, require_stable, progress)
+    search = Search(MixedNewton() if solver is None else solver, require_stable, progress, at_rest)
     arguments = {
         "remanent_magnetization": remanent_magnetization,
         "applied_flux_density": applied_flux_density,

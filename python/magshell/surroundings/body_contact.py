@@ -13,7 +13,6 @@ from ..bodies.solid import Solid
 
 _REACH_OF_SHEETS = 0.1  # of the thickness
 _REACH_OF_SOLIDS = 0.05  # of the mean edge on the surface
-_OF_HEIGHT = (0.5, 0.25)  # of the smallest height of a face: what a sheet may keep from itself, and feel beyond that
 _STICKING = 1e-2  # of the larger body's extent, a second
 _SMOOTHING = 0.1  # of the reach
 LAWS = ("barrier", "penalty")
@@ -44,8 +43,9 @@ class BodyContact(Owner):
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(4, 4))
+    >>> above = mesh.transformed(translation=(1e-3, 5e-4, 2e-3))
     >>> lower = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
-    >>> upper = ms.Shell(mesh.transformed(translation=(1e-3, 5e-4, 2e-3)), thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> upper = ms.Shell(above, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     >>> held = ms.Clamp(mesh.boundary_edges, body=lower)
     >>> scene = ms.Scene(
     ...     [lower, upper],
@@ -189,8 +189,8 @@ class SelfContact(BodyContact):
     """A body that does not pass through itself.
 
     a: a Shell or a Solid. The others are as in BodyContact, which ms.Contact(a, b, ...) makes, but that by default a sheet
-    keeps its whole thickness from itself, or half the smallest height of a face where that is less: a face has to be wider
-    than what it keeps from those beyond its neighbours. A larger distance than they have at rest is refused.
+    keeps its whole thickness from itself. Neighbours along the surface that are nearer at rest than twice minimal distance
+    and reach keep half of what they have there, in the proportion of the two.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -229,10 +229,7 @@ class SelfContact(BodyContact):
         )
 
     def _distance(self, bodies) -> float:
-        return min(_thickness(self.a), _OF_HEIGHT[0] * _smallest_height(self.a.mesh))
-
-    def _reach(self, bodies) -> float:
-        return min(_reach(self.a), _OF_HEIGHT[1] * _smallest_height(self.a.mesh))
+        return _thickness(self.a)
 
     @property
     def sides(self) -> tuple:
@@ -279,16 +276,6 @@ def _reach(body) -> float:
     return _REACH_OF_SOLIDS * _mean_edge(body.mesh)
 
 
-def _corners(mesh) -> np.ndarray:
-    return mesh.rest_positions[mesh.faces]
-
-
 def _mean_edge(mesh) -> float:
-    corners = _corners(mesh)
+    corners = mesh.rest_positions[mesh.faces]
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
-
-
-def _smallest_height(mesh) -> float:
-    corners = _corners(mesh)
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    return float((2.0 * mesh.face_areas / longest).min())
