@@ -169,7 +169,7 @@ def _squeeze(rng, size, modulus, law):
         up = top + rng.uniform(0.01, 0.05) * size - block.mesh.rest_positions[:, 2].min()
         layers.append(_raised(block, [0.1 * size * rng.random(), 0.0, up]))
         top = layers[-1].mesh.rest_positions[:, 2].max()
-    contacts = [ms.Contact(a, b, **law) for a, b in itertools.pairwise(layers)]
+    contacts = [ms.Contact(a, b, **law) for a, b in itertools.combinations(layers, 2)]
     return layers, [held], contacts, []
 
 
