@@ -77,7 +77,8 @@ class Model {
     /// Which term's force is not finite at q, and on which vertex; empty if all are.
     std::string not_finite(const VectorXd& q, const Controls& controls);
     /// The Hessian at the last evaluated state, in matrix(). Cautious: what touching bodies add is nowhere negative.
-    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, bool cautious = false);
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+                  bool cautious = false);
     /// Whether loads follow the bodies, which may make the Hessian unsymmetric; and whether, as assembled last, it is, for
     /// what is free to move: then it is matrix() and remainder(), and there is no energy.
     bool follows() const { return follows_; }
