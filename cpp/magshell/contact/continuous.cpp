@@ -7,7 +7,7 @@
 namespace magshell {
 namespace {
 
-constexpr int most_turns = 1024;      // of the direction: the share found up to there is free all the same
+constexpr int most_turns = 1024;     // of the direction: the share found up to there is free all the same
 constexpr double small_rest = 0.01;  // of the gap to be used up: nearer than that is near enough
 // Of the largest coordinate. A place x + t p has an error of two units of round-off, a difference of two such places
 // five, and its product with a direction of length 1 (itself good to four) less than 32.
