@@ -19,7 +19,7 @@ def _carried_skeleton(free: bool):
         own = {"mass": 2e-3, "inertia": (4e-7, 5e-7, 6e-7), "magnetic_moment": (1e-3, 2e-3, 5e-3), **own}
         return ms.Link(center=base + np.array(off), **own)
 
-    root = ms.Link(CORNER, mass=1e-3, inertia=1e-7, center=(*base, 0.001, 0, 0.002))
+    root = ms.Link(CORNER, mass=1e-3, inertia=1e-7, center=np.add(base, (0.001, 0, 0.002)))
     spin = {"velocity": (0.02, 0.01, -0.1), "angular_velocity": (2.0, 5.0, -1.0)} if free else {}
     arm, slider, bob = link(0.02, 0, 0.01, **spin), link(0.0, 0.02, 0.01), link(0.04, 0.0, 0.02)
     stone = link(0.02, 0, 0.03)
@@ -27,7 +27,7 @@ def _carried_skeleton(free: bool):
     hinge = ms.Revolute(
         arm,
         root,
-        origin=(*base, 0.005, 0, 0),
+        origin=np.add(base, (0.005, 0, 0)),
         axis=(0.1, 1, 0.3),
         rest_angle=0.02,
         torque=1e-5,
@@ -55,13 +55,13 @@ def _carried_skeleton(free: bool):
     ball = ms.Ball(
         bob,
         arm,
-        origin=(*base, 0.03, 0, 0.01),
+        origin=np.add(base, (0.03, 0, 0.01)),
         spring_stiffness=2e-3,
         upper_limit=1e-2,
         limit_stiffness=1e-3,
         limit_smoothing=1e-2,
     )
-    loop = ms.Closure(bob, origin=(*base, 0.05, 0.001, 0.02), stiffness=0.5)
+    loop = ms.Closure(bob, origin=np.add(base, (0.05, 0.001, 0.02)), stiffness=0.5)
     skeleton = ms.Skeleton([arm, root, slider, bob, stone], [hinge, slide, ball, ms.Fixed(stone, arm), loop])
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     return ms.Scene(

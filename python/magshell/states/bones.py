@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.tensors import detached
+from ..bodies.joints import Fixed
 from ..bodies.skeleton import Skeleton
 from ..mesh.triangle_mesh import TriangleMesh
 from ..obstacles import Capsule, Sphere
@@ -18,7 +19,8 @@ def surface_of(skeleton: Skeleton, link, center: np.ndarray) -> tuple[np.ndarray
     shape = getattr(link, "shape", None)
     if shape is not None:
         return shape.rest_positions, shape.faces
-    ends = [joint.origin for joint in skeleton.joints if link is joint.child or link is joint.parent]
+    turning = [joint for joint in skeleton.joints if not isinstance(joint, Fixed)]
+    ends = [joint.origin for joint in turning if link is joint.child or link is joint.parent]
     ends = [*ends, center] if len(ends) < 2 else ends
     middle = np.mean(ends, axis=0)
     rods = [(middle, end) for end in ends] if len(ends) > 2 else [tuple(ends)] if len(ends) == 2 else []

@@ -122,7 +122,10 @@ def states_of(
         own = _held_by(what)
         merged = {name: own.get(name) if value is None else value for name, value in given.items()}
         merged = _with_own(merged, what.scene, getattr(what, "_obstacles", None))
-        states = _states(what.scene.mesh, merged, what.scene.fields, own["strengths"], own["titles"])
+        mesh = what.scene.mesh
+        if not what.scene.bodies and positions is None:
+            mesh, merged["positions"] = _skeletons_alone(what)
+        states = _states(mesh, merged, what.scene.fields, own["strengths"], own["titles"])
         states = _with_elements(what, _with_bones(what, states, positions), positions)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
@@ -139,17 +142,19 @@ def states_of(
 
 
 def _with_bones(result, states: list[State], positions) -> list[State]:
-    """With its skeletons, where the states are those that it has itself; without flesh they are all that there is."""
-    if positions is not None or not result.scene._bodies.skeletons:
+    """With the skeletons inside its bodies, where the states are those that it has itself."""
+    if positions is not None or not result.scene._bodies.skeletons or not result.scene.bodies:
         return states
     bones = bones_of(result)
-    if result.scene.bodies:
-        return [replace(state, bones=tuple(each)) for state, each in zip(states, bones, strict=True)]
-    mesh = mesh_of(bones_at_rest(result.scene))
-    return [
-        replace(state, mesh=mesh, positions=joined(each)[0])
-        for state, each in zip(states, bones, strict=True)
-    ]
+    return [replace(state, bones=tuple(each)) for state, each in zip(states, bones, strict=True)]
+
+
+def _skeletons_alone(result) -> tuple[TriangleMesh, np.ndarray]:
+    """Of a result without flesh: its bones as a sheet, and where they are, (k, n, 3) m."""
+    if not result.scene._bodies.skeletons:
+        raise ValueError("cannot draw a scene of free rigid parts: they have no shape")
+    frames = [joined(each)[0] for each in bones_of(result)]
+    return mesh_of(bones_at_rest(result.scene)), np.stack(frames)
 
 
 def _with_elements(result, states: list[State], positions) -> list[State]:
