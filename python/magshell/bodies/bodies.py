@@ -168,6 +168,11 @@ class Bodies:
                 return skeleton
         return None
 
+    def drifts(self, part: Rigid) -> bool:
+        """Whether nothing but itself tells a rigid part where to be."""
+        skeleton = self.skeleton_of(part)
+        return part.vertices is None if skeleton is None else skeleton.drifts(part)
+
     def held_by_joints(self, part: Rigid) -> bool:
         """Whether joints lead from it to the world."""
         skeleton = self.skeleton_of(part)

@@ -83,10 +83,20 @@ class Skeleton:
 
     def held(self, link: Rigid) -> bool:
         """Whether joints lead from a link to the world."""
+        joint = self._leading.get(id(self._root(link)))
+        return joint is not None
+
+    def drifts(self, link: Rigid) -> bool:
+        """Whether neither the world nor a vertex of a body is in the tree of a link."""
+        root = self._root(link)
+        tree = [each for each in self.links if self._root(each) is root]
+        return not self.held(link) and all(each.vertices is None for each in tree)
+
+    def _root(self, link: Rigid) -> Rigid:
         joint = self._leading.get(id(link))
         while joint is not None and joint.parent is not None:
-            joint = self._leading.get(id(joint.parent))
-        return joint is not None
+            link, joint = joint.parent, self._leading.get(id(joint.parent))
+        return link
 
     @property
     def in_order(self) -> tuple[Rigid, ...]:

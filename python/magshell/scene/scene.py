@@ -151,7 +151,7 @@ class Scene:
             free += [
                 f"rigid part {k}, which is free"
                 for k, each in enumerate(self.rigid_parts)
-                if each.vertices is None and not bodies.held_by_joints(each)
+                if bodies.drifts(each)
             ]
         if free:
             raise ValueError(
