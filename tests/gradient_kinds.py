@@ -17,7 +17,7 @@ from gradient_kinds_bodies import (
 )
 from gradient_kinds_contact import CONTACT_MAKERS
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
-from gradient_kinds_skeletons import skeleton_at_rest, skeleton_in_motion
+from gradient_kinds_skeletons import skeleton_at_rest, skeleton_in_motion, thrown_skeleton
 from gradient_scenes import Kind
 from gradient_world import (
     BEGIN,
@@ -266,6 +266,7 @@ MAKERS = {
     "in motion, with a skeleton": lambda: skeleton_in_motion(
         ms.TRBDF2(), keep="checkpoints", memory_budget=2e4
     ),
+    "a thrown skeleton": thrown_skeleton,
     "in motion, with a skeleton, euler": lambda: skeleton_in_motion(ms.ImplicitEuler()),
     "onto a Plane": lambda: thrown(ob.Plane),
     "onto a Plane, rubbing": lambda: thrown(ob.Plane, **RUBS),

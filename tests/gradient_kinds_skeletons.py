@@ -8,7 +8,7 @@ from test_adjoint import DEFAULTS, DIPOLES, MESH, N_V
 
 import magshell as ms
 
-_LIMITS = {"lower_limit": -2e-3, "upper_limit": 1e-3, "limit_stiffness": 1e-2, "limit_smoothing": 5e-3}
+_LIMITS = {"lower_limit": -1.0, "upper_limit": -1e-3, "limit_stiffness": 1e-2, "limit_smoothing": 5e-3}
 
 
 def _carried_skeleton(free: bool):
@@ -20,15 +20,14 @@ def _carried_skeleton(free: bool):
         return ms.Link(center=base + np.array(off), **own)
 
     root = ms.Link(CORNER, mass=1e-3, inertia=1e-7, center=np.add(base, (0.001, 0, 0.002)))
-    spin = {"velocity": (0.02, 0.01, -0.1), "angular_velocity": (2.0, 5.0, -1.0)} if free else {}
-    arm, slider, bob = link(0.02, 0, 0.01, **spin), link(0.0, 0.02, 0.01), link(0.04, 0.0, 0.02)
-    stone = link(0.02, 0, 0.03)
+    arm, slider, bob = link(0.02, 0, 0.01), link(0.0, 0.02, 0.01), link(0.04, 0.0, 0.02)
+    stone, sled = link(0.02, 0, 0.03), link(0.01, 0.03, 0.02)
     springs = {"spring_stiffness": 3e-3, "servo_stiffness": 2e-3}
     hinge = ms.Revolute(
         arm,
         root,
         origin=np.add(base, (0.005, 0, 0)),
-        axis=(0.1, 1, 0.3),
+        axis=(-0.1, -1, -0.3),
         rest_angle=0.02,
         torque=1e-5,
         target_angle=0.05,
@@ -48,7 +47,7 @@ def _carried_skeleton(free: bool):
         spring_stiffness=5.0,
         servo_stiffness=3.0,
         lower_limit=-1e-2,
-        upper_limit=1e-5,
+        upper_limit=-1e-4,
         limit_stiffness=2.0,
         limit_smoothing=1e-3,
     )
@@ -57,18 +56,23 @@ def _carried_skeleton(free: bool):
         arm,
         origin=np.add(base, (0.03, 0, 0.01)),
         spring_stiffness=2e-3,
-        upper_limit=1e-2,
+        upper_limit=1.1e-3,
         limit_stiffness=1e-3,
         limit_smoothing=1e-2,
     )
     loop = ms.Closure(bob, origin=np.add(base, (0.05, 0.001, 0.02)), stiffness=0.5)
-    skeleton = ms.Skeleton([arm, root, slider, bob, stone], [hinge, slide, ball, ms.Fixed(stone, arm), loop])
+    turn = {"lower_limit": 0.05, "limit_stiffness": 1e-2, "limit_smoothing": 0.02, "spring_stiffness": 1e-3}
+    lever = ms.Revolute(stone, arm, origin=np.add(base, (0.02, 0, 0.02)), axis=(0, 1, 0), **turn)
+    push = {"lower_limit": 1e-3, "limit_stiffness": 5.0, "limit_smoothing": 1e-3, "spring_stiffness": 5.0}
+    rail = ms.Prismatic(sled, slider, origin=base, axis=(0, 0.3, 1), **push)
+    links, joints = [arm, root, slider, bob, stone, sled], [hinge, slide, ball, lever, rail, loop]
+    skeleton = ms.Skeleton(links, joints)
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     return ms.Scene(
         [sheet, skeleton],
         supports=[ms.Clamp(MESH.edges_at(x=0.0))],
         field=[ms.UniformField(), DIPOLES],
-        gravity=(0.1, 0.2, -2.0),
+        gravity=(0.1, 0.2, -9.81),
         allow_rigid_motions=free,
     )
 
@@ -84,6 +88,34 @@ def skeleton_in_motion(integrator, **options) -> Kind:
     moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
     controls = {**IN_TIME, "velocities": moves, "time_step": 3e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
-    reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0}
     in_time = {"in_time": STEPS} if "keep" in options else {}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach, **in_time)
+    # The small first steps of TR-BDF2 leave their round-off in velocities: longer differences feel less of it.
+    step = 8e-3 if in_time else 1e-5
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time)
+
+
+def thrown_skeleton() -> Kind:
+    """Two links on a hinge, in the air: they start as one."""
+    arm = ms.Link(
+        mass=2e-3,
+        inertia=(4e-7, 5e-7, 6e-7),
+        center=(0.01, 0.02, 0.0),
+        velocity=(0.02, 0.01, -0.1),
+        angular_velocity=(2.0, 5.0, -1.0),
+    )
+    hand = ms.Link(mass=1e-3, center=(0.03, 0.02, 0.01), magnetic_moment=(1e-3, 2e-3, 5e-3))
+    wrist = ms.Revolute(
+        hand, arm, origin=(0.02, 0.02, 0.0), axis=(0, 1, 0.2), spring_stiffness=1e-4, torque=1e-5
+    )
+    ring = ms.Link(mass=1e-4, inertia=1e-9, center=(0.03, 0.025, 0.01))
+    field = [ms.UniformField(), DIPOLES]
+    scene = ms.Scene(
+        ms.Skeleton([hand, arm, ring], [wrist, ms.Fixed(ring, hand)]),
+        field=field,
+        gravity=(0, 0, -2.0),
+        allow_rigid_motions=True,
+    )
+    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "time_step": 3e-3}
+    fixed = {**EXACT, "steps": STEPS, "integrator": ms.ImplicitEuler(), "progress": False}
+    reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0, "center": 0.01}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)

@@ -88,7 +88,11 @@ test_shell_is_refused = refused(
 
 test_scene_is_refused = refused(
     [
-        ("shell", lambda: ms.Scene(MESH), "bodies must hold Shell, Solid, Rigid objects, got TriangleMesh"),
+        (
+            "shell",
+            lambda: ms.Scene(MESH),
+            "bodies must hold Shell, Solid, Rigid, Skeleton objects, got TriangleMesh",
+        ),
         ("no supports", lambda: scene(supports=None), "supports must hold Pin, Clamp, .* got NoneType"),
         ("a string", lambda: scene(supports="clamp"), "supports must hold .* objects, got str"),
         (

@@ -156,6 +156,11 @@ def test_skeleton_in_jelly_keeps_its_bones_and_bends_the_bar():
         assert np.abs(lengths[0] - lengths[1]).max() < 1e-12
 
 
+def _held_with_a_velocity(link):
+    moving = ms.Link(mass=1.0, center=(0, 0, 0), velocity=(1, 0, 0))
+    return ms.Skeleton([link, moving], [ms.Ball(moving, link, origin=(0, 0, 1))])
+
+
 def differences(function, at: np.ndarray, step: float) -> np.ndarray:
     gradient = np.zeros_like(at)
     for k in np.ndindex(at.shape):
@@ -195,6 +200,7 @@ def test_gradient_of_a_motion_by_torques_in_time():
         (lambda a, b: ms.Revolute(a, origin=(0, 0, 0), axis=(0, 0, 1), target_angle=1.0), "servo_stiffness"),
         (lambda a, b: ms.Ball(a, origin=(0, 0, 0), spring_stiffness=-1.0), "must not be negative"),
         (lambda a, b: ms.Link(mass=1.0), "center"),
+        (lambda a, b: _held_with_a_velocity(a), "only that of a free link"),
         (lambda a, b: ms.Scene([ms.Skeleton([a]), a], allow_rigid_motions=True), "one Rigid"),
         (lambda a, b: ms.Scene(ms.Skeleton([ms.Link(mass=1.0, inertia=1.0, center=(0, 0, 0))])), "free"),
         (

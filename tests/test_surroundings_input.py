@@ -99,7 +99,7 @@ test_contacts_refuse = refused(
         (
             "no contact",
             lambda: ms.Scene(SHEET, contacts=GROUND),
-            "contacts must hold Contact objects, got Plane",
+            "contacts must hold Contact, BodyContact objects, got Plane",
         ),
         ("contact class", lambda: ms.Scene(SHEET, contacts=[ms.Contact]), "the class Contact: call it"),
         ("no water", lambda: ms.Scene(SHEET, water=1000.0), "water must be a Water, got float"),

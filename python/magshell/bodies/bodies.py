@@ -168,6 +168,12 @@ class Bodies:
                 return skeleton
         return None
 
+    def started_by(self, part: Rigid) -> list[int]:
+        """The numbers of the rigid parts that start with the velocity of a free one: of a skeleton, its tree."""
+        skeleton = self.skeleton_of(part)
+        moved = [part] if skeleton is None else skeleton.tree(part)
+        return [self.rigid_number(each) for each in moved]
+
     def drifts(self, part: Rigid) -> bool:
         """Whether nothing but itself tells a rigid part where to be."""
         skeleton = self.skeleton_of(part)

@@ -126,7 +126,9 @@ class Rigid(Owner):
             by_center += by_place
         by_mass_points = gradient.others.get("own_velocities")
         if by_mass_points is not None:
-            rows, at = by_mass_points[place.points], place.rest - place.center_of(self)
+            started = values.started_by(self)
+            rows = np.concatenate([by_mass_points[each.points] for each in started])
+            at = np.concatenate([each.rest for each in started]) - place.center_of(self)
             found["velocity"], found["angular_velocity"] = rows.sum(axis=0), np.cross(at, rows).sum(axis=0)
             if self.vertices is None:  # points start at velocity + angular_velocity x (point - center)
                 by_center -= np.cross(rows.sum(axis=0), or_zero(self.angular_velocity))

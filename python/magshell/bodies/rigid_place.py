@@ -73,9 +73,9 @@ class Place(NamedTuple):
         by_inertia = {2: by_tensor, 1: np.diag(by_tensor)}.get(len(shape), np.trace(by_tensor))
         return np.asarray(by_mass), np.asarray(by_inertia), by_center
 
-    def start_velocities(self, part: Rigid) -> np.ndarray:
-        """(10, 3) m/s of the points of a free body that starts at rest positions."""
-        turning = np.cross(or_zero(part.angular_velocity), self.rest - self.center_of(part))
+    def start_velocities(self, part: Rigid, points: np.ndarray) -> np.ndarray:
+        """(n, 3) m/s of points (n, 3) m that start with a free body at rest positions."""
+        turning = np.cross(or_zero(part.angular_velocity), points - self.center_of(part))
         return or_zero(part.velocity) + turning
 
     def as_input(self, owner: str, magnetic: bool) -> dict:
@@ -170,7 +170,8 @@ def own_velocities(inputs, start, goes_on: bool) -> np.ndarray:
         if part.vertices is not None or (part.velocity is None and part.angular_velocity is None):
             continue
         if start is None or is_tensor(start) or isinstance(start, np.ndarray | list | tuple):
-            rows[10 * k : 10 * k + 10] = place.start_velocities(part)
+            for number in scene._bodies.started_by(scene.rigid_parts[k]):
+                rows[10 * number : 10 * number + 10] = place.start_velocities(part, scene._rigid[number].rest)
         elif not goes_on or part is not scene.rigid_parts[k]:
             raise ValueError(
                 "the velocity of a free Rigid is that of a motion that starts at rest positions; this one goes on from "

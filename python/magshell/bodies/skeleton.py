@@ -43,6 +43,7 @@ class Skeleton:
         for k, joint in enumerate(self.joints):
             self._check(k, joint)
         self._order = self._in_order()
+        self._check_velocities()
 
     def _check(self, k: int, joint: Joint) -> None:
         for role in ("child", "parent"):
@@ -56,6 +57,16 @@ class Skeleton:
                 f"two joints lead to one link (joint {k} is the second): in a tree one does; close a loop by a Closure"
             )
         self._leading[id(joint.child)] = joint
+
+    def _check_velocities(self) -> None:
+        for k, link in enumerate(self.links):
+            if link.velocity is None and link.angular_velocity is None:
+                continue
+            if self._root(link) is not link or any(each.vertices is not None for each in self.tree(link)):
+                raise ValueError(
+                    f"link {k} has a velocity, but only that of a free link, to which no joint leads and whose tree has no "
+                    "vertices, can be given: its whole tree starts with it"
+                )
 
     def _in_order(self) -> list[int]:
         """The numbers of the links, parents first."""
@@ -83,14 +94,16 @@ class Skeleton:
 
     def held(self, link: Rigid) -> bool:
         """Whether joints lead from a link to the world."""
-        joint = self._leading.get(id(self._root(link)))
-        return joint is not None
+        return id(self._root(link)) in self._leading
 
     def drifts(self, link: Rigid) -> bool:
         """Whether neither the world nor a vertex of a body is in the tree of a link."""
+        return not self.held(link) and all(each.vertices is None for each in self.tree(link))
+
+    def tree(self, link: Rigid) -> list[Rigid]:
+        """All links that joints lead to from the root of this one."""
         root = self._root(link)
-        tree = [each for each in self.links if self._root(each) is root]
-        return not self.held(link) and all(each.vertices is None for each in tree)
+        return [each for each in self.links if self._root(each) is root]
 
     def _root(self, link: Rigid) -> Rigid:
         joint = self._leading.get(id(link))

@@ -145,6 +145,12 @@ class Values:
         """Where one of `rigid` is."""
         return next(place for place, each in zip(self.scene._rigid, self.rigid, strict=True) if each is part)
 
+    def started_by(self, part) -> list:
+        """The places of all that starts with one of `rigid`."""
+        scene = self.scene
+        own = next(each for each, now in zip(scene.rigid_parts, self.rigid, strict=True) if now is part)
+        return [scene._rigid[k] for k in scene._bodies.started_by(own)]
+
     def by_inertia_and_weight(self, gradient: Gradient) -> tuple[np.ndarray | None, np.ndarray | None]:
         """By `masses`, and by `weighed_masses`; None where they have no part."""
         by_weights = self.by_weights(gradient)
