@@ -19,7 +19,8 @@ IN_TIME = ", in time"
 # Keywords of a solve that are no numbers to differentiate by.
 SETTINGS = {"scene", "values", "solver", "progress"}
 SETTINGS_OF = {
-    ms.equilibrium: SETTINGS | {"require_stable", "at_rest", "start"},  # wherever the search began: a tensor is refused
+    ms.equilibrium: SETTINGS
+    | {"require_stable", "at_rest", "start"},  # wherever the search began: a tensor is refused
     ms.simulate: SETTINGS | {"steps", "integrator", "record_every", "memory_budget", "keep"},
 }
 

@@ -55,7 +55,9 @@ def test_hessian_and_gradient_are_those_of_the_energy(law):
     difference = (above - below) / (2 * step)
     assert np.abs(hessian @ p - difference).max() < 1e-5 * np.abs(difference).max()
     energies = [model.energy(q + sign * step * p, controls) for sign in (1, -1)]
-    assert (energies[0] - energies[1]) / (2 * step) == pytest.approx(model.gradient(q, controls) @ p, rel=1e-6)
+    assert (energies[0] - energies[1]) / (2 * step) == pytest.approx(
+        model.gradient(q, controls) @ p, rel=1e-6
+    )
 
 
 def test_reduced_hessian_is_that_of_the_free_unknowns():
@@ -165,7 +167,10 @@ def test_strip_folds_onto_itself():
 REFUSED = [
     (lambda s, o: ms.Contact(s, s), "one body"),
     (lambda s, o: ms.Contact(s, o, law="hard"), "law must be"),
-    (lambda s, o: ms.Contact(s, o, friction_coefficient=-0.1), r"friction_coefficient \[1\] must not be negative"),
+    (
+        lambda s, o: ms.Contact(s, o, friction_coefficient=-0.1),
+        r"friction_coefficient \[1\] must not be negative",
+    ),
     (lambda s, o: ms.Contact(s, o, static_friction_coefficient=0.3), "without a friction_coefficient"),
     (
         lambda s, o: ms.Contact(s, o, friction_coefficient=0.3, static_friction_coefficient=0.2),

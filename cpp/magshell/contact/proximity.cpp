@@ -43,25 +43,30 @@ void try_point_edge(const PairPlaces& x, int p, int a, int b, double sign, Close
     best.more[0] = sign > 0.0 ? b : a;
 }
 
-Closest closest_point_triangle(const PairPlaces& x) {
-    Closest best;
-    const Vec3 one = x[2] - x[1], two = x[3] - x[1], to = x[0] - x[1];
-    const Vec3 normal = one.cross(two);
-    const double squared_area = normal.squaredNorm();
-    if (squared_area > parallel * one.squaredNorm() * two.squaredNorm()) {
-        const double s = to.cross(two).dot(normal), t = one.cross(to).dot(normal);
-        if (s > 0.0 && t > 0.0 && s + t < squared_area) {
-            const double u = s / squared_area, v = t / squared_area, height = normal.dot(to);
-            best.squared = height * height / squared_area;
-            best.weights = {1.0, u + v - 1.0, -u, -v};
-            best.free = 2;
-            best.less[0] = 2;
-            best.more[0] = 1;
-            best.less[1] = 3;
-            best.more[1] = 1;
-            return best;
-        }
+/// Coordinates in the plane of two vectors: to = first one + second two + something across both.
+struct InPlane {
+    bool told = false;  // false where the two are parallel
+    double first, second;
+    double squared_height;
+
+    InPlane(const Vec3& one, const Vec3& two, const Vec3& to) {
+        const Vec3 normal = one.cross(two);
+        const double squared_area = normal.squaredNorm();
+        if (!(squared_area > parallel * one.squaredNorm() * two.squaredNorm())) return;
+        told = true;
+        const double height = normal.dot(to);
+        first = to.cross(two).dot(normal) / squared_area;
+        second = one.cross(to).dot(normal) / squared_area;
+        squared_height = height * height / squared_area;
     }
+};
+
+Closest closest_point_triangle(const PairPlaces& x) {
+    const InPlane at(x[2] - x[1], x[3] - x[1], x[0] - x[1]);
+    if (at.told && at.first > 0.0 && at.second > 0.0 && at.first + at.second < 1.0)
+        return {
+            at.squared_height, {1.0, at.first + at.second - 1.0, -at.first, -at.second}, 2, {2, 3}, {1, 1}};
+    Closest best;
     try_point_edge(x, 0, 1, 2, -1.0, best);
     try_point_edge(x, 0, 2, 3, -1.0, best);
     try_point_edge(x, 0, 3, 1, -1.0, best);
@@ -69,24 +74,11 @@ Closest closest_point_triangle(const PairPlaces& x) {
 }
 
 Closest closest_edge_edge(const PairPlaces& x) {
+    const InPlane at(x[1] - x[0], x[2] - x[3], x[2] - x[0]);
+    if (at.told && at.first > 0.0 && at.first < 1.0 && at.second > 0.0 && at.second < 1.0)
+        return {
+            at.squared_height, {1.0 - at.first, at.first, at.second - 1.0, -at.second}, 2, {0, 3}, {1, 2}};
     Closest best;
-    const Vec3 one = x[1] - x[0], two = x[3] - x[2], to = x[2] - x[0];
-    const Vec3 normal = one.cross(two);
-    const double squared_area = normal.squaredNorm();
-    if (squared_area > parallel * one.squaredNorm() * two.squaredNorm()) {
-        const double s = to.cross(two).dot(normal), t = to.cross(one).dot(normal);
-        if (s > 0.0 && s < squared_area && t > 0.0 && t < squared_area) {
-            const double u = s / squared_area, v = t / squared_area, height = normal.dot(to);
-            best.squared = height * height / squared_area;
-            best.weights = {1.0 - u, u, v - 1.0, -v};
-            best.free = 2;
-            best.less[0] = 0;
-            best.more[0] = 1;
-            best.less[1] = 3;
-            best.more[1] = 2;
-            return best;
-        }
-    }
     try_point_edge(x, 0, 2, 3, -1.0, best);
     try_point_edge(x, 1, 2, 3, -1.0, best);
     try_point_edge(x, 2, 0, 1, 1.0, best);

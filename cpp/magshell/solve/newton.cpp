@@ -33,8 +33,8 @@ constexpr double shrinking = 0.7;
 // A residual that shrinks less makes the next step a cautious one.
 constexpr double contracting = 0.5;
 
-// A shorter share of a step than that leads nowhere; a search along it may take very short ones.
-constexpr double shortest_share = 1e-4, shortest_searched = 1e-9;
+// A shorter share of a step than that leads nowhere.
+constexpr double shortest_share = 1e-4;
 
 // How exactly to solve for a Newton step with an unsymmetric matrix: what its quadratic convergence deserves,
 // and no more than the end needs.
@@ -316,78 +316,6 @@ bool Newton::descend(VectorXd& q, const Controls& controls, const Anchor& anchor
         }
     }
     return true;
-}
-
-double Newton::advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report) {
-    const double share = model_.share_of_step(q, step);
-    if (share < shortest) {
-        report.reason = model_.stuck(q, step);
-        return -1.0;
-    }
-    if (share < 1.0) step *= share;
-    model_.reduction().advance(q, step);
-    return share;
-}
-
-NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, const Anchor& anchor,
-                                     int max_iterations) {
-    constexpr double falling = 0.5, least = 0.1;  // of the slope along a step: where it may end
-    constexpr int most_cuts = 12;
-    NewtonReport report;
-    report.reason = model_.refusal(q);
-    if (!report.reason.empty()) return report;
-    VectorXd move = model_.reduction().prescribed_increment(q, controls);
-    double last_residual = std::numeric_limits<double>::infinity(), share = 1.0;
-    evaluate(q, controls, anchor);
-    for (;; ++report.iterations, ++iterations_) {
-        report.residual = relative_residual(q, anchor);
-        watch(report.residual);
-        if (!std::isfinite(report.residual)) {
-            report.reason = "the iteration diverged";
-            return report;
-        }
-        if (move.isZero(0.0) && report.residual <= options_.tolerance) {
-            report.converged = true;
-            return report;
-        }
-        if (report.iterations == max_iterations) {
-            report.reason = "no convergence in " + std::to_string(max_iterations) + " iterations";
-            return report;
-        }
-        const bool cautious = share < 1.0 || report.residual > contracting * last_residual;
-        last_residual = report.residual;
-        Eigen::MatrixXd pull = move;
-        report.factor = factorize(q, controls, false, anchor, pull, cautious);
-        if (!report.factor.succeeded) {
-            report.reason = report.factor.reason;
-            return report;
-        }
-        const VectorXd force = -gradient(q, anchor), from = q;
-        VectorXd step = move + solve_with_factor(force - pull.col(0),
-                                                 deserved(report.residual, options_.tolerance));
-        const bool in_place = move.isZero(0.0);
-        const double slope = force.dot(step);
-        if (in_place && !(slope > 0.0)) {
-            report.reason = "the energy does not fall along the step";
-            return report;
-        }
-        share = advance(q, step, shortest_searched, report);
-        if (share < 0.0) return report;
-        move *= 1.0 - share;
-        evaluate(q, controls, anchor);
-        if (!in_place) continue;
-        // Secants, where the energy has risen again at the end.
-        double part = 1.0;
-        for (int cut = 0; cut < most_cuts; ++cut) {
-            const double there = -gradient(q, anchor).dot(step) / share;
-            if (there >= -falling * slope) break;
-            part *= std::clamp(slope / (slope - there), least, falling);
-            q = from;
-            model_.reduction().advance(q, part * step);
-            evaluate(q, controls, anchor);
-        }
-        share *= part;
-    }
 }
 
 bool Newton::factor_serves(double contraction, double residual, double last_step) const {

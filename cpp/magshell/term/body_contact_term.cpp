@@ -63,7 +63,10 @@ std::vector<BodyContactTerm::Touch> BodyContactTerm::touches(const double* q) co
         for (Index k = first; k < last; ++k) {
             const PairPlaces x = places_of(near[k].pair, q);
             const PairEnergy at(near[k].pair, x, laws_[near[k].contact]);
-            if (at.acts()) found[block].push_back({near[k], at, x[0].lpNorm<Eigen::Infinity>()});
+            if (!at.acts()) continue;
+            double far = 0.0;
+            for (int i = 0; i < at.count(); ++i) far = std::max(far, x[i].lpNorm<Eigen::Infinity>());
+            found[block].push_back({near[k], at, far});
         }
     });
     std::vector<Touch> all;

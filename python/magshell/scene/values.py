@@ -81,7 +81,9 @@ class Values:
     @property
     def contacts(self) -> list[tuple]:
         """(contact with obstacles, its label, the sheets that touch) of all, as they are in this solve."""
-        labels = [(each, label) for each, label in self.scene._labels if each in self.scene._obstacle_contacts]
+        labels = [
+            (each, label) for each, label in self.scene._labels if each in self.scene._obstacle_contacts
+        ]
         return [(self.current(each), label, self.touching(each)) for each, label in labels]
 
     @property

@@ -278,4 +278,3 @@ def _reach(body) -> float:
 def _mean_edge(mesh) -> float:
     corners = mesh.rest_positions[mesh.faces]
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
-
