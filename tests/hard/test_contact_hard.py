@@ -271,6 +271,6 @@ def test_contact_that_opens_and_closes_in_every_step(integrator):
         contacts=[touch],
     )
     down = np.arange(21) % 2
-    motion = moved(scene, 20, 1e-3, motion_factor=down, stiffness_damping=1e-2, integrator=integrator)
+    motion = moved(scene, 20, 1e-3, motion_factor=down, stiffness_damping=2e-3, integrator=integrator)
     touched = np.array([len(motion.touching(touch, k).pairs) > 0 for k in range(21)])
     np.testing.assert_array_equal(touched, down == 1)
