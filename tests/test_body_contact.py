@@ -1,4 +1,4 @@
-"""Contact of bodies with each other and with themselves: nothing passes, forces balance, derivatives are those of the energy."""
+"""Contact of bodies with each other and with themselves: nothing passes, forces balance, derivatives fit the energy."""
 
 import numpy as np
 import pytest
@@ -150,6 +150,36 @@ def test_ball_falls_onto_a_sheet_and_never_through(integrator):
     assert middles.min() > move[sheet].positions[..., 2].min()
 
 
+@pytest.mark.parametrize("lagged", [False, True])
+@pytest.mark.parametrize("slope, slides", [(0.3, False), (0.7, True)])
+def test_block_on_a_slope_sticks_or_slides(slope, slides, lagged):
+    """With the acceleration g (sin - mu cos) once it slides."""
+    steep, friction = np.arctan(slope), 0.5
+    plate = ms.Shell(ms.meshes.rectangle(0.1, 0.06, cells=(5, 3)), **SOFT)
+    mesh = ms.meshes.box((0.03, 0.03, 0.01), cells=(2, 2, 1)).transformed(translation=(0.023, 0.017, 0.6e-3))
+    block = ms.Solid(
+        mesh,
+        material=ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.3),
+        mass_density=1e3,
+        element="linear",
+    )
+    touch = ms.Contact(block, plate, friction_coefficient=friction, lagged_friction=lagged)
+    scene = ms.Scene(
+        [block, plate],
+        supports=[ms.Pin(np.arange(plate.mesh.n_vertices), body=plate)],
+        contacts=[touch],
+        gravity=(9.81 * np.sin(steep), 0.0, -9.81 * np.cos(steep)),
+        allow_rigid_motions=True,
+    )
+    move = ms.simulate(scene, steps=40, time_step=2e-3, progress=False)
+    speed = move.velocities[:, : block.mesh.n_vertices, 0].mean(1)
+    gain = (speed[-1] - speed[-21]) / (move.times[-1] - move.times[-21])
+    wanted = 9.81 * (np.sin(steep) - friction * np.cos(steep)) if slides else 0.0
+    assert gain == pytest.approx(wanted, rel=0.02, abs=0.02)
+    if not slides:
+        assert 0.0 < speed[-1] < touch.sticking_speed
+
+
 def test_strip_folds_onto_itself():
     """Its end is turned over and brought down onto its beginning."""
     mesh = ms.meshes.rectangle(0.06, 0.01, cells=(24, 3))
@@ -162,6 +192,26 @@ def test_strip_folds_onto_itself():
     )
     assert len(move.self_intersections()) == 0
     assert move.touching(touch).smallest_distance > 0.9 * touch.minimal_distance
+
+
+def test_a_path_goes_through_the_closing_of_a_contact():
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    lower = ms.Shell(mesh, thickness=1e-3, young_modulus=1e8)
+    upper = ms.Shell(mesh.transformed(translation=(1.3e-3, 7e-4, 3e-3)), thickness=1e-3, young_modulus=1e7)
+    touch = ms.Contact(lower, upper)
+    scene = ms.Scene(
+        [lower, upper],
+        supports=[
+            ms.Clamp(mesh.edges_at(x=0.0), body=lower),
+            ms.Clamp(mesh.edges_at(x=0.0), body=upper),
+        ],
+        contacts=[touch],
+        loads=[ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, -0.06), body=upper)],
+    )
+    path = ms.follow(scene, start=ms.equilibrium(scene, load_factor=0.0), progress=False)
+    rest = ms.equilibrium(scene)
+    assert path.parameters[-1] == 1.0 and rest.touching(touch).normal_force > 1e-4
+    np.testing.assert_allclose(path.positions[-1], rest.positions, atol=1e-9)
 
 
 REFUSED = [
@@ -218,7 +268,7 @@ def test_supports_that_push_bodies_through_each_other_are_told():
         supports=[ms.Pin(all_of, body=lower), ms.Pin(all_of, displacement=(0, 0, -4e-3), body=upper)],
         contacts=[ms.Contact(lower, upper)],
     )
-    with pytest.raises(ms.NotConverged, match="bodies cannot follow: face .* in each other's way"):
+    with pytest.raises(ms.NotConverged, match=r"bodies cannot follow: face .* in each other's way"):
         ms.equilibrium(scene)
 
 

@@ -64,6 +64,7 @@ __all__: list[str] = [
     "set_num_threads",
     "simulate",
     "solid_point_states",
+    "touching_pairs",
     "vacuum_permeability",
     "vjp",
 ]
@@ -432,6 +433,10 @@ class Model:
     def reduce(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def refusal(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> str:
+        """
+        What is wrong with a state, in words; empty where nothing is.
+        """
     def rest_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def set_values(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
@@ -973,6 +978,13 @@ def solid_point_states(
 ) -> tuple:
     """
     (F, Cauchy stress [Pa], rest volumes [m3]) at the points of integration of a solid's elements: (n_t, p, 3, 3) twice and (n_t, p).
+    """
+
+def touching_pairs(
+    model: Model, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+) -> tuple:
+    """
+    Pairs of bodies in contact: contact (n,), vertices (n, 4), distances (n,), normal forces (n,), forces (n, 4, 3).
     """
 
 def vjp(

@@ -231,13 +231,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "values": {s.clamp: {"displacement": (0, 0, 2e-4)}, s.dipoles: {"moments": [(0, 0, 0.2)]}},
     }
     quick = ms.MixedNewton(max_iterations=10, max_relaxation_steps=5)
-    search = {
-        "start": s.positions,
-        "require_stable": True,
-        "at_rest": False,
-        "solver": quick,
-        "progress": None,
-    }
+    search = dict(start=s.positions, require_stable=True, at_rest=False, solver=quick, progress=None)
     yield Call("equilibrium", ms.equilibrium, {**magnetic, **replaced, **search})
     yield Call(
         "equilibrium of cases",

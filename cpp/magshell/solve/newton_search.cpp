@@ -53,6 +53,7 @@ NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, cons
     };
     VectorXd move = model_.reduction().prescribed_increment(q, controls);
     double last_residual = std::numeric_limits<double>::infinity(), share = 1.0;
+    bool was_cautious = false;
     evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, anchor);
@@ -65,7 +66,8 @@ NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, cons
         }
         if (report.iterations == max_iterations)
             return fail("no convergence in " + std::to_string(max_iterations) + " iterations");
-        bool cautious = share < 1.0 || report.residual > contracting * last_residual;
+        // After a cautious step that was taken whole an exact one may do, and tells whether it does.
+        bool cautious = share < 1.0 || (!was_cautious && report.residual > contracting * last_residual);
         last_residual = report.residual;
         const VectorXd force = -gradient(q, anchor), from = q;
         VectorXd step;
@@ -79,6 +81,7 @@ NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, cons
             if (!in_place || slope > 0.0) break;
             if (cautious) return fail("the energy does not fall along the step");
         }
+        was_cautious = cautious;
         share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
         move *= 1.0 - share;

@@ -70,8 +70,9 @@ def linear_buckling(
     modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
         the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
-    Raises ValueError on bad input, in a scene with contact of bodies, where the supports leave the sheet a motion without stiffness, where the
-    controls do nothing, and where the sheet does not buckle under them (a column that is pulled); Interrupted.
+    Raises ValueError on bad input, in a scene with contact of bodies, where the supports leave the sheet a motion without
+    stiffness, where the controls do nothing, and where the sheet does not buckle under them (a column that is pulled);
+    Interrupted.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))

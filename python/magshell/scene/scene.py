@@ -21,8 +21,8 @@ from ..bodies.solid import Solid
 from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
-from ..surroundings.constraints import Constraints, free_rigid_motions, gather
 from ..surroundings.body_contact import BodyContact
+from ..surroundings.constraints import Constraints, free_rigid_motions, gather
 from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import body_contact_inputs, contact_inputs, obstacles_of, split_contacts
 from ..surroundings.face_energies import FaceEnergy

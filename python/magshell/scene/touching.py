@@ -43,14 +43,12 @@ class Touching:
 
 def touching_in(scene, values, contact: BodyContact, state: np.ndarray) -> Touching:
     """values: of the solve that found the state. Raises ValueError where the contact is none of the scene's bodies."""
-    for k, each in enumerate(scene._body_contacts):
-        if each is contact:
-            break
-    else:
+    numbers = [k for k, each in enumerate(scene._body_contacts) if each is contact]
+    if not numbers:
         raise ValueError(f"contact must be one of bodies, of scene.contacts, got {contact!r:.80}")
     with values.in_core():
         of, pairs, distances, normal_forces, on_nodes = _core.touching_pairs(scene._model, state)
-    mine = of == k
+    mine = of == numbers[0]
     forces = np.zeros((scene.mesh.n_vertices, 3))
     there = pairs[mine] >= 0
     np.add.at(forces, pairs[mine][there], on_nodes[mine][there])

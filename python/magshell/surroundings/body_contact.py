@@ -43,8 +43,9 @@ class BodyContact(Owner):
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(4, 4))
+    >>> above = mesh.transformed(translation=(1e-3, 5e-4, 2e-3))
     >>> lower = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
-    >>> upper = ms.Shell(mesh.transformed(translation=(1e-3, 5e-4, 2e-3)), thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> upper = ms.Shell(above, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     >>> held = ms.Clamp(mesh.boundary_edges, body=lower)
     >>> scene = ms.Scene(
     ...     [lower, upper],
