@@ -286,3 +286,30 @@ def test_a_scene_whose_bodies_never_touch_has_the_bits_of_one_without_contact():
     free = ms.Scene([lower, upper], supports=supports, gravity=DOWN)
     near = ms.Scene([lower, upper], supports=supports, gravity=DOWN, contacts=[ms.Contact(lower, upper)])
     np.testing.assert_array_equal(ms.equilibrium(free).positions, ms.equilibrium(near).positions)
+
+
+@pytest.mark.parametrize("lagged", [False, True])
+def test_steps_taken_again_for_gradients_are_those_taken(lagged):
+    """While the pattern of the matrix grows with what comes near."""
+    torch = pytest.importorskip("torch")
+    lower, upper = ms.Shell(PLATE, **SOFT), above(1.4e-3)
+    scene = ms.Scene(
+        [lower, upper],
+        supports=[ms.Clamp(PLATE.boundary_edges, body=lower)],
+        contacts=[ms.Contact(lower, upper, friction_coefficient=0.4, lagged_friction=lagged)],
+        gravity=DOWN,
+        allow_rigid_motions=True,
+    )
+
+    def by_velocities(**options):
+        velocities = torch.zeros((scene.mesh.n_vertices, 3), dtype=torch.float64)
+        velocities[PLATE.n_vertices :] = torch.tensor([0.2, 0.1, -0.3])
+        velocities.requires_grad_()
+        move = ms.simulate(scene, steps=24, time_step=5e-4, velocities=velocities, progress=False, **options)
+        move.positions[-1].square().sum().backward()
+        return move.positions.detach().numpy(), velocities.grad.numpy()
+
+    kept, by_kept = by_velocities(keep="stages")
+    again, by_again = by_velocities(keep="checkpoints", memory_budget=2e4)
+    np.testing.assert_allclose(kept, again, rtol=0.0, atol=1e-12)
+    assert np.abs(by_kept - by_again).max() < 1e-6 * np.abs(by_kept).max()

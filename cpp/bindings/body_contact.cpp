@@ -41,7 +41,8 @@ py::tuple touching_pairs(Model& model, const VectorXd& q) {
 
 void register_body_contact(py::module_& module) {
     module.def("touching_pairs", &touching_pairs, py::arg("model"), py::arg("q"),
-               "Pairs of bodies in contact: contact (n,), vertices (n, 4), distances (n,), normal forces (n,), forces "
+               "Pairs of bodies in contact: contact (n,), vertices (n, 4), distances (n,), normal forces "
+               "(n,), forces "
                "(n, 4, 3).");
 }
 

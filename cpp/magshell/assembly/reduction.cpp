@@ -211,8 +211,7 @@ void Reduction::matrix(SystemMatrix& full, SystemMatrix* layer, LargeVector<doub
     if (carried_) carried_->add_matrix(0, full, values.data());
     if (!layer) return;
     for (const Pieces::Piece& piece : layer_pieces_.all)
-        for (Index k = 0; k < piece.count; ++k)
-            values[piece.to + k] += layer->values()[piece.from + k];
+        for (Index k = 0; k < piece.count; ++k) values[piece.to + k] += layer->values()[piece.from + k];
     if (carried_) carried_->add_matrix(1, *layer, values.data());
 }
 

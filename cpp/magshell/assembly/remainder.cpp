@@ -27,8 +27,7 @@ void Remainder::add_product(const VectorXd& p, bool transposed, VectorXd& out) c
                 if (each.nodes[i] < 0 || each.nodes[j] < 0) continue;
                 const Mat3& block = each.blocks[4 * i + j];
                 if (transposed)
-                    out.segment<3>(3 * each.nodes[j]) +=
-                        block.transpose() * p.segment<3>(3 * each.nodes[i]);
+                    out.segment<3>(3 * each.nodes[j]) += block.transpose() * p.segment<3>(3 * each.nodes[i]);
                 else
                     out.segment<3>(3 * each.nodes[i]) += block * p.segment<3>(3 * each.nodes[j]);
             }

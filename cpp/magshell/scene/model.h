@@ -77,7 +77,8 @@ class Model {
     /// Which term's force is not finite at q, and on which vertex; empty if all are.
     std::string not_finite(const VectorXd& q, const Controls& controls);
     /// The Hessian at the last evaluated state, in matrix(). Cautious: what touching bodies add is nowhere negative.
-    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, bool cautious = false);
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+                  bool cautious = false);
     void extrapolate(const VectorXd& p);
     /// How fast the gradient at q changes while the controls, now `at`, change at this rate: exact for those that it is
     /// linear in, by differences of fourth order for what varies. Leaves the model as evaluated elsewhere.

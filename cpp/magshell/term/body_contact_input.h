@@ -19,8 +19,9 @@ struct ContactSurfaceInput {
 /// Surfaces that touch each other; one and the same: itself.
 struct BodyContactInput {
     Index a, b;
-    bool penalty = false;               // else a barrier
-    bool rubs = false, lagged = false;  // whether there is friction, and whether with the normal force of before
+    bool penalty = false;  // else a barrier
+    bool rubs = false,
+         lagged = false;  // whether there is friction, and whether with the normal force of before
 };
 
 }  // namespace magshell

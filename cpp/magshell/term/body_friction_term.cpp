@@ -18,12 +18,13 @@ void BodyFrictionTerm::evaluate(const Kinematics& at, const Controls&, Residual&
     now_ = holds_ ? held_ : contact_.touching();
     const auto rub = [&](const Touch& touch, bool lagged) {
         if (!rubs_[touch.near.contact] || lagged_[touch.near.contact] != lagged) return;
-        rubbing_.push_back({&touch, lagged,
-                            PairFriction(touch.at, places_of(touch.near.pair, at.v.data()),
-                                         contact_.friction(touch))});
+        rubbing_.push_back(
+            {&touch, lagged,
+             PairFriction(touch.at, places_of(touch.near.pair, at.v.data()), contact_.friction(touch))});
         const PairVectors force = rubbing_.back().friction.force();
         for (int k = 0; k < touch.at.count(); ++k)
-            for (int axis = 0; axis < 3; ++axis) out.add(3 * touch.near.pair.nodes[k] + axis, -force[k][axis]);
+            for (int axis = 0; axis < 3; ++axis)
+                out.add(3 * touch.near.pair.nodes[k] + axis, -force[k][axis]);
     };
     for (const Touch& touch : now_) rub(touch, false);
     for (const Touch& touch : before_) rub(touch, true);
