@@ -216,8 +216,7 @@ def _body_of_vertices(scene) -> np.ndarray:
 class Watch:
     """Whether anything passes through anything, by ipctk where it is installed and by ourselves."""
 
-    def __init__(self, drawn: Drawn):
-        scene = drawn.scene
+    def __init__(self, scene: ms.Scene):
         self.surfaces = surfaces_of(scene)
         pairs = (
             [(0, 0)]
@@ -269,7 +268,7 @@ def verdict(seed: int) -> str | None:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-    watch = Watch(each)
+    watch = Watch(each.scene)
     for k, positions in enumerate(motion.positions):
         if complaint := watch.complaint(positions):
             return f"{seed}: {complaint} after step {k} ({each.words})"

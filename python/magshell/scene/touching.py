@@ -18,7 +18,7 @@ class Touching:
         vertex with an edge or another vertex, which take back what several faces would count twice.
     distances: (k,) m, between the parts of each pair. normal_forces: (k,) N, with which they push each other apart;
         negative where they take something back.
-    forces: (n_v, 3) N, on every vertex of the scene.
+    forces: (n_v, 3) N, on every vertex of the scene, with which they push each other apart; friction is not among them.
     """
 
     pairs: np.ndarray

@@ -190,7 +190,8 @@ class SelfContact(BodyContact):
 
     a: a Shell or a Solid. The others are as in BodyContact, which ms.Contact(a, b, ...) makes, but that by default a sheet
     keeps its whole thickness from itself. Neighbours along the surface that are nearer at rest than twice minimal distance
-    and reach keep half of what they have there, in the proportion of the two.
+    and reach keep half of what they have there, in the proportion of the two. A mesh that passes through itself at rest is
+    refused.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -215,6 +216,7 @@ class SelfContact(BodyContact):
     ):
         if not isinstance(a, BODIES):
             raise ValueError(f"a must be a Shell or Solid of the scene, got {a!r:.60}")
+        _check_does_not_cross(a)
         self.a = self.b = a
         self._take(
             minimal_distance=minimal_distance,
@@ -253,6 +255,15 @@ def checked_side(name: str, side):
     if side.body is None:
         raise ValueError(f"{name} is a Rigid that does not say of which body it is: Rigid(..., body=...)")
     return side
+
+
+def _check_does_not_cross(body) -> None:
+    pairs = body.mesh.self_intersections(body.mesh.rest_positions)
+    if len(pairs):
+        raise ValueError(
+            f"the mesh of a passes through itself at rest, and cannot be kept from it: {len(pairs)} pairs of faces do, "
+            f"{pairs[0, 0]} and {pairs[0, 1]} the first"
+        )
 
 
 def mesh_of(side) -> Shell | Solid:

@@ -23,6 +23,7 @@ def split_contacts(contacts) -> tuple[tuple, tuple]:
 
 def body_contact_inputs(contacts, bodies) -> tuple[list[dict], list[dict]]:
     """What of the contacts of bodies no solve can change: surfaces, and which of them touch."""
+    _check_each_pair_once(contacts)
     sides = list({id(side): side for contact in contacts for side in contact.sides}.values())
     numbers = {id(side): k for k, side in enumerate(sides)}
     return [_surface(side, bodies) for side in sides], [
@@ -35,6 +36,16 @@ def body_contact_inputs(contacts, bodies) -> tuple[list[dict], list[dict]]:
         }
         for contact in contacts
     ]
+
+
+def _check_each_pair_once(contacts) -> None:
+    """Two of the same sides would push, and rub, twice."""
+    sides = [frozenset(map(id, contact.sides)) for contact in contacts]
+    for k, contact in enumerate(contacts):
+        if sides[k] in sides[:k]:
+            raise ValueError(
+                f"contacts must hold what is between two sides once, got {contact!r} after one of the same sides"
+            )
 
 
 def _surface(side, bodies) -> dict:

@@ -1,0 +1,276 @@
+"""Hard cases of contact between bodies: whatever happens, nothing passes through anything."""
+
+import itertools
+
+import numpy as np
+import pytest
+from contact_scenes import Watch
+
+import magshell as ms
+
+DENSITY, GRAVITY = 1e3, 9.81
+DOWN = (0.0, 0.0, -GRAVITY)
+
+
+def shell(mesh, thickness=1e-3, young_modulus=1e6) -> ms.Shell:
+    return ms.Shell(
+        mesh, thickness=thickness, young_modulus=young_modulus, poisson_ratio=0.3, mass_density=DENSITY
+    )
+
+
+def solid(mesh, young_modulus=2e5, element="linear") -> ms.Solid:
+    material = ms.NeoHookean(young_modulus=young_modulus, poisson_ratio=0.3)
+    return ms.Solid(mesh, material=material, mass_density=DENSITY, element=element)
+
+
+def sheet(side, cells, at=(0.0, 0.0, 0.0), **given) -> ms.Shell:
+    """A square around `at`."""
+    flat = ms.meshes.rectangle(side, side, cells=(cells, cells))
+    return shell(flat.transformed(translation=np.asarray(at) - (side / 2, side / 2, 0.0)), **given)
+
+
+def everywhere(body) -> np.ndarray:
+    return np.arange(body.mesh.n_vertices)
+
+
+def of_body(scene, body, value) -> np.ndarray:
+    """(n_v, 3): a vector on the vertices of one body, none on the others."""
+    all_of = np.zeros((scene.mesh.n_vertices, 3))
+    all_of[scene._bodies.spans[scene.bodies.index(body)].vertices] = value
+    return all_of
+
+
+def moved(scene, steps, time_step, **options) -> ms.Trajectory:
+    motion = ms.simulate(scene, steps=steps, time_step=time_step, **{"progress": False, **options})
+    assert motion.steps_done == steps
+    assert_nothing_passes(scene, motion)
+    return motion
+
+
+def assert_nothing_passes(scene, motion) -> None:
+    watch = Watch(scene)
+    assert [told for positions in motion.positions if (told := watch.complaint(positions))] == []
+
+
+def between(*bodies, **law) -> list:
+    """Contact of each with the next."""
+    return [ms.Contact(a, b, **law) for a, b in itertools.pairwise(bodies)]
+
+
+def test_a_sheet_folded_to_zero_gap():
+    """Half a strip is turned over onto the other half until a thousandth of its thickness is left between them."""
+    mesh = ms.meshes.rectangle(0.06, 0.01, cells=(20, 2))
+    strip = shell(mesh, thickness=5e-4)
+    gap = 5e-7
+    touch = ms.SelfContact(strip, minimal_distance=1e-7, reach=1e-6)
+    over = ms.Clamp(mesh.edges_at(x=0.06), rotation=(0, -np.pi, 0), center=(0.03, 0.005, gap / 2))
+    scene = ms.Scene(strip, supports=[ms.Clamp(mesh.edges_at(x=0.0)), over], contacts=[touch])
+    motion = moved(scene, 40, 1e-2, motion_factor=np.linspace(0, 1, 41), damping=1e-4)
+    assert 1e-7 < motion.touching(touch).smallest_distance < 1e-6
+
+
+def test_twenty_layers_stacked():
+    """They fall on each other and come to rest: layer k bears those above it."""
+    layers = [sheet(0.02, 2, (3e-4 * (k % 3), 2e-4 * (k % 2), 1.12e-3 * k)) for k in range(20)]
+    contacts = between(*layers)
+    scene = ms.Scene(
+        layers,
+        supports=[ms.Pin(everywhere(layers[0]), body=layers[0])],
+        contacts=contacts,
+        gravity=DOWN,
+        allow_rigid_motions=True,
+    )
+    motion = moved(scene, 30, 5e-3, integrator=ms.ImplicitEuler())
+    weight = DENSITY * 1e-3 * 0.02**2 * GRAVITY
+    borne = [motion.touching(touch).normal_force for touch in contacts]
+    np.testing.assert_allclose(borne, weight * np.arange(19, 0, -1), rtol=1e-3)
+
+
+def needle(radius, length, sides=6) -> ms.TetMesh:
+    """A cone that stands on its tip at the origin."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(sides, length)], axis=1)
+    points = np.concatenate([[(0.0, 0.0, 0.0), (0.0, 0.0, length)], rim])
+    return ms.TetMesh(points, [(0, 2 + k, 2 + (k + 1) % sides, 1) for k in range(sides)])
+
+
+@pytest.mark.parametrize("at", [(0.001, 0.002), (0.0, 0.0)], ids=["on a face", "on a vertex"])
+def test_a_needle_on_a_sheet(at):
+    """Of an opening of 2 degrees, at 5 m/s."""
+    floor = sheet(0.06, 4)
+    cone = solid(needle(3.5e-4, 0.02).transformed(translation=(*at, 1e-3)), young_modulus=1e8)
+    scene = ms.Scene(
+        [floor, cone],
+        supports=[ms.Pin(floor.mesh.boundary_vertices, body=floor)],
+        contacts=between(floor, cone),
+        gravity=DOWN,
+        allow_rigid_motions=True,
+    )
+    motion = moved(scene, 25, 2e-4, velocities=of_body(scene, cone, (0.0, 0.0, -5.0)))
+    assert motion[floor].positions[..., 2].min() < -1e-4
+
+
+@pytest.mark.parametrize("friction", [None, 0.5])
+def test_an_edge_slides_over_an_edge(friction):
+    """Of two sheets that stand across each other."""
+    upright = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
+    across = np.array([[0, -1.0, 0], [1.0, 0, 0], [0, 0, 1.0]])
+    flat = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1)).transformed(translation=(-0.02, -0.01, 0))
+    lower = shell(flat.transformed(rotation=upright), young_modulus=1e8)
+    above = flat.transformed(translation=(0.003, 0.0112, 0)).transformed(rotation=across @ upright)
+    upper = shell(above, young_modulus=1e8)
+    touch = ms.Contact(lower, upper, friction_coefficient=friction)
+    scene = ms.Scene(
+        [lower, upper],
+        supports=[
+            ms.Pin(everywhere(lower), body=lower),
+            ms.Pin(everywhere(upper), "y", body=upper),
+        ],
+        contacts=[touch],
+        gravity=DOWN,
+        allow_rigid_motions=True,
+    )
+    motion = moved(scene, 30, 1e-3, velocities=of_body(scene, upper, (0.3, 0.0, 0.0)))
+    touched = [motion.touching(touch, k) for k in range(len(motion))]
+    assert sum(len(each.pairs) > 0 for each in touched) > 5
+    assert all(each.smallest_distance > touch.minimal_distance for each in touched)
+
+
+@pytest.mark.parametrize(
+    "ball_cells, sheet_cells", [(6, 3), (1, 24)], ids=["ball ten times finer", "sheet ten times finer"]
+)
+def test_a_ball_on_a_sheet_of_another_fineness(ball_cells, sheet_cells):
+    side = 0.06 if sheet_cells < 10 else 0.03
+    floor = sheet(side, sheet_cells)
+    ball = solid(ms.meshes.ball(0.01, cells=ball_cells).transformed(translation=(0.001, 0.002, 0.0108)))
+    touch = ms.Contact(floor, ball)
+    scene = ms.Scene(
+        [floor, ball],
+        supports=[ms.Pin(floor.mesh.boundary_vertices, body=floor)],
+        contacts=[touch],
+        gravity=DOWN,
+        allow_rigid_motions=True,
+    )
+    motion = moved(scene, 6, 1e-3, velocities=of_body(scene, ball, (0.0, 0.0, -1.0)))
+    assert len(motion.touching(touch).pairs) and motion[floor].positions[-1][:, 2].min() < -1e-3
+
+
+@pytest.mark.parametrize("law", ["barrier", "penalty"])
+def test_sheets_pressed_together_by_a_thousand_times_their_weight(law):
+    lower, upper = sheet(0.02, 4), sheet(0.02, 4, (1e-3, 5e-4, 1.11e-3))
+    touch = ms.Contact(lower, upper, law=law)
+    scene = ms.Scene(
+        [lower, upper],
+        supports=[
+            ms.Pin(everywhere(lower), body=lower),
+            ms.Pin(upper.mesh.vertices_at(x=-0.009), "xy", body=upper),
+        ],
+        contacts=[touch],
+        gravity=(0.0, 0.0, -1e3 * GRAVITY),
+        allow_rigid_motions=True,
+    )
+    pressed = ms.equilibrium(scene)
+    assert Watch(scene).complaint(pressed.positions) is None
+    weight = 1e3 * DENSITY * 1e-3 * 0.02**2 * GRAVITY
+    assert pressed.touching(touch).forces[lower.mesh.n_vertices :, 2].sum() == pytest.approx(weight, rel=1e-6)
+    motion = moved(scene, 10, 1e-3)
+    assert motion.touching(touch).smallest_distance > 0.5 * touch.minimal_distance
+
+
+def knotted(width, cells) -> ms.TetMesh:
+    """A cord of square section along an open overhand knot, m."""
+    t = np.linspace(-2.15, 2.15, 2001)
+    path = 0.02 * np.stack([t**3 - 3 * t, t**4 - 4 * t**2, 0.2 * (t**5 - 10 * t)], axis=1)
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+    even = np.linspace(0.0, length[-1], cells + 1)
+    path = np.stack([np.interp(even, length, each) for each in path.T], axis=1)
+    tangent = np.gradient(path, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    across = [np.cross(tangent[0], (0.0, 0.0, 1.0))]
+    for each in tangent[1:]:  # turned as little as can be
+        across.append(across[-1] - (across[-1] @ each) * each)
+    across = np.array([v / np.linalg.norm(v) for v in across])
+    up = np.cross(tangent, across)
+    straight = ms.meshes.box((cells, 1.0, 1.0), cells=(cells, 1, 1))
+    x = straight.rest_positions
+    k = np.rint(x[:, 0]).astype(int)
+    points = path[k] + width * ((x[:, 1:2] - 0.5) * across[k] + (x[:, 2:] - 0.5) * up[k])
+    return ms.TetMesh(points, straight.tetrahedra)
+
+
+def test_a_knot_pulled_tight():
+    """A cord along an open overhand knot, its ends drawn apart to nearly three times their distance."""
+    mesh = knotted(0.003, 80)
+    cord = solid(mesh, young_modulus=1e5)
+    touch = ms.SelfContact(cord)
+    x = mesh.rest_positions
+    ends = [np.flatnonzero(np.linalg.norm(x - x[k], axis=1) < 0.006) for k in (0, -1)]
+    way = x[ends[0]].mean(0) - x[ends[1]].mean(0)
+    pulls = [
+        ms.Pin(end, displacement=tuple(s * 0.9 * way), body=cord)
+        for end, s in zip(ends, (1, -1), strict=True)
+    ]
+    scene = ms.Scene(cord, supports=pulls, contacts=[touch])
+    motion = moved(
+        scene, 40, 1e-2, motion_factor=np.linspace(0, 1, 41), damping=1e-4, integrator=ms.ImplicitEuler()
+    )
+    assert len(motion.touching(touch).pairs) > 10
+
+
+def squeezed(advance, axes=range(3)) -> ms.Scene:
+    """A soft block among plates, two to an axis, that come nearer by `advance`."""
+    block = solid(ms.meshes.box((0.01, 0.01, 0.01), cells=(2, 2, 2)).transformed(translation=(-5e-3,) * 3))
+    plates, supports = [], []
+    for axis, sign in itertools.product(axes, (-1.0, 1.0)):
+        normal = np.zeros(3)
+        normal[axis] = sign
+        turn = np.roll(np.eye(3), axis + 1, axis=0)
+        flat = ms.meshes.rectangle(8e-3, 8e-3, cells=(1, 1)).transformed(translation=(-4e-3, -4e-3, 0))
+        plate = shell(flat.transformed(rotation=turn, translation=5.3e-3 * normal), thickness=1e-4)
+        plates.append(plate)
+        supports.append(ms.Pin(everywhere(plate), displacement=tuple(-advance * normal), body=plate))
+    contacts = [ms.Contact(block, plate) for plate in plates] + between(*plates)
+    return ms.Scene([block, *plates], supports=supports, contacts=contacts, allow_rigid_motions=True)
+
+
+PRESSING = {"motion_factor": np.linspace(0, 1, 11), "integrator": ms.ImplicitEuler()}
+
+
+def test_a_body_squeezed_until_it_cannot_move():
+    """On all six sides, to four fifths of its size."""
+    scene = squeezed(1.2e-3)
+    motion = moved(scene, 10, 1e-3, **PRESSING)
+    block = motion[scene.bodies[0]].positions[-1]
+    assert all(len(motion.touching(touch).pairs) for touch in scene.contacts[:6])
+    np.testing.assert_allclose(np.ptp(block, axis=0), 8.1e-3, rtol=1e-3)
+
+
+def test_what_has_no_place_left_is_told():
+    """Two plates that are to pass through each other, and what is between them."""
+    scene = squeezed(5.5e-3, axes=(2,))
+    with pytest.raises(ms.NotConverged) as told:
+        moved(scene, 10, 1e-3, **PRESSING)
+    assert told.value.last_good.steps_done > 5
+    assert_nothing_passes(scene, told.value.last_good)
+
+
+@pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=repr)
+def test_contact_that_opens_and_closes_in_every_step(integrator):
+    """A plate hammers on a block: down in one step, up in the next."""
+    block = solid(
+        ms.meshes.box((6e-3, 6e-3, 4e-3), cells=(1, 1, 1)).transformed(translation=(-3e-3, -3e-3, 0))
+    )
+    plate = sheet(0.02, 1, (1e-4, 2e-4, 4.1e-3), thickness=1e-4)
+    touch = ms.Contact(plate, block)
+    scene = ms.Scene(
+        [plate, block],
+        supports=[
+            ms.Pin(everywhere(plate), displacement=(0.0, 0.0, -4e-4), body=plate),
+            ms.Pin(block.mesh.vertices_at(z=0.0), body=block),
+        ],
+        contacts=[touch],
+    )
+    down = np.arange(21) % 2
+    motion = moved(scene, 20, 1e-3, motion_factor=down, stiffness_damping=2e-3, integrator=integrator)
+    touched = np.array([len(motion.touching(touch, k).pairs) > 0 for k in range(21)])
+    np.testing.assert_array_equal(touched, down == 1)

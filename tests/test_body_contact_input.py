@@ -1,0 +1,104 @@
+"""Contacts of bodies that cannot be: each is told before any work starts."""
+
+import numpy as np
+import pytest
+
+import magshell as ms
+
+SHEET = {"thickness": 1e-3, "young_modulus": 1e6, "mass_density": 1e3}
+PLATE = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
+TILTED = np.array([[1.0, 0, 0], [0, 0.8, -0.6], [0, 0.6, 0.8]])
+
+
+def shell(**moved) -> ms.Shell:
+    return ms.Shell(PLATE.transformed(**moved), **SHEET)
+
+
+def pair(height=2e-3) -> tuple[ms.Shell, ms.Shell]:
+    return shell(), shell(translation=(1e-3, 5e-4, height))
+
+
+def scene_of(*bodies, contacts) -> ms.Scene:
+    return ms.Scene(list(bodies), contacts=contacts, gravity=(0, 0, -9.81), allow_rigid_motions=True)
+
+
+def simulated(scene, **given):
+    return ms.simulate(scene, steps=1, time_step=1e-3, progress=False, **given)
+
+
+def two_pieces(other) -> ms.Shell:
+    """One mesh of two sheets."""
+    points = np.concatenate([PLATE.rest_positions, other.rest_positions])
+    return ms.Shell(
+        ms.TriangleMesh(points, np.concatenate([PLATE.faces, other.faces + PLATE.n_vertices])), **SHEET
+    )
+
+
+def test_a_mesh_that_crosses_itself_at_rest():
+    crossing = two_pieces(PLATE.transformed(rotation=TILTED, translation=(1e-3, -2e-3, -3e-3)))
+    with pytest.raises(
+        ValueError, match=r"passes through itself at rest.* pairs of faces do, 0 and 8 the first"
+    ):
+        ms.SelfContact(crossing)
+
+
+def test_a_minimal_distance_larger_than_that_of_two_faces():
+    near = two_pieces(PLATE.transformed(translation=(1e-3, 5e-4, 5e-4)))
+    with pytest.raises(
+        ValueError, match=r"face 0 of body 0 and face 9 of body 0 are 0.0005 m apart, .* 0.001 m"
+    ):
+        simulated(scene_of(near, contacts=[ms.SelfContact(near)]))
+    lower, upper = pair()
+    touch = ms.Contact(lower, upper)
+    scene = scene_of(lower, upper, contacts=[touch])
+    with pytest.raises(ValueError, match=r"are 0.002 m apart, but must be farther than 0.003 m"):
+        simulated(scene, values={touch: {"minimal_distance": 3e-3}})
+
+
+def test_what_touches_twice():
+    lower, upper = pair()
+    touch = ms.Contact(lower, upper)
+    for twice in (
+        [touch, touch],
+        [touch, ms.Contact(upper, lower)],
+        [ms.SelfContact(lower), ms.SelfContact(lower)],
+    ):
+        with pytest.raises(ValueError, match="contacts must hold what is between two sides once"):
+            scene_of(lower, upper, contacts=twice)
+    scene_of(lower, upper, contacts=[touch, ms.SelfContact(lower), ms.SelfContact(upper)])
+
+
+@pytest.mark.parametrize(
+    "name, value, message",
+    [
+        ("minimal_distance", -1.0, r"minimal_distance \[m\] must not be negative"),
+        ("contact_stiffness", -1.0, r"contact_stiffness \[Pa\] must be positive"),
+        ("reach", np.nan, r"reach \[m\] must be finite"),
+        ("friction_coefficient", 0.3, "without friction_coefficient cannot get one in a solve"),
+        ("stiffness", 1.0, "no value 'stiffness'"),
+    ],
+)
+def test_values_of_a_solve(name, value, message):
+    lower, upper = pair()
+    touch = ms.Contact(lower, upper)
+    with pytest.raises(ValueError, match=message):
+        simulated(scene_of(lower, upper, contacts=[touch]), values={touch: {name: value}})
+
+
+def test_rigid_parts_that_cannot_touch():
+    lower, upper = pair()
+    outside = ms.Rigid(np.arange(PLATE.n_vertices), body=upper)
+    with pytest.raises(ValueError, match="about a body that is not in the scene"):
+        scene_of(lower, upper, contacts=[ms.Contact(lower, outside)])
+    line = ms.Rigid([0, 1, 5], body=upper)
+    with pytest.raises(ValueError, match="rigid part 0 touches nothing"):
+        scene_of(lower, upper, line, contacts=[ms.Contact(lower, line)])
+
+
+def test_starts_that_lie_in_each_other():
+    lower, upper = pair()
+    scene = scene_of(lower, upper, contacts=[ms.Contact(lower, upper)])
+    with pytest.raises(ValueError, match=r"face \d+ of body 0 and face \d+ of body 1 pass through"):
+        simulated(scene, start=np.concatenate([PLATE.rest_positions] * 2))
+    with pytest.raises(ValueError, match=r"must be one of bodies, of scene\.contacts"):
+        simulated(scene).touching(ms.Contact(lower, upper))
