@@ -1,0 +1,1 @@
+"""What ball_on_sheet.py is made of."""
