@@ -1,1 +1,1 @@
-"""What ball_on_sheet.py is made of."""
+"""Parts of the example ball_on_sheet."""
