@@ -46,7 +46,7 @@ def draw_design(axes, result: dict) -> None:
         color="magnetization",
         arrows=200,
         view=(50, -70),
-        width=1000,
+        width=1500,
     )
     paste(axes, picture)
 
