@@ -86,11 +86,11 @@ def skeleton_in_motion(integrator, **options) -> Kind:
     turning = np.cross([2.0, 5.0, -1.0], MESH.rest_positions - MIDDLE)
     moves = np.array([0.02, 0.01, -0.1]) + turning + 0.05 * RNG.standard_normal((N_V, 3))
     moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
-    controls = {**IN_TIME, "velocities": moves, "time_step": 3e-3}
+    controls = {**IN_TIME, "velocities": moves, "time_step": 5e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     in_time = {"in_time": STEPS} if "keep" in options else {}
     # The small first steps of TR-BDF2 leave their round-off in velocities: longer differences feel less of it.
-    step = 8e-3 if in_time else 1e-5
+    step = 3e-3 if in_time else 1e-5
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time)
 
 

@@ -1,0 +1,1 @@
+"""Parts of the example ball_on_sheet."""

@@ -1,0 +1,95 @@
+"""The figure, the movie, and the summary that is printed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from _pasting import paste
+
+import magshell as ms
+
+from .lift import CLOSED, END, RISE
+
+BLUE, RED, GREY = "#20639b", "#c8442d", "#777777"
+VIEW = (10, -70)
+
+
+def _which(gripper) -> np.ndarray:
+    return np.repeat([0.0, 1.0], [gripper.mesh.n_vertices, gripper.ball.mesh.n_vertices])
+
+
+def draw_lift(axes, result: dict) -> None:
+    motion = result["lift"]["motion"]
+    frames = [int(np.argmin(np.abs(motion.times - time))) for time in (0, 0.5 * RISE, CLOSED, 0.34, END)]
+    picture = ms.plot(
+        motion,
+        states=frames,
+        titles=[f"{motion.times[frame]:.2f} s" for frame in frames],
+        color=[_which(result["gripper"])] * len(frames),
+        color_label="sheet 0, ball 1",
+        obstacles=[],
+        arrows=False,
+        show_field=False,
+        view=VIEW,
+        columns=len(frames),
+        width=2200,
+    )
+    paste(axes, picture)
+
+
+def draw_design(axes, result: dict) -> None:
+    gripper = result["gripper"]
+    picture = ms.plot(
+        gripper.mesh,
+        remanent_magnetization=result["design"]["remanent_magnetization"],
+        color="magnetization",
+        arrows=200,
+        view=(50, -70),
+        width=1500,
+    )
+    paste(axes, picture)
+
+
+def draw_convergence(axes, design: dict) -> None:
+    axes.plot(np.sqrt(design["history"]), "o-", color=BLUE)
+    axes.set(xlabel="iteration", ylabel="rms distance from the wrapped shape [mm]", ylim=(0, None))
+
+
+def draw_motion(axes, result: dict) -> None:
+    for name, color, label in (("lift", BLUE, "ball, found"), ("without", RED, "ball, start of the search")):
+        each = result[name]
+        axes.plot(
+            each["motion"].times,
+            1e3 * (each["ball_height"] - each["ball_height"][0]),
+            color=color,
+            label=label,
+        )
+    lift = result["lift"]
+    heights = 1e3 * (lift["sheet_height"] - lift["sheet_height"][0])
+    axes.plot(lift["motion"].times, heights, color=GREY, ls=":", label="middle of the sheet")
+    axes.set(xlabel="time [s]", ylabel="raised by [mm]", xlim=(0, END))
+    axes.legend(frameon=False, loc="upper left", fontsize=8)
+
+
+def movie(lift: dict, path: Path, **options) -> Path:
+    return ms.animate(
+        lift["motion"], path, arrows=False, view=VIEW, **{"width": 600, "speed": 0.1, **options}
+    )
+
+
+def summary(result: dict) -> str:
+    design, lift, without = (result[name] for name in ("design", "lift", "without"))
+    raised = [1e3 * (each["ball_height"][-1] - each["ball_height"][0]) for each in (lift, without)]
+    return "\n".join(
+        [
+            f"A gripper of {result['gripper'].mesh.n_faces} faces",
+            f"  rms distance from the wrapped shape: {design['history'][0] ** 0.5:.2f} mm at first, "
+            f"{design['objective'] ** 0.5:.2f} mm after {len(design['history']) - 1} iterations, {design['seconds']:.1f} s",
+            f"  the ball is raised by {raised[0]:.1f} mm; with the magnetization that the search began with by "
+            f"{raised[1]:.1f}",
+            f"  contact: {1e3 * lift['forces'].max():.0f} mN at most, {1e3 * lift['gaps'].min():.3f} mm apart at least "
+            f"(least {1e3 * lift['least_gap']:.3f}); {lift['crossings']} faces pass; "
+            f"{1e3 * lift['seconds'] / len(lift['motion']):.0f} ms a step",
+        ]
+    )
