@@ -6,6 +6,7 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/rotations.h"
+#include "magshell/term/body_contact_term.h"
 
 namespace magshell {
 namespace {
@@ -232,6 +233,7 @@ MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions&
                       const MotionWatch& watch) {
     MotionResult result;
     result.last = input.start;
+    if (model.has_body_contact()) model.body_contact()->forget();
     const WhileVarying varying(model, input.varying);
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(static_cast<double>(result.steps_done) / static_cast<double>(input.steps), residual);

@@ -45,6 +45,11 @@ class BodyContactTerm final : public Term {
     void add_vjp(const Touch& touch, const PairEnergy::ByLaw& by, const FrictionLaw& by_friction,
                  VectorXd& by_values) const;
     ContactLayer& layer() const { return layer_; }
+    /// From now on as if no state had been looked at: a solve has the same bits whatever came before it.
+    void forget() const {
+        candidates_.forget();
+        layer_.couple({});
+    }
     /// The layer couples these as well, whether they still touch or not, until others take their place.
     void keep_coupled(const std::vector<Touch>& touches);
 

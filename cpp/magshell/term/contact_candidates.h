@@ -24,6 +24,7 @@ class ContactCandidates {
 
     /// Those that touch at q, and others.
     const std::vector<NearPair>& near(const double* q);
+    void forget() { looked_at_.resize(0); }
     /// Points and triangles, and edges, that may come nearer than that, one a contact, on straight ways from q to
     /// q + share p.
     std::vector<NearPair> on_the_way(const double* q, const double* p, double share,

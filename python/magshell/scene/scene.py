@@ -45,7 +45,7 @@ class Scene:
     """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
     needs and, up to 256 MB, the memory of its last factorization.
 
-    bodies: a Shell or a Solid, or several, which do not feel each other but through ties, Rigid parts and
+    bodies: a Shell or a Solid, or several, which feel each other through ties and contacts only, Rigid parts and
         Skeletons. Positions and
         faces of a result are those of one body after another, and `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
