@@ -104,18 +104,19 @@ def thrown_skeleton() -> Kind:
         angular_velocity=(2.0, 5.0, -1.0),
     )
     hand = ms.Link(mass=1e-3, center=(0.03, 0.02, 0.01), magnetic_moment=(1e-3, 2e-3, 5e-3))
-    wrist = ms.Revolute(
-        hand, arm, origin=(0.02, 0.02, 0.0), axis=(0, 1, 0.2), spring_stiffness=1e-4, torque=1e-5
-    )
+    spring = {"spring_stiffness": 1e-4, "torque": 1e-5}
+    wrist = ms.Revolute(hand, arm, origin=(0.02, 0.02, 0.0), axis=(0, 1, 0.2), rate=-8.0, **spring)
+    weight = ms.Link(mass=1e-3, inertia=1e-7, center=(0.0, 0.03, 0.01))
+    rail = ms.Prismatic(weight, hand, origin=(0, 0.03, 0), axis=(1, 0, 1), rate=0.05, spring_stiffness=1.0)
     ring = ms.Link(mass=1e-4, inertia=1e-9, center=(0.03, 0.025, 0.01))
     field = [ms.UniformField(), DIPOLES]
     scene = ms.Scene(
-        ms.Skeleton([hand, arm, ring], [wrist, ms.Fixed(ring, hand)]),
+        ms.Skeleton([hand, arm, ring, weight], [wrist, rail, ms.Fixed(ring, hand)]),
         field=field,
         gravity=(0, 0, -2.0),
         allow_rigid_motions=True,
     )
     controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "time_step": 3e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": ms.ImplicitEuler(), "progress": False}
-    reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0, "center": 0.01}
+    reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0, "center": 0.01, "rate": 5.0}
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)

@@ -168,6 +168,11 @@ class Bodies:
                 return skeleton
         return None
 
+    def moved_by(self, joint: Joint) -> list[int]:
+        """The numbers of the rigid parts that a joint carries."""
+        (skeleton,) = (each for each in self.skeletons if any(joint is own for own in each.joints))
+        return [self.rigid_number(each) for each in skeleton.moved_by(joint)]
+
     def started_by(self, part: Rigid) -> list[int]:
         """The numbers of the rigid parts that start with the velocity of a free one: of a skeleton, its tree."""
         skeleton = self.skeleton_of(part)

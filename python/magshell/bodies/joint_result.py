@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .joints import Joint
-from .rigid_result import RigidResult
+from .rigid_result import RigidResult, _cross
 
 
 class JointResult:
@@ -49,6 +49,22 @@ class JointResult:
         return (along * (self.place - self._place_of(self._parent))).sum(-1)
 
     @property
+    def rate(self):
+        """(n,) rad/s of a Revolute, m/s of a Prismatic: how fast its coordinate changes, in a motion."""
+        kind = self.joint._kind
+        if kind not in ("revolute", "prismatic"):
+            raise ValueError(f"a {type(self.joint).__name__} has no rate")
+        axis, spin = _like(self.joint.axis, self._child.center), 0.0
+        velocity = self._velocity_of(self._child) - self._velocity_of(self._parent)
+        if self._parent is not None:
+            axis, spin = self._parent.rotation @ axis, self._parent.angular_velocity
+        if kind == "revolute":
+            return (axis * (self._child.angular_velocity - spin)).sum(-1)
+        slid = self.place - self._place_of(self._parent)
+        turned = 0.0 if self._parent is None else (_cross(spin, axis) * slid).sum(-1)
+        return (axis * velocity).sum(-1) + turned
+
+    @property
     def place(self):
         """(..., 3) m, of the joint, on its child."""
         return self._place_of(self._child)
@@ -63,6 +79,11 @@ class JointResult:
     def _relative(self):
         child = self._child.rotation
         return child if self._parent is None else self._parent.rotation.swapaxes(-1, -2) @ child
+
+    def _velocity_of(self, link: RigidResult | None):
+        if link is None:
+            return 0.0
+        return link.velocity + _cross(link.angular_velocity, self._place_of(link) - link.center)
 
     def _place_of(self, link: RigidResult | None):
         if link is None:

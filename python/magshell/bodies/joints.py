@@ -23,7 +23,7 @@ class Joint(Owner):
     _kind: ClassVar[str] = ""
     _defaults: ClassVar[dict[str, float]] = {}  # by name: where it does not act
 
-    def __init__(self, child: Rigid, parent: Rigid | None, origin, axis=None, **law):
+    def __init__(self, child: Rigid, parent: Rigid | None, origin, axis=None, rate=None, **law):
         for name, link in (("child", child), ("parent", parent)):
             if not isinstance(link, Rigid) and (name == "child" or link is not None):
                 raise ValueError(f"{name} of a {type(self).__name__} must be a Rigid, got {link!r:.60}")
@@ -42,7 +42,9 @@ class Joint(Owner):
         for name, value in self._given.items():
             self._given[name] = self._checked(name, value)
         self._check_together()
-        self._replaceable = tuple(self._given)  # what it was made without, a solve cannot give it
+        self.rate = None if rate is None else float(quantity("rate", f"{self._unit('')}/s", rate, ()))
+        # What it was made without, a solve cannot give it.
+        self._replaceable = (*self._given, *(() if rate is None else ("rate",)))
         self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
 
     def __getattr__(self, name: str):
@@ -92,9 +94,10 @@ class Joint(Owner):
     def replaced(self, **values) -> Joint:
         """The same joint with other numbers of what acts in it."""
         for name in values:
-            if name not in self._given:
+            if name not in self._replaceable:
                 raise ValueError(f"the {type(self).__name__} was made without {name}: zero will do")
-        return self._again({**self._given, **values})
+        own = {name: getattr(self, name) for name in self._replaceable}
+        return self._again({**own, **values})
 
     def _again(self, law: dict) -> Joint:
         axis = {"axis": self.axis} if self.axis.any() else {}
@@ -106,7 +109,18 @@ class Joint(Owner):
                 numbers[label, name] = self._given.get(name, default)
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
-        return {name: gradient.value(label, name)[0] for name in self._given}
+        found = {name: gradient.value(label, name)[0] for name in self._given}
+        if self.rate is not None:
+            rows, found["rate"] = gradient.others.get("own_velocities"), np.zeros(())
+            for place in values.moved_by(self) if rows is not None else ():
+                found["rate"] = found["rate"] + (rows[place.points] * self.directions(place.rest)).sum()
+        return found
+
+    def directions(self, points: np.ndarray) -> np.ndarray:
+        """How points (n, 3) m of what it carries at rest move as its coordinate does: (n, 3), m/rad or 1."""
+        if self._kind == "prismatic":
+            return np.broadcast_to(self.axis, points.shape)
+        return np.cross(self.axis, points - self.origin)
 
     def __repr__(self) -> str:
         law = "".join(f", {name} {value:g}" for name, value in self._given.items())
@@ -135,8 +149,9 @@ class Revolute(Joint):
         that stays below the limit (none by default).
     lower_limit, upper_limit, limit_stiffness, limit_smoothing: rad, rad, N m/rad, rad: beyond a limit the torque grows by
         a parabola of the length of the smoothing, then at this stiffness.
+    rate: rad/s, at the start of a motion from rest positions, in a tree without vertices.
 
-    All but the places may change in ms.simulate, one value a step or at the ends of steps.
+    All but the rate and the places may change in ms.simulate, one value a step or at the ends of steps.
 
     >>> import numpy as np
     >>> import magshell as ms
@@ -161,7 +176,8 @@ class Revolute(Joint):
         "limit_stiffness": 0.0,
         "limit_smoothing": 1.0,
     }
-    _replaceable = _in_time = tuple(_defaults)
+    _in_time = tuple(_defaults)
+    _replaceable = (*_in_time, "rate")
 
     def __init__(
         self,
@@ -180,9 +196,10 @@ class Revolute(Joint):
         upper_limit=None,
         limit_stiffness=None,
         limit_smoothing=None,
+        rate=None,
     ):
         law = {name: value for name, value in locals().items() if name in self._defaults}
-        super().__init__(child, parent, origin, axis, **law)
+        super().__init__(child, parent, origin, axis, rate, **law)
 
 
 class Prismatic(Joint):
@@ -190,7 +207,7 @@ class Prismatic(Joint):
 
     As Revolute, with lengths for angles and forces [N] for torques: spring_stiffness N/m, rest_displacement m, force N,
     target_displacement m, servo_stiffness N/m, force_limit N, lower_limit, upper_limit m, limit_stiffness N/m,
-    limit_smoothing m.
+    limit_smoothing m, rate m/s.
     """
 
     _kind = "prismatic"
@@ -206,7 +223,8 @@ class Prismatic(Joint):
         "limit_stiffness": 0.0,
         "limit_smoothing": 1.0,
     }
-    _replaceable = _in_time = tuple(_defaults)
+    _in_time = tuple(_defaults)
+    _replaceable = (*_in_time, "rate")
 
     def __init__(
         self,
@@ -225,9 +243,10 @@ class Prismatic(Joint):
         upper_limit=None,
         limit_stiffness=None,
         limit_smoothing=None,
+        rate=None,
     ):
         law = {name: value for name, value in locals().items() if name in self._defaults}
-        super().__init__(child, parent, origin, axis, **law)
+        super().__init__(child, parent, origin, axis, rate, **law)
 
 
 class Ball(Joint):

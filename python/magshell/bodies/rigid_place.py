@@ -165,16 +165,29 @@ def own_velocities(inputs, start, goes_on: bool) -> np.ndarray:
     Raises ValueError where a start does not fit their velocities.
     """
     scene, values = inputs.scene, inputs.values
-    rows = np.zeros((10 * len(scene.rigid_parts), 3))
-    for k, (place, part) in enumerate(zip(scene._rigid, values.rigid, strict=True)):
+    rows = np.zeros((len(scene.rigid_parts), 10, 3))
+    from_rest = start is None or is_tensor(start) or isinstance(start, np.ndarray | list | tuple)
+    for place, part, own in zip(scene._rigid, values.rigid, scene.rigid_parts, strict=True):
         if part.vertices is not None or (part.velocity is None and part.angular_velocity is None):
             continue
-        if start is None or is_tensor(start) or isinstance(start, np.ndarray | list | tuple):
-            for number in scene._bodies.started_by(scene.rigid_parts[k]):
-                rows[10 * number : 10 * number + 10] = place.start_velocities(part, scene._rigid[number].rest)
-        elif not goes_on or part is not scene.rigid_parts[k]:
-            raise ValueError(
-                "the velocity of a free Rigid is that of a motion that starts at rest positions; this one goes on from "
-                f"{type(start).__name__}"
-            )
-    return rows
+        if from_rest:
+            for k in scene._bodies.started_by(own):
+                rows[k] += place.start_velocities(part, scene._rigid[k].rest)
+        elif not goes_on or part is not own:
+            raise _not_from(start, "velocity of a free Rigid")
+    for own in scene.joints:
+        joint = values.current(own)
+        if joint.rate is None:
+            continue
+        if from_rest:
+            for place, k in zip(values.moved_by(joint), scene._bodies.moved_by(own), strict=True):
+                rows[k] += joint.rate * joint.directions(place.rest)
+        elif not goes_on or joint is not own:
+            raise _not_from(start, "rate of a joint")
+    return rows.reshape(-1, 3)
+
+
+def _not_from(start, what: str) -> ValueError:
+    return ValueError(
+        f"the {what} is that of a motion that starts at rest positions; this one goes on from {type(start).__name__}"
+    )

@@ -68,6 +68,12 @@ class Skeleton:
                     "vertices, can be given: its whole tree starts with it"
                 )
 
+        for k, joint in enumerate(self.joints):
+            if joint.rate is not None and any(each.vertices is not None for each in self.tree(joint.child)):
+                raise ValueError(
+                    f"joint {k} has a rate, but its tree has vertices, whose velocities ms.simulate takes"
+                )
+
     def _in_order(self) -> list[int]:
         """The numbers of the links, parents first."""
         number = {id(link): k for k, link in enumerate(self.links)}
@@ -99,6 +105,16 @@ class Skeleton:
     def drifts(self, link: Rigid) -> bool:
         """Whether neither the world nor a vertex of a body is in the tree of a link."""
         return not self.held(link) and all(each.vertices is None for each in self.tree(link))
+
+    def moved_by(self, joint: Joint) -> list[Rigid]:
+        """All links that it carries."""
+        return [link for link in self.links if self._on_the_way(joint, link)]
+
+    def _on_the_way(self, joint: Joint, link: Rigid) -> bool:
+        before = self._leading.get(id(link))
+        while before is not None and before is not joint:
+            before = None if before.parent is None else self._leading.get(id(before.parent))
+        return before is joint
 
     def tree(self, link: Rigid) -> list[Rigid]:
         """All links that joints lead to from the root of this one."""

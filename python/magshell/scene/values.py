@@ -151,6 +151,12 @@ class Values:
         own = next(each for each, now in zip(scene.rigid_parts, self.rigid, strict=True) if now is part)
         return [scene._rigid[k] for k in scene._bodies.started_by(own)]
 
+    def moved_by(self, joint) -> list:
+        """The places of all that one of the joints carries."""
+        scene = self.scene
+        own = next(each for each in scene.joints if self.current(each) is joint)
+        return [scene._rigid[k] for k in scene._bodies.moved_by(own)]
+
     def by_inertia_and_weight(self, gradient: Gradient) -> tuple[np.ndarray | None, np.ndarray | None]:
         """By `masses`, and by `weighed_masses`; None where they have no part."""
         by_weights = self.by_weights(gradient)
