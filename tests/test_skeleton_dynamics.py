@@ -148,10 +148,10 @@ def test_accelerations_are_those_of_pinocchio(angles, mass_matrix, rates, torque
     """From the change of the rates over short steps, extrapolated to none."""
     scene = in_state(angles, rates, torques, gravity=(0, 0, -9.81))
     found = []
-    for time_step in (1e-4, 5e-5, 2.5e-5):
-        move = ms.simulate(scene, steps=1, time_step=time_step)
+    for time_step in (4e-4, 2e-4, 1e-4):
+        move = ms.simulate(scene, steps=1, time_step=time_step, solver=ms.MixedNewton(tolerance=1e-13))
         end = np.array([move[joint].rate for joint in scene.joints])
         np.testing.assert_allclose(end[:, 0], rates, rtol=1e-12)
         found.append((end[:, 1] - end[:, 0]) / time_step)
     rough, fine = (2 * found[k + 1] - found[k] for k in (0, 1))
-    np.testing.assert_allclose((4 * fine - rough) / 3, accelerations, atol=2e-8 * np.abs(accelerations).max())
+    np.testing.assert_allclose((4 * fine - rough) / 3, accelerations, atol=1e-6 * np.abs(accelerations).max())
