@@ -95,4 +95,4 @@ def test_pictures_of_the_heart(heart, tmp_path, monkeypatch) -> None:
     assert example.picture(found, "lower_half")._repr_png_().startswith(b"\x89PNG")
     assert example.movie(found, "lower_half", tmp_path / "a.gif", fps=3.0, width=400).stat().st_size > 10_000
     told = example.summary(heart)
-    assert "on a converged mesh" in told and "a stroke of" in told
+    assert "on a finer mesh" in told and "a stroke of" in told
