@@ -83,6 +83,24 @@ std::vector<SheetInput> sheets_of(const py::list& given) {
     return sheets;
 }
 
+std::vector<SixNodeSheetInput> six_node_sheets_of(const py::list& given) {
+    std::vector<SixNodeSheetInput> sheets;
+    for (const py::handle each : given) {
+        SixNodeSheetInput& sheet = sheets.emplace_back();
+        sheet.owner = each["owner"].cast<std::string>();
+        sheet.mesh.rest_positions = to_rows3(each["rest_positions"].cast<Array>());
+        const IndexArray faces = each["faces"].cast<IndexArray>();
+        for (py::ssize_t f = 0; f < faces.shape(0); ++f)
+            for (std::array<Index, 6>& nodes = sheet.mesh.faces.emplace_back();
+                 const int k : {0, 1, 2, 3, 4, 5})
+                nodes[k] = faces.at(f, k);
+        sheet.mesh.corners = each["corners"].cast<std::shared_ptr<TriangleMesh>>();
+        sheet.mesh.vertices = each["vertices"].cast<std::vector<Index>>();
+        sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
+    }
+    return sheets;
+}
+
 std::vector<PressureInput> pressures_of(const py::list& given) {
     std::vector<PressureInput> pressures;
     for (const py::handle each : given)
@@ -143,6 +161,7 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     input.n_vertices = given["n_vertices"].cast<Index>();
     input.original = given["original"].cast<std::vector<Index>>();
     input.sheets = sheets_of(given["sheets"]);
+    input.six_node_sheets = six_node_sheets_of(given["six_node_sheets"]);
     input.solids = solids_of(given["solids"]);
     input.skins = skins_of(given["skins"]);
     input.rigid = rigid_of(given["rigid"]);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <span>
 #include <utility>
 
 namespace magshell {
@@ -22,12 +21,9 @@ void ContactLayer::couple(std::vector<Group> groups) {
     all.reserve(groups_.size() + groups.size());
     std::set_union(groups_.begin(), groups_.end(), groups.begin(), groups.end(), std::back_inserter(all));
     groups_ = all.size() > too_many * groups.size() ? std::move(groups) : std::move(all);
-    std::vector<std::span<const Index>> cliques;
+    std::vector<Clique> cliques;
     cliques.reserve(groups_.size());
-    for (const Group& group : groups_)
-        cliques.emplace_back(group.data(), std::find_if(group.begin(), group.end(), [](Index node) {
-                                               return node < 0;
-                                           }) - group.begin());
+    for (const Group& group : groups_) cliques.push_back({group});
     matrix_ = SystemMatrix(matrix_.nodes(), matrix_.rotations(), {}, cliques);
     ++version_;
 }

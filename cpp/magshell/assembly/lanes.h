@@ -30,13 +30,21 @@ inline void set_lane(Pack3& pack, int lane, const Vec3& from) {
     set_lane(pack, lane, from.data());
 }
 
-inline void set_lane(Symmetric3& pack, int lane, const Mat3& from) {
-    for (int i = 0; i < 3; ++i)
+template <int N>
+inline void set_lane(Symmetric<N>& pack, int lane, const Eigen::Matrix<double, N, N>& from) {
+    for (int i = 0; i < N; ++i)
         for (int j = 0; j <= i; ++j) pack.at[lower_index(i, j)].set(lane, from(i, j));
 }
 
 inline Vec3 lane_of(const Pack v[3], int lane) {
     return {v[0][lane], v[1][lane], v[2][lane]};
+}
+
+template <int N>
+inline Eigen::Vector<double, N> lane_of(const Pack v[N], int lane) {
+    Eigen::Vector<double, N> numbers;
+    for (int i = 0; i < N; ++i) numbers[i] = v[i][lane];
+    return numbers;
 }
 
 inline Vec3 lane_of(const Pack3& v, int lane) {

@@ -19,12 +19,13 @@ std::vector<std::vector<Index>> holders(Index count, const std::vector<Stencil>&
     return of;
 }
 
-// For every node, the cliques that hold it.
-std::vector<std::vector<Index>> holders(Index count, const std::vector<std::span<const Index>>& cliques) {
-    if (cliques.empty()) return {};
+// Likewise, the cliques that hold it.
+std::vector<std::vector<Index>> holders(Index count, const std::vector<Clique>& cliques,
+                                        std::span<const Index> Clique::* members) {
     std::vector<std::vector<Index>> of(count);
     for (Index c = 0; c < static_cast<Index>(cliques.size()); ++c)
-        for (const Index node : cliques[c]) of[node].push_back(c);
+        for (const Index member : cliques[c].*members)
+            if (member >= 0) of[member].push_back(c);
     return of;
 }
 
@@ -45,12 +46,13 @@ class Marks {
 }  // namespace
 
 SystemMatrix::SystemMatrix(Index nodes, Index rotations, const std::vector<Stencil>& stencils,
-                           const std::vector<std::span<const Index>>& cliques)
+                           const std::vector<Clique>& cliques)
     : nodes_(nodes), rotations_(rotations) {
     const std::vector<std::vector<Index>> node_holders = holders(nodes, stencils, &Stencil::nodes);
     const std::vector<std::vector<Index>> rotation_holders =
         holders(rotations, stencils, &Stencil::rotations);
-    const std::vector<std::vector<Index>> clique_holders = holders(nodes, cliques);
+    const std::vector<std::vector<Index>> node_cliques = holders(nodes, cliques, &Clique::nodes);
+    const std::vector<std::vector<Index>> scalar_cliques = holders(rotations, cliques, &Clique::scalars);
 
     column_starts_.reserve(size() + 1);
     column_starts_.push_back(0);
@@ -70,10 +72,12 @@ SystemMatrix::SystemMatrix(Index nodes, Index rotations, const std::vector<Stenc
             for (const Index r : stencils[s].rotations)
                 if (r >= 0) rotation_marks.collect(j, r, beside_rotations);
         }
-        if (!cliques.empty())
-            for (const Index c : clique_holders[j])
-                for (const Index i : cliques[c])
-                    if (i > j) node_marks.collect(j, i, beside);
+        for (const Index c : node_cliques[j]) {
+            for (const Index i : cliques[c].nodes)
+                if (i > j) node_marks.collect(j, i, beside);
+            for (const Index r : cliques[c].scalars)
+                if (r >= 0) rotation_marks.collect(j, r, beside_rotations);
+        }
         std::sort(beside.begin(), beside.end());
         std::sort(beside_rotations.begin(), beside_rotations.end());
         for (Index column = 0; column < 3; ++column) {
@@ -88,6 +92,9 @@ SystemMatrix::SystemMatrix(Index nodes, Index rotations, const std::vector<Stenc
         beside_rotations.clear();
         for (const Index s : rotation_holders[j])
             for (const Index r : stencils[s].rotations)
+                if (r >= j) own_marks.collect(j, r, beside_rotations);
+        for (const Index c : scalar_cliques[j])
+            for (const Index r : cliques[c].scalars)
                 if (r >= j) own_marks.collect(j, r, beside_rotations);
         std::sort(beside_rotations.begin(), beside_rotations.end());
         for (const Index r : beside_rotations) rows_.push_back(3 * nodes + r);

@@ -24,9 +24,9 @@ class SystemMatrix {
     using Slot = Index;
 
     SystemMatrix() = default;
-    /// `cliques`: nodes that couple all with each other, beside those of the stencils.
+    /// `cliques`: what couples all with each other, beside the stencils.
     SystemMatrix(Index nodes, Index rotations, const std::vector<Stencil>& stencils,
-                 const std::vector<std::span<const Index>>& cliques = {});
+                 const std::vector<Clique>& cliques = {});
 
     Index nodes() const { return nodes_; }
     Index rotations() const { return rotations_; }

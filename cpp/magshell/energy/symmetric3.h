@@ -1,4 +1,4 @@
-// A symmetric 3x3 matrix of packs, the stiffness C of an element's three strain measures: 00 10 11 20 21 22.
+// A symmetric matrix of packs, the stiffness C of an element's strain measures: 00 10 11 20 21 22 ...
 #pragma once
 
 #include "magshell/core/vector3.h"
@@ -9,15 +9,20 @@ constexpr int lower_index(int row, int column) {
     return row * (row + 1) / 2 + column;
 }
 
-struct Symmetric3 {
-    Pack at[6];
+template <int N>
+struct Symmetric {
+    Pack at[N * (N + 1) / 2];
 
     const Pack& operator()(int i, int j) const { return at[i >= j ? lower_index(i, j) : lower_index(j, i)]; }
 
-    void times(const Pack d[3], Pack product[3]) const {
-        for (int i = 0; i < 3; ++i)
-            product[i] = (*this)(i, 0) * d[0] + (*this)(i, 1) * d[1] + (*this)(i, 2) * d[2];
+    void times(const Pack d[N], Pack product[N]) const {
+        for (int i = 0; i < N; ++i) {
+            product[i] = (*this)(i, 0) * d[0];
+            for (int j = 1; j < N; ++j) product[i] += (*this)(i, j) * d[j];
+        }
     }
 };
+
+using Symmetric3 = Symmetric<3>;
 
 }  // namespace magshell

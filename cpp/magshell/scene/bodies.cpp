@@ -15,6 +15,8 @@ Bodies::Bodies(const SceneInput& input) {
         owned_solids_.push_back(std::make_unique<Solid>(solid.owner, solid.rest_positions, solid.elements,
                                                         solid.nodes_per_element, solid.vertices,
                                                         solid.surface, numbering));
+    for (const SixNodeSheetInput& sheet : input.six_node_sheets)
+        owned_six_node_sheets_.push_back(std::make_unique<SixNodeSheet>(sheet.owner, sheet.mesh, numbering));
     for (const SkinInput& skin : input.skins)
         owned_skins_.push_back(
             std::make_unique<Surface>(skin.owner, *skin.surface.mesh, skin.surface.vertices, numbering));
@@ -38,6 +40,13 @@ Bodies::Bodies(const SceneInput& input) {
     for (std::size_t k = 0; k < solids_.size(); ++k)
         add_surface(input.solids[k].surface_acts ? solids_[k]->surface() : nullptr);
     for (const std::unique_ptr<Surface>& skin : owned_skins_) add_surface(skin.get());
+    for (std::size_t k = 0; k < owned_six_node_sheets_.size(); ++k) {
+        const SixNodeSheetInput& given = input.six_node_sheets[k];
+        owned_six_node_sheets_[k]->add_folds(given.mesh, given.directed_edges, nodes_);
+        n_edges_ += owned_six_node_sheets_[k]->n_edge_rotations();
+        six_node_sheets_.push_back(owned_six_node_sheets_[k].get());
+        all_.push_back(owned_six_node_sheets_[k].get());
+    }
 }
 
 void Bodies::add_surface(const Surface* surface) {
@@ -91,12 +100,15 @@ std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
     return all;
 }
 
-std::vector<std::span<const Index>> Bodies::cliques() const {
-    std::vector<std::span<const Index>> all;
+std::vector<Clique> Bodies::cliques() const {
+    std::vector<Clique> all;
     for (const Solid* solid : solids_)
         for (Index element = 0; element < solid->n_elements(); ++element)
-            all.push_back(solid->nodes_of(element));
-    for (const std::vector<Index>& corners : coupled_corners_) all.push_back(corners);
+            all.push_back({solid->nodes_of(element)});
+    for (const SixNodeSheet* sheet : six_node_sheets_)
+        for (Index face = 0; face < sheet->n_faces(); ++face)
+            all.push_back({sheet->nodes_of(face), sheet->scalars_of(face)});
+    for (const std::vector<Index>& corners : coupled_corners_) all.push_back({corners});
     return all;
 }
 
@@ -146,6 +158,11 @@ void Bodies::add_rotations(const VectorXd& of_edges, VectorXd& q) const {
                 of_edges[first_edge + sheet->edge_of_rotation[r]];
         first_edge += sheet->n_edges();
     }
+    for (const SixNodeSheet* sheet : six_node_sheets_)
+        for (const Index rotation : sheet->rotation_of) {
+            if (rotation >= 0) q[nodes_.first_scalar() + rotation] = of_edges[first_edge];
+            ++first_edge;
+        }
 }
 
 Rows3 Bodies::rows(const VectorXd& q, Index count) const {
@@ -165,6 +182,11 @@ VectorXd Bodies::edge_rotations(const VectorXd& q) const {
                 q[nodes_.first_scalar() + sheet->first_rotation + r];
         first_edge += sheet->n_edges();
     }
+    for (const SixNodeSheet* sheet : six_node_sheets_)
+        for (const Index rotation : sheet->rotation_of) {
+            if (rotation >= 0) rotations[first_edge] = q[nodes_.first_scalar() + rotation];
+            ++first_edge;
+        }
     return rotations;
 }
 
@@ -182,6 +204,7 @@ std::vector<Vec3> Bodies::unknown_points() const {
     for (Index node = 0; node < nodes_.n_nodes(); ++node)
         std::fill_n(points.begin() + 3 * node, 3, nodes_.rest[node]);
     for (const Sheet* sheet : sheets_) sheet->place_rotations(points, nodes_.first_scalar());
+    for (const SixNodeSheet* sheet : six_node_sheets_) sheet->place_rotations(points, nodes_.first_scalar());
     return points;
 }
 
@@ -191,6 +214,7 @@ double Bodies::extent() const {
     for (const Rows3& points : rigid_points_)
         largest = std::max(largest, (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm());
     for (const Solid* solid : solids_) largest = std::max(largest, solid->extent());
+    for (const SixNodeSheet* sheet : six_node_sheets_) largest = std::max(largest, sheet->extent());
     return largest;
 }
 
@@ -216,6 +240,7 @@ VectorXd Bodies::area_metric() const {
             for (const Index node : sheet->corners[f])
                 metric.segment<3>(3 * node).array() += (b - a).cross(c - a).norm() / 6.0;
         }
+    for (const SixNodeSheet* sheet : six_node_sheets_) sheet->add_areas(metric);
     for (const Solid* solid : solids_) {
         VectorXd volumes = VectorXd::Zero(nodes_.n_unknowns());
         solid->add_volumes(volumes);

@@ -16,7 +16,8 @@ class Bodies {
     const Nodes& nodes() const { return nodes_; }
     const std::vector<const Sheet*>& sheets() const { return sheets_; }
     const std::vector<const Solid*>& solids() const { return solids_; }
-    /// Sheets, then solids, then the surfaces of solids that something acts on, then skins.
+    const std::vector<const SixNodeSheet*>& six_node_sheets() const { return six_node_sheets_; }
+    /// Sheets, then solids, then the surfaces of solids that something acts on, then skins, then sheets of six-node faces.
     const std::vector<const Body*>& all() const { return all_; }
     /// Triangles of bodies, and which of all() has their chunks: of sheets, of solids (none where nothing acts on them), of
     /// skins.
@@ -36,8 +37,8 @@ class Bodies {
     /// What each element of a sheet couples, and each couple.
     std::vector<Stencil> stencils(const SceneInput& input) const;
 
-    /// The nodes of each element of a solid, and the corners of rigid parts that a joint couples.
-    std::vector<std::span<const Index>> cliques() const;
+    /// What each element of a solid or of a sheet of six-node faces couples, and the corners of rigid parts that a joint couples.
+    std::vector<Clique> cliques() const;
 
     VectorXd rest_state() const;
     /// All unknowns from the caller's positions (n_v, 3) and edge rotations (n_e,); a rigid part's own points at rest.
@@ -76,10 +77,12 @@ class Bodies {
 
     std::vector<std::unique_ptr<Sheet>> owned_;
     std::vector<std::unique_ptr<Solid>> owned_solids_;
+    std::vector<std::unique_ptr<SixNodeSheet>> owned_six_node_sheets_;
     std::vector<std::unique_ptr<Surface>> owned_skins_;
     std::vector<std::unique_ptr<SurfaceBody>> owned_surfaces_;
     std::vector<const Sheet*> sheets_;
     std::vector<const Solid*> solids_;
+    std::vector<const SixNodeSheet*> six_node_sheets_;
     std::vector<const Body*> all_;
     std::vector<Faces> faces_;
     Nodes nodes_;

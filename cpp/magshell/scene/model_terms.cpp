@@ -4,6 +4,7 @@
 
 #include "magshell/scene/model.h"
 #include "magshell/strain/fold_angle.h"
+#include "magshell/term/bending_six_term.h"
 #include "magshell/term/bending_term.h"
 #include "magshell/term/body_contact_term.h"
 #include "magshell/term/body_friction_term.h"
@@ -13,6 +14,7 @@
 #include "magshell/term/load_term.h"
 #include "magshell/term/magnetic_solid_term.h"
 #include "magshell/term/magnetic_term.h"
+#include "magshell/term/membrane_six_term.h"
 #include "magshell/term/membrane_term.h"
 #include "magshell/term/moment_term.h"
 #include "magshell/term/pressure_term.h"
@@ -62,6 +64,7 @@ void Model::add_terms(const SceneInput& input) {
         elastic_.push_back(term.get());
         terms_.push_back(std::move(term));
     }
+    for (const SixNodeSheet* sheet : bodies_.six_node_sheets()) add_six_node_sheet(*sheet);
     add_magnetic_terms(input);
     add_solids(input);
     for (const FaceEnergyInput& given : input.face_energies) {
@@ -84,6 +87,18 @@ void Model::add_terms(const SceneInput& input) {
         for (Index k = 0; k < count + static_cast<Index>(input.solids.size()); ++k)
             forces_.push_back(std::make_unique<WaterTerm>(*bodies_.faces()[k].surface, *loops_[k],
                                                           *input.water, registry_));
+}
+
+void Model::add_six_node_sheet(const SixNodeSheet& sheet) {
+    const std::vector<const Body*>& all = bodies_.all();
+    const Index body = static_cast<Index>(std::find(all.begin(), all.end(), &sheet) - all.begin());
+    const auto add = [&](auto term) {
+        elastic_.push_back(term.get());
+        terms_.push_back(std::move(term));
+    };
+    const ChunkLoop& chunks = schedule_.of(body);
+    add(std::make_unique<MembraneSixTerm>(sheet, body, chunks, nodes(), matrix_, registry_));
+    add(std::make_unique<BendingSixTerm>(sheet, body, chunks, nodes(), matrix_, registry_));
 }
 
 void Model::add_magnetic_terms(const SceneInput& input) {

@@ -8,6 +8,7 @@
 #include "magshell/assembly/reduction.h"
 #include "magshell/body/joint.h"
 #include "magshell/body/sheet.h"
+#include "magshell/body/six_node_sheet.h"
 #include "magshell/body/solid.h"
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
@@ -32,6 +33,13 @@ struct SheetInput {
     bool directors = true;        // midedge; false: hinge
     bool magnetic = false;
     std::vector<DirectedEdge> directed_edges;  // directions are rows of SceneInput::directions
+};
+
+/// A sheet of six-node faces.
+struct SixNodeSheetInput {
+    std::string owner;  // under which its parameters are registered
+    SixNodeInput mesh;
+    std::vector<DirectedEdge> directed_edges;  // of mesh.corners; directions are rows of SceneInput::directions
 };
 
 struct SolidInput {
@@ -89,6 +97,7 @@ struct SceneInput {
     Index n_vertices = 0;         // of sheets and solids
     std::vector<Index> original;  // of each vertex: itself, or the one that it is welded to; empty if none is
     std::vector<SheetInput> sheets;
+    std::vector<SixNodeSheetInput> six_node_sheets;
     std::vector<SolidInput> solids;  // numbered on after the sheets
     std::vector<SkinInput> skins;
     std::vector<RigidInput> rigid;

@@ -34,39 +34,41 @@ class ElasticTerm : public Term {
 ///     begin_strains(q), begin_rates(p)  what the strains of all elements need beforehand
 ///     strain(pack, q, d), rate(pack, p, d)   d at q; J p at the last evaluated state
 ///     stiffness(pack)                   C
-template <class Kernel>
+/// of N strains an element.
+template <class Kernel, int N = 3>
 class StrainScaffold : public ElasticTerm {
   public:
-    explicit StrainScaffold(Index elements) : stress_(elements), extrapolated_(elements) {}
+    explicit StrainScaffold(Index elements) : stress_(elements, N), extrapolated_(elements, N) {}
 
     Index elements() const final { return stress_.elements; }
+    int strains_per_element() const final { return N; }
 
     void extrapolate(const double* p) final {
         kernel().begin_rates(p);
         kernel().each_pack([&](Index pack) {
-            Pack along[3], change[3];
+            Pack along[N], change[N];
             kernel().rate(pack, p, along);
             history_.scaled(kernel().stiffness(pack)).times(along, change);
-            for (int i = 0; i < 3; ++i) extrapolated_.at(pack)[i] = stress_.at(pack)[i] + change[i];
+            for (int i = 0; i < N; ++i) extrapolated_.at(pack)[i] = stress_.at(pack)[i] + change[i];
         });
     }
 
     Strains strains(const double* q) final {
         kernel().begin_strains(q);
-        Strains out(stress_.elements);
+        Strains out(stress_.elements, N);
         kernel().each_pack([&](Index pack) { kernel().strain(pack, q, out.at(pack)); });
         return out;
     }
 
     Strains strain_rates(const double* p) final {
         kernel().begin_rates(p);
-        Strains out(stress_.elements);
+        Strains out(stress_.elements, N);
         kernel().each_pack([&](Index pack) { kernel().rate(pack, p, out.at(pack)); });
         return out;
     }
 
     Strains stresses(const Strains& strains) const final {
-        Strains out(stress_.elements);
+        Strains out(stress_.elements, N);
         kernel().each_pack(
             [&](Index pack) { kernel().stiffness(pack).times(strains.at(pack), out.at(pack)); });
         return out;
@@ -74,8 +76,8 @@ class StrainScaffold : public ElasticTerm {
 
   protected:
     /// Keeps the stress of a pack, given its strain.
-    void keep_stress(Index pack, Pack strain[3]) {
-        history_.apply(pack, strain);
+    void keep_stress(Index pack, Pack strain[N]) {
+        history_.apply<N>(pack, strain);
         kernel().stiffness(pack).times(strain, stress_.at(pack));
     }
 

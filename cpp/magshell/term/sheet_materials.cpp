@@ -4,13 +4,11 @@
 
 namespace magshell {
 
-SheetMaterials::SheetMaterials(const Surface& surface, Registry& registry)
-    : thickness_(registry.values.add(surface.owner, "thickness", "m", surface.n_faces(), 1, &surface.faces)),
-      young_modulus_(
-          registry.values.add(surface.owner, "young_modulus", "Pa", surface.n_faces(), 1, &surface.faces)),
-      poisson_ratio_(
-          registry.values.add(surface.owner, "poisson_ratio", "1", surface.n_faces(), 1, &surface.faces)),
-      of_faces_(surface.n_faces()) {}
+SheetMaterials::SheetMaterials(const std::string& owner, const Renumbering& faces, Registry& registry)
+    : thickness_(registry.values.add(owner, "thickness", "m", faces.size(), 1, &faces)),
+      young_modulus_(registry.values.add(owner, "young_modulus", "Pa", faces.size(), 1, &faces)),
+      poisson_ratio_(registry.values.add(owner, "poisson_ratio", "1", faces.size(), 1, &faces)),
+      of_faces_(faces.size()) {}
 
 bool SheetMaterials::set_values(const Values& values) {
     if (!values.changed(thickness_, young_modulus_, poisson_ratio_)) return false;

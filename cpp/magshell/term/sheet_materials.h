@@ -11,7 +11,10 @@ namespace magshell {
 
 class SheetMaterials {
   public:
-    SheetMaterials(const Surface& surface, Registry& registry);
+    SheetMaterials(const Surface& surface, Registry& registry)
+        : SheetMaterials(surface.owner, surface.faces, registry) {}
+    /// `faces` has to outlive the registry.
+    SheetMaterials(const std::string& owner, const Renumbering& faces, Registry& registry);
 
     /// Whether any has changed.
     bool set_values(const Values& values);

@@ -48,14 +48,16 @@ struct StrainHistory {
     const Strains* shift = nullptr;
 
     /// From d to scale d - shift.
-    void apply(Index pack, Pack strain[3]) const {
+    template <int N = 3>
+    void apply(Index pack, Pack strain[N]) const {
         if (!shift) return;
-        for (int i = 0; i < 3; ++i) strain[i] = Pack(scale) * strain[i] - shift->at(pack)[i];
+        for (int i = 0; i < N; ++i) strain[i] = Pack(scale) * strain[i] - shift->at(pack)[i];
     }
 
     /// scale C.
-    Symmetric3 scaled(const Symmetric3& stiffness) const {
-        Symmetric3 result = stiffness;
+    template <int N>
+    Symmetric<N> scaled(const Symmetric<N>& stiffness) const {
+        Symmetric<N> result = stiffness;
         if (shift)
             for (Pack& entry : result.at) entry *= Pack(scale);
         return result;

@@ -1,0 +1,52 @@
+// The derivatives of an element's nine measures by its six nodes, and what they make of a stiffness.
+#pragma once
+
+#include "magshell/energy/symmetric3.h"
+
+namespace magshell {
+
+using Symmetric9 = Symmetric<9>;
+
+struct SixNodeRows {
+    Pack3 at[9][6];
+
+    /// C J
+    SixNodeRows times(const Symmetric9& stiffness) const {
+        SixNodeRows product;
+        for (int r = 0; r < 9; ++r)
+            for (int a = 0; a < 6; ++a) {
+                Pack3 sum = stiffness(r, 0) * at[0][a];
+                for (int s = 1; s < 9; ++s) sum += stiffness(r, s) * at[s][a];
+                product.at[r][a] = sum;
+            }
+        return product;
+    }
+
+    /// The lower blocks (a, b) of J^T S, at lower_index(a, b), with S = C J.
+    void blocks(const SixNodeRows& stiff, Pack33 h[21]) const {
+        for (int a = 0; a < 6; ++a)
+            for (int b = 0; b <= a; ++b) {
+                Pack33 sum = outer(at[0][a], stiff.at[0][b]);
+                for (int r = 1; r < 9; ++r) sum += outer(at[r][a], stiff.at[r][b]);
+                h[lower_index(a, b)] = sum;
+            }
+    }
+
+    /// J^T s
+    void forces(const Pack stress[9], Pack3 g[6]) const {
+        for (int a = 0; a < 6; ++a) {
+            g[a] = stress[0] * at[0][a];
+            for (int r = 1; r < 9; ++r) g[a] += stress[r] * at[r][a];
+        }
+    }
+
+    /// J p
+    void along(const Pack3 p[6], Pack rate[9]) const {
+        for (int r = 0; r < 9; ++r) {
+            rate[r] = dot(at[r][0], p[0]);
+            for (int a = 1; a < 6; ++a) rate[r] += dot(at[r][a], p[a]);
+        }
+    }
+};
+
+}  // namespace magshell

@@ -1,0 +1,106 @@
+// The angle by which two six-node faces are folded about the edge that they share, at its two Gauss points.
+//
+// At a place of the edge the tangent t along it and, in each face, the derivative u towards the corner opposite span the
+// tangent planes. All three are linear in the nine nodes
+//
+//   0, 1, 2   the edge: from, to, middle      3, 4, 5 and 6, 7, 8   left and right: the corner, the middles between `to`
+//                                                                   and it, and between it and `from`
+//
+// so the angle is that of strain/fold_angle.h about (0, t) with the wings u_left and u_right. A direction in place of the
+// right face is node 6 alone.
+#pragma once
+
+#include "magshell/energy/symmetric3.h"
+#include "magshell/strain/fold_angle.h"
+#include "magshell/strain/six_nodes.h"
+
+namespace magshell {
+
+class FoldSix {
+  public:
+    FoldSix(const Pack3 x[9], const Pack& right_is_face, int point)
+        : point_(point), right_is_face_(right_is_face), fold_(angle_of(x, right_is_face, point)) {}
+
+    Pack angle() const { return fold_.angle(); }
+
+    void gradient(Pack3 g[9]) const {
+        Pack3 by[4];
+        fold_.gradient(by);
+        for (int a = 0; a < 3; ++a)
+            g[a] = Pack(tangent(a)) * by[1] + Pack(wing(a)) * (by[2] + right_is_face_ * by[3]);
+        for (int a = 3; a < 6; ++a) {
+            g[a] = Pack(wing(a)) * by[2];
+            g[a + 3] = right(a) * by[3];
+        }
+    }
+
+    /// Adds moment d2theta, as lower blocks of the nine nodes at lower_index.
+    void add_curvature(const Pack& moment, Pack33 h[45]) const {
+        const FoldCurvature c(fold_);
+        const auto times = [&](const Pack33& block) { return moment * block; };
+        const Pack33 tt = times(c.block[FoldCurvature::B11]), lt = times(c.block[FoldCurvature::B21]),
+                     rt = times(c.block[FoldCurvature::B31]), ll = times(c.block[FoldCurvature::B22]),
+                     rr = times(c.block[FoldCurvature::B33]);
+        // Of the edge's nodes, which enter by t, and by u on both sides alike.
+        const Pack33 both_t = lt + right_is_face_ * rt, both = ll + right_is_face_ * rr,
+                     t_both = transpose(both_t);
+        for (int a = 0; a < 3; ++a)
+            for (int b = 0; b <= a; ++b) {
+                Pack33& into = h[lower_index(a, b)];
+                into += Pack(tangent(a) * tangent(b)) * tt;
+                into += Pack(wing(a) * tangent(b)) * both_t;
+                into += Pack(tangent(a) * wing(b)) * t_both;
+                into += Pack(wing(a) * wing(b)) * both;
+            }
+        for (int a = 3; a < 6; ++a)
+            for (int b = 0; b < 3; ++b) {
+                Pack33 &left = h[lower_index(a, b)], &opposite = h[lower_index(a + 3, b)];
+                left += Pack(wing(a) * tangent(b)) * lt;
+                left += Pack(wing(a) * wing(b)) * ll;
+                opposite += (Pack(tangent(b)) * right(a)) * rt;
+                opposite += (Pack(wing(b)) * right(a) * right_is_face_) * rr;
+            }
+        for (int a = 3; a < 6; ++a)
+            for (int b = 3; b <= a; ++b) {
+                h[lower_index(a, b)] += Pack(wing(a) * wing(b)) * ll;
+                h[lower_index(a + 3, b + 3)] += (right(a) * right(b)) * rr;
+            }
+    }
+
+  private:
+    static constexpr std::array<std::array<double, 3>, 2> tangents_ = {six_nodes::along(six_nodes::gauss[0]),
+                                                                       six_nodes::along(six_nodes::gauss[1])};
+    static constexpr std::array<std::array<double, 6>, 2> wings_ = {six_nodes::inward(six_nodes::gauss[0]),
+                                                                    six_nodes::inward(six_nodes::gauss[1])};
+    double tangent(int a) const { return tangents_[point_][a]; }
+    double wing(int a) const { return wings_[point_][a]; }
+    /// Of node a + 3 on the right, where a direction is the wing itself.
+    Pack right(int a) const {
+        const double alone = a == 3 ? 1.0 : 0.0;
+        return Pack(alone) + right_is_face_ * Pack(wing(a) - alone);
+    }
+
+    static Fold angle_of(const Pack3 x[9], const Pack& right_is_face, int point) {
+        const std::array<double, 3>& t = tangents_[point];
+        const std::array<double, 6>& u = wings_[point];
+        Pack3 tangent = Pack(t[0]) * x[0], shared = Pack(u[0]) * x[0];
+        for (int a = 1; a < 3; ++a) {
+            tangent += Pack(t[a]) * x[a];
+            shared += Pack(u[a]) * x[a];
+        }
+        Pack3 left = shared, right = right_is_face * shared;
+        for (int a = 3; a < 6; ++a) {
+            const double alone = a == 3 ? 1.0 : 0.0;
+            left += Pack(u[a]) * x[a];
+            right += (Pack(alone) + right_is_face * Pack(u[a] - alone)) * x[a + 3];
+        }
+        const Pack3 zero = {Pack(0.0), Pack(0.0), Pack(0.0)};
+        return Fold(zero, tangent, left, right, Pack(0.0));
+    }
+
+    const int point_;
+    const Pack right_is_face_;
+    const Fold fold_;
+};
+
+}  // namespace magshell

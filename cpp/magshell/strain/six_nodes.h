@@ -1,0 +1,79 @@
+// Triangles of six nodes: corners 0, 1, 2, then the middles of the edges 0-1, 1-2, 2-0. What the quadratic shape functions
+// are at the points that a second-order shell measures at.
+//
+// Edge i is opposite corner i and runs from corner i + 1 to corner i + 2; t_i is its vector in the reference triangle. What
+// is measured on it stands at the two Gauss points of the edge. Points inside are those of the symmetric rule of six points,
+// exact to fourth degree.
+#pragma once
+
+#include <array>
+
+namespace magshell::six_nodes {
+
+/// The middle of the edge opposite corner i.
+constexpr int middle(int i) {
+    return 3 + (i + 1) % 3;
+}
+
+/// Where along an edge: (1 -+ 1/sqrt(3)) / 2, each with half the weight.
+constexpr std::array<double, 2> gauss = {0.21132486540518711775, 0.78867513459481288225};
+
+/// d/ds at a place s of an edge, of its two ends and its middle.
+constexpr std::array<double, 3> along(double s) {
+    return {4.0 * s - 3.0, 4.0 * s - 1.0, 4.0 - 8.0 * s};
+}
+
+/// The derivative towards the corner opposite: of the ends `from` and `to`, the middle, that corner, and the middles
+/// between `to` and it and between it and `from`.
+constexpr std::array<double, 6> inward(double s) {
+    return {(4.0 * s - 3.0) * (1.0 - s),
+            (1.0 - 4.0 * s) * s,
+            -8.0 * s * (1.0 - s),
+            -1.0,
+            4.0 * s,
+            4.0 * (1.0 - s)};
+}
+
+struct Point {
+    std::array<double, 3> at;  // barycentric
+    double weight;             // of the triangle's area
+};
+
+constexpr std::array<Point, 6> inside = [] {
+    std::array<Point, 6> points{};
+    constexpr double places[2] = {0.44594849091596488632, 0.09157621350977074346},
+                     weights[2] = {0.22338158967801146570, 0.10995174365532186764};
+    for (int ring = 0; ring < 2; ++ring)
+        for (int k = 0; k < 3; ++k) {
+            Point& point = points[3 * ring + k];
+            for (int i = 0; i < 3; ++i) point.at[i] = i == k ? 1.0 - 2.0 * places[ring] : places[ring];
+            point.weight = weights[ring];
+        }
+    return points;
+}();
+
+/// Along t_i at a point of these barycentric coordinates, of the six nodes.
+constexpr std::array<double, 6> derivative(int i, const std::array<double, 3>& at) {
+    double rate[3] = {};
+    rate[(i + 1) % 3] = -1.0;
+    rate[(i + 2) % 3] = 1.0;
+    std::array<double, 6> by_node{};
+    for (int k = 0; k < 3; ++k) {
+        const int a = (k + 1) % 3, b = (k + 2) % 3;
+        by_node[k] = (4.0 * at[k] - 1.0) * rate[k];
+        by_node[middle(k)] = 4.0 * (at[a] * rate[b] + at[b] * rate[a]);
+    }
+    return by_node;
+}
+
+/// The linear functions of one direction i: two that are 1 at one Gauss point of edge i, 0 at the other and at the corner
+/// opposite, and the barycentric coordinate of that corner.
+constexpr double test(int i, int which, const std::array<double, 3>& at) {
+    if (which == 2) return at[i];
+    // At the two ends of the edge: a line through 1 at one Gauss point and 0 at the other.
+    const double first = gauss[which], other = gauss[1 - which];
+    const double from = -other / (first - other), to = (1.0 - other) / (first - other);
+    return from * at[(i + 1) % 3] + to * at[(i + 2) % 3];
+}
+
+}  // namespace magshell::six_nodes

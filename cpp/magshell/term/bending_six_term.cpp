@@ -1,0 +1,384 @@
+#include "magshell/term/bending_six_term.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace magshell {
+namespace {
+
+// A fold's first six and last three nodes as a face beside it numbers its own six and what is beyond: [on its left][...].
+struct SideNodes {
+    std::array<int, 6>
+        own;     // of the fold, for the face's nodes i + 1, i + 2, middle(i), i, middle(i + 1), middle(i + 2)
+    int beyond;  // the first of three
+};
+constexpr SideNodes left_side = {{0, 1, 2, 3, 4, 5}, 6}, right_side = {{1, 0, 2, 6, 8, 7}, 3};
+
+constexpr std::array<int, 6> face_order(int i) {
+    using six_nodes::middle;
+    return {(i + 1) % 3, (i + 2) % 3, middle(i), i, middle((i + 1) % 3), middle((i + 2) % 3)};
+}
+
+}  // namespace
+
+BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
+                               const Nodes& nodes, const SystemMatrix& matrix, Registry& registry)
+    : StrainScaffold(sheet.n_faces()),
+      sheet_(sheet),
+      body_(body),
+      nodes_(nodes.n_nodes()),
+      first_scalar_(nodes.first_scalar()),
+      chunks_(chunks),
+      loop_(sheet.own_nodes, chunks, matrix),
+      materials_(sheet.owner, sheet.faces, registry),
+      rest_(sheet.rest.begin(), sheet.rest.end()),
+      elements_(loop_.packs()),
+      rest_measures_(loop_.packs()),
+      stiffness_(loop_.packs()),
+      folds_(sheet.folds.size()) {
+    for (Index pack = 0; pack < loop_.packs(); ++pack) {
+        Pack3 x[6];
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = loop_.element(pack, lane);
+            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet.rest[f][k]);
+            for (int p = 0; p < BendingSix::points; ++p)
+                elements_[pack].inverse_jacobian[p].set(lane, rest_[f].inverse_jacobian[p]);
+            for (int r = 0; r < 9; ++r) elements_[pack].scale[r].set(lane, rest_[f].scale[r]);
+        }
+        BendingSix(x).measures(elements_[pack], rest_measures_[pack].data());
+    }
+    for (const SixNodeSheet::Stencil& s : sheet.stencils) {
+        FaceSlots& slots = face_slots_.emplace_back();
+        slots.nodes = pair_slots<15>(matrix, s.nodes);
+        for (int a = 0; a < 6; ++a) {
+            const Index r = s.rotations[a];
+            for (int k = 0; k < 15; ++k)
+                slots.rotation_nodes[a][k] =
+                    r < 0 || s.nodes[k] < 0 ? -1 : matrix.rotation_slot(r, s.nodes[k]);
+            for (int b = 0; b <= a; ++b)
+                slots.rotations[lower_index(a, b)] =
+                    r < 0 || s.rotations[b] < 0 ? -1 : matrix.rotations_slot(r, s.rotations[b]);
+        }
+    }
+    for (const FoldSixStencil& fold : sheet.folds) {
+        PairSlots<9>& slots = fold_slots_.emplace_back(pair_slots<9>(matrix, fold.nodes));
+        for (int a = 6; a < 9; ++a)  // the two wings do not meet in d2theta
+            for (int b = 3; b < 6; ++b) slots[lower_index(a - 1, b)] = -1;
+    }
+}
+
+bool BendingSixTerm::set_values(const Values& values) {
+    if (!materials_.set_values(values)) return false;
+    for (Index pack = 0; pack < loop_.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = loop_.element(pack, lane);
+            set_lane(stiffness_[pack], lane, rest_[f].bending_stiffness(materials_[f]));
+        }
+    return true;
+}
+
+FoldSix BendingSixTerm::folds_at(Index first, Index last, int point, const double* q) const {
+    Pack3 x[9] = {};
+    Pack right_is_face(0.0);
+    for (int lane = 0; lane < Pack::width; ++lane) {
+        const FoldSixStencil& fold = sheet_.folds[std::min(first + lane, last - 1)];
+        for (int a = 0; a < 9; ++a)
+            if (fold.nodes[a] >= 0) set_lane(x[a], lane, q + 3 * fold.nodes[a]);
+        right_is_face.set(lane, fold.right_is_face ? 1.0 : 0.0);
+    }
+    return FoldSix(x, right_is_face, point);
+}
+
+double BendingSixTerm::turn_from(Index fold, int point, double angle) const {
+    return std::remainder(angle - sheet_.folds[fold].rest_angle[point], 2.0 * std::numbers::pi);
+}
+
+void BendingSixTerm::store_folds(const double* q) {
+    state_.assign(q, q + 3 * nodes_);
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_fold);
+            for (int g = 0; g < 2; ++g) {
+                const FoldSix fold = folds_at(first, last, g, q);
+                const Pack angle = fold.angle();
+                Pack3 by_node[9];
+                fold.gradient(by_node);
+                for (int lane = 0; lane < last - first; ++lane) {
+                    FoldState& state = folds_[first + lane][g];
+                    state.turn = turn_from(first + lane, g, angle[lane]);
+                    for (int a = 0; a < 9; ++a) {
+                        state.gradient[3 * a] = by_node[a].x[lane];
+                        state.gradient[3 * a + 1] = by_node[a].y[lane];
+                        state.gradient[3 * a + 2] = by_node[a].z[lane];
+                    }
+                }
+            }
+        }
+    });
+}
+
+void BendingSixTerm::store_rates(const double* p) {
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h)
+            for (FoldState& state : folds_[h]) {
+                state.rate = 0.0;
+                for (int a = 0; a < 9; ++a) {
+                    const Index node = sheet_.folds[h].nodes[a];
+                    if (node < 0) continue;
+                    for (int c = 0; c < 3; ++c) state.rate += state.gradient[3 * a + c] * p[3 * node + c];
+                }
+            }
+    });
+}
+
+/// Adds what the edges of a pack of faces measure, from a number turn(fold, point) and the rotations in q; linear.
+template <class Turn>
+void BendingSixTerm::measure(Index pack, const double* q, const Turn& turn, Pack d[9]) const {
+    const double* rotation = q + first_scalar_;
+    for (int lane = 0; lane < Pack::width; ++lane)
+        for (int i = 0; i < 3; ++i) {
+            const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
+            for (int g = 0; g < 2; ++g) {
+                double delta = side.fold < 0 ? 0.0 : side.weight * turn(side.fold, side.point(g));
+                if (side.rotation[g] >= 0) delta += side.sign * rotation[side.rotation[g]];
+                d[3 * i + g].set(lane, d[3 * i + g][lane] + delta);
+            }
+        }
+}
+
+void BendingSixTerm::inside(Index pack, const double* q, Pack f[9]) const {
+    Pack3 x[6];
+    loop_.gather(pack, q, x);
+    BendingSix(x).measures(elements_[pack], f);
+    for (int r = 0; r < 9; ++r) f[r] -= rest_measures_[pack][r];
+}
+
+void BendingSixTerm::strain(Index pack, const double* q, Pack d[9]) const {
+    inside(pack, q, d);
+    measure(pack, q, [&](Index fold, int g) { return folds_[fold][g].turn; }, d);
+}
+
+void BendingSixTerm::rate(Index pack, const double* p, Pack d[9]) const {
+    Pack3 x[6], along[6];
+    SixNodeRows rows;
+    loop_.gather(pack, state_.data(), x);
+    loop_.gather(pack, p, along);
+    BendingSix(x).rows(elements_[pack], rows);
+    rows.along(along, d);
+    measure(pack, p, [&](Index fold, int g) { return folds_[fold][g].rate; }, d);
+}
+
+double BendingSixTerm::energy(const double* q, const Controls&) const {
+    std::vector<std::array<double, 2>> turns(folds_.size());
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_fold);
+            for (int g = 0; g < 2; ++g) {
+                const Pack angle = folds_at(first, last, g, q).angle();
+                for (Index h = first; h < last; ++h) turns[h][g] = turn_from(h, g, angle[h - first]);
+            }
+        }
+    });
+    return loop_.sum([&](Index pack) {
+        Pack d[9], stress[9];
+        inside(pack, q, d);
+        measure(pack, q, [&](Index fold, int g) { return turns[fold][g]; }, d);
+        stiffness_[pack].times(d, stress);
+        Pack sum = d[0] * stress[0];
+        for (int r = 1; r < 9; ++r) sum += d[r] * stress[r];
+        return Pack(0.5) * sum;
+    });
+}
+
+void BendingSixTerm::evaluate(const double* q, const Controls&, Residual& out) {
+    store_folds(q);
+    each_pack([&](Index pack) {
+        Pack d[9];
+        strain(pack, q, d);
+        keep_stress(pack, d);
+    });
+    add_forces(stress_, out);
+}
+
+/// dE/dtheta at a point of a fold: what the strains that it enters are worth.
+double BendingSixTerm::moment(const FoldSixStencil& fold, int point, const Strains& stress) const {
+    double sum = 0.0;
+    if (fold.left.face >= 0) sum += stress.number(fold.left.face, 3 * fold.left.corner + point);
+    if (fold.right.face >= 0) sum += stress.number(fold.right.face, 3 * fold.right.corner + 1 - point);
+    return fold.weight() * sum;
+}
+
+void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
+    loop_.scatter_packs([&](Index pack) {
+        Pack3 x[6], g[6];
+        SixNodeRows rows;
+        loop_.gather(pack, state_.data(), x);
+        BendingSix(x).rows(elements_[pack], rows);
+        rows.forces(stresses.at(pack), g);
+        loop_.scatter(pack, g, out);
+    });
+    // Faces that share a rotation share an edge and so a node: chunks of one colour meet at no rotation either.
+    chunks_.scatter([&](const Chunk& chunk) {
+        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h)
+            for (int g = 0; g < 2; ++g) {
+                const double m = moment(sheet_.folds[h], g, stresses);
+                for (int a = 0; a < 9; ++a) {
+                    const Index node = sheet_.folds[h].nodes[a];
+                    if (node < 0) continue;
+                    for (int c = 0; c < 3; ++c) out.add(3 * node + c, m * folds_[h][g].gradient[3 * a + c]);
+                }
+            }
+        for (Index f = chunk.first; f < chunk.last; ++f)
+            for (int i = 0; i < 3; ++i) {
+                const FaceSideSix& side = sheet_.sides[f][i];
+                for (int g = 0; g < 2; ++g)
+                    if (side.rotation[g] >= 0)
+                        out.add(first_scalar_ + side.rotation[g], side.sign * stresses.number(f, 3 * i + g));
+            }
+    });
+}
+
+void BendingSixTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
+                              SystemMatrix& out) const {
+    const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
+    ElementLoop<6>::over_packs(chunk, [&](Index pack) { assemble_faces(pack, q, stress, out); });
+    for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width)
+        assemble_folds(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
+}
+
+void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& stress,
+                                    SystemMatrix& out) const {
+    Pack3 x[6];
+    SixNodeRows rows;
+    loop_.gather(pack, q, x);
+    const BendingSix face(x);
+    face.rows(elements_[pack], rows);
+    // Folds add to the rows of their edge: to the face's own nodes, and to the three beyond.
+    Pack3 beyond[3][2][3] = {};
+    Pack sign[3] = {};
+    for (int lane = 0; lane < Pack::width; ++lane)
+        for (int i = 0; i < 3; ++i) {
+            const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
+            sign[i].set(lane, side.sign);
+            if (side.fold < 0) continue;
+            const SideNodes& at = side.on_left ? left_side : right_side;
+            const std::array<int, 6> own = face_order(i);
+            for (int g = 0; g < 2; ++g) {
+                const std::array<double, 27>& by_node = folds_[side.fold][side.point(g)].gradient;
+                const auto part = [&](int a) -> Vec3 { return side.weight * Vec3(by_node.data() + 3 * a); };
+                for (int k = 0; k < 6; ++k) {
+                    Pack3& row = rows.at[3 * i + g][own[k]];
+                    set_lane(row, lane, lane_of(row, lane) + part(at.own[k]));
+                }
+                for (int k = 0; k < 3; ++k) set_lane(beyond[i][g][k], lane, part(at.beyond + k));
+            }
+        }
+    const Symmetric9 stiffness = history_.scaled(stiffness_[pack]);
+    const SixNodeRows stiff = rows.times(stiffness);
+    Pack33 h[120];
+    rows.blocks(stiff, h);
+    face.add_curvature(elements_[pack], stress.at(pack), h);
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) {
+            const int row = 6 + 3 * i + k;
+            for (int a = 0; a < 6; ++a)
+                h[lower_index(row, a)] = outer(beyond[i][0][k], stiff.at[3 * i][a]) +
+                                         outer(beyond[i][1][k], stiff.at[3 * i + 1][a]);
+            for (int j = 0; j <= i; ++j) {
+                // What the nodes beyond edge i feel of those beyond edge j.
+                Pack3 felt[2];
+                for (int g = 0; g < 2; ++g)
+                    felt[g] = stiffness(3 * i, 3 * j + g) * beyond[i][0][k] +
+                              stiffness(3 * i + 1, 3 * j + g) * beyond[i][1][k];
+                for (int l = 0; l < 3; ++l)
+                    if (6 + 3 * j + l <= row)
+                        h[lower_index(row, 6 + 3 * j + l)] =
+                            outer(felt[0], beyond[j][0][l]) + outer(felt[1], beyond[j][1][l]);
+            }
+        }
+    Pack3 beside[6][15];  // rotation 2 i + g against the nodes
+    for (int i = 0; i < 3; ++i)
+        for (int g = 0; g < 2; ++g) {
+            for (int a = 0; a < 6; ++a) beside[2 * i + g][a] = sign[i] * stiff.at[3 * i + g][a];
+            for (int j = 0; j < 3; ++j)
+                for (int l = 0; l < 3; ++l)
+                    beside[2 * i + g][6 + 3 * j + l] =
+                        sign[i] * (stiffness(3 * i + g, 3 * j) * beyond[j][0][l] +
+                                   stiffness(3 * i + g, 3 * j + 1) * beyond[j][1][l]);
+        }
+    for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+        const Index f = loop_.element(pack, lane);
+        const SixNodeSheet::Stencil& stencil = sheet_.stencils[f];
+        const FaceSlots& slots = face_slots_[f];
+        scatter_blocks<15>(out, stencil.nodes, slots.nodes, h, lane);
+        for (int a = 0; a < 6; ++a) {
+            if (stencil.rotations[a] < 0) continue;
+            for (int k = 0; k < 15; ++k)
+                if (stencil.nodes[k] >= 0)
+                    out.add_rotation_row(slots.rotation_nodes[a][k], out.column_length(stencil.nodes[k]),
+                                         beside[a][k], lane);
+            for (int b = 0; b <= a; ++b)
+                if (stencil.rotations[b] >= 0)
+                    out.add(slots.rotations[lower_index(a, b)],
+                            sign[a / 2][lane] * sign[b / 2][lane] *
+                                stiffness(3 * (a / 2) + a % 2, 3 * (b / 2) + b % 2)[lane]);
+        }
+    }
+}
+
+void BendingSixTerm::assemble_folds(Index first, Index last, const double* q, const Strains& stress,
+                                    SystemMatrix& out) const {
+    Pack33 h[45] = {};
+    for (int g = 0; g < 2; ++g) {
+        Pack moments(0.0);
+        for (Index fold = first; fold < last; ++fold)
+            moments.set(fold - first, moment(sheet_.folds[fold], g, stress));
+        folds_at(first, last, g, q).add_curvature(moments, h);
+    }
+    for (Index fold = first; fold < last; ++fold)
+        scatter_blocks<9>(out, sheet_.folds[fold].nodes, fold_slots_[fold], h, fold - first);
+}
+
+void BendingSixTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+    store_rates(lambda);
+    std::vector<Eigen::Vector2d> of_faces(sheet_.n_faces());
+    each_pack([&](Index pack) {
+        Pack d[9], along[9];
+        strain(pack, q, d);
+        history_.apply<9>(pack, d);
+        rate(pack, lambda, along);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const Eigen::Vector<double, 9> rates = lane_of<9>(along, lane);
+            of_faces[f] = {rates.dot(lane_of<9>(stress_.at(pack), lane)),
+                           rates.dot(rest_[f].bending_by_poisson_ratio(materials_[f]) * lane_of<9>(d, lane))};
+        }
+    });
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        materials_.add_vjp(f, 3, of_faces[f][0], of_faces[f][1], out);
+}
+
+// As for triangles of three nodes: angles are exact to a unit of round-off, or as the positions over the heights.
+void BendingSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const double height = sheet_.smallest_height(f);
+        const double angle = 1.0 + 0.25 * (sheet_.largest_coordinate(f) + beyond) / height;
+        for (int r = 0; r < 9; ++r) {
+            double moment = 0.0;
+            for (int s = 0; s < 9; ++s)
+                moment += std::abs(stiffness_[f / Pack::width](r, s)[f % Pack::width]) * angle;
+            if (r % 3 < 2)
+                if (const Index rotation = sheet_.sides[f][r / 3].rotation[r % 3]; rotation >= 0)
+                    out[first_scalar_ + rotation] += moment;
+            for (const Index node : sheet_.own_nodes[f]) out.segment<3>(3 * node).array() += moment / height;
+        }
+    }
+}
+
+std::size_t BendingSixTerm::bytes() const {
+    return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + bytes_of(rest_) +
+           bytes_of(elements_) + bytes_of(rest_measures_) + bytes_of(stiffness_) + bytes_of_stresses() +
+           bytes_of(folds_) + bytes_of(state_) + loop_.bytes();
+}
+
+}  // namespace magshell

@@ -1,0 +1,87 @@
+// The bending energy of a sheet of six-node faces: what the curvature inside a face makes (energy/bending_six.h), plus the
+// turn and the rotation at two points of each edge (strain/fold_six.h).
+//
+// As for three nodes: folds are found once an edge, faces combine them, and the Hessian is the faces' J^T C J plus what is
+// curved, each fold's and each face's own, times the moments.
+#pragma once
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/body/six_node_sheet.h"
+#include "magshell/energy/bending_six.h"
+#include "magshell/energy/six_node_face.h"
+#include "magshell/strain/fold_six.h"
+#include "magshell/term/elastic_term.h"
+#include "magshell/term/sheet_materials.h"
+
+namespace magshell {
+
+class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
+  public:
+    BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
+                   const SystemMatrix& matrix, Registry& registry);
+
+    std::string_view name() const override { return "bending"; }
+    Index body() const override { return body_; }
+    bool set_values(const Values& values) override;
+    double length_scale() const override { return materials_.thinnest(); }
+    double energy(const double* q, const Controls&) const override;
+    void evaluate(const double* q, const Controls&, Residual& out) override;
+    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
+                  SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    void add_cancelling_forces(double beyond, VectorXd& out) const override;
+    void add_forces(const Strains& stresses, Residual& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    friend class StrainScaffold<BendingSixTerm, 9>;
+    // A fold at one of its points, at the last evaluated state.
+    struct FoldState {
+        double turn;                      // theta - theta~
+        std::array<double, 27> gradient;  // by its nine nodes
+        double rate;                      // of theta, along the last step that was asked for
+    };
+    using FoldStates = std::array<FoldState, 2>;
+    struct FaceSlots {
+        PairSlots<15> nodes;
+        std::array<std::array<Index, 15>, 6> rotation_nodes;
+        std::array<Index, 21> rotations;  // at lower_index(a, b)
+    };
+
+    template <class Body>
+    void each_pack(const Body& body) const {
+        loop_.each_pack(body);
+    }
+    FoldSix folds_at(Index first, Index last, int point, const double* q) const;
+    double turn_from(Index fold, int point, double angle) const;
+    template <class Turn>
+    void measure(Index pack, const double* q, const Turn& turn, Pack d[9]) const;
+    void inside(Index pack, const double* q, Pack f[9]) const;
+    void begin_strains(const double* q) { store_folds(q); }
+    void begin_rates(const double* p) { store_rates(p); }
+    void strain(Index pack, const double* q, Pack d[9]) const;
+    void rate(Index pack, const double* p, Pack d[9]) const;
+    const Symmetric9& stiffness(Index pack) const { return stiffness_[pack]; }
+    void store_folds(const double* q);
+    void store_rates(const double* p);
+    double moment(const FoldSixStencil& fold, int point, const Strains& stress) const;
+    void assemble_faces(Index pack, const double* q, const Strains& stress, SystemMatrix& out) const;
+    void assemble_folds(Index first, Index last, const double* q, const Strains& stress,
+                        SystemMatrix& out) const;
+
+    const SixNodeSheet& sheet_;
+    const Index body_, nodes_, first_scalar_;
+    const ChunkLoop& chunks_;
+    ElementLoop<6> loop_;
+    SheetMaterials materials_;
+    std::vector<SixNodeFace> rest_;
+    std::vector<BendingSix::Element> elements_;
+    std::vector<std::array<Pack, 9>> rest_measures_;
+    std::vector<FaceSlots> face_slots_;
+    std::vector<PairSlots<9>> fold_slots_;
+    std::vector<Symmetric9> stiffness_;
+    std::vector<FoldStates> folds_;
+    std::vector<double> state_;  // the nodes at which all of this holds
+};
+
+}  // namespace magshell

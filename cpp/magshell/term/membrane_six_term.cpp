@@ -1,0 +1,142 @@
+#include "magshell/term/membrane_six_term.h"
+
+#include <cmath>
+
+namespace magshell {
+
+MembraneSixTerm::MembraneSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
+                                 const Nodes& nodes, const SystemMatrix& matrix, Registry& registry)
+    : StrainScaffold(sheet.n_faces()),
+      sheet_(sheet),
+      body_(body),
+      nodes_(nodes.n_nodes()),
+      loop_(sheet.own_nodes, chunks, matrix),
+      materials_(sheet.owner, sheet.faces, registry),
+      rest_(sheet.rest.begin(), sheet.rest.end()),
+      rest_measures_(loop_.packs()),
+      stiffness_(loop_.packs()) {
+    for (Index pack = 0; pack < loop_.packs(); ++pack) {
+        Pack3 x[6];
+        for (int lane = 0; lane < Pack::width; ++lane)
+            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet.rest[loop_.element(pack, lane)][k]);
+        MembraneSix(x).measures(rest_measures_[pack].data());
+    }
+}
+
+bool MembraneSixTerm::set_values(const Values& values) {
+    if (!materials_.set_values(values)) return false;
+    for (Index pack = 0; pack < loop_.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = loop_.element(pack, lane);
+            set_lane(stiffness_[pack], lane, rest_[f].membrane_stiffness(materials_[f]));
+        }
+    return true;
+}
+
+double MembraneSixTerm::energy(const double* q, const Controls&) const {
+    return loop_.sum([&](Index pack) {
+        Pack d[9], stress[9];
+        strain(pack, q, d);
+        stiffness_[pack].times(d, stress);
+        Pack sum = d[0] * stress[0];
+        for (int r = 1; r < 9; ++r) sum += d[r] * stress[r];
+        return Pack(0.5) * sum;
+    });
+}
+
+void MembraneSixTerm::evaluate(const double* q, const Controls&, Residual& out) {
+    state_.assign(q, q + 3 * nodes_);
+    loop_.each_pack([&](Index pack) {
+        Pack d[9];
+        strain(pack, q, d);
+        keep_stress(pack, d);
+    });
+    add_forces(stress_, out);
+}
+
+void MembraneSixTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
+                               SystemMatrix& out) const {
+    const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
+    ElementLoop<6>::over_packs(chunk, [&](Index pack) {
+        Pack3 x[6];
+        Pack33 h[21];
+        SixNodeRows rows;
+        loop_.gather(pack, q, x);
+        MembraneSix(x).rows(rows);
+        rows.blocks(rows.times(history_.scaled(stiffness_[pack])), h);
+        MembraneSix::add_curvature(stress.at(pack), h);
+        loop_.scatter(pack, h, out);
+    });
+}
+
+void MembraneSixTerm::strain(Index pack, const double* q, Pack d[9]) const {
+    Pack3 x[6];
+    loop_.gather(pack, q, x);
+    MembraneSix(x).measures(d);
+    for (int r = 0; r < 9; ++r) d[r] -= rest_measures_[pack][r];
+}
+
+void MembraneSixTerm::rate(Index pack, const double* p, Pack d[9]) const {
+    Pack3 x[6], along[6];
+    SixNodeRows rows;
+    loop_.gather(pack, state_.data(), x);
+    loop_.gather(pack, p, along);
+    MembraneSix(x).rows(rows);
+    rows.along(along, d);
+}
+
+void MembraneSixTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+    std::vector<Eigen::Vector2d> of_faces(sheet_.n_faces());
+    loop_.each_pack([&](Index pack) {
+        Pack d[9], along[9];
+        strain(pack, q, d);
+        history_.apply<9>(pack, d);
+        rate(pack, lambda, along);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.element(pack, lane);
+            of_faces[f] = {
+                lane_of<9>(along, lane).dot(rest_[f].membrane_stiffness(materials_[f]) * lane_of<9>(d, lane)),
+                lane_of<9>(along, lane)
+                    .dot(rest_[f].membrane_by_poisson_ratio(materials_[f]) * lane_of<9>(d, lane))};
+        }
+    });
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        materials_.add_vjp(f, 1, of_faces[f][0], of_faces[f][1], out);
+}
+
+void MembraneSixTerm::add_forces(const Strains& stresses, Residual& out) {
+    loop_.scatter_packs([&](Index pack) {
+        Pack3 x[6], g[6];
+        SixNodeRows rows;
+        loop_.gather(pack, state_.data(), x);
+        MembraneSix(x).rows(rows);
+        rows.forces(stresses.at(pack), g);
+        loop_.scatter(pack, g, out);
+    });
+}
+
+// As for triangles of three nodes: squared derivatives carry their own round-off, and that of the positions.
+void MembraneSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const Index pack = f / Pack::width;
+        const int lane = f % Pack::width;
+        const double coordinate = sheet_.largest_coordinate(f) + beyond;
+        for (int r = 0; r < 9; ++r) {
+            double stress = 0.0;
+            for (int s = 0; s < 9; ++s) {
+                const double squared = rest_measures_[pack][s][lane];
+                stress += std::abs(stiffness_[pack](r, s)[lane]) *
+                          (squared + 0.25 * std::sqrt(squared) * coordinate);
+            }
+            const double force = 2.0 * stress * std::sqrt(rest_measures_[pack][r][lane]);
+            for (const Index node : sheet_.own_nodes[f]) out.segment<3>(3 * node).array() += force;
+        }
+    }
+}
+
+std::size_t MembraneSixTerm::bytes() const {
+    return materials_.bytes() + bytes_of(stiffness_) + bytes_of(rest_measures_) + bytes_of(rest_) +
+           bytes_of_stresses() + bytes_of(state_) + loop_.bytes();
+}
+
+}  // namespace magshell
