@@ -17,7 +17,13 @@ from gradient_kinds_bodies import (
 )
 from gradient_kinds_contact import CONTACT_MAKERS
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
-from gradient_kinds_skeletons import skeleton_at_rest, skeleton_in_motion, thrown_skeleton
+from gradient_kinds_skeletons import (
+    driven_skeleton_at_rest,
+    driven_skeleton_in_motion,
+    skeleton_at_rest,
+    skeleton_in_motion,
+    thrown_skeleton,
+)
 from gradient_scenes import Kind
 from gradient_world import (
     BEGIN,
@@ -267,6 +273,9 @@ MAKERS = {
         ms.TRBDF2(), keep="checkpoints", memory_budget=2e4
     ),
     "a thrown skeleton": thrown_skeleton,
+    "at rest, with a driven skeleton": driven_skeleton_at_rest,
+    "in motion, with a driven skeleton, euler": lambda: driven_skeleton_in_motion(ms.ImplicitEuler()),
+    "in motion, with a driven skeleton": lambda: driven_skeleton_in_motion(ms.TRBDF2(), keep="stages"),
     "in motion, with a skeleton, euler": lambda: skeleton_in_motion(ms.ImplicitEuler()),
     "onto a Plane": lambda: thrown(ob.Plane),
     "onto a Plane, rubbing": lambda: thrown(ob.Plane, **RUBS),

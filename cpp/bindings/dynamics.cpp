@@ -1,4 +1,5 @@
 // Motions and their adjoint to Python: whole runs with the GIL released.
+#include <limits>
 #include <string>
 
 #include "bindings/arrays.h"
@@ -42,11 +43,11 @@ Knots rows_of(const std::vector<Controls>& controls) {
 StrainSet strains_of(Model& model, const Array& numbers) {
     StrainSet strains;
     if (numbers.size() == 0) return strains;
-    if (numbers.size() != model.n_strains())
-        throw InvalidInput("the scene has " + std::to_string(model.n_strains()) + " strains, got " +
+    if (numbers.size() != model.elastic().size())
+        throw InvalidInput("the scene has " + std::to_string(model.elastic().size()) + " strains, got " +
                            std::to_string(numbers.size()));
     const double* from = numbers.data();
-    strains = model.no_strains();
+    strains = model.elastic().zeros();
     for (Strains& part : strains.of_terms)
         for (Index element = 0; element < part.elements; ++element)
             for (int i = 0; i < part.width; ++i) part.set(element, i, *from++);
@@ -54,7 +55,7 @@ StrainSet strains_of(Model& model, const Array& numbers) {
 }
 
 VectorXd numbers_of(const Model& model, const StrainSet& strains) {
-    VectorXd numbers(strains.empty() ? 0 : model.n_strains());
+    VectorXd numbers(strains.empty() ? 0 : model.elastic().size());
     double* to = numbers.data();
     for (const Strains& part : strains.of_terms)
         for (Index element = 0; element < part.elements; ++element)
@@ -74,8 +75,8 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.start.rates.w = to_vector(array("acceleration"));
     if (input.start.rates.w.size() > 0) {
         input.start.rates.v = input.start.v;
-        input.start.rates.d = strains_of(model, given["strain_rates"].cast<Array>());
-        input.start.rates.e = strains_of(model, given["maxwell_strain_rates"].cast<Array>());
+        input.start.rates.elastic.d = strains_of(model, given["strain_rates"].cast<Array>());
+        input.start.rates.elastic.e = strains_of(model, given["maxwell_strain_rates"].cast<Array>());
     }
     input.rotations_given = given["rotations_given"].cast<bool>();
     input.viscosity = {given["stiffness_damping"].cast<double>(), given["maxwell_modulus"].cast<double>(),
@@ -119,6 +120,16 @@ Array directions_of(const MotionResult& motion, const Model& model) {
     for (py::ssize_t k = 0; k < n; ++k)
         Eigen::Map<VectorXd>(rows.mutable_data() + k * size, size) =
             motion.recorded[k].q.segment(3 * n_v, size);
+    return rows;
+}
+
+// (n, m): what motors do in every recorded state; NaN in one that no step led to.
+Knots driving_of(const MotionResult& motion) {
+    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()),
+                       m = motion.last.driving.size();
+    Knots rows = Knots::Constant(n, m, std::numeric_limits<double>::quiet_NaN());
+    for (Eigen::Index k = 0; k < n; ++k)
+        if (motion.recorded[k].driving.size() == m) rows.row(k) = motion.recorded[k].driving.transpose();
     return rows;
 }
 
@@ -205,9 +216,9 @@ void register_dynamics(py::module_& module) {
         .def("last_maxwell_strains",
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.e); })
         .def("last_strain_rates",
-             [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.d); })
+             [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.elastic.d); })
         .def("last_maxwell_strain_rates",
-             [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.e); })
+             [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.elastic.e); })
         .def_property_readonly("last_turns", [](const MotionResult& r) { return r.last.turns; })
         .def_readonly("kinetic_energy", &MotionResult::kinetic_energy)
         .def_readonly("energies", &MotionResult::energies)
@@ -227,6 +238,7 @@ void register_dynamics(py::module_& module) {
              })
         .def("edge_rotations", [](const MotionResult& r, const Model& m) { return rotations_of(m, r); })
         .def("directions", &directions_of)
+        .def("driving", &driving_of)
         .def("largest_strains", &largest_strains, py::arg("model"), py::arg("thickness"));
 
     module.def("simulate", &run, py::arg("model"), py::arg("input"), py::arg("gradients"), py::arg("budget"),

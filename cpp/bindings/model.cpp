@@ -123,7 +123,8 @@ std::vector<SkeletonInput> skeletons_of(const py::list& given) {
         for (const py::handle joint : each["joints"])
             skeleton.joints.push_back({joint_kind(joint["kind"].cast<std::string>()),
                                        joint["parent"].cast<Index>(), to_vec3(joint["origin"]),
-                                       to_vec3(joint["axis"])});
+                                       to_vec3(joint["axis"]), joint["driven"].cast<bool>(),
+                                       joint["damped"].cast<bool>(), joint["twisted"].cast<bool>()});
     }
     return skeletons;
 }
@@ -283,7 +284,7 @@ void register_model(py::module_& module) {
             "Where each free unknown is at rest (n, 3) [m]: its vertex, or the middle of its edge.")
         .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
         .def_property_readonly("bytes", &Model::bytes)
-        .def_property_readonly("n_strains", &Model::n_strains)
+        .def_property_readonly("n_strains", [](const Model& m) { return m.elastic().size(); })
         .def("rest_state", [](const Model& m) { return m.bodies().rest_state(); })
         .def("state",
              [](const Model& m, const Array& x, const Array& r) {
@@ -350,6 +351,17 @@ void register_model(py::module_& module) {
                 model.evaluate(q, controls);
                 return model.residual().gradient;
             },
+            py::call_guard<py::gil_scoped_release>())
+        .def(
+            "driving",
+            [](Model& model, const VectorXd& q, const Controls& controls, const Model::Turns& turns) {
+                const std::lock_guard lock(model.in_use());
+                model.set_turns(turns);
+                model.evaluate(q, controls);
+                return model.reduction().driving(model.residual().gradient);
+            },
+            py::arg("q"), py::arg("controls"), py::arg("turns"),
+            "What the motors of joints do in an equilibrium q, N and N m, one after another.",
             py::call_guard<py::gil_scoped_release>())
         .def(
             "assemble",

@@ -396,6 +396,17 @@ class Model:
         """
         Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.
         """
+    def driving(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        turns: collections.abc.Sequence[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+        ],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        What the motors of joints do in an equilibrium q, N and N m, one after another.
+        """
     def gradient(
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -744,6 +755,7 @@ class Keep:
 
 class MotionResult:
     def directions(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    def driving(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
     def edge_rotations(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
     def largest_strains(
         self, model: Model, thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]

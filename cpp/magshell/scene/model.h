@@ -17,13 +17,14 @@
 #include "magshell/linalg/factor.h"
 #include "magshell/scene/bodies.h"
 #include "magshell/scene/varying.h"
-#include "magshell/term/elastic_term.h"
 #include "magshell/term/field_sources.h"
 #include "magshell/term/force_term.h"
+#include "magshell/term/viscous_terms.h"
 
 namespace magshell {
 
 class BodyContactTerm;
+class DamperTerm;
 
 class Model {
   public:
@@ -115,15 +116,15 @@ class Model {
     /// they hold.
     void vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda, Gradient& out);
 
-    /// The elastic terms' stresses are C (scale d - shift) from now on, and C d without a shift.
-    void set_history(double scale, const StrainSet* shift);
-    StrainSet strains(const VectorXd& q);
-    /// Zeros.
-    StrainSet no_strains() const;
-    /// At the last evaluated state: J p, and J^T s.
-    StrainSet strain_rates(const VectorXd& p);
-    VectorXd strain_forces(const StrainSet& stresses);
-    StrainSet stresses(const StrainSet& strains) const;
+    /// What a law of viscosity is about: elastic terms; and dampers in joints, which may be none.
+    ViscousTerms& elastic() { return elastic_; }
+    const ViscousTerms& elastic() const { return elastic_; }
+    ViscousTerms& dampers() { return dampers_; }
+    const ViscousTerms& dampers() const { return dampers_; }
+    /// How fast dampers are drawn at q, as nodes move by v; and the way back.
+    StrainSet damper_rates(const VectorXd& q, const VectorXd& v) const;
+    void damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates, VectorXd& by_q,
+                          VectorXd& by_v) const;
     /// Whether some states have no energy, as of solids turned inside out; then, of a step p from q, the largest
     /// share up to which there is one, and what is wrong with a state, in words.
     bool refuses_states() const { return !refusing_.empty(); }
@@ -139,9 +140,6 @@ class Model {
     const ElasticTerm& elastic_term(Index sheet, std::string_view name) const;
     /// The elastic term of a solid.
     const SolidTerm& solid_term(Index solid) const { return *solid_terms_[solid]; }
-
-    /// How many numbers a set of strains has.
-    Index n_strains() const;
 
     /// A factorization for the reduced Hessian, analysed once for all of them. `watch` is called now and then
     /// meanwhile, and may throw.
@@ -190,7 +188,8 @@ class Model {
     FieldSources sources_;
     std::vector<std::unique_ptr<Term>> terms_;
     std::vector<std::vector<const Term*>> of_body_;  // those assembled by its chunks
-    std::vector<ElasticTerm*> elastic_;
+    ViscousTerms elastic_, dampers_;
+    const DamperTerm* damper_term_ = nullptr;
     std::vector<const SolidTerm*> solid_terms_;
     std::vector<const Term*> refusing_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
@@ -214,7 +213,6 @@ class Model {
     VectorXd metric_;
     VectorXd cancelling_forces_;  // of the elastic terms, without history
     double beyond_ = 0.0;         // [m] by how much coordinates were larger than at rest then
-    double history_scale_ = 1.0;
     double extent_, rest_reach_;  // [m]
     std::mutex in_use_;
 };

@@ -9,6 +9,8 @@
 #include "magshell/term/body_friction_term.h"
 #include "magshell/term/couple_term.h"
 #include "magshell/term/friction_term.h"
+#include "magshell/term/ball_torque_term.h"
+#include "magshell/term/damper_term.h"
 #include "magshell/term/joint_term.h"
 #include "magshell/term/load_term.h"
 #include "magshell/term/magnetic_solid_term.h"
@@ -53,13 +55,13 @@ void Model::add_terms(const SceneInput& input) {
         std::unique_ptr<MembraneTerm> term = std::make_unique<MembraneTerm>(
             *bodies_.sheets()[body], body, *membrane_faces_[body],
             membrane_loops_[body] ? *membrane_loops_[body] : *loops_[body], nodes(), registry_);
-        elastic_.push_back(term.get());
+        elastic_.add(term.get());
         terms_.push_back(std::move(term));
     }
     for (Index body = 0; body < count; ++body) {
         std::unique_ptr<BendingTerm> term = std::make_unique<BendingTerm>(
             *bodies_.sheets()[body], body, schedule_.of(body), nodes(), matrix_, registry_);
-        elastic_.push_back(term.get());
+        elastic_.add(term.get());
         terms_.push_back(std::move(term));
     }
     add_magnetic_terms(input);
@@ -116,19 +118,33 @@ void Model::add_moments(const SceneInput& input) {
 void Model::add_joints(const SceneInput& input) {
     const auto corners = [&](Index part) { return part < 0 ? nullptr : bodies_.rigid_nodes()[part].data(); };
     std::vector<JointTerm::Input> joints;
+    std::vector<DamperTerm::Input> damped;
+    std::vector<BallTorqueTerm::Input> twisted;
     for (const SkeletonInput& skeleton : input.skeletons)
         for (std::size_t k = 0; k < skeleton.links.size(); ++k) {
+            if (skeleton.owners[k].empty()) continue;
             const Joint& joint = skeleton.joints[k];
-            if (!skeleton.owners[k].empty())
-                joints.push_back({skeleton.owners[k], joint,
-                                  corners(joint.parent < 0 ? -1 : skeleton.links[joint.parent]),
-                                  corners(skeleton.links[k])});
+            const Index *parent = corners(joint.parent < 0 ? -1 : skeleton.links[joint.parent]),
+                        *child = corners(skeleton.links[k]);
+            joints.push_back({skeleton.owners[k], joint, parent, child});
+            if (joint.damped) damped.push_back({skeleton.owners[k], joint, parent, child});
+            if (joint.twisted) twisted.push_back({skeleton.owners[k], parent, child});
         }
     for (const ClosureInput& closure : input.closures)
         joints.push_back({closure.owner, Joint{JointKind::ball, -1, closure.place, Vec3::Zero()},
                           corners(closure.parent), corners(closure.child), true});
     if (!joints.empty())
         terms_.push_back(std::make_unique<JointTerm>(joints, nodes().rest, matrix_, registry_));
+    if (!damped.empty()) {
+        std::unique_ptr<DamperTerm> term =
+            std::make_unique<DamperTerm>(damped, nodes().rest, matrix_, registry_);
+        damper_term_ = term.get();
+        dampers_.add(term.get());
+        terms_.push_back(std::move(term));
+    }
+    if (twisted.empty()) return;
+    terms_.push_back(std::make_unique<BallTorqueTerm>(twisted, nodes().rest, registry_));
+    follows_ = true;
 }
 
 void Model::add_solids(const SceneInput& input) {
@@ -137,7 +153,7 @@ void Model::add_solids(const SceneInput& input) {
         std::unique_ptr<SolidTerm> term =
             make_solid_term(input.solids[k].response, *bodies_.solids()[k], body, schedule_.of(body), matrix_,
                             nodes(), registry_);
-        elastic_.push_back(term.get());
+        elastic_.add(term.get());
         solid_terms_.push_back(term.get());
         terms_.push_back(std::move(term));
     }

@@ -25,7 +25,7 @@ std::vector<Controls> controls_of(const MotionInput& input, const Tableau& table
 
 std::size_t bytes_of(const MotionState& state) {
     return sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() + state.rates.w.size()) +
-           state.e.bytes() + state.rates.d.bytes() + state.rates.e.bytes();
+           state.e.bytes() + state.rates.elastic.d.bytes() + state.rates.elastic.e.bytes();
 }
 
 std::size_t bytes_of(const SubstepRecord& substep) {
@@ -42,14 +42,14 @@ MotionState beginning(Model& model, const MotionInput& input) {
     model.take(input.controls_at(0, 0.0));
     if (!input.rotations_given)
         start.q += RotationsAtRest(model, start.q, input.controls_at(0, 0.0)).correction();
-    if (input.viscosity.maxwell() && start.e.empty()) start.e = model.strains(start.q);
+    if (input.viscosity.maxwell() && start.e.empty()) start.e = model.elastic().strains(start.q);
     return start;
 }
 
 // The last state; its energies are not known yet.
 void record_state(const Model& model, const MotionInput& input, MotionResult& result) {
     const MotionState& state = result.last;
-    result.recorded.push_back({state.q, state.v, state.turns, {}, {}});
+    result.recorded.push_back({state.q, state.v, state.turns, {}, {}, state.driving});
     result.kinetic_energy.push_back(0.5 * state.v.dot(input.inertia.mass.cwiseProduct(state.v)));
     result.energies.emplace_back(model.term_names().size(), std::numeric_limits<double>::quiet_NaN());
 }
@@ -88,7 +88,7 @@ class Run {
     void plan(const KeepOptions& keep) {
         const bool explicit_first = input_.tableau.begins_explicitly;
         const std::size_t vector = sizeof(double) * model_.size();
-        const std::size_t strains = sizeof(double) * model_.n_strains();
+        const std::size_t strains = sizeof(double) * model_.elastic().size();
         std::size_t state = (explicit_first ? 4 : 2) * vector;
         if (input_.viscosity.maxwell()) state += strains;
         if (explicit_first && input_.viscosity.any()) state += (input_.viscosity.maxwell() ? 2 : 1) * strains;

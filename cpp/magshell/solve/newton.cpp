@@ -154,6 +154,10 @@ FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool
         VectorXd pull(move.size());
         model_.multiply(move, pull);
         model_.remainder().add_product(move, false, pull);
+        if (model_.reduction().drives()) {
+            if (anchor.weights) pull += anchor.weights->cwiseProduct(move);
+            model_.reduction().add_driven_forces(gradient(q, anchor), move, pull);
+        }
         moves.col(k) = pull;
     }
     return factorize_assembled(q, anchor);
@@ -209,6 +213,12 @@ VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
         throw InvalidInput("a linear solve with friction, water or pressure stopped at a residual of " +
                            std::to_string(report.residual));
     return model_.reduction().expand(reduced);
+}
+
+VectorXd Newton::left_of(const VectorXd& move, double share, const VectorXd& q,
+                         const Controls& controls) const {
+    if (!model_.reduction().drives()) return (1.0 - share) * move;
+    return model_.reduction().prescribed_increment(q, controls);  // along curves
 }
 
 bool Newton::still_holds(const VectorXd& q, const Controls& controls) {
@@ -365,7 +375,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
                                   : solve_with_factor(force));
         const double share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
-        move *= 1.0 - share;
+        move = left_of(move, share, q, controls);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())

@@ -76,6 +76,8 @@ class Newton {
     void evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor);
     /// Evaluates, assembles with the state's own stresses and factorizes.
     FactorReport factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor = {});
+    /// That of the energy at the last evaluated state, with the pull of the anchor.
+    VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
     /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes,
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
@@ -119,6 +121,8 @@ class Newton {
     /// As far along a step as there are states; the share of it, negative where that leads nowhere, and the report
     /// says why.
     double advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
+    /// What is left of a motion that supports and motors prescribe after a share of it.
+    VectorXd left_of(const VectorXd& move, double share, const VectorXd& q, const Controls& controls) const;
     /// From the end of a step, last evaluated, back towards `from` by secants where the energy has risen again there,
     /// which fell at `slope` [J] at the beginning; the share of the step that is left.
     double search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
@@ -132,7 +136,6 @@ class Newton {
     /// Whether steps with the last factorization will do, which are as good as free.
     bool factor_serves(double contraction, double residual, double last_step) const;
     FactorReport factorize_assembled(const VectorXd& q, const Anchor& anchor);
-    VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
 
     Model& model_;
     NewtonOptions options_;

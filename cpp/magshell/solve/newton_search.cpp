@@ -84,7 +84,7 @@ NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, cons
         was_cautious = cautious;
         share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
-        move *= 1.0 - share;
+        move = left_of(move, share, q, controls);
         evaluate(q, controls, anchor);
         if (in_place) share *= search(q, controls, anchor, from, step, share * slope);
     }

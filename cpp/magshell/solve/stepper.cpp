@@ -47,9 +47,12 @@ const StepAlgebra& Stepper::algebra(double dt, const Tableau& tableau) {
     return *algebra_;
 }
 
-std::vector<StageRates> first_rates(const Tableau& tableau, const MotionState& state) {
+// What dampers feel follows from the motion: no state has to remember it.
+std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, const MotionState& state) {
     if (!tableau.begins_explicitly) return {};
-    return {state.rates};
+    std::vector<StageRates> rates = {state.rates};
+    rates.front().joints.d = model.damper_rates(state.q, state.v);
+    return rates;
 }
 
 bool Stepper::step(MotionState& state, double dt, std::span<const Controls> controls, SubstepRecord* kept,
@@ -61,11 +64,14 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
     model.set_turns(state.turns);
     model.begin_step(state.q, controls.front());
     const ElasticAfterwards elastic_afterwards(model);
-    const StrainSet at_begin = viscosity_.any() ? model.strains(state.q) : StrainSet();
-    std::vector<StageRates> rates = first_rates(tableau, state);
+    const bool damped = !model.dampers().empty();
+    const StrainSet at_begin = viscosity_.any() ? model.elastic().strains(state.q) : StrainSet(),
+                    joints_at_begin = model.dampers().strains(state.q);
+    std::vector<StageRates> rates = first_rates(model, tableau, state);
     std::vector<StageState> stages;
     VectorXd q = state.q, x_hat, v_hat;
     StrainSet e;
+    VectorXd driving;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
         model.take(controls[i + 1]);
@@ -83,10 +89,17 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             model.reduction().advance(q, ahead);
             q.tail(others.size()) = others;
         }
-        ViscousStage viscous;
+        const double T = step.stage_time();
+        ViscousStage viscous, joints;
         if (viscosity_.any()) {
-            viscous = ViscousStage(viscosity_, step.stage_time(), dt, tableau.a[i], rates, at_begin, state.e);
-            model.set_history(viscosity_.scale(step.stage_time()), &viscous.shift);
+            viscous = ViscousStage(viscosity_, T, dt, tableau.a[i], rates, &StageRates::elastic, at_begin,
+                                   state.e);
+            model.elastic().set_history(viscosity_.scale(T), &viscous.shift);
+        }
+        if (damped) {
+            joints = ViscousStage(damper_law, T, dt, tableau.a[i], rates, &StageRates::joints,
+                                  joints_at_begin, {});
+            model.dampers().set_history(damper_law.scale(T), &joints.shift);
         }
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
         const Anchor anchor{&step.weights(), &target, &motion};
@@ -106,12 +119,14 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             model.set_turns(state.turns);
             return false;
         }
+        if (i + 1 == tableau.stages) driving = model.reduction().driving(newton_.gradient(q, anchor));
         StageRates& now = rates.emplace_back();
         step.finish_stage(q, x_hat, v_hat, coordinates, now);
         if (viscosity_.any()) {
-            viscous.finish(viscosity_, step.stage_time(), model.strains(q), now);
+            viscous.finish(viscosity_, T, model.elastic().strains(q), now.elastic);
             e = std::move(viscous.e);
         }
+        if (damped) joints.finish(damper_law, T, model.dampers().strains(q), now.joints);
         if (kept) {
             const bool factorized = with_factors && report.iterations > 0;
             stages.push_back({q, model.turns(), factorized ? newton_.release_factor() : nullptr});
@@ -122,7 +137,7 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         model.set_turns(state.turns);
         return false;
     }
-    MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {}};
+    MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {}, std::move(driving)};
     if (tableau_.begins_explicitly) end.rates = std::move(rates.back());
     std::swap(state, end);
     if (kept) *kept = {std::move(end), std::move(stages)};

@@ -20,6 +20,7 @@ struct MotionState {
     Model::Turns turns;
     StrainSet e;       // of the Maxwell branch; empty without one
     StageRates rates;  // at the end of the step that led here, for a method that begins with them; else empty
+    VectorXd driving;  // what motors do there [N, N m]; empty where none is, and before the first step
 };
 
 /// Of all unknowns: masses [kg] and viscous damping [N s/m], zero for those that are no vertex.
@@ -87,6 +88,6 @@ class Stepper {
 };
 
 /// The rates that a step begins with: those of the state, if the method takes them.
-std::vector<StageRates> first_rates(const Tableau& tableau, const MotionState& state);
+std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, const MotionState& state);
 
 }  // namespace magshell

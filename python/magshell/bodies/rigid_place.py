@@ -181,7 +181,7 @@ def own_velocities(inputs, start, goes_on: bool) -> np.ndarray:
             continue
         if from_rest:
             for place, k in zip(values.moved_by(joint), scene._bodies.moved_by(own), strict=True):
-                rows[k] += joint.rate * joint.directions(place.rest)
+                rows[k] += joint.velocities(place.rest)
         elif not goes_on or joint is not own:
             raise _not_from(start, "rate of a joint")
     return rows.reshape(-1, 3)

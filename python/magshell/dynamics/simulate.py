@@ -257,6 +257,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         ],
         _own_points=points[:, n_v:] if rigid else None,
         _own_velocities=velocities[:, n_v:] if rigid else None,
+        _driving=found.driving(),
     )
 
 

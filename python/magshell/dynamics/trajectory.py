@@ -135,6 +135,7 @@ class Trajectory:
     )  # the first arguments of near_kinks, of each contact
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
+    _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
 
     def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
         """What it says of one body of the scene."""

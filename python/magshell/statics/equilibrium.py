@@ -88,6 +88,12 @@ class Equilibrium:
         return self._state
 
     @property
+    def _driving(self) -> np.ndarray:
+        """Of the motors of joints, in the core's order, N m or N."""
+        with self._values.in_core():
+            return self.scene._model.driving(self._state, self._controls, self._turns)
+
+    @property
     def _obstacles(self) -> tuple:
         """Of the scene, where they were."""
         return tuple(self._values.current(each) for each in self.scene.obstacles)
