@@ -125,14 +125,19 @@ def test_gradients_by_a_motor_in_time(integrator):
 
     def bent(angle):
         move = ms.simulate(
-            scene, steps=12, time_step=2e-2, integrator=integrator, values={hinge: {"motor_angle": angle}}
+            scene,
+            steps=12,
+            time_step=2e-2,
+            integrator=integrator,
+            solver=ms.MixedNewton(tolerance=1e-13),
+            values={hinge: {"motor_angle": angle}},
         )
         return move[wrist].angle[-1] + 0.3 * move[hinge].angle[6]
 
     angle = torch.tensor(given, requires_grad=True)
     bent(angle).backward()
-    by_hand = differences(lambda a: float(bent(a)), given, 1e-4)
-    np.testing.assert_allclose(angle.grad, by_hand, rtol=1e-6, atol=1e-8)
+    by_hand = differences(lambda a: float(bent(a)), given, 2e-5)
+    np.testing.assert_allclose(angle.grad, by_hand, rtol=1e-5, atol=1e-6)
 
 
 def test_first_order_response_to_a_motor():

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import magshell as ms
 
-STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s, extrapolated to none
+STEPS = (3.2e-2, 1.6e-2, 8e-3, 4e-3, 2e-3)  # s, extrapolated to none
 # Of the largest entry: the issue asks for 1e-6.
 CLOSE = 1e-6
 
@@ -56,12 +56,11 @@ class Posed:
                 self.scene,
                 steps=1,
                 time_step=time_step,
-                integrator=ms.ImplicitEuler(),
                 solver=ms.MixedNewton(tolerance=1e-13),
                 values=values,
             )
             found.append(sum(self._change(move)) / time_step)
-        for order in (1, 2, 3):
+        for order in (1, 2, 3, 4):
             found = [
                 (2**order * fine - rough) / (2**order - 1)
                 for rough, fine in zip(found[:-1], found[1:], strict=True)
@@ -92,16 +91,16 @@ def test_accelerations_and_their_derivatives_are_those_of_pinocchio(state):
     pose, rates, torques, accelerations, _, by_pose, by_rates, by_torques = map(np.array, state)
     posed = Posed(pose, rates, torques)
     found = posed.accelerations()
-    np.testing.assert_allclose(found, accelerations, atol=1e-8 * np.abs(accelerations).max())
+    np.testing.assert_allclose(found, accelerations, atol=1e-7 * np.abs(accelerations).max())
 
     tilts = np.zeros((6, 6))
     for k in range(6):
         unit = np.eye(6)[k]
         for weight, steps in ((8 / 12, 1), (-1 / 12, 2)):
             there, back = (
-                Posed(pose, rates, torques, sign * steps * 5e-3 * unit).accelerations() for sign in (1, -1)
+                Posed(pose, rates, torques, sign * steps * 4e-2 * unit).accelerations() for sign in (1, -1)
             )
-            tilts[:, k] += weight * (there - back) / 5e-3
+            tilts[:, k] += weight * (there - back) / 4e-2
     np.testing.assert_allclose(tilts, by_pose, atol=CLOSE * np.abs(by_pose).max())
 
 

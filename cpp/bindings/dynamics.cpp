@@ -125,8 +125,7 @@ Array directions_of(const MotionResult& motion, const Model& model) {
 
 // (n, m): what motors do in every recorded state; NaN in one that no step led to.
 Knots driving_of(const MotionResult& motion) {
-    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()),
-                       m = motion.last.driving.size();
+    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()), m = motion.last.driving.size();
     Knots rows = Knots::Constant(n, m, std::numeric_limits<double>::quiet_NaN());
     for (Eigen::Index k = 0; k < n; ++k)
         if (motion.recorded[k].driving.size() == m) rows.row(k) = motion.recorded[k].driving.transpose();

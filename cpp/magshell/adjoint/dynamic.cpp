@@ -20,7 +20,8 @@ struct Rates {
           all(first_rates(model, step.tableau(), substep.begin)) {
         for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
             step.start_of_stage(i, substep.begin, all, x_hat[i], v_hat[i]);
-            step.finish_stage(substep.stages[i].q, x_hat[i], v_hat[i], model.n_coordinates(), all.emplace_back());
+            step.finish_stage(substep.stages[i].q, x_hat[i], v_hat[i], model.n_coordinates(),
+                              all.emplace_back());
         }
     }
 };
@@ -122,9 +123,9 @@ class Backward {
         by_v.back() = std::move(g_.velocities);
         if (by_w_.size() > 0) by_w.back() = std::move(by_w_);
         g_.positions = g_.velocities = VectorXd::Zero(model_.size());
-        Viscous viscous{{model_, model_.elastic(), input_.viscosity, &StageRates::elastic, algebra, record,
-                         by_strains_},
-                        {model_, model_.dampers(), damper_law, &StageRates::joints, algebra, record, {}}};
+        Viscous viscous{
+            {model_, model_.elastic(), input_.viscosity, &StageRates::elastic, algebra, record, by_strains_},
+            {model_, model_.dampers(), damper_law, &StageRates::joints, algebra, record, {}}};
         double by_dt = 0.0;
         for (int i = n - 1; i >= 0; --i) {
             const VectorXd &v = at.all[first + i].v, &w = at.all[first + i].w;

@@ -172,8 +172,8 @@ void Carried::add_curvature(const VectorXd& gradient, double* values) const {
 void Carried::add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const {
     for (const Chunk& chunk : chunks_) {
         const Index n = chunk.carrier->coordinates(), first = free_ + chunk.first;
-        out.segment(first, n) += chunk.carrier->curvature(at_, gradient).topLeftCorner(n, n) *
-                                 reduced.segment(first, n);
+        out.segment(first, n) +=
+            chunk.carrier->curvature(at_, gradient).topLeftCorner(n, n) * reduced.segment(first, n);
     }
 }
 

@@ -105,7 +105,8 @@ MatrixXd SkeletonCarrier::jacobian(const VectorXd& q) const {
                 const Vec3 axis = column.share * column.axis;
                 for (Index n = 0; n < links_[k].size(); ++n) {
                     const Vec3 x = q.segment<3>(3 * links_[k].nodes()[n]);
-                    b.block<3, 1>(3 * (row_[k] + n), place_[j]) = column.turns ? axis.cross(x - column.origin) : axis;
+                    b.block<3, 1>(3 * (row_[k] + n), place_[j]) =
+                        column.turns ? axis.cross(x - column.origin) : axis;
                 }
             }
     return b;
@@ -180,9 +181,11 @@ VectorXd SkeletonCarrier::driven_increment(const VectorXd& q) const {
     VectorXd increment(driven());
     for (Index m = 0; m < driven(); ++m) {
         const Index link = driven_[m].link;
-        const double length = links_[link].length(), reach = poses[link].center.cwiseAbs().maxCoeff() + length;
+        const double length = links_[link].length(),
+                     reach = poses[link].center.cwiseAbs().maxCoeff() + length;
         const bool turns = joints_[link].kind == JointKind::revolute;
-        double off = driven_[m].target - coordinate(link, poses), rounds = reach + std::abs(driven_[m].target);
+        double off = driven_[m].target - coordinate(link, poses),
+               rounds = reach + std::abs(driven_[m].target);
         if (turns) {
             off = length * std::remainder(off, 2.0 * std::numbers::pi);
             rounds = reach + length * std::abs(driven_[m].target);
@@ -203,8 +206,7 @@ VectorXd SkeletonCarrier::driven_units() const {
 
 void SkeletonCarrier::driven_vjp(const VectorXd& by_driven, Gradient& out) const {
     const VectorXd units = driven_units();
-    for (Index m = 0; m < driven(); ++m)
-        out.values[driven_[m].slot.first] += units[m] * by_driven[m];
+    for (Index m = 0; m < driven(); ++m) out.values[driven_[m].slot.first] += units[m] * by_driven[m];
 }
 
 SkeletonCarrier::Pose SkeletonCarrier::moved(Index link, const std::vector<Pose>& from,
@@ -222,8 +224,7 @@ SkeletonCarrier::Pose SkeletonCarrier::moved(Index link, const std::vector<Pose>
     Pose pose{joint_place(link, to), after};
     switch (joint.kind) {
         case JointKind::revolute:
-            pose.rotation =
-                after * rotation((coordinate(link, from) + z[0] / nodes.length()) * joint.axis);
+            pose.rotation = after * rotation((coordinate(link, from) + z[0] / nodes.length()) * joint.axis);
             break;
         case JointKind::ball:
             pose.rotation = after * orthonormal(before.transpose() * turn(z) * from[link].rotation);

@@ -37,11 +37,10 @@ Carriers carriers_of(const Bodies& bodies, const std::vector<SkeletonInput>& ske
         std::vector<Slot> motors(skeleton.joints.size());
         for (std::size_t k = 0; k < motors.size(); ++k)
             if (skeleton.joints[k].driven)
-                motors[k] = registry.values.add(skeleton.owners[k],
-                                                skeleton.joints[k].kind == JointKind::revolute
-                                                    ? "motor_angle"
-                                                    : "motor_displacement",
-                                                "SI", 1, 1);
+                motors[k] = registry.values.add(
+                    skeleton.owners[k],
+                    skeleton.joints[k].kind == JointKind::revolute ? "motor_angle" : "motor_displacement",
+                    "SI", 1, 1);
         carriers.push_back(
             std::make_unique<SkeletonCarrier>(std::move(links), skeleton.joints, std::move(motors)));
     }
@@ -149,8 +148,7 @@ StrainSet Model::damper_rates(const VectorXd& q, const VectorXd& v) const {
 
 void Model::damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates, VectorXd& by_q,
                              VectorXd& by_v) const {
-    if (damper_term_)
-        damper_term_->rates_vjp(q.data(), v.data(), by_rates.of_terms.front(), by_q, by_v);
+    if (damper_term_) damper_term_->rates_vjp(q.data(), v.data(), by_rates.of_terms.front(), by_q, by_v);
 }
 
 const ElasticTerm& Model::elastic_term(Index sheet, std::string_view name) const {

@@ -20,15 +20,22 @@ void Model::add_remainders(const VectorXd& q, const Controls& controls) {
 }
 
 void Model::require_symmetric() const {
-    if (unsymmetric_)
+    if (!unsymmetric_) return;
+    if (std::none_of(terms_.begin(), terms_.end(),
+                     [](const auto& term) { return term->name() == "pressure"; }))
         throw InvalidInput(
-            "the pressure has no potential here, so the stiffness is not symmetric: its faces end at a "
-            "border that is "
-            "free, or neighbouring faces have different pressures. Equilibria, motions and their gradients "
-            "can be "
-            "computed, vibrations, buckling loads and followed paths cannot: close the surface, hold its "
-            "border, or "
-            "give one pressure to all of it");
+            "the torque of a Ball has no potential, so the stiffness is not symmetric. Equilibria, motions "
+            "and "
+            "their gradients can be computed, vibrations, buckling loads and followed paths cannot: take the "
+            "torques of Revolute joints instead");
+    throw InvalidInput(
+        "the pressure has no potential here, so the stiffness is not symmetric: its faces end at a "
+        "border that is "
+        "free, or neighbouring faces have different pressures. Equilibria, motions and their gradients "
+        "can be "
+        "computed, vibrations, buckling loads and followed paths cannot: close the surface, hold its "
+        "border, or "
+        "give one pressure to all of it");
 }
 
 void Model::begin_step(const VectorXd& q, const Controls& controls) {

@@ -210,8 +210,10 @@ VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
     VectorXd reduced = model_.reduction().vector(rhs);
     const GmresReport report = solve_unsymmetric(model_, *factor_, true, to_round_off, reduced);
     if (!report.converged)
-        throw InvalidInput("a linear solve with friction, water or pressure stopped at a residual of " +
-                           std::to_string(report.residual));
+        throw InvalidInput(
+            "a linear solve with friction, water, pressure or the torque of a Ball stopped at a residual "
+            "of " +
+            std::to_string(report.residual));
     return model_.reduction().expand(reduced);
 }
 

@@ -55,6 +55,21 @@ std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, 
     return rates;
 }
 
+// Along a prescribed path the acceleration of a stage is of first order only; that through three ends of steps is of
+// second. In a first step there are but two.
+VectorXd Stepper::driving(const MotionState& begin, double dt, const VectorXd& q, const Anchor& anchor,
+                          const StageRates& last) const {
+    VectorXd force = newton_.gradient(q, anchor);
+    if (begin.dt_before > 0.0) {
+        const double r = dt / begin.dt_before;
+        const VectorXd w = ((1.0 + 2.0 * r) / (1.0 + r) * last.v - (1.0 + r) * begin.v +
+                            r * r / (1.0 + r) * begin.v_before) /
+                           dt;
+        force += inertia_.mass.cwiseProduct(w - last.w);
+    }
+    return newton_.model().reduction().driving(force);
+}
+
 bool Stepper::step(MotionState& state, double dt, std::span<const Controls> controls, SubstepRecord* kept,
                    bool with_factors, std::string& reason) {
     const StepAlgebra& step = algebra(dt, tableau_from(state));
@@ -92,8 +107,8 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         const double T = step.stage_time();
         ViscousStage viscous, joints;
         if (viscosity_.any()) {
-            viscous = ViscousStage(viscosity_, T, dt, tableau.a[i], rates, &StageRates::elastic, at_begin,
-                                   state.e);
+            viscous =
+                ViscousStage(viscosity_, T, dt, tableau.a[i], rates, &StageRates::elastic, at_begin, state.e);
             model.elastic().set_history(viscosity_.scale(T), &viscous.shift);
         }
         if (damped) {
@@ -119,9 +134,10 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             model.set_turns(state.turns);
             return false;
         }
-        if (i + 1 == tableau.stages) driving = model.reduction().driving(newton_.gradient(q, anchor));
         StageRates& now = rates.emplace_back();
         step.finish_stage(q, x_hat, v_hat, coordinates, now);
+        if (i + 1 == tableau.stages && model.reduction().drives())
+            driving = this->driving(state, dt, q, anchor, now);
         if (viscosity_.any()) {
             viscous.finish(viscosity_, T, model.elastic().strains(q), now.elastic);
             e = std::move(viscous.e);
@@ -138,6 +154,10 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         return false;
     }
     MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {}, std::move(driving)};
+    if (model.reduction().drives()) {
+        end.v_before = state.v;
+        end.dt_before = dt;
+    }
     if (tableau_.begins_explicitly) end.rates = std::move(rates.back());
     std::swap(state, end);
     if (kept) *kept = {std::move(end), std::move(stages)};

@@ -21,6 +21,8 @@ struct MotionState {
     StrainSet e;       // of the Maxwell branch; empty without one
     StageRates rates;  // at the end of the step that led here, for a method that begins with them; else empty
     VectorXd driving;  // what motors do there [N, N m]; empty where none is, and before the first step
+    VectorXd v_before;       // where motors are: at the beginning of the step that led here
+    double dt_before = 0.0;  // [s] of that step; 0: there was none
 };
 
 /// Of all unknowns: masses [kg] and viscous damping [N s/m], zero for those that are no vertex.
@@ -80,6 +82,10 @@ class Stepper {
     const StepAlgebra& algebra(double dt, const Tableau& tableau);
 
   private:
+    /// What motors do at the end of a step, once its last stage is solved and `last` holds its rates.
+    VectorXd driving(const MotionState& begin, double dt, const VectorXd& q, const Anchor& anchor,
+                     const StageRates& last) const;
+
     Newton& newton_;
     Tableau tableau_, starter_ = sdirk2();
     Inertia inertia_;

@@ -93,8 +93,7 @@ Strains DamperTerm::stresses(const Strains& strains) const {
 }
 
 void DamperTerm::add_forces(const Strains& stresses, Residual& out) {
-    for (Index k = 0; k < elements(); ++k)
-        each_[k].links.scatter(stresses.number(k, 0) * now_[k].first, out);
+    for (Index k = 0; k < elements(); ++k) each_[k].links.scatter(stresses.number(k, 0) * now_[k].first, out);
 }
 
 Strains DamperTerm::rates(const double* q, const double* v) const {

@@ -15,8 +15,7 @@ Vec3 across(const Vec3& axis) {
 
 }  // namespace
 
-JointForm::JointForm(const Joint& joint, const LinkPair& links)
-    : angle_(joint.kind == JointKind::revolute) {
+JointForm::JointForm(const Joint& joint, const LinkPair& links) : angle_(joint.kind == JointKind::revolute) {
     const auto add = [&](CornerForm& form, const Vec3& of_parent, const Vec3& of_child, double factor) {
         form.add(links.vector(false, of_parent), links.vector(true, of_child), factor);
     };

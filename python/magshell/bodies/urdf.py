@@ -19,11 +19,11 @@ def read_urdf(
     links = {each.name: _link(each, placed[each.name]) for each in robot.links}
     (root,) = {each.name for each in robot.links} - {each.child for each in robot.joints}
     base = None
-    if fixed_base and links[root].mass == 0.0:  # it is the world
+    if fixed_base and not links[root].mass:  # it is the world
         del links[root]
     elif fixed_base:
         base = Fixed(links[root])
-    elif links[root].mass == 0.0 and not any(
+    elif not links[root].mass and not any(
         each.parent == root and each.type == "fixed" for each in robot.joints
     ):
         raise ValueError(
