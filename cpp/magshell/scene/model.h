@@ -24,6 +24,7 @@
 namespace magshell {
 
 class BodyContactTerm;
+class MuscleTerm;
 
 class Model {
   public:
@@ -140,6 +141,9 @@ class Model {
     /// The elastic term of a solid.
     const SolidTerm& solid_term(Index solid) const { return *solid_terms_[solid]; }
 
+    const MuscleTerm& muscle_term(Index muscle) const { return *muscle_terms_[muscle]; }
+    Index n_muscles() const { return static_cast<Index>(muscle_terms_.size()); }
+
     /// How many numbers a set of strains has.
     Index n_strains() const;
 
@@ -173,7 +177,9 @@ class Model {
     void add_contacts(const SceneInput& input);
     void add_body_contacts(const SceneInput& input);
     void share_out_columns();
+    void add_muscles(const SceneInput& input);
     void add_remainders(const VectorXd& q, const Controls& controls);
+    bool feels_skews(std::size_t from) const;  // of remainder_, from that one on
     void hand_out_values();
     template <class Function>
     VectorXd rate_by_varying(const Controls& at, const Controls& rate, const Function& function);
@@ -192,6 +198,7 @@ class Model {
     std::vector<std::vector<const Term*>> of_body_;  // those assembled by its chunks
     std::vector<ElasticTerm*> elastic_;
     std::vector<const SolidTerm*> solid_terms_;
+    std::vector<const MuscleTerm*> muscle_terms_;
     std::vector<const Term*> refusing_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
     const ContactTerm* contact_ = nullptr;
