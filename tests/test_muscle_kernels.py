@@ -58,7 +58,7 @@ def curve(table, x):
     c = torch.tensor(c, dtype=torch.float64)
     s = (x - origin) / step
     total = torch.zeros_like(s)
-    around = range(-3, len(c) + 3)
+    around = range(-40, len(c) + 60)
     for i in around:
         u = (s - i).abs()
         near = 2.0 / 3.0 - u**2 + u**3 / 2.0

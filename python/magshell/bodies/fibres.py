@@ -12,6 +12,7 @@ from .._checks.selections import indices, selection
 from ..mesh.tet_mesh import TetMesh
 from .solid import Solid
 
+_BACK = -0.98  # the cosine between two pieces beyond which what is between them has no direction
 _LEAST = 1e-3  # weights below are left out: the reach times 6.9
 
 
@@ -143,11 +144,11 @@ def _tangents(coordinates, pieces, lengths) -> np.ndarray:
     """Unit vectors, from those in the middles of the pieces."""
     middles = np.cumsum(lengths) - 0.5 * lengths
     units = pieces / lengths[:, None]
+    if (turned := np.sum(units[1:] * units[:-1], axis=1) < _BACK).any():
+        corner = int(np.argmax(turned)) + 1
+        raise ValueError(f"line turns back on itself at corner {corner}: give it more corners there")
     rows = np.stack([np.interp(coordinates, middles, units[:, axis]) for axis in range(3)], axis=1)
-    sizes = np.linalg.norm(rows, axis=1, keepdims=True)
-    if (sizes < 0.1).any():
-        raise ValueError("line turns back on itself from one piece to the next: give it more corners there")
-    return rows / sizes
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 
 def _sizes(mesh: TetMesh) -> np.ndarray:
