@@ -257,7 +257,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         ],
         _own_points=points[:, n_v:] if rigid else None,
         _own_velocities=velocities[:, n_v:] if rigid else None,
-        _in_time=asked.activations,
+        _activations=asked.activations,
         _record_every=asked.record_every,
     )
 

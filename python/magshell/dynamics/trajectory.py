@@ -135,7 +135,7 @@ class Trajectory:
     )  # the first arguments of near_kinks, of each contact
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
-    _in_time: Any = field(repr=False, default=None)  # what changed of the values
+    _activations: Any = field(repr=False, default=None)  # what changed of the values
     _record_every: int = field(repr=False, default=1)
 
     def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
@@ -153,7 +153,7 @@ class Trajectory:
     def _values_at(self, index: int):
         """With the values in time that muscles had then."""
         return (
-            self._values if self._in_time is None else self._in_time.values(self._values, self._knot(index))
+            self._values if self._activations is None else self._activations.values(self._values, self._knot(index))
         )
 
     def _knot(self, index: int) -> int:
