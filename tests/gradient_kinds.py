@@ -16,6 +16,7 @@ from gradient_kinds_bodies import (
     two_sheets_in_motion,
 )
 from gradient_kinds_contact import CONTACT_MAKERS
+from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
 from gradient_kinds_skeletons import (
     driven_skeleton_at_rest,
@@ -258,6 +259,9 @@ MAKERS = {
     "a solid under pressure in motion": lambda: pressed_solid(True),
     "a sheet under pressure at rest": lambda: pressed_sheet(False),
     "a sheet under pressure in motion": lambda: pressed_sheet(True),
+    "a solid with muscles at rest": muscles_at_rest,
+    "a solid with muscles in motion, euler": lambda: muscles_in_motion(ms.ImplicitEuler(), in_time=3),
+    "a solid with muscles in motion, tr_bdf2": lambda: muscles_in_motion(ms.TRBDF2()),
     "in motion, euler": lambda: moving(ms.ImplicitEuler(), "hinge"),
     "in motion, tr_bdf2": lambda: moving(ms.TRBDF2()),
     "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),

@@ -50,10 +50,11 @@ def second_order(nodes, tetrahedra):
 class SolidModel:
     """nodes (n, 3) m, tetrahedra (n_t, 4 or 10); values by the core's names, a number or one an element.
 
-    held: nodes that are held entirely.
+    held: nodes that are held entirely. muscles: as the core takes them; their numbers go into `others`, {(owner, name):
+    array}, before `set`.
     """
 
-    def __init__(self, nodes, tetrahedra, material, mean=False, values=None, held=()):
+    def __init__(self, nodes, tetrahedra, material, mean=False, values=None, held=(), muscles=()):
         self.nodes, self.tetrahedra = np.asarray(nodes, dtype=float), np.asarray(tetrahedra)
         held = np.asarray(held, dtype=np.int32)
         self.core = _core.Model(
@@ -64,6 +65,7 @@ class SolidModel:
             rigid=[],
             skeletons=[],
             closures=[],
+            muscles=list(muscles),
             face_energies=[],
             pressures=[],
             solids=[
@@ -95,6 +97,7 @@ class SolidModel:
             water=None,
         )
         self.layout = Layout(self.core.parameters)
+        self.others = {key: np.zeros(1) for key in self.layout if key[0] != "body 0"}
         self.controls = np.zeros(sum(entry[4] * entry[5] for entry in self.core.controls))
         self.set(values_of(material) if values is None else values)
         marks = np.arange(3.0 * len(self.nodes)).reshape(-1, 3)
@@ -107,9 +110,8 @@ class SolidModel:
             else np.asarray(value)
             for name, value in values.items()
         }
-        self.core.set_values(
-            self.layout.packed({("body 0", name): each for name, each in self.values.items()})
-        )
+        own = {("body 0", name): each for name, each in self.values.items()}
+        self.core.set_values(self.layout.packed({**own, **self.others}))
 
     def state(self, x):
         return self.core.state(np.asarray(x, dtype=float), np.zeros(0))
@@ -133,8 +135,16 @@ class SolidModel:
 
     def vjp(self, x, adjoint) -> dict[str, np.ndarray]:
         """adjoint . dg/dk of every value k, by name; adjoint (n, 3)."""
-        found = _core.vjp(self.core, self.state(x), self.controls, self.state(adjoint))
-        return {name: self.layout.of(np.asarray(found), "body 0", name) for name in self.values}
+        found = self._vjp(x, adjoint)
+        return {name: self.layout.of(found, "body 0", name) for name in self.values}
+
+    def other_vjp(self, x, adjoint) -> dict[tuple[str, str], np.ndarray]:
+        """Likewise of the numbers in `others`."""
+        found = self._vjp(x, adjoint)
+        return {key: self.layout.of(found, *key) for key in self.others}
+
+    def _vjp(self, x, adjoint) -> np.ndarray:
+        return np.asarray(_core.vjp(self.core, self.state(x), self.controls, self.state(adjoint)))
 
 
 def shape_gradients(nodes, tetrahedra):

@@ -6,6 +6,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/muscle.h"
 #include "bindings/solid.h"
 #include "bindings/strains.h"
 #include "magshell/core/errors.h"
@@ -146,6 +147,7 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     input.sheets = sheets_of(given["sheets"]);
     input.solids = solids_of(given["solids"]);
     input.skins = skins_of(given["skins"]);
+    input.muscles = muscles_of(given["muscles"]);
     input.rigid = rigid_of(given["rigid"]);
     input.skeletons = skeletons_of(given["skeletons"]);
     input.closures = closures_of(given["closures"]);

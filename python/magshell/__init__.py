@@ -4,10 +4,13 @@ from . import control, meshes, objectives, obstacles, optim, parametrize, shapes
 from ._core import __version__
 from ._machine.threads import num_threads, set_num_threads, show_config
 from .bodies.body_result import BodyResult
+from .bodies.fibres import Fibres, fibres_along
 from .bodies.joint_result import JointResult
 from .bodies.joints import Ball, Closure, Fixed, Joint, Prismatic, Revolute
 from .bodies.link import Link
 from .bodies.materials import Corotated, Guccione, NeoHookean, StableNeoHookean, StVenantKirchhoff
+from .bodies.muscle import Muscle
+from .bodies.muscle_result import MuscleResult
 from .bodies.rigid import Rigid
 from .bodies.rigid_result import RigidResult
 from .bodies.shell import Shell
@@ -89,6 +92,7 @@ __all__ = [
     "Equilibria",
     "Equilibrium",
     "EquilibriumJumped",
+    "Fibres",
     "Fixed",
     "Guccione",
     "ImplicitEuler",
@@ -105,6 +109,8 @@ __all__ = [
     "MotionState",
     "Multistart",
     "MultistartFailed",
+    "Muscle",
+    "MuscleResult",
     "NeoHookean",
     "Newton",
     "NoGradient",
@@ -146,6 +152,7 @@ __all__ = [
     "animate",
     "control",
     "equilibrium",
+    "fibres_along",
     "follow",
     "linear_buckling",
     "linear_response",

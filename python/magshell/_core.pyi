@@ -845,6 +845,16 @@ def drag_gradients(
 
 def factor_backends() -> list[str]: ...
 def factor_orderings() -> list[str]: ...
+def fibre_states(
+    model: Model,
+    muscle: typing.SupportsInt | typing.SupportsIndex,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None,
+) -> tuple:
+    """
+    (stretches |F m|, tensions [Pa] a rest area, rest volumes [m3]) at the points of integration of a muscle's elements, (n, p) each. v: velocities of all unknowns [m/s], or None.
+    """
+
 def find_equilibrium(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],

@@ -11,6 +11,7 @@ NOT_CALLED = {
     "RigidResult": "a result",
     "Joint": "abstract",
     "JointResult": "a result",
+    "MuscleResult": "a result",
     "LinearResponse": "a result",
     "Minimum": "a result",
     "Multistart": "a result",

@@ -17,6 +17,7 @@ def solid_calls(s: Sample) -> Iterator[Call]:
     yield from _generators(s)
     yield from _shapes()
     yield from _solids()
+    yield from _muscles()
     block = meshes.box((1.0, 1.0, 1.0), cells=(2, 1, 1))
     parts = np.arange(block.n_tetrahedra) % 2
     given = {"rest_positions": block.rest_positions, "tetrahedra": block.tetrahedra, "parts": parts}
@@ -132,3 +133,26 @@ def _solids() -> Iterator[Call]:
     exponents = dict.fromkeys(("fibre_exponent", "cross_fibre_exponent", "fibre_shear_exponent"), 2.0)
     fibres = {"stiffness": 1e3, "bulk_modulus": 1e5, "fibres": (1.0, 0.0, 0.0)}
     yield Call("Guccione", ms.Guccione, {**exponents, **fibres})
+
+
+def _muscles() -> Iterator[Call]:
+    mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1))
+    body = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3), element="linear")
+    pins = [ms.Pin(mesh.vertices_at(x=0.0))]
+    line = {"line": [(0, 0.01, 0.01), (0.1, 0.01, 0.01)], "body": body, "reach": 0.01}
+    yield Call("fibres_along", ms.fibres_along, {**line, "elements": np.arange(12)})
+    some = {"elements": [0, 3], "directions": np.ones((2, 3)), "weights": (1.0, 0.5)}
+    yield Call("Fibres", ms.Fibres, {**some, "coordinates": (0.0, 0.05), "length": 0.1})
+
+    def pulled(**arguments):
+        muscle = ms.Muscle(**arguments)
+        return ms.Scene(body, supports=pins, actuators=[muscle]), muscle.places
+
+    common = {"body": body, "fibres": ms.fibres_along(**line), "activation": 0.5, "segments": 3}
+    yield Call("Muscle", pulled, {**common, "stiffness": 1e4, "weights": 1.0})
+    table = [(0.5, 0.2), (1.0, 1.0), (1.5, 0.2)]
+    hill = {"peak_stress": 1e4, "force_length": table, "passive": table, "shortening_rate": 1.0}
+    hill["force_velocity"] = [(-1, 0.0), (0, 1), (1, 1.5)]
+    yield Call("Muscle of Hill's", pulled, {**common, **hill})
+    one = {"body": body, "fibres": (1, 0, 0), "elements": [0, 1], "stiffness": 1e4}
+    yield Call("Muscle in some", lambda **a: repr(ms.Muscle(**a)), one)

@@ -129,6 +129,9 @@ def _controls(s: Sample) -> Iterator[Call]:
     yield Call("control.fit_spline", control.fit_spline, fit)
     yield Call("control.fourier", control.fourier, {"times": times, **waves, "mean": (0, 0, 0)})
     yield Call("control.frames_at", control.frames_at, {"times": times, "wanted": (0.2, 0.4)})
+    travelling = {"times": times, "places": (0.1, 0.2), "speed": 0.3, "amplitude": 0.5, "delay": (0.0, 0.1)}
+    yield Call("control.wave", control.wave, {**travelling, "wavelength": 0.2, "mean": 0.5, "ramp": 0.1})
+    yield Call("control.pulse", control.pulse, {**travelling, "width": 0.2, "period": 1.0})
     yield Call("control.harmonics", control.harmonics, {"number": 2, "duration": 1.0})
     yield Call("control.held", control.held, {"values": fields, "steps": 12})
     frames = {

@@ -38,6 +38,13 @@ Bodies::Bodies(const SceneInput& input) {
     for (std::size_t k = 0; k < solids_.size(); ++k)
         add_surface(input.solids[k].surface_acts ? solids_[k]->surface() : nullptr);
     for (const std::unique_ptr<Surface>& skin : owned_skins_) add_surface(skin.get());
+    for (const MuscleInput& muscle : input.muscles) {
+        const Fibres* fibres =
+            owned_fibres_.emplace_back(std::make_unique<Fibres>(*solids_[muscle.solid], muscle.elements))
+                .get();
+        fibres_.push_back({fibres, static_cast<Index>(all_.size())});
+        all_.push_back(fibres);
+    }
 }
 
 void Bodies::add_surface(const Surface* surface) {

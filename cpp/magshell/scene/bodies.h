@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "magshell/body/fibres.h"
 #include "magshell/body/surface_body.h"
 #include "magshell/scene/scene_input.h"
 
@@ -16,7 +17,7 @@ class Bodies {
     const Nodes& nodes() const { return nodes_; }
     const std::vector<const Sheet*>& sheets() const { return sheets_; }
     const std::vector<const Solid*>& solids() const { return solids_; }
-    /// Sheets, then solids, then the surfaces of solids that something acts on, then skins.
+    /// Sheets, then solids, then the surfaces of solids that something acts on, then skins, then fibres of muscles.
     const std::vector<const Body*>& all() const { return all_; }
     /// Triangles of bodies, and which of all() has their chunks: of sheets, of solids (none where nothing acts on them), of
     /// skins.
@@ -25,6 +26,12 @@ class Bodies {
         Index body = -1;
     };
     const std::vector<Faces>& faces() const { return faces_; }
+    /// Of each muscle, and which of all() has their chunks.
+    struct OfMuscle {
+        const Fibres* fibres;
+        Index body;
+    };
+    const std::vector<OfMuscle>& fibres() const { return fibres_; }
     /// The nodes of each rigid part, its own first.
     const std::vector<std::vector<Index>>& rigid_nodes() const { return rigid_nodes_; }
     /// Of the smallest rigid part, half the edge of the cube around its tetrahedron [m]; infinite without.
@@ -78,10 +85,12 @@ class Bodies {
     std::vector<std::unique_ptr<Solid>> owned_solids_;
     std::vector<std::unique_ptr<Surface>> owned_skins_;
     std::vector<std::unique_ptr<SurfaceBody>> owned_surfaces_;
+    std::vector<std::unique_ptr<Fibres>> owned_fibres_;
     std::vector<const Sheet*> sheets_;
     std::vector<const Solid*> solids_;
     std::vector<const Body*> all_;
     std::vector<Faces> faces_;
+    std::vector<OfMuscle> fibres_;
     Nodes nodes_;
     std::vector<Index> copies_;  // the caller's vertices that are welded to an earlier one
     Index n_edges_ = 0, n_body_vertices_ = 0;

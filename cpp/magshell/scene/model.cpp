@@ -226,8 +226,10 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
     };
     clear(first_nodes_.size() - 1);
     // All terms of a chunk before the next chunk: its share of the matrix is cleared and filled in the cache.
-    if (body_contact_) body_contact_->be_cautious(cautious);
-    for (const std::unique_ptr<Term>& term : terms_) term->prepare_assembly(q.data(), controls);
+    for (const std::unique_ptr<Term>& term : terms_) {
+        term->be_cautious(cautious);
+        term->prepare_assembly(q.data(), controls);
+    }
     if (layer_ && layer_->version() != coupled_) {
         reduction_.set_pattern(matrix_, &layer_->matrix());
         coupled_ = layer_->version();

@@ -25,6 +25,7 @@ namespace magshell {
 
 class BodyContactTerm;
 class DamperTerm;
+class MuscleTerm;
 
 class Model {
   public:
@@ -141,6 +142,9 @@ class Model {
     /// The elastic term of a solid.
     const SolidTerm& solid_term(Index solid) const { return *solid_terms_[solid]; }
 
+    const MuscleTerm& muscle_term(Index muscle) const { return *muscle_terms_[muscle]; }
+    Index n_muscles() const { return static_cast<Index>(muscle_terms_.size()); }
+
     /// A factorization for the reduced Hessian, analysed once for all of them. `watch` is called now and then
     /// meanwhile, and may throw.
     std::shared_ptr<Factor> new_factor(const std::function<void()>& watch = [] {});
@@ -171,7 +175,9 @@ class Model {
     void add_contacts(const SceneInput& input);
     void add_body_contacts(const SceneInput& input);
     void share_out_columns();
+    void add_muscles(const SceneInput& input);
     void add_remainders(const VectorXd& q, const Controls& controls);
+    bool feels_skews(std::size_t from) const;  // of remainder_, from that one on
     void hand_out_values();
     template <class Function>
     VectorXd rate_by_varying(const Controls& at, const Controls& rate, const Function& function);
@@ -191,6 +197,7 @@ class Model {
     ViscousTerms elastic_, dampers_;
     const DamperTerm* damper_term_ = nullptr;
     std::vector<const SolidTerm*> solid_terms_;
+    std::vector<const MuscleTerm*> muscle_terms_;
     std::vector<const Term*> refusing_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
     const ContactTerm* contact_ = nullptr;

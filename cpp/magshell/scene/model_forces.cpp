@@ -13,10 +13,14 @@ void Model::add_remainders(const VectorXd& q, const Controls& controls) {
     unsymmetric_ = false;
     if (!follows_) return;
     for (const std::unique_ptr<Term>& term : terms_) term->add_remainder(q.data(), controls, remainder_);
-    unsymmetric_ =
-        std::any_of(remainder_.skews().begin(), remainder_.skews().end(), [&](const Remainder::Skew& each) {
-            return reduction_.feels_skew(each.nodes[0], each.nodes[1], each.axis);
-        });
+    unsymmetric_ = feels_skews(0);
+}
+
+bool Model::feels_skews(std::size_t from) const {
+    return std::any_of(remainder_.skews().begin() + static_cast<std::ptrdiff_t>(from),
+                       remainder_.skews().end(), [&](const Remainder::Skew& each) {
+                           return reduction_.feels_skew(each.nodes[0], each.nodes[1], each.axis);
+                       });
 }
 
 void Model::require_symmetric() const {
@@ -73,9 +77,10 @@ void Model::hold_forces(bool held) {
 }
 
 void Model::assemble_forces(const Controls& controls, bool cautious) {
+    const std::size_t before = remainder_.skews().size();
     for (const std::unique_ptr<ForceTerm>& force : forces_)
         force->assemble(kinematics_, controls, cautious, matrix_, remainder_);
-    unsymmetric_ |= remainder_.of_motion();
+    unsymmetric_ = unsymmetric_ || remainder_.of_motion() || feels_skews(before);
 }
 
 KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda, Gradient& out) const {

@@ -17,6 +17,7 @@
 #include "magshell/term/magnetic_term.h"
 #include "magshell/term/membrane_term.h"
 #include "magshell/term/moment_term.h"
+#include "magshell/term/muscle_term.h"
 #include "magshell/term/pressure_term.h"
 #include "magshell/term/water_term.h"
 
@@ -66,6 +67,7 @@ void Model::add_terms(const SceneInput& input) {
     }
     add_magnetic_terms(input);
     add_solids(input);
+    add_muscles(input);
     for (const FaceEnergyInput& given : input.face_energies) {
         const auto& [surface, body] = bodies_.faces()[given.body];
         terms_.push_back(given.energy->term(given.owner, body, *surface, *loops_[given.body], registry_));
@@ -156,6 +158,16 @@ void Model::add_solids(const SceneInput& input) {
         elastic_.add(term.get());
         solid_terms_.push_back(term.get());
         terms_.push_back(std::move(term));
+    }
+}
+
+void Model::add_muscles(const SceneInput& input) {
+    for (std::size_t k = 0; k < input.muscles.size(); ++k) {
+        const auto& [fibres, body] = bodies_.fibres()[k];
+        Muscle muscle = make_muscle(input.muscles[k], *fibres, body, schedule_.of(body), matrix_, registry_);
+        muscle_terms_.push_back(muscle.term.get());
+        terms_.push_back(std::move(muscle.term));
+        if (muscle.force) forces_.push_back(std::move(muscle.force));
     }
 }
 

@@ -14,6 +14,7 @@
 #include "magshell/term/body_contact_input.h"
 #include "magshell/term/contact_term.h"
 #include "magshell/term/face_energy.h"
+#include "magshell/term/muscle_fibres.h"
 #include "magshell/term/pressure_term.h"
 #include "magshell/term/solid_term.h"
 
@@ -91,6 +92,7 @@ struct SceneInput {
     std::vector<SheetInput> sheets;
     std::vector<SolidInput> solids;  // numbered on after the sheets
     std::vector<SkinInput> skins;
+    std::vector<MuscleInput> muscles;
     std::vector<RigidInput> rigid;
     std::vector<SkeletonInput> skeletons;
     std::vector<ClosureInput> closures;

@@ -38,7 +38,7 @@ class BodyContactTerm final : public Term {
     /// Which faces are in the way of a step p from q, in words.
     std::string blocking(const double* q, const double* p) const;
     /// Whether what is negative of the Hessians of pairs is left out from now on.
-    void be_cautious(bool cautious) { cautious_ = cautious; }
+    void be_cautious(bool cautious) override { cautious_ = cautious; }
     /// Adds the magnitude of forces that cancel inside those between pairs at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
     /// Adds the gradient by the numbers of a pair's contact.

@@ -40,12 +40,17 @@ class Term {
 
     /// Whether the controls drive it. Every term that they do is linear in them; poses move in time steps only.
     virtual bool driven() const { return true; }
+    /// Whether values that may vary within a solve act in it.
+    virtual bool varies() const { return body() < 0 || driven(); }
 
     /// The energy [J] at q; changes nothing.
     virtual double energy(const double* q, const Controls& controls) const = 0;
 
     /// Adds the gradient at q and keeps what assemble and extrapolate need of this state.
     virtual void evaluate(const double* q, const Controls& controls, Residual& out) = 0;
+
+    /// From now on, what keeps an iteration from overshooting instead of a Hessian that is not positive, or not.
+    virtual void be_cautious(bool /*cautious*/) {}
 
     /// What the Hessian at the last evaluated state needs beforehand.
     virtual void prepare_assembly(const double* /*q*/, const Controls&) {}

@@ -24,6 +24,7 @@ from .motions import (
 from .penalties import dmp, field_cap, field_excess, field_rate, field_strength
 from .signals import fit_fourier, fourier, harmonics, held, rotating, step_times
 from .splines import fit_spline, spline
+from .waves import pulse, wave
 
 __all__ = [
     "Arc",
@@ -44,10 +45,12 @@ __all__ = [
     "held",
     "key_frames",
     "path_following",
+    "pulse",
     "rotating",
     "spline",
     "step_times",
     "successive_targets",
     "track",
     "track_fitting",
+    "wave",
 ]

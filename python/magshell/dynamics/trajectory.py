@@ -136,6 +136,8 @@ class Trajectory:
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
     _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
+    _activations: Any = field(repr=False, default=None)  # what changed of the values
+    _record_every: int = field(repr=False, default=1)
 
     def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
         """What it says of one body of the scene."""
@@ -150,7 +152,15 @@ class Trajectory:
         return self.positions - self.positions.new_tensor(np.array(rest))
 
     def _values_at(self, index: int):
-        return self._values
+        """With the values in time that muscles had then."""
+        return (
+            self._values if self._activations is None else self._activations.values(self._values, self._knot(index))
+        )
+
+    def _knot(self, index: int) -> int:
+        """Where a recorded state is among the times at which controls are given."""
+        step = range(len(self))[index] * self._record_every
+        return 0 if step == 0 else (len(self.integrator._times) + 1) * step - 1
 
     @property
     def _obstacles(self) -> tuple:

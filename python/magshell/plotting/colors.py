@@ -181,6 +181,31 @@ def _von_mises(states: list[State], _: LengthUnit) -> Scalar:
     return Scalar(f"von Mises stress [{unit}]", values, limits, inside=inside, of_tetrahedra=True)
 
 
+def _of_muscles(name: str):
+    """Of tetrahedra with fibres: activation from 0, or even on both sides of it; stretch even about 1; tension in Pa."""
+
+    def rows(found: SolidStates) -> np.ndarray:
+        return np.full(len(found.volumes), np.nan) if found.muscles is None else found.muscles[name]
+
+    def scalar(states: list[State], _: LengthUnit) -> Scalar:
+        values, inside = _of_elements(states, name, rows, SolidStates)
+        low, high = _range(values)
+        label, limits, scale = name.replace("_", " "), (0.0, max(high, 1e-300)), "sequential"
+        if name == "fibre_stretch":
+            bound = max(high - 1.0, 1.0 - low)
+            limits, scale = (1.0 - bound, 1.0 + bound), "diverging"
+        elif low < 0:
+            bound = max(high, -low)
+            limits, scale = (-bound, bound), "diverging"
+        if name == "fibre_tension":
+            factor, unit = prefixed(limits[1], "Pa")
+            values, inside = ([each / factor for each in some] for some in (values, inside))
+            label, limits = f"{label} [{unit}]", (limits[0] / factor, limits[1] / factor)
+        return Scalar(label, values, limits, scale, inside, True)
+
+    return scalar
+
+
 def _resultant(name: str, text: str, unit: str, of_faces: str):
     """Of sheets: the principal value of larger magnitude, even on both sides of 0."""
 
@@ -230,6 +255,7 @@ NAMED = {
     "magnetic_energy": _magnetic_energy,
     "volume_ratio": _volume_ratio,
     "von_mises_stress": _von_mises,
+    **{name: _of_muscles(name) for name in ("activation", "fibre_stretch", "fibre_tension")},
     "membrane_force": _resultant(
         "membrane_force", "principal membrane force", "N/m", "principal_membrane_forces"
     ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..bodies.muscle import Muscle
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from ..surroundings.face_energies import FaceEnergy
@@ -21,6 +22,15 @@ def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
             for k, (part, place) in enumerate(zip(scene.rigid_parts, scene._rigid, strict=True))
         ],
     }
+
+
+def muscle_inputs(scene) -> list[dict]:
+    solids = scene._bodies.solids
+    return [
+        muscle._core_input(label, next(k for k, solid in enumerate(solids) if solid is muscle.body))
+        for muscle, label in scene._labels
+        if isinstance(muscle, Muscle)
+    ]
 
 
 def face_inputs(scene) -> dict[str, list[dict]]:

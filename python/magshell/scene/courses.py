@@ -10,10 +10,11 @@ import numpy as np
 from .._checks.quantity import shape_of
 from .._machine.keywords import nearest_first
 from ..bodies.joints import Joint
+from ..bodies.muscle import Muscle
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
 
-_JUMPING = (AppliedField, Joint)  # their values may change at once, others move
+_JUMPING = (AppliedField, Joint, Muscle)  # their values may change at once, others move
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ _UNITS = {
     "rotation": "rad",
     "displacement": "m",
     "pressure": "Pa",
+    "activation": "1",
 }
 
 

@@ -15,6 +15,7 @@ from .._checks.quantity import quantity
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
 from ..bodies.joints import Joint
+from ..bodies.muscle import Muscle
 from ..bodies.rigid import Rigid
 from ..bodies.rigid_place import places
 from ..bodies.shell import Shell
@@ -33,7 +34,7 @@ from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, Point
 from ..surroundings.pressure import Pressure
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane, continuations
 from ..surroundings.water import Water
-from .core_inputs import body_inputs, face_inputs
+from .core_inputs import body_inputs, face_inputs, muscle_inputs
 from .layout import Layout
 from .values import Values
 
@@ -51,6 +52,7 @@ class Scene:
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.
+    actuators: Muscle objects, of its solids.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     gravity: (3,), m/s2; needs the mass density of all bodies.
     contacts: Contact objects, each with the obstacles or the bodies that it is about, and SelfContact objects. Bodies pass
@@ -85,6 +87,7 @@ class Scene:
         ties=(),
         supports=(),
         loads=(),
+        actuators=(),
         field=None,
         gravity=None,
         contacts=(),
@@ -94,6 +97,7 @@ class Scene:
         self._bodies = Bodies(bodies, ties)
         self.supports = checked_list("supports", supports, _SUPPORTS)
         self.loads = checked_list("loads", loads, _LOADS)
+        self.actuators = _checked_actuators(self._bodies, actuators)
         self.fields = () if field is None else checked_list("field", field, (AppliedField,))
         self.contacts = checked_list("contacts", contacts, (Contact, BodyContact))
         self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
@@ -121,6 +125,7 @@ class Scene:
             "ties": self.ties,
             "supports": self.supports,
             "loads": self.loads,
+            "actuators": self.actuators,
             "field": self.fields,
             "gravity": self.gravity,
             "contacts": self.contacts,
@@ -178,6 +183,7 @@ class Scene:
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
             **face_inputs(self),
+            muscles=muscle_inputs(self),
             loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
             contacts=contact_inputs(self._obstacle_contacts, bodies),
@@ -215,6 +221,7 @@ class Scene:
             ("joint", self.joints),
             ("support", self.supports),
             ("load", self.loads),
+            ("actuator", self.actuators),
             ("field", self._sources),
             ("contact", self._obstacle_contacts),
             ("body contact", self._body_contacts),
@@ -279,6 +286,7 @@ class Scene:
             *self.joints,
             *self.supports,
             *self.loads,
+            *self.actuators,
             *self.fields,
             *self.contacts,
             *self.obstacles,
@@ -313,6 +321,7 @@ class Scene:
         lines += [f"  joined by {joint!r}" for joint in self.joints]
         lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
         lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
+        lines += [f"  pulled by {actuator!r}{self._whose(actuator)}" for actuator in self.actuators]
         lines += [f"  in {field!r}" for field in self.fields]
         lines += [f"  kept out by {contact!r}{self._whose(contact)}" for contact in self.contacts]
         if self.water is not None:
@@ -327,6 +336,17 @@ class Scene:
         if len(self.bodies) < 2 or item.body is None:
             return ""
         return f" (body {self._bodies.number(item.body)})"
+
+
+def _checked_actuators(bodies: Bodies, given) -> tuple[Muscle, ...]:
+    """Raises ValueError where one is of no solid of the scene, or is there twice."""
+    actuators = checked_list("actuators", given, (Muscle,))
+    for k, each in enumerate(actuators):
+        if not any(each.body is solid for solid in bodies.solids):
+            raise ValueError(f"actuator {k} is a Muscle of a solid that is not in the scene: {each.body!r}")
+        if any(each is other for other in actuators[:k]):
+            raise ValueError(f"actuators must differ, but actuator {k} is there twice")
+    return actuators
 
 
 def _refuse_support(parts, held: np.ndarray) -> None:

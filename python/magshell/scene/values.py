@@ -179,6 +179,17 @@ class Values:
         """An object of the scene as it is in this solve."""
         return self._now.get(item, item)
 
+    def with_objects(self, now: dict) -> Values:
+        """These with other objects, {object of the scene: as it is}, whose numbers are their own alone."""
+        other = copy(self)
+        other._now = {**self._now, **now}
+        numbers: dict[tuple[str, str], np.ndarray] = {}
+        for owner, label in self.scene._labels:
+            if owner in now:
+                now[owner].add_numbers(label, other, numbers)
+        other.numbers = self.scene._value_layout.packed(numbers, self.numbers)
+        return other
+
     def move(self, obstacle, path) -> None:
         """Has an obstacle, whose own place is the origin in `numbers`, follow a path."""
         self._now[obstacle] = obstacle._on(path)

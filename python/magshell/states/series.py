@@ -49,7 +49,8 @@ def write_series(
         or (n, n_t, k), which are added; rows are those of one body after another, faces those of solids' surfaces too.
 
     Tetrahedra are written as such, with sheets beside them as triangles. Of a result they have their means of
-    `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`; sheets have `membrane_force` [N/m]
+    `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`, and where muscles are `activation`,
+    `fibre_stretch` and `fibre_tension` [Pa]; sheets have `membrane_force` [N/m]
     and `bending_moment` [N] as they pull now, and the larger `von_mises_stress` [Pa] of their surfaces. Matrices are
     by rows; what an element does not have is NaN.
 

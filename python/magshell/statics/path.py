@@ -193,8 +193,9 @@ def follow(
     unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
     parameter passes 1 or `lowest_parameter`, or where until(parameter, positions) says so. Controls as in ms.equilibrium.
 
-    values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, those
-        move along the path, on straight lines from the start's to these; everything else has to be the same.
+    values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, or with
+        other activations of muscles, those move along the path, on straight lines from the start's to these; everything
+        else has to be the same.
 
     first_step: of the parameter. largest_step: root mean square displacement between points, over the mesh's size.
     locate_critical: find limit points and bifurcations between points whose numbers of unstable directions differ.
