@@ -66,6 +66,8 @@ class SolidModel:
             closures=[],
             face_energies=[],
             pressures=[],
+            volumes=[],
+            tendons=[],
             solids=[
                 {
                     "owner": "body 0",

@@ -15,7 +15,9 @@ from .solid_result import SolidResult
 def result_of(
     result, body: Shell | Solid | Rigid | Joint
 ) -> BodyResult | SolidResult | RigidResult | JointResult:
-    """`result[body]`, or `result[joint]`. Raises ValueError where the scene has no such body."""
+    """`result[body]`, `result[joint]`, or `result[actuator]`. Raises ValueError where the scene has no such body."""
+    if hasattr(body, "_result_in"):  # an actuator
+        return body._result_in(result)
     if isinstance(body, Joint):
         return JointResult(result, body)
     if isinstance(body, Rigid):

@@ -12,8 +12,9 @@ from .._machine.keywords import nearest_first
 from ..bodies.joints import Joint
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
+from ..surroundings.actuator import Actuator
 
-_JUMPING = (AppliedField, Joint)  # their values may change at once, others move
+_JUMPING = (AppliedField, Joint, Actuator)  # their values may change at once, others move
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Course:
 
 
 def _unit(owner, name: str) -> str:
-    return owner._unit(name) if isinstance(owner, Joint) else _UNITS[name]
+    return owner._unit(name) if isinstance(owner, Joint | Actuator) else _UNITS[name]
 
 
 _UNITS = {

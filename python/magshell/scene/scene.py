@@ -24,6 +24,7 @@ from ..bodies.solid import Solid
 from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
+from ..surroundings.actuator import Actuator
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.constraints import free_rigid_motions, gather
 from ..surroundings.contact import Contact
@@ -33,7 +34,7 @@ from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, Point
 from ..surroundings.pressure import Pressure
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane, continuations
 from ..surroundings.water import Water
-from .core_inputs import body_inputs, face_inputs
+from .core_inputs import actuator_inputs, body_inputs, face_inputs
 from .layout import Layout
 from .values import Values
 
@@ -51,6 +52,7 @@ class Scene:
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.
+    actuators: Cavity, Cells and Tendon objects.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     gravity: (3,), m/s2; needs the mass density of all bodies.
     contacts: Contact objects, each with the obstacles or the bodies that it is about, and SelfContact objects. Bodies pass
@@ -85,6 +87,7 @@ class Scene:
         ties=(),
         supports=(),
         loads=(),
+        actuators=(),
         field=None,
         gravity=None,
         contacts=(),
@@ -94,6 +97,7 @@ class Scene:
         self._bodies = Bodies(bodies, ties)
         self.supports = checked_list("supports", supports, _SUPPORTS)
         self.loads = checked_list("loads", loads, _LOADS)
+        self.actuators = checked_list("actuators", actuators, (Actuator,), "Cavity, Cells and Tendon objects")
         self.fields = () if field is None else checked_list("field", field, (AppliedField,))
         self.contacts = checked_list("contacts", contacts, (Contact, BodyContact))
         self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
@@ -121,6 +125,7 @@ class Scene:
             "ties": self.ties,
             "supports": self.supports,
             "loads": self.loads,
+            "actuators": self.actuators,
             "field": self.fields,
             "gravity": self.gravity,
             "contacts": self.contacts,
@@ -178,6 +183,7 @@ class Scene:
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
             **face_inputs(self),
+            **actuator_inputs(self),
             loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
             contacts=contact_inputs(self._obstacle_contacts, bodies),
@@ -215,6 +221,7 @@ class Scene:
             ("joint", self.joints),
             ("support", self.supports),
             ("load", self.loads),
+            ("actuator", self.actuators),
             ("field", self._sources),
             ("contact", self._obstacle_contacts),
             ("body contact", self._body_contacts),
@@ -279,6 +286,7 @@ class Scene:
             *self.joints,
             *self.supports,
             *self.loads,
+            *self.actuators,
             *self.fields,
             *self.contacts,
             *self.obstacles,
@@ -313,6 +321,7 @@ class Scene:
         lines += [f"  joined by {joint!r}" for joint in self.joints]
         lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
         lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
+        lines += [f"  driven by {each!r}{self._whose(each)}" for each in self.actuators]
         lines += [f"  in {field!r}" for field in self.fields]
         lines += [f"  kept out by {contact!r}{self._whose(contact)}" for contact in self.contacts]
         if self.water is not None:
