@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+from gradient_kinds_actuators import actuated_at_rest, actuated_in_motion
 from gradient_kinds_bodies import (
     magnetized_solid_at_rest,
     magnetized_solid_in_motion,
@@ -267,6 +268,9 @@ MAKERS = {
     "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),
     "in motion, sdirk3": lambda: moving(ms.SDIRK3(), "hinge", keep="checkpoints", memory_budget=2e4),
     "from an equilibrium": let_go,
+    "actuated at rest": actuated_at_rest,
+    "actuated in motion, tr_bdf2": lambda: actuated_in_motion(ms.TRBDF2()),
+    "actuated in motion, euler": lambda: actuated_in_motion(ms.ImplicitEuler(), keep="factors"),
     "at rest, with a rigid part": rigid_at_rest,
     "in motion, with rigid parts, euler": lambda: rigid_in_motion(ms.ImplicitEuler(), {"inertia": 1.1e-6}),
     "in motion, with rigid parts, tr_bdf2": lambda: rigid_in_motion(

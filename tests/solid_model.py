@@ -68,6 +68,8 @@ class SolidModel:
             muscles=list(muscles),
             face_energies=[],
             pressures=[],
+            volumes=[],
+            tendons=[],
             solids=[
                 {
                     "owner": "body 0",

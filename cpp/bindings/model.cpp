@@ -93,6 +93,41 @@ std::vector<PressureInput> pressures_of(const py::list& given) {
     return pressures;
 }
 
+std::vector<VolumeInput> volumes_of(const py::list& given) {
+    const std::map<std::string, VolumeLaw> laws = {{"pressure", VolumeLaw::pressure},
+                                                   {"gas", VolumeLaw::gas},
+                                                   {"liquid", VolumeLaw::liquid},
+                                                   {"cell", VolumeLaw::cell}};
+    std::vector<VolumeInput> volumes;
+    for (const py::handle each : given) {
+        VolumeInput& volume = volumes.emplace_back();
+        volume.owner = each["owner"].cast<std::string>();
+        volume.law = laws.at(each["law"].cast<std::string>());
+        volume.stays_open = each["stays_open"].cast<bool>();
+        volume.coupled = each["coupled"].cast<bool>();
+        for (const py::handle surface : each["surfaces"])
+            volume.surfaces.push_back({surface["triangles"].cast<std::vector<Index>>(),
+                                       surface["curved"].cast<std::vector<Index>>(),
+                                       surface["weights"].cast<std::vector<double>>(),
+                                       surface["curved_weights"].cast<std::vector<double>>()});
+    }
+    return volumes;
+}
+
+std::vector<TendonInput> tendons_of(const py::list& given) {
+    std::vector<TendonInput> tendons;
+    for (const py::handle each : given) {
+        TendonInput& tendon = tendons.emplace_back();
+        tendon.owner = each["owner"].cast<std::string>();
+        tendon.slides = each["slides"].cast<bool>();
+        tendon.shares = each["shares"].cast<std::vector<double>>();
+        for (const py::handle point : each["points"])
+            tendon.points.push_back(
+                {point["vertices"].cast<std::vector<Index>>(), point["weights"].cast<std::vector<double>>()});
+    }
+    return tendons;
+}
+
 std::vector<RigidInput> rigid_of(const py::list& given) {
     std::vector<RigidInput> rigid;
     for (const py::handle each : given)
@@ -161,6 +196,8 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
         input.face_energies.push_back({each["owner"].cast<std::string>(), each["body"].cast<Index>(),
                                        each["energy"].cast<std::shared_ptr<FaceEnergy>>()});
     input.pressures = pressures_of(given["pressures"]);
+    input.volumes = volumes_of(given["volumes"]);
+    input.tendons = tendons_of(given["tendons"]);
     input.gravity = given["gravity"].cast<bool>();
     input.loads = given["loads"].cast<bool>();
     for (const py::handle source : given["field_sources"])
@@ -374,6 +411,19 @@ void register_model(py::module_& module) {
             },
             "Gradient and Hessian, left in the core: what `python -m magshell.bench kernels` times.",
             py::call_guard<py::gil_scoped_release>())
+        .def(
+            "low_rank",
+            [](Model& model, bool reduced) {
+                const std::lock_guard lock(model.in_use());
+                const LowRank& rest = model.low_rank();
+                return py::make_tuple(
+                    reduced ? rest.reduced(model.reduction(), model.size()) : rest.columns(model.size()),
+                    rest.stiffness());
+            },
+            py::arg("reduced") = true,
+            "What hessian(), called last, leaves out: columns u (n, k) and stiffnesses s (k,), the sum of s "
+            "u u^T. Of "
+            "cavities, cells and tendons, which couple all of their nodes.")
         .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true);
 }
 

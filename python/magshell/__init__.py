@@ -60,11 +60,14 @@ from .statics.path import CriticalPoint, Path, follow
 from .statics.solve import equilibrium
 from .statics.warm_start import WarmStart
 from .surroundings.body_contact import BodyContact, SelfContact
+from .surroundings.cavity import Cavity
+from .surroundings.cells import Cells
 from .surroundings.contact import Contact
 from .surroundings.face_energies import SurfaceTension
 from .surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .surroundings.pressure import Pressure
 from .surroundings.supports import Clamp, Pin, SymmetryPlane
+from .surroundings.tendon import Tendon
 from .surroundings.water import Water
 
 __all__ = [
@@ -77,6 +80,8 @@ __all__ = [
     "BodyContact",
     "BodyResult",
     "Buckling",
+    "Cavity",
+    "Cells",
     "Clamp",
     "Closure",
     "Contact",
@@ -138,6 +143,7 @@ __all__ = [
     "Strains",
     "SurfaceTension",
     "SymmetryPlane",
+    "Tendon",
     "TetMesh",
     "Tie",
     "Touching",

@@ -103,9 +103,14 @@ class Factor:
     """
     An analysed sparse symmetric pattern; factorize() it with values, then solve().
     """
-    def factorize(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> FactorReport:
+    def factorize(
+        self,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        columns: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
+        stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+    ) -> FactorReport:
         """
-        Factorizes the matrix with these values (nnz,), in the order of the pattern's rows.
+        Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T.
         """
     def solve(self, rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
         """
@@ -428,6 +433,10 @@ class Model:
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
         Positions, then the own points of rigid parts (10 each).
+        """
+    def low_rank(self, reduced: bool = True) -> tuple:
+        """
+        What hessian(), called last, leaves out: columns u (n, k) and stiffnesses s (k,), the sum of s u u^T. Of cavities, cells and tendons, which couple all of their nodes.
         """
     def positions(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]

@@ -18,6 +18,7 @@ def solid_calls(s: Sample) -> Iterator[Call]:
     yield from _shapes()
     yield from _solids()
     yield from _muscles()
+    yield from _actuators()
     block = meshes.box((1.0, 1.0, 1.0), cells=(2, 1, 1))
     parts = np.arange(block.n_tetrahedra) % 2
     given = {"rest_positions": block.rest_positions, "tetrahedra": block.tetrahedra, "parts": parts}
@@ -74,6 +75,32 @@ def _generators(s: Sample) -> Iterator[Call]:
     yield Call("meshes.from_distance of a number", meshes.from_distance, wanted, cost=10)
     closed = {"surface": meshes.box((1.0, 1.0, 1.0), cells=(2, 2, 2)).surface, "size": 0.5, "order": 1}
     yield Call("meshes.tetrahedralize", meshes.tetrahedralize, closed, cost=20)
+
+
+def _actuators() -> Iterator[Call]:
+    mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1))
+    solid = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3), element="linear")
+    sheet = ms.Shell(mesh.surface, thickness=1e-3, young_modulus=1e6)
+
+    def acting(body, kind):
+        return lambda **a: ms.Scene(body, actuators=[kind(body, **a)], allow_rigid_motions=True)
+
+    around = {"faces": np.arange(mesh.n_faces), "cap_rims": False}
+    gas = {"filling_pressure": 1e5, "outside_pressure": 1e5}
+    yield Call("Cavity", acting(sheet, ms.Cavity), {**around, "pressure": 1e3})
+    yield Call("Cavity of gas", acting(sheet, ms.Cavity), {**around, **gas})
+    yield Call("Cavity of liquid", acting(sheet, ms.Cavity), {**around, "volume": 1e-4, "bulk_modulus": 1e5})
+    groups = np.arange(mesh.n_tetrahedra) % 2
+    yield Call(
+        "Cells", acting(solid, ms.Cells), {"groups": groups, "stiffness": 1e4, "volume_ratio": [1.1, 0.9]}
+    )
+    path = [(0.01, 0.01, 0.01), (0.05, 0.01, 0.015), (0.09, 0.01, 0.01)]
+    spring = {"tension": 1.0, "stiffness": 10.0, "rest_length": 0.05, "smoothing": 1e-3, "sliding": True}
+
+    def tendon(body, points, **a):
+        return ms.Tendon(points, body, **a)
+
+    yield Call("Tendon", acting(solid, tendon), {"points": path, **spring})
 
 
 def _shapes() -> Iterator[Call]:

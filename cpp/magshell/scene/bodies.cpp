@@ -21,6 +21,7 @@ Bodies::Bodies(const SceneInput& input) {
     add_rigid(input.rigid, numbering);
     couple_links(input);
     nodes_ = numbering.finish(input.directions, input.original);
+    couple_volumes_and_tendons(input);
     for (Index user = 0; user < nodes_.n_user_vertices(); ++user)
         if (nodes_.vertices.is_copy(user)) copies_.push_back(user);
     for (std::size_t k = 0; k < owned_.size(); ++k) {
@@ -67,7 +68,7 @@ void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numb
 
 void Bodies::couple_links(const SceneInput& input) {
     const auto couple = [&](Index a, Index b) {
-        std::vector<Index>& corners = coupled_corners_.emplace_back();
+        std::vector<Index>& corners = coupled_.emplace_back();
         for (const Index part : {a, b})
             if (part >= 0)
                 corners.insert(corners.end(), rigid_nodes_[part].begin(), rigid_nodes_[part].begin() + 4);
@@ -79,6 +80,40 @@ void Bodies::couple_links(const SceneInput& input) {
                 couple(parent < 0 ? -1 : skeleton.links[parent], skeleton.links[k]);
             }
     for (const ClosureInput& closure : input.closures) couple(closure.parent, closure.child);
+}
+
+void Bodies::couple_volumes_and_tendons(const SceneInput& input) {
+    const auto add = [&](std::vector<Index>& nodes, auto first, auto last) {
+        for (; first != last; ++first) nodes.push_back(nodes_.vertices.core[*first]);
+    };
+    const auto close = [](std::vector<Index>& nodes) {
+        std::sort(nodes.begin(), nodes.end());
+        nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    };
+    for (const VolumeInput& volume : input.volumes)
+        for (const ClosedSurface& surface : volume.surfaces) {
+            const auto &flat = surface.triangles, &curved = surface.curved;
+            if (volume.coupled) {
+                std::vector<Index>& nodes = coupled_.emplace_back();
+                add(nodes, flat.begin(), flat.end());
+                add(nodes, curved.begin(), curved.end());
+                close(nodes);
+                continue;
+            }
+            // Faces of bodies are coupled by their elements; those of caps are nobody's.
+            for (std::size_t f = 0; f + 2 < flat.size(); f += 3) {
+                std::vector<Index>& nodes = coupled_.emplace_back();
+                add(nodes, flat.begin() + f, flat.begin() + f + 3);
+                close(nodes);
+            }
+        }
+    for (const TendonInput& tendon : input.tendons)
+        for (std::size_t k = 0; k + 1 < tendon.points.size(); ++k) {
+            std::vector<Index>& nodes = coupled_.emplace_back();
+            for (const RidingPoint& point : {tendon.points[k], tendon.points[k + 1]})
+                add(nodes, point.vertices.begin(), point.vertices.end());
+            close(nodes);
+        }
 }
 
 std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
@@ -103,7 +138,7 @@ std::vector<std::span<const Index>> Bodies::cliques() const {
     for (const Solid* solid : solids_)
         for (Index element = 0; element < solid->n_elements(); ++element)
             all.push_back(solid->nodes_of(element));
-    for (const std::vector<Index>& corners : coupled_corners_) all.push_back(corners);
+    for (const std::vector<Index>& nodes : coupled_) all.push_back(nodes);
     return all;
 }
 

@@ -43,7 +43,8 @@ class Bodies {
     /// What each element of a sheet couples, and each couple.
     std::vector<Stencil> stencils(const SceneInput& input) const;
 
-    /// The nodes of each element of a solid, and the corners of rigid parts that a joint couples.
+    /// The nodes of each element of a solid, the corners of rigid parts that a joint couples, and what volumes and tendons
+    /// couple beyond that.
     std::vector<std::span<const Index>> cliques() const;
 
     VectorXd rest_state() const;
@@ -80,6 +81,7 @@ class Bodies {
     void add_surface(const Surface* surface);
     void add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering);
     void couple_links(const SceneInput& input);
+    void couple_volumes_and_tendons(const SceneInput& input);
 
     std::vector<std::unique_ptr<Sheet>> owned_;
     std::vector<std::unique_ptr<Solid>> owned_solids_;
@@ -96,7 +98,7 @@ class Bodies {
     Index n_edges_ = 0, n_body_vertices_ = 0;
     std::vector<std::vector<Index>> rigid_nodes_;
     std::vector<Rows3> rigid_points_;
-    std::vector<std::vector<Index>> coupled_corners_;
+    std::vector<std::vector<Index>> coupled_;
 };
 
 }  // namespace magshell

@@ -6,7 +6,9 @@
 
 #include "magshell/assembly/skeleton_carrier.h"
 #include "magshell/core/errors.h"
+#include "magshell/linalg/low_rank_factor.h"
 #include "magshell/term/body_contact_term.h"
+#include "magshell/term/border_term.h"
 #include "magshell/term/damper_term.h"
 
 namespace magshell {
@@ -164,6 +166,7 @@ std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
     spare_ = nullptr;
     if (!analysed_ || analysed_->pattern() != reduction_.pattern()) {
         analysed_ = analyze(reduction_.pattern(), {.points = free_points(), .watch = watch});
+        if (!borders_.empty()) analysed_ = std::make_unique<LowRankFactor>(std::move(analysed_));
         ++analyses_;
     }
     return analysed_->sibling();
@@ -226,6 +229,7 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
     };
     clear(first_nodes_.size() - 1);
     // All terms of a chunk before the next chunk: its share of the matrix is cleared and filled in the cache.
+    for (BorderTerm* term : borders_) term->take_extrapolated(extrapolated_stress);
     for (const std::unique_ptr<Term>& term : terms_) {
         term->be_cautious(cautious);
         term->prepare_assembly(q.data(), controls);
@@ -240,6 +244,8 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
             term->assemble(chunk, q.data(), controls, extrapolated_stress, matrix_);
     });
     for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
+    low_rank_.clear();
+    for (const BorderTerm* term : borders_) term->add_low_rank(controls, low_rank_);
     add_remainders(q, controls);
 }
 
@@ -250,17 +256,26 @@ SystemMatrix* Model::contact_matrix() {
 void Model::multiply(const VectorXd& x, VectorXd& out) const {
     matrix_.multiply(x.data(), out.data());
     if (coupled_ > 0) layer_->matrix().add_product(x.data(), out.data());
+    low_rank_.add_product(x, out);
 }
 
 VectorXd Model::diagonal() const {
     VectorXd sum = VectorXd::Zero(size());
     matrix_.add_diagonal(sum);
     if (coupled_ > 0) layer_->matrix().add_diagonal(sum);
+    low_rank_.add_diagonal(sum);
     return sum;
 }
 
 void Model::reduce_matrix(LargeVector<double>& values) {
     reduction_.matrix(matrix_, contact_matrix(), values);
+}
+
+void Model::reduce_matrix(Factor& factor) {
+    reduce_matrix(factor.values());
+    if (!borders_.empty())
+        static_cast<LowRankFactor&>(factor).set_low_rank(low_rank_.reduced(reduction_, size()),
+                                                         low_rank_.stiffness());
 }
 
 void Model::share_out_columns() {

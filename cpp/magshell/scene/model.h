@@ -12,6 +12,7 @@
 
 #include "magshell/assembly/contact_layer.h"
 #include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/low_rank.h"
 #include "magshell/assembly/reduction.h"
 #include "magshell/body/membrane_faces.h"
 #include "magshell/linalg/factor.h"
@@ -24,6 +25,7 @@
 namespace magshell {
 
 class BodyContactTerm;
+class BorderTerm;
 class DamperTerm;
 class MuscleTerm;
 
@@ -55,6 +57,10 @@ class Model {
     void multiply(const VectorXd& x, VectorXd& out) const;
     VectorXd diagonal() const;
     void reduce_matrix(LargeVector<double>& values);
+    /// All of it, for the next factorization.
+    void reduce_matrix(Factor& factor);
+    /// What of the Hessian as assembled last is in low_rank() and not in matrix().
+    const LowRank& low_rank() const { return low_rank_; }
     SystemMatrix* contact_matrix();
     const Residual& residual() const { return residual_; }
     Index size() const { return nodes().n_unknowns(); }
@@ -65,8 +71,8 @@ class Model {
     const VectorXd& metric() const { return metric_; }
     /// The floor under every residual of a state, to be multiplied by the unit of round-off.
     VectorXd cancelling_forces(const VectorXd& q);
-    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or without.
-    void add_cancelling_contact_forces(bool in_motion, VectorXd& out) const;
+    /// Adds what of it there is at the last evaluated state, with the forces of a time step or without.
+    void add_cancelling_forces_here(bool in_motion, VectorXd& out) const;
 
     double energy(const VectorXd& q, const Controls& controls) const;
     /// In the order of energies(); terms of one name, of several bodies, follow each other.
@@ -172,6 +178,7 @@ class Model {
     void add_joints(const SceneInput& input);
     void add_solids(const SceneInput& input);
     void add_couples(const SceneInput& input);
+    void add_volumes(const SceneInput& input);
     void add_contacts(const SceneInput& input);
     void add_body_contacts(const SceneInput& input);
     void share_out_columns();
@@ -212,6 +219,8 @@ class Model {
     VectorXd standing_;      // the values, before any varied
     Kinematics kinematics_;  // where the forces were evaluated last
     Remainder remainder_;
+    LowRank low_rank_;
+    std::vector<BorderTerm*> borders_;  // those that it is of
     std::unique_ptr<Factor> analysed_;
     std::shared_ptr<Factor> spare_;
     int analyses_ = 0;

@@ -5,6 +5,7 @@
 #include "magshell/core/errors.h"
 #include "magshell/scene/model.h"
 #include "magshell/term/body_contact_term.h"
+#include "magshell/term/border_term.h"
 
 namespace magshell {
 
@@ -65,7 +66,8 @@ void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const S
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
 }
 
-void Model::add_cancelling_contact_forces(bool in_motion, VectorXd& out) const {
+void Model::add_cancelling_forces_here(bool in_motion, VectorXd& out) const {
+    for (const BorderTerm* term : borders_) term->add_cancelling_here(out);
     if (contact_) contact_->add_cancelling_normal_forces(out);
     if (body_contact_) body_contact_->add_cancelling_normal_forces(out);
     if (!in_motion) return;

@@ -76,6 +76,7 @@ void Model::add_terms(const SceneInput& input) {
         terms_.push_back(std::make_unique<PressureTerm>(input.pressures, nodes(), matrix_, registry_));
         follows_ = true;
     }
+    add_volumes(input);
     add_moments(input);
     add_joints(input);
     if (input.gravity)
@@ -105,6 +106,15 @@ void Model::add_magnetic_terms(const SceneInput& input) {
             terms_.push_back(make_magnetic_solid_term(*bodies_.solids()[k], body, schedule_.of(body), matrix_,
                                                       sources_, registry_));
     }
+}
+
+void Model::add_volumes(const SceneInput& input) {
+    const auto add = [&](std::unique_ptr<BorderTerm> term) {
+        borders_.push_back(term.get());
+        terms_.push_back(std::move(term));
+    };
+    if (!input.volumes.empty()) add(std::make_unique<VolumeTerm>(input.volumes, nodes(), matrix_, registry_));
+    if (!input.tendons.empty()) add(std::make_unique<TendonTerm>(input.tendons, nodes(), matrix_, registry_));
 }
 
 void Model::add_moments(const SceneInput& input) {

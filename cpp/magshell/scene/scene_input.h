@@ -17,6 +17,8 @@
 #include "magshell/term/muscle_fibres.h"
 #include "magshell/term/pressure_term.h"
 #include "magshell/term/solid_term.h"
+#include "magshell/term/tendon_term.h"
+#include "magshell/term/volume_term.h"
 
 namespace magshell {
 
@@ -102,6 +104,8 @@ struct SceneInput {
     std::vector<EdgeCoupleInput> couples;
     std::vector<FaceEnergyInput> face_energies;
     std::vector<PressureInput> pressures;
+    std::vector<VolumeInput> volumes;
+    std::vector<TendonInput> tendons;
     bool gravity = false, loads = false;
     std::vector<std::shared_ptr<const AppliedField>> field_sources;
     std::vector<ContactInput> contacts;

@@ -100,7 +100,7 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
     VectorXd cancelling = model_.cancelling_forces(q);
     // In the inertia of a short step, positions cancel.
     if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q).cwiseAbs();
-    model_.add_cancelling_contact_forces(anchor.motion != nullptr, cancelling);
+    model_.add_cancelling_forces_here(anchor.motion != nullptr, cancelling);
     if (!with_floor) cancelling.setZero();
     return std::max(
         relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
@@ -111,8 +111,8 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
 FactorReport Newton::factorize_assembled(const VectorXd& q, const Anchor& anchor) {
     if (!factor_ || factor_->pattern() != model_.reduction().pattern())
         factor_ = model_.new_factor([this] { watch(watched_); });
+    model_.reduce_matrix(*factor_);
     LargeVector<double>& values = factor_->values();
-    model_.reduce_matrix(values);
     if (anchor.weights) model_.reduction().add_weights(*anchor.weights, values);
     if (model_.reduction().carries()) model_.reduction().add_curvature(gradient(q, anchor), values);
     ++factorizations_;

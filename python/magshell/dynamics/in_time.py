@@ -9,6 +9,7 @@ from ..bodies.muscle import Muscle
 from ..obstacles import Obstacle
 from ..scene.courses import Course
 from ..scene.values import Values
+from ..surroundings.actuator import Actuator
 from ..surroundings.supports import Support
 from .obstacle_paths import ObstaclePath
 from .supports_in_time import check_supports
@@ -27,6 +28,7 @@ class InTime:
         self._places: dict[tuple[int, str], list[slice]] = {}
         self.entries: list[int] = []
         self.poses: dict[int, np.ndarray] = {}
+        self.of_actuators: dict[tuple[Actuator, str], np.ndarray] = {}
         for course in courses:
             course.check(asked.steps)
         of_values = [each for each in courses if not isinstance(each.owner, Obstacle)]
@@ -41,6 +43,9 @@ class InTime:
             numbers = np.reshape(
                 asked.inputs.take(course.name, at_knots, _Values(self, course)), (asked.knots, -1)
             )
+            if isinstance(course.owner, Actuator):
+                self.of_actuators[course.owner, course.name] = numbers.reshape(-1, *course.row)
+                numbers = self._check_actuator(course, numbers)
             rows += [numbers] * self._add(course, numbers.shape[1])
         self.activations: dict[Muscle, np.ndarray] = {
             course.owner: np.asarray(detached(at_knots), dtype=np.float64)
@@ -75,6 +80,13 @@ class InTime:
             end += width
         return len(labels)
 
+    def _check_actuator(self, course: Course, numbers: np.ndarray) -> np.ndarray:
+        """As many as the core has of it. Raises ValueError where the actuator cannot have one of them."""
+        at_knots = self.of_actuators[course.owner, course.name]
+        for extreme in (at_knots.min(axis=0), at_knots.max(axis=0)):
+            course.owner.replaced(**{course.name: extreme})
+        return np.broadcast_to(numbers, (len(numbers), course.owner.count))
+
     def _add_obstacles(self, courses: list[Course]) -> None:
         values, obstacles = self._asked.inputs.values, self._asked.inputs.scene.obstacles
         for k, obstacle in enumerate(obstacles):
@@ -89,9 +101,12 @@ class _Values:
 
     def __init__(self, in_time: InTime, course: Course):
         self._places, self._key = in_time._places, (id(course.owner), course.name)
+        self._width = int(np.prod(course.row))
 
     def by_knots(self, gradient) -> np.ndarray:
-        return sum(gradient.of_controls(place) for place in self._places[self._key])
+        total = sum(gradient.of_controls(place) for place in self._places[self._key])
+        # One number for all cells: of each of them.
+        return total if total.shape[-1] == self._width else total.sum(axis=-1, keepdims=True)
 
 
 class _Pose:

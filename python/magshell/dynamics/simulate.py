@@ -243,6 +243,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         wall_time=wall_time,
         linear_time=found.linear_time,
         _field_factors=asked.recorded("field_factor", recorded),
+        _load_factors=asked.recorded("load_factor", recorded),
+        _varied=asked.varied(recorded),
         _thickness=thickness,
         _values=values,
         _directions=found.directions(model),

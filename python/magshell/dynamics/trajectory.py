@@ -127,6 +127,8 @@ class Trajectory:
     wall_time: float
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
+    _load_factors: np.ndarray = field(repr=False)
+    _varied: dict = field(repr=False)  # {(actuator, name): (n, ...)}, of the recorded states
     _thickness: np.ndarray = field(repr=False)
     _values: Any = field(repr=False)
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold

@@ -27,6 +27,7 @@ MAGNETIZATION = "#23272e"
 FIELD = "#1b7f5c"
 OBSTACLE = "#b59a76"
 BONE = "#f0e6d2"
+TENDON = "#8c1c3c"
 NO_VALUE = "#d9dbde"
 # Sheets that lie over each other in one picture, when no scalar colours them.
 SERIES = ("#7fa8d1", "#e8b36a", "#8fbf9f", "#d58b8b", "#b3a2d0", "#9fa8b2")

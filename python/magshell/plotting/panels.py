@@ -23,7 +23,7 @@ SOLID_CREASE = np.cos(
 )  # of closed surfaces, where coarse triangles turn by more on what is round
 LINE = 0.0022  # width, in sizes of the drawing
 LONGEST_FIELD = 0.2  # arrow of a uniform field, in sizes of the drawing
-FLESH = 0.45  # the opacity of what has bones inside
+FLESH = 0.45  # the opacity of what has bones or tendons inside
 PALEST = 0.8  # the way to white of the first of many states that fade
 
 
@@ -173,7 +173,8 @@ def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, opti
     step = float(mesh.edge_lengths.mean())
     skin = sheet(state.positions, mesh.faces, shades)
     bones = [sheet(*each, rgb(colors.BONE)) for each in state.bones]
-    solids = [*bones, replace(skin, opacity=FLESH) if bones else skin]
+    inside = [*bones, *(sheet(*each, rgb(colors.TENDON)) for each in state.tendons)]
+    solids = [*inside, replace(skin, opacity=FLESH) if inside else skin]
     if options.mesh_lines:
         edges = mesh.edges[_seen(state, np.arange(mesh.n_edges), eye)]
         solids.append(ribbons(state.positions[edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))

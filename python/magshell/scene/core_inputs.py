@@ -7,8 +7,11 @@ import numpy as np
 from ..bodies.muscle import Muscle
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
+from ..surroundings.cavity import Cavity
+from ..surroundings.cells import Cells
 from ..surroundings.face_energies import FaceEnergy
 from ..surroundings.pressure import Pressure
+from ..surroundings.tendon import Tendon
 
 
 def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
@@ -46,6 +49,20 @@ def face_inputs(scene) -> dict[str, list[dict]]:
             load._core_input(label, bodies) for load, label in scene._labels if isinstance(load, Pressure)
         ],
     }
+
+
+def actuator_inputs(scene) -> dict[str, list[dict]]:
+    """Volumes and tendons."""
+    bodies = scene._bodies
+    volumes = [
+        each._core_input(label, bodies) for each, label in scene._labels if isinstance(each, Cavity | Cells)
+    ]
+    tendons = [
+        each._core_input(label, bodies, scene._rigid)
+        for each, label in scene._labels
+        if isinstance(each, Tendon)
+    ]
+    return {"volumes": volumes, "tendons": tendons}
 
 
 def _sheets(scene, directed_edges: np.ndarray) -> list[dict]:

@@ -13,8 +13,9 @@ from ..bodies.joints import Joint
 from ..bodies.muscle import Muscle
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
+from ..surroundings.actuator import Actuator
 
-_JUMPING = (AppliedField, Joint, Muscle)  # their values may change at once, others move
+_JUMPING = (AppliedField, Joint, Muscle, Actuator)  # their values may change at once, others move
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Course:
 
 
 def _unit(owner, name: str) -> str:
-    return owner._unit(name) if isinstance(owner, Joint) else _UNITS[name]
+    return owner._unit(name) if isinstance(owner, Joint | Actuator) else _UNITS[name]
 
 
 _UNITS = {

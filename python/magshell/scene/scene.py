@@ -25,6 +25,7 @@ from ..bodies.solid import Solid
 from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
+from ..surroundings.actuator import Actuator
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.constraints import free_rigid_motions, gather
 from ..surroundings.contact import Contact
@@ -34,7 +35,7 @@ from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, Point
 from ..surroundings.pressure import Pressure
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane, continuations
 from ..surroundings.water import Water
-from .core_inputs import body_inputs, face_inputs, muscle_inputs
+from .core_inputs import actuator_inputs, body_inputs, face_inputs, muscle_inputs
 from .layout import Layout
 from .values import Values
 
@@ -52,7 +53,7 @@ class Scene:
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.
-    actuators: Muscle objects, of its solids.
+    actuators: Muscle, Cavity, Cells and Tendon objects.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     gravity: (3,), m/s2; needs the mass density of all bodies.
     contacts: Contact objects, each with the obstacles or the bodies that it is about, and SelfContact objects. Bodies pass
@@ -184,6 +185,7 @@ class Scene:
             gravity=bool(self.gravity.any()),
             **face_inputs(self),
             muscles=muscle_inputs(self),
+            **actuator_inputs(self),
             loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
             contacts=contact_inputs(self._obstacle_contacts, bodies),
@@ -321,7 +323,7 @@ class Scene:
         lines += [f"  joined by {joint!r}" for joint in self.joints]
         lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
         lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
-        lines += [f"  pulled by {actuator!r}{self._whose(actuator)}" for actuator in self.actuators]
+        lines += [f"  driven by {each!r}{self._whose(each)}" for each in self.actuators]
         lines += [f"  in {field!r}" for field in self.fields]
         lines += [f"  kept out by {contact!r}{self._whose(contact)}" for contact in self.contacts]
         if self.water is not None:
@@ -338,11 +340,12 @@ class Scene:
         return f" (body {self._bodies.number(item.body)})"
 
 
-def _checked_actuators(bodies: Bodies, given) -> tuple[Muscle, ...]:
+def _checked_actuators(bodies: Bodies, given) -> tuple[Muscle | Actuator, ...]:
     """Raises ValueError where one is of no solid of the scene, or is there twice."""
-    actuators = checked_list("actuators", given, (Muscle,))
+    kinds = "Muscle, Cavity, Cells and Tendon objects"
+    actuators = checked_list("actuators", given, (Muscle, Actuator), kinds)
     for k, each in enumerate(actuators):
-        if not any(each.body is solid for solid in bodies.solids):
+        if isinstance(each, Muscle) and not any(each.body is solid for solid in bodies.solids):
             raise ValueError(f"actuator {k} is a Muscle of a solid that is not in the scene: {each.body!r}")
         if any(each is other for other in actuators[:k]):
             raise ValueError(f"actuators must differ, but actuator {k} is there twice")

@@ -25,6 +25,7 @@ from ..scene.scene import Scene
 from ..statics.equilibria import Equilibria
 from ..statics.path import Path
 from .bones import bones_at_rest, bones_of, joined, mesh_of
+from .tendons import tendons_at_rest, tendons_of
 from .units import clock
 
 
@@ -36,7 +37,7 @@ class State:
     flux_density: (3,), T, the uniform field, or None without one.
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
     title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
-    bones: surfaces of links inside, vertices (n, 3) m and faces (m, 3) each.
+    bones, tendons: surfaces of links and of tendons inside, vertices (n, 3) m and faces (m, 3) each.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
     """
 
@@ -52,6 +53,7 @@ class State:
         None
     )
     bones: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    tendons: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     @property
     def magnetization(self) -> np.ndarray:
@@ -116,7 +118,8 @@ def states_of(
         if bones and not what.bodies:
             return _states(mesh_of(bones), _with_own(given, what), what.fields)
         states = _states(what.mesh, _with_own(given, what), what.fields)
-        return [replace(state, bones=tuple(bones)) for state in states]
+        tendons = tuple(tendons_at_rest(what))
+        return [replace(state, bones=tuple(bones), tendons=tendons) for state in states]
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
     if is_result and not isinstance(what, Equilibria):
         own = _held_by(what)
@@ -126,7 +129,8 @@ def states_of(
         if not what.scene.bodies and positions is None:
             mesh, merged["positions"] = _skeletons_alone(what)
         states = _states(mesh, merged, what.scene.fields, own["strengths"], own["titles"])
-        states = _with_elements(what, _with_bones(what, states, positions), positions)
+        states = _with_tendons(what, _with_bones(what, states, positions), positions)
+        states = _with_elements(what, states, positions)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
@@ -147,6 +151,14 @@ def _with_bones(result, states: list[State], positions) -> list[State]:
         return states
     bones = bones_of(result)
     return [replace(state, bones=tuple(each)) for state, each in zip(states, bones, strict=True)]
+
+
+def _with_tendons(result, states: list[State], positions) -> list[State]:
+    """With the tendons in its bodies, where the states are those that it has itself."""
+    tendons = [] if positions is not None else tendons_of(result)
+    if not tendons:
+        return states
+    return [replace(state, tendons=tuple(each)) for state, each in zip(states, tendons, strict=True)]
 
 
 def _skeletons_alone(result) -> tuple[TriangleMesh, np.ndarray]:

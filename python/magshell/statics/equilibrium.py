@@ -84,6 +84,15 @@ class Equilibrium:
     def _values_at(self, index: int):
         return self._values
 
+    @property
+    def _load_factors(self) -> np.ndarray:
+        """Of its one state, ()."""
+        return self.scene._control_layout.of(self._controls, "scene", "load_factor")[0]
+
+    @property
+    def _varied(self) -> dict:
+        return {}
+
     def _state_at(self, index: int) -> np.ndarray:
         return self._state
 

@@ -123,6 +123,14 @@ class Path:
     def _state_at(self, index: int) -> np.ndarray:
         return self._points[index].state
 
+    @property
+    def _load_factors(self) -> np.ndarray:
+        return self._control("load_factor")[:, 0]
+
+    @property
+    def _varied(self) -> dict:
+        return {}
+
     def _values_at(self, index: int):
         return self._moving.values(self.parameters[index])
 
