@@ -352,6 +352,16 @@ void register_model(py::module_& module) {
             },
             py::call_guard<py::gil_scoped_release>())
         .def(
+            "held_forces",
+            [](Model& model, const VectorXd& q, const Model::Turns& turns, const Controls& controls) {
+                const std::lock_guard lock(model.in_use());
+                model.set_turns(turns);
+                model.evaluate(q, controls);
+                return model.reduction().held(model.residual().gradient);
+            },
+            "(3 m,) [N], with which supports pull at the held nodes of a scene at rest.", py::arg("q"),
+            py::arg("turns"), py::arg("controls"), py::call_guard<py::gil_scoped_release>())
+        .def(
             "assemble",
             [](Model& model, const VectorXd& q, const Controls& controls) {
                 const std::lock_guard lock(model.in_use());

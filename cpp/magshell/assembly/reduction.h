@@ -53,6 +53,11 @@ class Reduction {
     /// Adds the gradients by the moves and by their progress, given the gradient by what supports hold.
     void vjp(const VectorXd& by_state, const Controls& controls, Gradient& out) const;
 
+    /// Whether supports hold anything; and what of a vector of all unknowns lies along what they hold, three numbers for
+    /// each of the nodes that were given, in their order.
+    bool holds() const { return !held_.empty(); }
+    VectorXd held(const VectorXd& full) const;
+
     /// Whether [axis]x between two nodes does anything along motions of the free ones.
     bool feels_skew(Index a, Index b, const Vec3& axis) const;
 

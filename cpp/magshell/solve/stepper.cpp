@@ -66,6 +66,7 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
     std::vector<StageState> stages;
     VectorXd q = state.q, x_hat, v_hat;
     StrainSet e;
+    VectorXd held;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
         model.take(controls[i + 1]);
@@ -106,6 +107,10 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             model.set_turns(state.turns);
             return false;
         }
+        // The stage's whole residual, evaluated at q last: it vanishes but for what supports hold.
+        if (i + 1 == tableau.stages && model.reduction().holds())
+            held =
+                model.reduction().held(model.residual().gradient + step.weights().cwiseProduct(q - target));
         StageRates& now = rates.emplace_back();
         step.finish_stage(q, x_hat, v_hat, coordinates, now);
         if (viscosity_.any()) {
@@ -122,7 +127,7 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         model.set_turns(state.turns);
         return false;
     }
-    MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {}};
+    MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {}, std::move(held)};
     if (tableau_.begins_explicitly) end.rates = std::move(rates.back());
     std::swap(state, end);
     if (kept) *kept = {std::move(end), std::move(stages)};

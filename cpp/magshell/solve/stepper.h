@@ -20,6 +20,7 @@ struct MotionState {
     Model::Turns turns;
     StrainSet e;       // of the Maxwell branch; empty without one
     StageRates rates;  // at the end of the step that led here, for a method that begins with them; else empty
+    VectorXd held;  // [N] what supports pulled with at the end of that step, as Reduction::held; else empty
 };
 
 /// Of all unknowns: masses [kg] and viscous damping [N s/m], zero for those that are no vertex.

@@ -233,8 +233,8 @@ class Bodies:
 
     @property
     def n_points(self) -> int:
-        """Vertices, and points of rigid parts."""
-        return self.mesh.n_vertices + 10 * len(self.rigid)
+        """Vertices, of which those that are welded count once, and points of rigid parts: what comes first in a state."""
+        return self.n_vertices + 10 * len(self.rigid)
 
     def of(self, item) -> Span:
         """What a support, a load or a contact is about. Raises ValueError where it does not say so, and has to."""
