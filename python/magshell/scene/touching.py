@@ -25,7 +25,8 @@ class Touching:
         part along the second. Both are zero in what is at rest. Of lagged friction, that which normal forces of this state
         would make, not those of the beginning of the step.
     coefficient: the largest that friction may be, of the normal force; zero without friction. sticking_speed: m/s.
-    forces: (n_v, 3) N, on every vertex of the scene, with which they push each other apart. friction: (n_v, 3) N, likewise
+    forces: (n_v, 3) N, on every vertex of the scene, with which they push each other apart; and what turns edges that are
+        nearly parallel, as their pairs fade there, which comes to nothing on each edge. friction: (n_v, 3) N, likewise
         what rubs. pushed: (n_v,) N, what vertices have of the normal forces, without regard to direction.
     """
 
@@ -40,9 +41,8 @@ class Touching:
     forces: np.ndarray
     friction: np.ndarray
     pushed: np.ndarray
-    _direction: (
-        np.ndarray
-    )  # (k,), 1 where the first part is of the contact's first body, or of the body at an obstacle
+    _pushes: np.ndarray  # (n_v, 3) N, of the normal forces alone, without what turns nearly parallel edges
+    _direction: np.ndarray  # (k,), 1 where the first part is of the contact's first body or at an obstacle
 
     @property
     def normal_force(self) -> float:
@@ -136,5 +136,6 @@ def _gathered(scene, found: dict, coefficient: float, sticking_speed: float) -> 
         on_vertices(found["forces"]),
         on_vertices(weights[:, :, None] * found["friction_forces"][:, None, :]),
         on_vertices(np.abs(weights) * found["normal_forces"][:, None]),
+        on_vertices((weights * found["normal_forces"][:, None])[:, :, None] * found["normals"][:, None, :]),
         np.where(found["swapped"], -1.0, 1.0),
     )

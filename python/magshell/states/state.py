@@ -25,6 +25,7 @@ from ..scene.scene import Scene
 from ..statics.equilibria import Equilibria
 from ..statics.path import Path
 from .bones import bones_at_rest, bones_of, joined, mesh_of
+from .contact_loads import ContactLoads, contact_loads
 from .units import clock
 
 
@@ -38,6 +39,7 @@ class State:
     title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
     bones: surfaces of links inside, vertices (n, 3) m and faces (m, 3) each.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
+    loads: () -> ContactLoads of a result of a scene with contacts, or None without any.
     """
 
     mesh: TriangleMesh | TetMesh | JoinedMesh
@@ -52,6 +54,12 @@ class State:
         None
     )
     bones: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    loads: Callable[[], ContactLoads] | None = None
+
+    @property
+    def contact_pressures(self) -> np.ndarray | None:
+        """(n_v,) Pa, or None without contacts."""
+        return None if self.loads is None else self.loads().pressures(self.positions, self.mesh.faces)
 
     @property
     def magnetization(self) -> np.ndarray:
@@ -158,7 +166,7 @@ def _skeletons_alone(result) -> tuple[TriangleMesh, np.ndarray]:
 
 
 def _with_elements(result, states: list[State], positions) -> list[State]:
-    """With what the elements of its bodies go through, where the states are those that it has itself."""
+    """With what the elements of its bodies go through, and contacts do, where the states are those that it has itself."""
     if positions is not None or not hasattr(result, "_values_at"):
         return states
     bodies = result.scene._bodies
@@ -169,7 +177,10 @@ def _with_elements(result, states: list[State], positions) -> list[State]:
             for body, span in zip(bodies.shells, bodies.spans, strict=True)
         ]
 
-    return [replace(state, elements=elements_of(k)) for k, state in enumerate(states)]
+    def loads_of(k: int):
+        return (lambda: contact_loads(result, k)) if result.scene.contacts else None
+
+    return [replace(state, elements=elements_of(k), loads=loads_of(k)) for k, state in enumerate(states)]
 
 
 def timed(states: list[State], times) -> list[State]:
