@@ -468,6 +468,17 @@ class Model:
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def term_energies(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        turns: collections.abc.Sequence[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+        ],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> list:
+        """
+        [(name, J)] of each term, at a state with these turns.
+        """
     @property
     def analyses(self) -> int: ...
     @property

@@ -21,6 +21,7 @@ NOT_CALLED = {
     "Path": "a result",
     "Picture": "a result",
     "Touching": "a result",
+    "Reaction": "a result",
     "Trajectory": "a result",
     "Strains": "a result",
     "LargeStrainWarning": "a warning",

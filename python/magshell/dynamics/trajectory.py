@@ -194,8 +194,8 @@ class Trajectory:
         return found
 
     def _near_body_kinks(self, contact: BodyContact, index: int) -> np.ndarray:
-        positions = np.asarray(detached(self.positions)[index], dtype=np.float64)
         smoothing = self._values.current(contact).smoothing
+        positions = self.scene._model.points(self._state_at(index))
         return near_body_kinks(self.scene, self.touching(contact, index), smoothing, positions)
 
     def strains(self, index: int = -1) -> Strains:
@@ -208,12 +208,18 @@ class Trajectory:
         model = self.scene._model
         state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
         before = 3 * self.scene._bodies.n_points
+        if self._own_points is not None:  # free parts are where no vertex tells
+            own = np.asarray(detached(self._own_points)[index], dtype=np.float64)
+            state[:before] = model.full_vector(np.concatenate([positions, own]))[:before]
         state[before : before + self._directions.shape[1]] = self._directions[index]
         return state
 
     def touching(self, contact: BodyContact | Contact, index: int = -1) -> Touching:
         """The pairs of a contact that touch in a recorded state, by default the last, and their forces."""
-        velocities = np.asarray(detached(self.velocities)[index], dtype=np.float64)
+        own = () if self._own_velocities is None else (self._own_velocities,)
+        velocities = np.concatenate(
+            [np.asarray(detached(each)[index], dtype=np.float64) for each in (self.velocities, *own)]
+        )
         state, time = self._state_at(index), float(self.times[index])
         return touching_in(self.scene, self._values, contact, state, velocities, time)
 

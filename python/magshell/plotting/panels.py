@@ -177,7 +177,8 @@ def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, opti
     step = float(mesh.edge_lengths.mean())
     skin = sheet(state.positions, mesh.faces, shades)
     bones = [sheet(*each, rgb(colors.BONE)) for each in state.bones]
-    solids = [*bones, replace(skin, opacity=FLESH) if bones else skin]
+    shapes = [sheet(*each, rgb(colors.BONE)) for each in state.shapes]
+    solids = [*bones, *shapes, replace(skin, opacity=FLESH) if bones else skin]
     if options.mesh_lines:
         edges = mesh.edges[_seen(state, np.arange(mesh.n_edges), eye)]
         solids.append(ribbons(state.positions[edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))

@@ -12,14 +12,16 @@ _NEXT = np.array([[1, 2], [2, 3], [3, 1]])  # of a point and a triangle, the sid
 
 def near_body_kinks(scene, touching: Touching, smoothing: float, positions: np.ndarray) -> np.ndarray:
     """Vertices (k,) of the first parts of pairs whose closest points are nearer than the smoothing [m] to where they change
-    over to a neighbour that turns away by more than LARGEST_SMOOTH_TURN, or to nothing."""
+    over to a neighbour that turns away by more than LARGEST_SMOOTH_TURN, or to nothing. positions: of all points."""
     pairs = touching.pairs[touching.normal_forces > 0.0]
     pairs = pairs[(pairs >= 0).all(axis=1)]
     if not len(pairs):
         return np.zeros(0, dtype=np.int32)
-    sharp = _sharp_edges(scene.mesh.faces, positions)
-    faces = _keys(np.sort(scene.mesh.faces, axis=1), scene.mesh.n_vertices)
-    on_face = np.isin(_keys(np.sort(pairs[:, 1:], axis=1), scene.mesh.n_vertices), faces)
+    bodies, n = scene._bodies, len(positions)
+    surfaces = [part.shape.faces + bodies.first_on_surface(part) for part in bodies.touching]
+    faces = np.concatenate([bodies.original[scene.mesh.faces], *surfaces])
+    sharp = _sharp_edges(faces, positions)
+    on_face = np.isin(_keys(np.sort(pairs[:, 1:], axis=1), n), _keys(np.sort(faces, axis=1), n))
     found = [_over_sides(pairs[on_face], positions, smoothing, sharp)]
     found.append(_over_ends(pairs[~on_face], positions, smoothing, sharp))
     return np.unique(np.concatenate(found)).astype(np.int32)

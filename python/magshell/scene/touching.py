@@ -94,8 +94,8 @@ def touching_in(
     velocities: np.ndarray | None = None,
     time: float | None = None,
 ) -> Touching:
-    """values: of the solve that found the state. velocities: (n_v, 3) m/s, and time, s, of a motion. Raises ValueError where
-    the contact is none of the scene's."""
+    """values: of the solve that found the state. velocities: (n_v, 3) m/s, or with those of the points of rigid parts, and
+    time, s, of a motion. Raises ValueError where the contact is none of the scene's."""
     velocities = np.zeros((scene.mesh.n_vertices, 3)) if velocities is None else velocities
     if isinstance(contact, Contact) and any(each is contact for each in scene._obstacle_contacts):
         found = pairs_with_obstacles(scene, values, contact, scene._model.positions(state), velocities, time)
@@ -120,9 +120,9 @@ def _gathered(scene, found: dict, coefficient: float, sticking_speed: float) -> 
 
     def on_vertices(rows: np.ndarray) -> np.ndarray:
         """rows: (k, 4) or (k, 4, 3)."""
-        sums = np.zeros((scene.mesh.n_vertices, *rows.shape[2:]))
+        sums = np.zeros((scene._bodies.n_rows, *rows.shape[2:]))
         np.add.at(sums, pairs[there], rows[there])
-        return sums
+        return sums[: scene.mesh.n_vertices]
 
     return Touching(
         pairs,

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._checks.tensors import detached
 from ..dynamics.trajectory import Trajectory
 from ..scene.touching import touching_in
 
@@ -35,9 +34,10 @@ def contact_loads(result, index: int) -> ContactLoads:
     """In one of its states."""
     scene, moving = result.scene, isinstance(result, Trajectory)
     values, state = result._values_at(index), result._state_at(index)
-    velocities = np.asarray(detached(result.velocities)[index], dtype=np.float64) if moving else None
-    time = float(result.times[index]) if moving else None
-    found = [touching_in(scene, values, contact, state, velocities, time) for contact in scene.contacts]
+    found = [
+        result.touching(contact, index) if moving else touching_in(scene, values, contact, state)
+        for contact in scene.contacts
+    ]
     forces, pushed = np.zeros((scene.mesh.n_vertices, 3)), np.zeros(scene.mesh.n_vertices)
     for each in found:
         forces += each._pushes + each.friction

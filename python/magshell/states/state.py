@@ -24,7 +24,7 @@ from ..obstacles import Obstacle
 from ..scene.scene import Scene
 from ..statics.equilibria import Equilibria
 from ..statics.path import Path
-from .bones import bones_at_rest, bones_of, joined, mesh_of
+from .bones import bones_at_rest, bones_of, joined, mesh_of, shapes_at_rest, shapes_of
 from .contact_loads import ContactLoads, contact_loads
 from .units import clock
 
@@ -37,7 +37,7 @@ class State:
     flux_density: (3,), T, the uniform field, or None without one.
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
     title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
-    bones: surfaces of links inside, vertices (n, 3) m and faces (m, 3) each.
+    bones: surfaces of links inside, vertices (n, 3) m and faces (m, 3) each. shapes: of free rigid parts, likewise.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
     loads: () -> ContactLoads of a result of a scene with contacts, or None without any.
     """
@@ -55,6 +55,7 @@ class State:
     )
     bones: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     loads: Callable[[], ContactLoads] | None = None
+    shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     @property
     def contact_pressures(self) -> np.ndarray | None:
@@ -120,11 +121,11 @@ def states_of(
     if isinstance(what, Shell | Solid):
         return _states(what.mesh, _magnetized(given, [what]))
     if isinstance(what, Scene):
-        bones = bones_at_rest(what)
-        if bones and not what.bodies:
-            return _states(mesh_of(bones), _with_own(given, what), what.fields)
+        bones, shapes = bones_at_rest(what), shapes_at_rest(what)
+        if (bones or shapes) and not what.bodies:
+            return _states(mesh_of([*bones, *shapes]), _with_own(given, what), what.fields)
         states = _states(what.mesh, _with_own(given, what), what.fields)
-        return [replace(state, bones=tuple(bones)) for state in states]
+        return [replace(state, bones=tuple(bones), shapes=tuple(shapes)) for state in states]
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
     if is_result and not isinstance(what, Equilibria):
         own = _held_by(what)
@@ -150,19 +151,24 @@ def states_of(
 
 
 def _with_bones(result, states: list[State], positions) -> list[State]:
-    """With the skeletons inside its bodies, where the states are those that it has itself."""
-    if positions is not None or not result.scene._bodies.skeletons or not result.scene.bodies:
+    """With the skeletons inside its bodies and the shapes of free parts, where the states are those that it has itself."""
+    if positions is not None or not result.scene.bodies:
         return states
-    bones = bones_of(result)
-    return [replace(state, bones=tuple(each)) for state, each in zip(states, bones, strict=True)]
+    none = [[] for _ in states]
+    pairs = zip(states, bones_of(result) or none, shapes_of(result) or none, strict=True)
+    return [replace(state, bones=tuple(bones), shapes=tuple(shapes)) for state, bones, shapes in pairs]
 
 
 def _skeletons_alone(result) -> tuple[TriangleMesh, np.ndarray]:
     """Of a result without flesh: its bones as a sheet, and where they are, (k, n, 3) m."""
-    if not result.scene._bodies.skeletons:
+    bones, shapes = bones_of(result), shapes_of(result)
+    if not bones and not shapes:
         raise ValueError("cannot draw a scene of free rigid parts: they have no shape")
-    frames = [joined(each)[0] for each in bones_of(result)]
-    return mesh_of(bones_at_rest(result.scene)), np.stack(frames)
+    count = len(bones or shapes)
+    pairs = zip(bones or [[]] * count, shapes or [[]] * count, strict=True)
+    frames = [joined([*each, *others])[0] for each, others in pairs]
+    at_rest = [*bones_at_rest(result.scene), *shapes_at_rest(result.scene)]
+    return mesh_of(at_rest), np.stack(frames)
 
 
 def _with_elements(result, states: list[State], positions) -> list[State]:
