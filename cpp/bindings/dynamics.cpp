@@ -132,6 +132,23 @@ Knots driving_of(const MotionResult& motion) {
     return rows;
 }
 
+// (n, m, 3) [N], of the held nodes in the order in which they were given; NaN in states that no step led to.
+Array held_forces_of(const MotionResult& motion, const Model& model) {
+    const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size());
+    const VectorXd none = model.reduction().held(VectorXd::Zero(model.size()));
+    const py::ssize_t size = none.size();
+    Array rows({n, size / 3, py::ssize_t{3}});
+    for (py::ssize_t k = 0; k < n; ++k) {
+        const VectorXd& held = motion.recorded[k].held;
+        Eigen::Map<VectorXd> row(rows.mutable_data() + k * size, size);
+        if (held.size() == size)
+            row = held;
+        else
+            row.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+    return rows;
+}
+
 // Of every recorded state.
 py::list largest_strains(const MotionResult& motion, const Model& model, const VectorXd& thickness) {
     std::vector<LargestStrains> largest;
@@ -238,6 +255,10 @@ void register_dynamics(py::module_& module) {
         .def("edge_rotations", [](const MotionResult& r, const Model& m) { return rotations_of(m, r); })
         .def("directions", &directions_of)
         .def("driving", &driving_of)
+        .def("held_forces", &held_forces_of,
+             "(n, m, 3) [N], with which supports pulled at the held nodes of recorded states; NaN where no "
+             "step "
+             "led to.")
         .def("largest_strains", &largest_strains, py::arg("model"), py::arg("thickness"));
 
     module.def("simulate", &run, py::arg("model"), py::arg("input"), py::arg("gradients"), py::arg("budget"),

@@ -235,6 +235,21 @@ py::dict energies(const Model& model, const VectorXd& q, const Controls& control
     return energies;
 }
 
+// [(name, J)], of each term: those of one name, of several bodies, follow each other.
+py::list term_energies(Model& model, const VectorXd& q, const Model::Turns& turns, const Controls& controls) {
+    std::vector<std::pair<std::string_view, double>> of_terms;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        model.set_turns(turns);
+        of_terms = model.energies(q, controls);
+    }
+    py::list energies;
+    for (const auto& [name, value] : of_terms)
+        energies.append(py::make_tuple(py::str(name.data(), name.size()), value));
+    return energies;
+}
+
 // The lower triangle as (size, column starts, rows, values): of all unknowns, or of the free ones.
 py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, bool reduced) {
     LargeVector<double> values;
@@ -381,6 +396,8 @@ void register_model(py::module_& module) {
                                    return names;
                                })
         .def("energies", &energies)
+        .def("term_energies", &term_energies, "[(name, J)] of each term, at a state with these turns.",
+             py::arg("q"), py::arg("turns"), py::arg("controls"))
         .def("refusal", &Model::refusal, "What is wrong with a state, in words; empty where nothing is.",
              py::call_guard<py::gil_scoped_release>())
         .def(
@@ -402,6 +419,16 @@ void register_model(py::module_& module) {
             py::arg("q"), py::arg("controls"), py::arg("turns"),
             "What the motors of joints do in an equilibrium q, N and N m, one after another.",
             py::call_guard<py::gil_scoped_release>())
+        .def(
+            "held_forces",
+            [](Model& model, const VectorXd& q, const Model::Turns& turns, const Controls& controls) {
+                const std::lock_guard lock(model.in_use());
+                model.set_turns(turns);
+                model.evaluate(q, controls);
+                return model.reduction().held(model.residual().gradient);
+            },
+            "(3 m,) [N], with which supports pull at the held nodes of a scene at rest.", py::arg("q"),
+            py::arg("turns"), py::arg("controls"), py::call_guard<py::gil_scoped_release>())
         .def(
             "assemble",
             [](Model& model, const VectorXd& q, const Controls& controls) {

@@ -48,12 +48,14 @@ from .mesh.welding import Weld, weld
 from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
 from .methods.solvers import MixedNewton, Newton
 from .plotting import Picture, animate, plot, write_page
+from .scene.reactions import Reaction
 from .scene.scene import Scene
 from .scene.touching import Touching
 from .starts.multistart import multistart
 from .starts.sampling import random_starts
 from .starts.starts import Multistart
 from .states.series import write_series
+from .statics.energies_at import energies
 from .statics.equilibria import Equilibria
 from .statics.equilibrium import Equilibrium
 from .statics.path import CriticalPoint, Path, follow
@@ -128,6 +130,7 @@ __all__ = [
     "PointLoad",
     "Pressure",
     "Prismatic",
+    "Reaction",
     "Revolute",
     "Rigid",
     "RigidResult",
@@ -157,6 +160,7 @@ __all__ = [
     "__version__",
     "animate",
     "control",
+    "energies",
     "equilibrium",
     "fibres_along",
     "follow",

@@ -417,6 +417,17 @@ class Model:
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def held_forces(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        turns: collections.abc.Sequence[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+        ],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (3 m,) [N], with which supports pull at the held nodes of a scene at rest.
+        """
     def hessian(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -477,6 +488,17 @@ class Model:
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def term_energies(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        turns: collections.abc.Sequence[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+        ],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> list:
+        """
+        [(name, J)] of each term, at a state with these turns.
+        """
     @property
     def analyses(self) -> int: ...
     @property
@@ -766,6 +788,10 @@ class MotionResult:
     def directions(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
     def driving(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
     def edge_rotations(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    def held_forces(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, m, 3) [N], with which supports pulled at the held nodes of recorded states; NaN where no step led to.
+        """
     def largest_strains(
         self, model: Model, thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> list: ...
@@ -1028,10 +1054,12 @@ def solid_point_states(
     """
 
 def touching_pairs(
-    model: Model, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
-) -> tuple:
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> dict:
     """
-    Pairs of bodies in contact: contact (n,), vertices (n, 4), distances (n,), normal forces (n,), forces (n, 4, 3).
+    Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) [N], forces (n, 4, 3) [N], weights (n, 4) of the difference of the closest points, normals (n, 3) on the first part, friction_forces (n, 3) [N] on it and sliding_velocities (n, 3) [m/s] of it.
     """
 
 def vjp(

@@ -22,6 +22,7 @@ NOT_CALLED = {
     "Path": "a result",
     "Picture": "a result",
     "Touching": "a result",
+    "Reaction": "a result",
     "Trajectory": "a result",
     "Strains": "a result",
     "LargeStrainWarning": "a warning",

@@ -109,6 +109,14 @@ VectorXd Reduction::prescribed_increment(const VectorXd& q, const Controls& cont
     return increment;
 }
 
+VectorXd Reduction::held(const VectorXd& full) const {
+    VectorXd parts(3 * held_.size());
+    for (std::size_t k = 0; k < held_.size(); ++k)
+        parts.segment<3>(3 * static_cast<Index>(k)) =
+            held_part(held_[k], [&](Index) -> Vec3 { return full.segment<3>(3 * held_[k].node); });
+    return parts;
+}
+
 Mat3 Reduction::free_motions(Index node) const {
     Mat3 free = Mat3::Identity();
     if (held_at_[node] < 0) return free;

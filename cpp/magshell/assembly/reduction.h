@@ -65,6 +65,11 @@ class Reduction {
         return drives() ? carried_->driving(gradient) : VectorXd();
     }
 
+    /// Whether supports hold anything; and what of a vector of all unknowns lies along what they hold, three numbers for
+    /// each of the nodes that were given, in their order.
+    bool holds() const { return !held_.empty(); }
+    VectorXd held(const VectorXd& full) const;
+
     /// Whether [axis]x between two nodes does anything along motions of the free ones.
     bool feels_skew(Index a, Index b, const Vec3& axis) const;
 

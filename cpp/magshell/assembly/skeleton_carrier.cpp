@@ -59,7 +59,8 @@ SkeletonCarrier::SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Join
     for (const Joint& joint : joints_)
         for (Index j = 0; j < joint.freedom(); ++j) place_.push_back(joint.driven ? held++ : free++);
     for (Index k = 0; k < n_links(); ++k)
-        for (Index n = vertices ? links_[k].own() : 0; n < links_[k].size(); ++n)
+        for (Index n = vertices ? links_[k].own() : 0; n < (vertices ? links_[k].size() : RigidNodes::points);
+             ++n)
             leading_.push_back(row_[k] + n);
 }
 

@@ -8,7 +8,9 @@ namespace magshell {
 
 Bodies::Bodies(const SceneInput& input) {
     n_body_vertices_ = input.n_vertices;
-    NodeNumbering numbering(input.n_vertices + RigidInput::own * static_cast<Index>(input.rigid.size()));
+    Index n_points = input.n_vertices;
+    for (const RigidInput& part : input.rigid) n_points += static_cast<Index>(part.points.rows());
+    NodeNumbering numbering(n_points);
     for (const SheetInput& sheet : input.sheets)
         owned_.push_back(std::make_unique<Sheet>(sheet.owner, *sheet.mesh, sheet.vertices, numbering));
     for (const SolidInput& solid : input.solids)
@@ -56,11 +58,13 @@ void Bodies::add_surface(const Surface* surface) {
 }
 
 void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering) {
-    Index user = n_body_vertices_;
+    // The ten of each part, then those of their surfaces.
+    Index user = n_body_vertices_, on_surface = user + RigidInput::own * static_cast<Index>(rigid.size());
     for (const RigidInput& part : rigid) {
         std::vector<Index>& nodes = rigid_nodes_.emplace_back();
-        for (Index k = 0; k < RigidInput::own; ++k)
-            nodes.push_back(numbering.number(user++, part.points.row(k).transpose()));
+        for (Index k = 0; k < static_cast<Index>(part.points.rows()); ++k)
+            nodes.push_back(numbering.number(k < RigidInput::own ? user++ : on_surface++,
+                                             part.points.row(k).transpose()));
         for (const Index vertex : part.vertices) nodes.push_back(numbering.number(vertex, Vec3::Zero()));
         rigid_points_.push_back(part.points);
     }
@@ -153,8 +157,11 @@ VectorXd Bodies::state(const Rows3& positions, const VectorXd& edge_rotations) c
     add_rotations(edge_rotations, q);
     for (Index node = nodes_.n_vertices(); node < nodes_.n_nodes(); ++node)
         q.segment<3>(3 * node) = nodes_.rest[node];
-    for (const std::vector<Index>& part : rigid_nodes_)
-        for (Index k = 0; k < RigidInput::own; ++k) q.segment<3>(3 * part[k]) = nodes_.rest[part[k]];
+    for (std::size_t part = 0; part < rigid_nodes_.size(); ++part)
+        for (Index k = 0; k < n_own(part); ++k) {
+            const Index node = rigid_nodes_[part][k];
+            q.segment<3>(3 * node) = nodes_.rest[node];
+        }
     return q;
 }
 

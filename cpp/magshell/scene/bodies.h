@@ -34,6 +34,8 @@ class Bodies {
     const std::vector<OfMuscle>& fibres() const { return fibres_; }
     /// The nodes of each rigid part, its own first.
     const std::vector<std::vector<Index>>& rigid_nodes() const { return rigid_nodes_; }
+    /// How many those are: ten, and the vertices of its surface.
+    Index n_own(std::size_t part) const { return static_cast<Index>(rigid_points_[part].rows()); }
     /// Of the smallest rigid part, half the edge of the cube around its tetrahedron [m]; infinite without.
     double rigid_length() const;
     /// How many vertices the caller's sheets and solids have; those of rigid parts follow.

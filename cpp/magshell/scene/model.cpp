@@ -26,7 +26,7 @@ std::vector<HeldNode> renumbered(std::vector<HeldNode> held, const Bodies& bodie
 // Of skeletons, then of the parts that are no links.
 Carriers carriers_of(const Bodies& bodies, const std::vector<SkeletonInput>& skeletons, Registry& registry) {
     const auto link = [&](Index part) {
-        return RigidNodes(bodies.rigid_nodes()[part], RigidInput::own, bodies.nodes().rest);
+        return RigidNodes(bodies.rigid_nodes()[part], bodies.n_own(part), bodies.nodes().rest);
     };
     std::vector<char> joined(bodies.rigid_nodes().size(), 0);
     Carriers carriers;

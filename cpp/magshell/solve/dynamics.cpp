@@ -49,7 +49,7 @@ MotionState beginning(Model& model, const MotionInput& input) {
 // The last state; its energies are not known yet.
 void record_state(const Model& model, const MotionInput& input, MotionResult& result) {
     const MotionState& state = result.last;
-    result.recorded.push_back({state.q, state.v, state.turns, {}, {}, state.driving});
+    result.recorded.push_back({state.q, state.v, state.turns, {}, {}, state.driving, state.held});
     result.kinetic_energy.push_back(0.5 * state.v.dot(input.inertia.mass.cwiseProduct(state.v)));
     result.energies.emplace_back(model.term_names().size(), std::numeric_limits<double>::quiet_NaN());
 }

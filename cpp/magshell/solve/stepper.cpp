@@ -86,7 +86,7 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
     std::vector<StageState> stages;
     VectorXd q = state.q, x_hat, v_hat;
     StrainSet e;
-    VectorXd driving;
+    VectorXd driving, held;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
         model.take(controls[i + 1]);
@@ -134,6 +134,10 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             model.set_turns(state.turns);
             return false;
         }
+        // The stage's whole residual, evaluated at q last: it vanishes but for what supports hold.
+        if (i + 1 == tableau.stages && model.reduction().holds())
+            held =
+                model.reduction().held(model.residual().gradient + step.weights().cwiseProduct(q - target));
         StageRates& now = rates.emplace_back();
         step.finish_stage(q, x_hat, v_hat, coordinates, now);
         if (i + 1 == tableau.stages && model.reduction().drives())
@@ -153,7 +157,8 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         model.set_turns(state.turns);
         return false;
     }
-    MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {}, std::move(driving)};
+    MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {},
+                    std::move(driving), std::move(held)};
     if (model.reduction().drives()) {
         end.v_before = state.v;
         end.dt_before = dt;

@@ -248,6 +248,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         _thickness=thickness,
         _values=values,
         _directions=found.directions(model),
+        _held_forces=found.held_forces(model),
         _placed=[
             (
                 values.current(contact),

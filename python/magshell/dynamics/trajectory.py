@@ -23,10 +23,14 @@ from ..bodies.strains import StrainHistory, Strains, strains_of
 from ..mesh.crossings import told
 from ..methods.clock import Clock, clock_of
 from ..methods.integrators import Integrator
+from ..scene.body_kinks import near_body_kinks
+from ..scene.reactions import Reaction, reaction_in
 from ..scene.scene import Scene
 from ..scene.touching import Touching, touching_in
 from ..surroundings.body_contact import BodyContact
+from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import near_kinks
+from ..surroundings.supports import Clamp, Pin, SymmetryPlane
 
 
 @dataclass(frozen=True)
@@ -132,6 +136,7 @@ class Trajectory:
     _thickness: np.ndarray = field(repr=False)
     _values: Any = field(repr=False)
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
+    _held_forces: np.ndarray = field(repr=False)  # (n, m, 3) N, of the constraints' held nodes
     _placed: list = field(
         repr=False, default_factory=list
     )  # the first arguments of near_kinks, of each contact
@@ -176,11 +181,13 @@ class Trajectory:
 
     @property
     def kinks(self) -> dict[int, np.ndarray]:
-        """{recorded state: vertices} that touch an obstacle where the motion is not differentiable, or within the
-        smoothing of there: by the sharp edge of a box or a mesh, in the middle of a body.
+        """{recorded state: vertices} that touch where the motion is not differentiable, or within the smoothing of there: an
+        obstacle by the sharp edge of a box or a mesh, or in the middle of a body; of bodies in contact, the point or edge
+        whose closest point goes over a fold of the other surface by more than 0.3 rad, or over its border.
 
         A small change may bring such a point to another side. A gradient is that of the side on which it is. Looked up
-        when asked for, in the recorded states only.
+        when asked for, in the recorded states only. What opens and closes, sticks and slips is none: the laws of contact
+        and friction are smooth there, and `touching` tells what does.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
@@ -194,9 +201,15 @@ class Trajectory:
         found = {}
         for k, time in enumerate(self.times):
             near = [near_kinks(*each, positions[k], time) for each in self._placed]
+            near += [self._near_body_kinks(contact, k) for contact in self.scene._body_contacts]
             if near and (every := np.unique(np.concatenate(near))).size:
                 found[k] = every
         return found
+
+    def _near_body_kinks(self, contact: BodyContact, index: int) -> np.ndarray:
+        smoothing = self._values.current(contact).smoothing
+        positions = self.scene._model.points(self._state_at(index))
+        return near_body_kinks(self.scene, self.touching(contact, index), smoothing, positions)
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face in a recorded state, by default the last."""
@@ -208,12 +221,25 @@ class Trajectory:
         model = self.scene._model
         state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
         before = 3 * self.scene._bodies.n_points
+        if self._own_points is not None:  # free parts are where no vertex tells
+            own = np.asarray(detached(self._own_points)[index], dtype=np.float64)
+            state[:before] = model.full_vector(np.concatenate([positions, own]))[:before]
         state[before : before + self._directions.shape[1]] = self._directions[index]
         return state
 
-    def touching(self, contact: BodyContact, index: int = -1) -> Touching:
-        """The pairs of a contact of bodies that touch in a recorded state, by default the last, and their forces."""
-        return touching_in(self.scene, self._values, contact, self._state_at(index))
+    def touching(self, contact: BodyContact | Contact, index: int = -1) -> Touching:
+        """The pairs of a contact that touch in a recorded state, by default the last, and their forces."""
+        own = () if self._own_velocities is None else (self._own_velocities,)
+        velocities = np.concatenate(
+            [np.asarray(detached(each)[index], dtype=np.float64) for each in (self.velocities, *own)]
+        )
+        state, time = self._state_at(index), float(self.times[index])
+        return touching_in(self.scene, self._values, contact, state, velocities, time)
+
+    def reaction(self, support: Pin | Clamp | SymmetryPlane, index: int = -1) -> Reaction:
+        """With what forces a support of the scene held it in a recorded state, by default the last, inertia and damping
+        included: those at the end of the time step that led there, NaN at the start."""
+        return reaction_in(self.scene, support, self._state_at(index), self._held_forces[index])
 
     def self_intersections(self, index: int = -1) -> np.ndarray:
         """The faces that pass through each other in a recorded state, as in TriangleMesh.self_intersections, (k, 2)."""

@@ -25,6 +25,7 @@ OUTLINE = "#3a4048"
 REST = "#9aa3ad"
 MAGNETIZATION = "#23272e"
 FIELD = "#1b7f5c"
+CONTACT = "#b3202c"
 OBSTACLE = "#b59a76"
 BONE = "#f0e6d2"
 TENDON = "#8c1c3c"
@@ -207,6 +208,16 @@ def _of_muscles(name: str):
     return scalar
 
 
+def _contact_pressure(states: list[State], _: LengthUnit) -> Scalar:
+    found = [state.contact_pressures for state in states]
+    if any(each is None for each in found):
+        raise ValueError("color='contact_pressure' is of a result of a scene with contacts: there is none")
+    largest = max(float(each.max(initial=0.0)) for each in found)
+    factor, unit = prefixed(largest, "Pa") if largest > 0.0 else (1.0, "Pa")
+    values = [each / factor for each in found]
+    return Scalar(f"contact pressure [{unit}]", values, (0.0, _range(values)[1]), inside=values)
+
+
 def _resultant(name: str, text: str, unit: str, of_faces: str):
     """Of sheets: the principal value of larger magnitude, even on both sides of 0."""
 
@@ -254,6 +265,7 @@ NAMED = {
     "magnetization": _magnetization,
     "displacement": _displacement,
     "magnetic_energy": _magnetic_energy,
+    "contact_pressure": _contact_pressure,
     "volume_ratio": _volume_ratio,
     "von_mises_stress": _von_mises,
     **{name: _of_muscles(name) for name in ("activation", "fibre_stretch", "fibre_tension")},

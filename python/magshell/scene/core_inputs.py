@@ -97,6 +97,9 @@ def _solids(scene) -> list[dict]:
 
 
 def _skins(scene) -> list[dict]:
+    """Those that feel a field; what they weigh their solids know."""
+    if not scene.fields:
+        return []
     bodies = scene._bodies
     skinned = [
         (body, span)

@@ -29,7 +29,13 @@ from ..surroundings.actuator import Actuator
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.constraints import free_rigid_motions, gather
 from ..surroundings.contact import Contact
-from ..surroundings.contact_inputs import body_contact_inputs, contact_inputs, obstacles_of, split_contacts
+from ..surroundings.contact_inputs import (
+    body_contact_inputs,
+    contact_inputs,
+    obstacles_of,
+    shapes_that_touch,
+    split_contacts,
+)
 from ..surroundings.face_energies import FaceEnergy
 from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..surroundings.pressure import Pressure
@@ -95,13 +101,13 @@ class Scene:
         water: Water | None = None,
         allow_rigid_motions: bool = False,
     ):
-        self._bodies = Bodies(bodies, ties)
+        self.contacts = checked_list("contacts", contacts, (Contact, BodyContact))
+        self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
+        self._bodies = Bodies(bodies, ties, shapes_that_touch(self._body_contacts))
         self.supports = checked_list("supports", supports, _SUPPORTS)
         self.loads = checked_list("loads", loads, _LOADS)
         self.actuators = _checked_actuators(self._bodies, actuators)
         self.fields = () if field is None else checked_list("field", field, (AppliedField,))
-        self.contacts = checked_list("contacts", contacts, (Contact, BodyContact))
-        self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
         self.obstacles = obstacles_of(self._obstacle_contacts)
         if water is not None and not isinstance(water, Water):
             raise ValueError(f"water must be a Water, got {type(water).__name__}")
@@ -364,12 +370,17 @@ def _refuse_support(parts, held: np.ndarray) -> None:
 
 
 def _refuse_idle_magnetization(scene: Scene) -> None:
-    """A skin does nothing but feel a field."""
+    """A skin does nothing but feel a field, and weigh if it has a mass density."""
     if scene.fields:
         return
     for k, body in enumerate(scene.bodies):
-        if isinstance(body, Solid) and (body.skin is not None or body.remanent_magnetization is not None):
-            what = "a skin" if body.skin is not None else "a remanent_magnetization"
+        if not isinstance(body, Solid):
+            continue
+        idle = body.skin is not None and (
+            body.skin.mass_density is None or body.skin.remanent_magnetization is not None
+        )
+        if idle or body.remanent_magnetization is not None:
+            what = "a skin" if idle else "a remanent_magnetization"
             raise ValueError(f"body {k} has {what}, but the scene has no field: Scene(..., field=...)")
 
 
