@@ -22,22 +22,27 @@ from .library import require_gymnasium
 __all__ = ["magnetic_strip", "soft_arm"]
 
 
-def magnetic_strip(target: float = 0.01, render_mode: str | None = None) -> Environment:
+STRIP_LENGTH, STRIP_TARGET = 0.05, 0.01  # m
+
+
+def magnetic_strip(
+    target: float = STRIP_TARGET, render_mode: str | None = None, disturbed: bool = True
+) -> Environment:
     """A magnetized strip, 5 cm long and clamped at one end; a field of up to 4 mT upwards and 1 mT along and across is
     to lift its tip to a height, m. An action lasts 20 ms, an episode 1 s. Observed: heights and speeds of the tip and of
-    the middle.
+    the middle, over its length. disturbed: whether it starts with a small velocity.
     """
-    mesh = meshes.rectangle(0.05, 0.01, cells=(8, 2))
+    mesh = meshes.rectangle(STRIP_LENGTH, 0.01, cells=(8, 2))
     sheet = Shell(
         mesh, thickness=1e-3, young_modulus=3e6, mass_density=1e3, remanent_magnetization=(4e4, 0.0, 0.0)
     )
     scene = Scene(sheet, supports=[Clamp(mesh.edges_at(x=0.0))], field=UniformField(), gravity=(0, 0, -9.81))
-    tip, middle = mesh.vertices_at(x=0.05), mesh.vertices_at(x=0.025)
+    tip, middle = mesh.vertices_at(x=STRIP_LENGTH), mesh.vertices_at(x=STRIP_LENGTH / 2)
 
     def seen(now):
         heights = (now.positions[tip, 2].mean(), now.positions[middle, 2].mean())
         speeds = (now.velocities[tip, 2].mean(), now.velocities[middle, 2].mean())
-        return np.array([*heights, *speeds]) / 0.05
+        return np.array([*heights, *speeds]) / STRIP_LENGTH
 
     return Environment(
         scene,
@@ -45,8 +50,8 @@ def magnetic_strip(target: float = 0.01, render_mode: str | None = None) -> Envi
             Actuator(scene, "applied_flux_density", lower=(-1e-3, -1e-3, -4e-3), upper=(1e-3, 1e-3, 4e-3))
         ],
         observation=seen,
-        reward=lambda now: -abs(now.positions[tip, 2].mean() - target) / 0.05,
-        start=lambda generator: {"velocities": generator.normal(scale=0.01, size=3)},
+        reward=lambda now: -abs(now.positions[tip, 2].mean() - target) / STRIP_LENGTH,
+        start=(lambda generator: {"velocities": generator.normal(scale=0.01, size=3)}) if disturbed else None,
         time_step=1e-2,
         steps_per_action=2,
         actions_per_episode=50,
