@@ -1,6 +1,6 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
-from . import control, meshes, objectives, obstacles, optim, parametrize, shapes
+from . import control, envs, meshes, objectives, obstacles, optim, parametrize, shapes
 from ._core import __version__
 from ._machine.threads import num_threads, set_num_threads, show_config
 from .bodies.body_result import BodyResult
@@ -161,6 +161,7 @@ __all__ = [
     "animate",
     "control",
     "energies",
+    "envs",
     "equilibrium",
     "fibres_along",
     "follow",

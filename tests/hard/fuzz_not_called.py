@@ -38,6 +38,9 @@ NOT_CALLED = {
     "TRBDF2": "takes nothing",
     "ImplicitEuler": "takes nothing",
     "UniformField": "takes nothing",
+    "envs.Snapshot": "a result",
+    "envs.robots.magnetic_strip": "makes an Environment",
+    "envs.robots.soft_arm": "makes an Environment",
     "num_threads": "takes nothing",
     "show_config": "takes nothing",
 }
