@@ -7,7 +7,7 @@ from .bodies.body_result import BodyResult
 from .bodies.joint_result import JointResult
 from .bodies.joints import Ball, Closure, Fixed, Joint, Prismatic, Revolute
 from .bodies.link import Link
-from .bodies.materials import Corotated, Guccione, NeoHookean, StableNeoHookean, StVenantKirchhoff
+from .bodies.materials import Corotated, Guccione, NeoHookean, Projective, StableNeoHookean, StVenantKirchhoff
 from .bodies.rigid import Rigid
 from .bodies.rigid_result import RigidResult
 from .bodies.shell import Shell
@@ -43,6 +43,7 @@ from .mesh.tet_mesh import TetMesh
 from .mesh.triangle_mesh import TriangleMesh
 from .mesh.welding import Weld, weld
 from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
+from .methods.projective_dynamics import ProjectiveDynamics
 from .methods.solvers import MixedNewton, Newton
 from .plotting import Picture, animate, plot, write_page
 from .scene.scene import Scene
@@ -117,6 +118,8 @@ __all__ = [
     "PointLoad",
     "Pressure",
     "Prismatic",
+    "Projective",
+    "ProjectiveDynamics",
     "Revolute",
     "Rigid",
     "RigidResult",

@@ -21,6 +21,7 @@ struct MotionInput {
     std::vector<Controls> controls;
     Varying varying;  // values whose numbers stand in them, after the others
     NewtonOptions newton;
+    ProjectiveOptions projective;  // where it solves the stages
     Index record_every = 1;  // steps between the states handed out, from the start on
 
     /// At a share of a step.
