@@ -121,6 +121,35 @@ def test_supports(name):
     assert_same(*both(scene, **options))
 
 
+def bones_in_jelly(free):
+    """A bar with two bones and an elbow between them; its first bone is fixed, or falls."""
+    solid = bar(MATERIALS["Corotated"], cells=(8, 2, 2))
+    x = solid.mesh.rest_positions[:, 0] / SIZE[0]
+    bones = [
+        ms.Link(vertices=np.flatnonzero((x > a) & (x < b)), body=solid) for a, b in ((0.1, 0.4), (0.6, 0.9))
+    ]
+    elbow = ms.Revolute(bones[1], bones[0], origin=(0.5 * SIZE[0], 0.005, 0.005), axis=(0, 1, 0), torque=2e-5)
+    skeleton = ms.Skeleton(bones, [elbow] if free else [ms.Fixed(bones[0]), elbow])
+    return ms.Scene([solid, skeleton], gravity=(0, 2.0, -9.81), allow_rigid_motions=free)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_skeletons_turn_while_the_soft_part_stays_factorized(free):
+    scene = bones_in_jelly(free)
+    assert_same(*both(scene, steps=6))
+    given = {"time_step": 5e-3, "integrator": ms.ProjectiveDynamics(tolerance=1e-8), "progress": False}
+    assert ms.simulate(scene, steps=6, **given).factorizations == 1
+    assert ms.simulate(scene, steps=1, **given).factorizations == 1
+
+
+def test_rigid_parts():
+    solid = bar(MATERIALS["Corotated"])
+    x = solid.mesh.rest_positions[:, 0]
+    weight = ms.Rigid(np.flatnonzero(x > 0.9 * SIZE[0]), mass=2e-3, inertia=(1e-8, 2e-8, 3e-8), body=solid)
+    scene = ms.Scene([solid, weight], supports=[clamped(solid)], gravity=(0, 2.0, -9.81))
+    assert_same(*both(scene))
+
+
 @pytest.mark.parametrize("law", [{"stiffness_damping": 5e-3}, {"maxwell_modulus": 1.0, "maxwell_time": 1e-2}])
 def test_viscosity_and_damping(law):
     solid = bar(MATERIALS["Corotated"])

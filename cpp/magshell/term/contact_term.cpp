@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
 
 namespace magshell {
