@@ -75,6 +75,14 @@ def test_a_curved_obstacle_is_not_entered():
     assert (distance[-20:].min(axis=1) < 1e-9 * SIZE).any()  # it does touch
 
 
+def test_acceleration_changes_the_rounds_and_not_where_they_lead():
+    scene, _ = slope(0.3, friction=0.2)
+    fast = moved(scene, 10, 4e-3)
+    plain = moved(scene, 10, 4e-3, history=0, iterations=5000)
+    assert np.abs(fast.positions - plain.positions).max() < 1e-8 * SIZE
+    assert fast.iterations < 0.7 * plain.iterations
+
+
 def test_stiff_penalties_tend_to_it():
     found = []
     scene, below = slope(0.3, friction=0.2)

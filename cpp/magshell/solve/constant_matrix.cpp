@@ -30,8 +30,10 @@ ConstantMatrix::ConstantMatrix(const Model& model)
         place[free[k] % 3].push_back(k);
     }
     if (special_.size() > most_special)
-        throw InvalidInput("Projective Dynamics eliminates nodes that are held along slanted directions densely, and there are " +
-                           std::to_string(special_.size()) + " such unknowns: hold them along x, y or z, or entirely");
+        throw InvalidInput(
+            "Projective Dynamics eliminates nodes that are held along slanted directions densely, and there "
+            "are " +
+            std::to_string(special_.size()) + " such unknowns: hold them along x, y or z, or entirely");
     for (int axis = 0; axis < 3; ++axis) {
         if (of_axis[axis].empty()) continue;
         const auto same = std::find_if(groups_.begin(), groups_.end(),
@@ -51,7 +53,8 @@ ConstantMatrix::ConstantMatrix(const Model& model)
 bool ConstantMatrix::solves(Index node) const {
     if (groups_.size() != 1 || groups_[0].axes.size() != 3 || !special_.empty())
         throw InvalidInput(
-            "Coulomb's law node by node is for scenes whose supports hold vertices entirely, and without rigid parts or "
+            "Coulomb's law node by node is for scenes whose supports hold vertices entirely, and without "
+            "rigid parts or "
             "skeletons");
     return column_of_[node] >= 0;
 }
@@ -119,8 +122,7 @@ void ConstantMatrix::factorize() {
         for (std::size_t k = 0; k < group.from.size(); ++k)
             values[k] = scale_ * stiffness_.values()[group.from[k]];
         const std::vector<Index>& starts = group.factor->pattern()->column_starts;
-        for (std::size_t k = 0; k < group.nodes.size(); ++k)
-            values[starts[k]] += weights_[group.nodes[k]];
+        for (std::size_t k = 0; k < group.nodes.size(); ++k) values[starts[k]] += weights_[group.nodes[k]];
         const FactorReport report = group.factor->factorize();
         ++factorizations_;
         if (!report.succeeded)

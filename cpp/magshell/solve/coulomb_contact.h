@@ -38,7 +38,7 @@ class CoulombContact {
     struct Pair {
         ContactTerm::Keeping keeping;
         StandingObstacle obstacle;
-        double gap = 0.0;                                        // [m] at q
+        double gap = 0.0;  // [m] at q
         Vec3 normal = Vec3::Zero(), force = Vec3::Zero(), obstacle_move = Vec3::Zero();
     };
 

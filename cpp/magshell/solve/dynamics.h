@@ -22,7 +22,7 @@ struct MotionInput {
     Varying varying;  // values whose numbers stand in them, after the others
     NewtonOptions newton;
     ProjectiveOptions projective;  // where it solves the stages
-    Index record_every = 1;  // steps between the states handed out, from the start on
+    Index record_every = 1;        // steps between the states handed out, from the start on
 
     /// At a share of a step.
     Controls controls_at(Index step, double share) const;

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "magshell/solve/anderson.h"
 #include "magshell/solve/coulomb_contact.h"
 #include "magshell/solve/secants.h"
 
@@ -79,7 +80,8 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
         if (report.converged) return report;
         if (last)
             return fail("no convergence in " + std::to_string(report.iterations) +
-                        " iterations of Projective Dynamics: the residual is " + std::to_string(report.residual));
+                        " iterations of Projective Dynamics: the residual is " +
+                        std::to_string(report.residual));
         VectorXd direction = -gradient;
         if (!in_place) direction -= reduction.vector(matrix_.times(move));
         secants.solve(direction, [&](VectorXd& rhs) { matrix_.solve(rhs); });
@@ -121,15 +123,19 @@ NewtonReport ProjectiveSolver::solve_touching(VectorXd& q, const Controls& contr
     CoulombContact contact(model_, matrix_, controls, *anchor.motion->x_hat, anchor.motion->time);
     VectorXd target = *anchor.target;
     const Anchor pushed{anchor.weights, &target, anchor.motion};
+    Anderson anderson(options_.history);
+    const auto last_round = [&](const NewtonReport& now) {
+        return now.iterations + 1 == options_.iterations;
+    };
     for (;; ++report.iterations, newton_.count_iteration()) {
         report.residual = newton_.relative_residual(q, pushed);
         newton_.watch(report.residual);
         if (!std::isfinite(report.residual)) return fail("the iteration diverged");
         const bool last = report.iterations == options_.iterations;
         const double off = contact.look(q);
-        report.converged = options_.tolerance > 0.0
-                               ? report.residual <= options_.tolerance && off <= law_tolerance * model_.extent()
-                               : last;
+        report.converged = options_.tolerance > 0.0 ? report.residual <= options_.tolerance &&
+                                                          off <= law_tolerance * model_.extent()
+                                                    : last;
         if (report.converged) return report;
         if (last)
             return fail("no convergence in " + std::to_string(report.iterations) +
@@ -139,7 +145,12 @@ NewtonReport ProjectiveSolver::solve_touching(VectorXd& q, const Controls& contr
         matrix_.solve(direction);
         VectorXd move = reduction.expand(direction);
         contact.settle(q, move);
-        if (newton_.advance(q, move, shortest_share, report) < 0.0) return report;
+        VectorXd end = q;
+        const double share = newton_.advance(end, move, shortest_share, report);
+        if (share < 0.0) return report;
+        VectorXd ahead =
+            share < 1.0 || last_round(report) ? VectorXd(end - q) : VectorXd(anderson.next(end, move) - q);
+        if (newton_.advance(q, ahead, shortest_share, report) < 0.0) return report;
         target = *anchor.target;
         for (Index k = 0; k < model_.n_coordinates(); ++k)
             if (contact.forces()[k] != 0.0) target[k] += contact.forces()[k] / (*anchor.weights)[k];

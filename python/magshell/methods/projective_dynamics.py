@@ -21,7 +21,7 @@ class ProjectiveDynamics:
     iterations: rounds of a step, at most.
     tolerance: of the residual, relative to the forces that cancel in it, as Newton's. A step that does not reach it is taken
         in halves. None: every step takes just `iterations` rounds, whatever is left; such steps have no gradient.
-    history: steps that L-BFGS goes by; 0: the rounds as they are.
+    history: steps that L-BFGS goes by, and Anderson's acceleration with contact="coulomb"; 0: the rounds as they are.
     contact: with obstacles. "penalty": as ms.Contact says, as in the other integrators. "coulomb": hard, by Coulomb's law
         node by node, static and kinetic, in every round ([Qiao21] 5; Ly et al. 2020): vertices keep just `offset` of
         ms.Contact, its stiffness, smoothing and sticking speed do not count. Such motions have no gradient: forces jump
