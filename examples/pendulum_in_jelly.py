@@ -21,11 +21,8 @@ Run it: prints a summary and writes a picture and a movie into out/.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from _pasting import paste
-from _run import run
 
 import magshell as ms
 
@@ -61,9 +58,7 @@ def pendulum(cells: int, **swing) -> Pendulum:
     lower = ms.Link(vertices=np.flatnonzero(inside & (z < middle - GAP / 2)), body=bar)
     shoulder = ms.Revolute(upper, origin=(0, 0, 0), axis=(0, 1, 0), **swing)
     elbow = ms.Revolute(lower, upper, origin=(0, 0, middle), axis=(0, 1, 0))
-    scene = ms.Scene(
-        [bar, ms.Skeleton([upper, lower], [shoulder, elbow])], gravity=(0, 0, -GRAVITY)
-    )
+    scene = ms.Scene([bar, ms.Skeleton([upper, lower], [shoulder, elbow])], gravity=(0, 0, -GRAVITY))
     return Pendulum(scene, bar, [upper, lower], shoulder, elbow)
 
 

@@ -103,9 +103,7 @@ def test_gradient_by_damping_in_time_and_past_full_turns():
     angle = turned(damping)
     assert float(angle) > 2 * np.pi
     angle.backward()
-    np.testing.assert_allclose(
-        damping.grad, differences(lambda d: float(turned(d)), given, 1e-4), rtol=1e-5
-    )
+    np.testing.assert_allclose(damping.grad, differences(lambda d: float(turned(d)), given, 1e-4), rtol=1e-5)
 
 
 def test_going_on_has_the_same_bits():

@@ -1,6 +1,7 @@
 // Motions and their adjoint to Python: whole runs with the GIL released.
 #include <limits>
 #include <string>
+#include <tuple>
 
 #include "bindings/arrays.h"
 #include "bindings/gradients.h"
@@ -87,6 +88,12 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.varying = Varying(model.registry(), given["varying"].cast<std::vector<Index>>());
     input.controls = controls_of(model, input.varying, array("controls"));
     input.newton = given["newton"].cast<NewtonOptions>();
+    if (const py::object projective = given["projective"]; !projective.is_none()) {
+        const auto [iterations, tolerance, history, coulomb] =
+            projective.cast<std::tuple<int, double, int, bool>>();
+        input.projective = {true, iterations, tolerance, history, coulomb};
+        if (tolerance > 0.0) input.newton.tolerance = tolerance;
+    }
     input.record_every = given["record_every"].cast<Index>();
     return input;
 }

@@ -8,7 +8,7 @@ from .bodies.fibres import Fibres, fibres_along
 from .bodies.joint_result import JointResult
 from .bodies.joints import Ball, Closure, Fixed, Joint, Prismatic, Revolute
 from .bodies.link import Link
-from .bodies.materials import Corotated, Guccione, NeoHookean, StableNeoHookean, StVenantKirchhoff
+from .bodies.materials import Corotated, Guccione, NeoHookean, Projective, StableNeoHookean, StVenantKirchhoff
 from .bodies.muscle import Muscle
 from .bodies.muscle_result import MuscleResult
 from .bodies.rigid import Rigid
@@ -46,6 +46,7 @@ from .mesh.tet_mesh import TetMesh
 from .mesh.triangle_mesh import TriangleMesh
 from .mesh.welding import Weld, weld
 from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
+from .methods.projective_dynamics import ProjectiveDynamics
 from .methods.solvers import MixedNewton, Newton
 from .plotting import Picture, animate, plot, write_page
 from .scene.reactions import Reaction
@@ -130,6 +131,8 @@ __all__ = [
     "PointLoad",
     "Pressure",
     "Prismatic",
+    "Projective",
+    "ProjectiveDynamics",
     "Reaction",
     "Revolute",
     "Rigid",

@@ -266,6 +266,11 @@ def _solves(s: Sample) -> Iterator[Call]:
     for kind in (ms.Newton, ms.MixedNewton):
         yield Call(kind.__name__, lambda kind=kind, **a: ms.equilibrium(s.scene, solver=kind(**a)), newton)
     yield Call(
+        "ProjectiveDynamics",
+        ms.ProjectiveDynamics,
+        {"iterations": 20, "tolerance": 1e-6, "history": 4, "contact": "coulomb"},
+    )
+    yield Call(
         "WarmStart",
         lambda start, **a: ms.WarmStart(s.magnetic, start=start, solver=quick)(**a),
         {"start": None, **{k: v for k, v in magnetic.items() if k != "scene"}},

@@ -157,6 +157,7 @@ def _solids() -> Iterator[Call]:
     yield Call("StableNeoHookean", ms.StableNeoHookean, {"log_barrier": True, **moduli})
     yield Call("StVenantKirchhoff", ms.StVenantKirchhoff, moduli)
     yield Call("Corotated", ms.Corotated, moduli)
+    yield Call("Projective", ms.Projective, moduli)
     exponents = dict.fromkeys(("fibre_exponent", "cross_fibre_exponent", "fibre_shear_exponent"), 2.0)
     fibres = {"stiffness": 1e3, "bulk_modulus": 1e5, "fibres": (1.0, 0.0, 0.0)}
     yield Call("Guccione", ms.Guccione, {**exponents, **fibres})

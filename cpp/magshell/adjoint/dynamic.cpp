@@ -41,7 +41,7 @@ class Backward {
           motion_(motion),
           by_q_(by_q),
           by_v_(by_v),
-          stepper_(newton, input.tableau, input.inertia, input.viscosity),
+          stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
           scene_(model_.registry()) {
         scene_.controls = model_.no_controls();
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());

@@ -38,6 +38,11 @@ class Reduction {
     /// Whether values prescribe coordinates of carriers.
     bool drives() const { return carried_ && carried_->drives(); }
 
+    /// The free unknowns that are no coordinates of carriers, ascending: these come first in the reduced order. Those of a
+    /// framed node count along its frame.
+    const std::vector<Index>& free_unknowns() const { return free_unknowns_; }
+    bool framed(Index node) const { return !frame_of_.empty() && frame_of_[node] >= 0; }
+
     /// How far the moves have gone: 0 at rest, 1 at their end.
     double progress(const Controls& controls) const { return controls[progress_.first]; }
 

@@ -118,6 +118,23 @@ void Model::hand_out_values() {
     }
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->set_values(values_);
     if (cancels_otherwise) cancelling_forces_.resize(0);
+    ++values_version_;
+}
+
+NodeMatrix Model::surrogate() const {
+    NodeMatrix sum(nodes().n_nodes());
+    for (const std::unique_ptr<Term>& term : terms_)
+        if (!term->add_surrogate(sum))
+            throw InvalidInput("Projective Dynamics has no constant matrix for the " +
+                               std::string(term->name()) + " energy of this scene");
+    sum.finish();
+    return sum;
+}
+
+VectorXd Model::touching_stiffness() const {
+    VectorXd of_nodes = VectorXd::Zero(nodes().n_nodes());
+    for (const std::unique_ptr<Term>& term : terms_) term->add_touching_stiffness(of_nodes);
+    return of_nodes;
 }
 
 // A sheet that has fallen or flown far knows its shape less exactly. By powers of two, so that most states

@@ -106,6 +106,8 @@ class Model {
     bool has_forces() const { return !forces_.empty(); }
     void begin_step(const VectorXd& q, const Controls& controls);
     bool has_contact() const { return contact_ != nullptr; }
+    /// With obstacles; nullptr: there is none.
+    ContactTerm* contact() const { return contact_; }
     /// Whether bodies keep each other, or themselves, out.
     bool has_body_contact() const { return body_contact_ != nullptr; }
     const BodyContactTerm* body_contact() const { return body_contact_; }
@@ -150,6 +152,14 @@ class Model {
 
     const MuscleTerm& muscle_term(Index muscle) const { return *muscle_terms_[muscle]; }
     Index n_muscles() const { return static_cast<Index>(muscle_terms_.size()); }
+
+    /// What Projective Dynamics has in the place of the Hessian: constant while the values are. Throws InvalidInput where a
+    /// term has none, and says which.
+    NodeMatrix surrogate() const;
+    /// What the obstacles that are touched at the last evaluated state add on the nodes [N/m].
+    VectorXd touching_stiffness() const;
+    /// Counts changes of the values.
+    int values_version() const { return values_version_; }
 
     /// A factorization for the reduced Hessian, analysed once for all of them. `watch` is called now and then
     /// meanwhile, and may throw.
@@ -207,7 +217,7 @@ class Model {
     std::vector<const MuscleTerm*> muscle_terms_;
     std::vector<const Term*> refusing_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
-    const ContactTerm* contact_ = nullptr;
+    ContactTerm* contact_ = nullptr;
     bool follows_ = false, unsymmetric_ = false;
     BodyContactTerm* body_contact_ = nullptr;
     std::unique_ptr<ContactLayer> layer_;  // nullptr: no bodies touch each other
@@ -223,7 +233,7 @@ class Model {
     std::vector<BorderTerm*> borders_;  // those that it is of
     std::unique_ptr<Factor> analysed_;
     std::shared_ptr<Factor> spare_;
-    int analyses_ = 0;
+    int analyses_ = 0, values_version_ = 0;
     double length_scale_ = 0.0;
     Residual residual_;
     VectorXd metric_;

@@ -61,7 +61,7 @@ class Run {
           model_(newton.model()),
           input_(input),
           result_(result),
-          stepper_(newton, input.tableau, input.inertia, input.viscosity) {
+          stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective) {
         result_.start = result_.last = beginning(newton.model(), input);
         result_.begun = true;
         if (keep.gradients) plan(keep);

@@ -21,7 +21,8 @@ struct MotionInput {
     std::vector<Controls> controls;
     Varying varying;  // values whose numbers stand in them, after the others
     NewtonOptions newton;
-    Index record_every = 1;  // steps between the states handed out, from the start on
+    ProjectiveOptions projective;  // where it solves the stages
+    Index record_every = 1;        // steps between the states handed out, from the start on
 
     /// At a share of a step.
     Controls controls_at(Index step, double share) const;

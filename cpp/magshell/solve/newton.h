@@ -93,6 +93,14 @@ class Newton {
     /// K^T p = rhs likewise, to round-off. Throws InvalidInput where forces make K too unsymmetric for that.
     VectorXd solve_transposed(const VectorXd& rhs) const;
 
+    /// As far along a step as there are states; the share of it, negative where that leads nowhere, and the report
+    /// says why.
+    double advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
+    /// From the end of a step, last evaluated, back towards `from` by secants where the energy has risen again there,
+    /// which fell at `slope` [J] at the beginning; the share of the step that is left.
+    double search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
+                  const VectorXd& step, double slope);
+
     /// The residual at the last evaluated state, relative to the forces that cancel in it and to their
     /// round-off, if that is to count.
     double relative_residual(const VectorXd& q, const Anchor& anchor, bool with_floor = true) const;
@@ -110,6 +118,7 @@ class Newton {
     std::shared_ptr<Factor> release_factor();
     double linear_time() const { return linear_time_; }  // [s] in factorizations and solves
     void count_iteration() { ++iterations_; }
+    void count_factorizations(int more) { factorizations_ += more; }
     void watch(double residual) const {
         watched_ = residual;
         if (watch_) watch_(residual);
@@ -118,15 +127,8 @@ class Newton {
   private:
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                          bool mixed);
-    /// As far along a step as there are states; the share of it, negative where that leads nowhere, and the report
-    /// says why.
-    double advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
     /// What is left of a motion that supports and motors prescribe after a share of it.
     VectorXd left_of(const VectorXd& move, double share, const VectorXd& q, const Controls& controls) const;
-    /// From the end of a step, last evaluated, back towards `from` by secants where the energy has risen again there,
-    /// which fell at `slope` [J] at the beginning; the share of the step that is left.
-    double search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
-                  const VectorXd& step, double slope);
     /// Shortened steps with held normal forces, from the last evaluated state until the residual is small
     /// enough or so many are done; false where none can be taken, and the report says why.
     bool descend(VectorXd& q, const Controls& controls, const Anchor& anchor, double enough, int most_steps,

@@ -33,8 +33,29 @@ VectorXd StepAlgebra::target(const VectorXd& x_hat, const VectorXd& v_hat) const
     return x_hat + velocity_share_.cwiseProduct(v_hat);
 }
 
-Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity)
-    : newton_(newton), tableau_(tableau), inertia_(std::move(inertia)), viscosity_(viscosity) {}
+Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity,
+                 const ProjectiveOptions& projective)
+    : newton_(newton), tableau_(tableau), inertia_(std::move(inertia)), viscosity_(viscosity) {
+    if (projective.on) projective_ = std::make_unique<ProjectiveSolver>(newton, projective);
+}
+
+NewtonReport Stepper::solve(VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    Model& model = newton_.model();
+    if (projective_) {
+        const double scale = viscosity_.any() ? viscosity_.scale(anchor.motion->time) : 1.0;
+        return projective_->solve(q, controls, anchor, scale);
+    }
+    const VectorXd predicted = q;
+    const Model::Turns turns = model.turns();
+    NewtonReport report = newton_.solve(q, controls, anchor);
+    if (!report.converged && !model.has_body_contact() && (model.has_contact() || newton_.options().mixed)) {
+        q = predicted;
+        model.set_turns(turns);
+        report = model.has_contact() ? newton_.solve_damped(q, controls, anchor)
+                                     : newton_.solve_plain(q, controls, anchor);
+    }
+    return report;
+}
 
 const Tableau& Stepper::tableau_from(const MotionState& state) const {
     return tableau_.begins_explicitly && state.rates.empty() ? starter_ : tableau_;
@@ -118,16 +139,7 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         }
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
         const Anchor anchor{&step.weights(), &target, &motion};
-        const VectorXd predicted = q;
-        const Model::Turns turns = model.turns();
-        NewtonReport report = newton_.solve(q, controls[i + 1], anchor);
-        if (!report.converged && !model.has_body_contact() &&
-            (model.has_contact() || newton_.options().mixed)) {
-            q = predicted;
-            model.set_turns(turns);
-            report = model.has_contact() ? newton_.solve_damped(q, controls[i + 1], anchor)
-                                         : newton_.solve_plain(q, controls[i + 1], anchor);
-        }
+        const NewtonReport report = solve(q, controls[i + 1], anchor);
         if (!report.converged) {
             reason = model.not_finite(q, controls[i + 1]);
             if (reason.empty()) reason = report.reason;

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "magshell/solve/newton.h"
+#include "magshell/solve/projective.h"
 #include "magshell/solve/tableau.h"
 #include "magshell/solve/viscosity.h"
 
@@ -70,7 +71,8 @@ class StepAlgebra {
 
 class Stepper {
   public:
-    Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity);
+    Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity,
+            const ProjectiveOptions& projective);
 
     /// Takes the state over a step with these controls at its beginning and at its stages. On failure the
     /// state stays, and the reason tells why. `kept`, if given, gets the step; with_factors: Newton's last
@@ -86,8 +88,11 @@ class Stepper {
     /// What motors do at the end of a step, once its last stage is solved and `last` holds its rates.
     VectorXd driving(const MotionState& begin, double dt, const VectorXd& q, const Anchor& anchor,
                      const StageRates& last) const;
+    /// A stage, by other means where the first fail.
+    NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor);
 
     Newton& newton_;
+    std::unique_ptr<ProjectiveSolver> projective_;  // nullptr: Newton's steps
     Tableau tableau_, starter_ = sdirk2();
     Inertia inertia_;
     Viscosity viscosity_;

@@ -53,6 +53,7 @@ class BodyContactTerm final : public Term {
     /// The layer couples these as well, whether they still touch or not, until others take their place.
     void keep_coupled(const std::vector<Touch>& touches);
 
+    bool add_surrogate(NodeMatrix&) const override { return false; }
     std::string_view name() const override { return "body contact"; }
     bool set_values(const Values& values) override;
     bool refuses_states() const override { return true; }

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "magshell/assembly/node_matrix.h"
 #include "magshell/assembly/remainder.h"
 #include "magshell/assembly/residual.h"
 #include "magshell/assembly/schedule.h"
@@ -81,6 +82,12 @@ class Term {
     /// puts them back.
     virtual std::vector<double> turns() const { return {}; }
     virtual void set_turns(const std::vector<double>&) {}
+
+    /// What Projective Dynamics puts in the place of its Hessian: a matrix of the nodes, the same along x, y and z, about as
+    /// stiff as the term in any state. Adds it; false where there is none, and Projective Dynamics cannot do the term.
+    virtual bool add_surrogate(NodeMatrix& /*out*/) const { return true; }
+    /// Of what touches at the last evaluated state: stiffness [N/m] on the nodes.
+    virtual void add_touching_stiffness(VectorXd& /*of_nodes*/) const {}
 
     virtual std::size_t bytes() const = 0;
 };

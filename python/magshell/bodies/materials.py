@@ -177,6 +177,25 @@ class Corotated(_Isotropic):
     """
 
 
+class Projective(_Isotropic):
+    """What Projective Dynamics is for: mu |F - R|^2 + lam/2 |F - P|^2, R the nearest rotation, P the nearest matrix with
+    determinant 1 (Bouaziz et al. 2014; with the weights 2 mu and lam of [Qiao21]). Elements turned inside out come back.
+    Volume counts at every point of an element, so that it has no mean_volume.
+
+    young_modulus: Pa, positive. poisson_ratio: in [0, 1/2). Each a number, or (n_t,). They give mu and lam as everywhere;
+        but for small strains e this energy is mu |e|^2 + lam/6 (tr e)^2: it resists changes of volume with a third of lam.
+    """
+
+    _ranges: ClassVar = {
+        "young_modulus": _YOUNG["young_modulus"],
+        "poisson_ratio": ("1", "in [0, 1/2): lam is a weight here", lambda nu: (nu >= 0) & (nu < 0.5)),
+    }
+
+    @property
+    def nearly_incompressible(self) -> bool:
+        return False
+
+
 class Guccione(SolidMaterial):
     """Muscle, transversely isotropic (Guccione et al. 1995): C/2 (exp(Q) - 1) + K/2 (J - 1)^2,
     Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2), E Green's strain.

@@ -90,6 +90,7 @@ class MotionInputs:
                 "controls": self._all_controls(),
                 "varying": self._in_time.entries,
                 "newton": solver._newton_options(),
+                "projective": getattr(integrator, "_projective", None),
                 "record_every": self.record_every,
             },
         )
