@@ -17,7 +17,7 @@ from .solid_result import SolidResult
 def result_of(
     result, body: Shell | Solid | Rigid | Joint | Muscle
 ) -> BodyResult | SolidResult | RigidResult | JointResult | MuscleResult:
-    """`result[body]`, `result[joint]` `result[muscle]` or `result[actuator]`. Raises ValueError where the scene has no such body."""
+    """`result[body]`, `result[joint]` or `result[actuator]`. Raises ValueError where the scene has no such one."""
     if hasattr(body, "_result_in"):  # an actuator
         return body._result_in(result)
     if isinstance(body, Joint):
