@@ -15,7 +15,7 @@ What comes out, on 288 tetrahedra (tests/test_example_pendulum_in_jelly.py asser
 - The bones are vertices of the bar's own mesh that move as one; the flesh rides on them, and the joints hold exactly.
 - The jelly lets the elbow bend, so the bar swings 0.9 % slower than a stiff one. Let go level it bends as a double
   pendulum does, and the jelly straightens it.
-- Coarse as it is, the mesh matters: the bones end at vertices, and on 144 tetrahedra the gap between them is wider, 1.0966 Hz.
+- The bones end at vertices of the mesh: on 144 tetrahedra the gap between them is wider, and it swings at 1.0966 Hz.
 
 Run it: prints a summary and writes a picture and a movie into out/.
 """
@@ -63,9 +63,7 @@ def pendulum(cells: int, **swing) -> Pendulum:
     lower = ms.Link(vertices=np.flatnonzero(inside & (z < middle - GAP / 2)), body=bar)
     shoulder = ms.Revolute(upper, origin=(center, center, LENGTH), axis=(0, 1, 0), **swing)
     elbow = ms.Revolute(lower, upper, origin=(center, center, middle), axis=(0, 1, 0))
-    scene = ms.Scene(
-        [bar, ms.Skeleton([upper, lower], [shoulder, elbow])], gravity=(0, 0, -GRAVITY)
-    )
+    scene = ms.Scene([bar, ms.Skeleton([upper, lower], [shoulder, elbow])], gravity=(0, 0, -GRAVITY))
     return Pendulum(scene, bar, [upper, lower], shoulder, elbow)
 
 
@@ -140,9 +138,7 @@ def plot(outcome: dict):
 
     hanging, motion = outcome["pendulum"], outcome["motion"]
     frames = np.linspace(0, len(motion) - 1, 5).astype(int).tolist()
-    figure, (above, below) = plt.subplots(
-        2, 1, figsize=(10, 6), height_ratios=(1.3, 1), layout="constrained"
-    )
+    figure, (above, below) = plt.subplots(2, 1, figsize=(10, 6), height_ratios=(1.3, 1), layout="constrained")
     picture = ms.plot(
         motion,
         states=frames,

@@ -144,9 +144,7 @@ def driven_skeleton_in_motion(integrator, **options) -> Kind:
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     in_time = {"in_time": STEPS} if "keep" in options else {}
     step = 3e-4 if in_time else 1e-5
-    return Kind(
-        _driven_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time
-    )
+    return Kind(_driven_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time)
 
 
 def skeleton_at_rest() -> Kind:
@@ -177,7 +175,9 @@ def thrown_skeleton() -> Kind:
     )
     hand = ms.Link(mass=1e-3, center=(0.03, 0.02, 0.01), magnetic_moment=(1e-3, 2e-3, 5e-3))
     spring = {"spring_stiffness": 1e-4, "torque": 1e-5}
-    wrist = ms.Revolute(hand, arm, origin=(0.02, 0.02, 0.0), axis=(0, 1, 0.2), rate=-8.0, damping=1e-6, **spring)
+    wrist = ms.Revolute(
+        hand, arm, origin=(0.02, 0.02, 0.0), axis=(0, 1, 0.2), rate=-8.0, damping=1e-6, **spring
+    )
     weight = ms.Link(mass=1e-3, inertia=1e-7, center=(0.0, 0.03, 0.01))
     rail = ms.Prismatic(weight, hand, origin=(0, 0.03, 0), axis=(1, 0, 1), rate=0.05, spring_stiffness=1.0)
     eye = ms.Link(mass=1e-3, inertia=1e-7, center=(0.0, 0.0, 0.01))

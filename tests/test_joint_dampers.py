@@ -19,7 +19,9 @@ def wheel(**law):
     return ms.Scene(ms.Skeleton([rotor], [axle])), axle
 
 
-@pytest.mark.parametrize(("integrator", "order", "rate"), [(ms.TRBDF2(), 2, 8.0), (ms.ImplicitEuler(), 1, 0.2)])
+@pytest.mark.parametrize(
+    ("integrator", "order", "rate"), [(ms.TRBDF2(), 2, 8.0), (ms.ImplicitEuler(), 1, 0.2)]
+)
 def test_a_wheel_slows_down_as_its_damper_says(integrator, order, rate):
     """I w' = -d w, over several turns in one case: theta = w0 I/d (1 - exp(-d t/I))."""
     scene, axle = wheel(damping=0.005, rate=rate)
@@ -103,9 +105,7 @@ def test_gradient_by_damping_in_time_and_past_full_turns():
     angle = turned(damping)
     assert float(angle) > 2 * np.pi
     angle.backward()
-    np.testing.assert_allclose(
-        damping.grad, differences(turned, given, 1e-4), rtol=1e-5
-    )
+    np.testing.assert_allclose(damping.grad, differences(turned, given, 1e-4), rtol=1e-5)
 
 
 def test_going_on_has_the_same_bits():
@@ -120,5 +120,5 @@ def test_going_on_has_the_same_bits():
 
 def test_damping_must_not_be_negative():
     rod = ms.Link(mass=1.0, inertia=0.1, center=(0.5, 0, 0))
-    with pytest.raises(ValueError, match="damping.*must not be negative"):
+    with pytest.raises(ValueError, match=r"damping.*must not be negative"):
         ms.Revolute(rod, origin=(0, 0, 0), axis=(0, 1, 0), damping=-1.0)

@@ -46,9 +46,7 @@ def test_a_motor_that_turns_evenly_needs_what_statics_says():
     free = ms.Link(mass=1.0, inertia=0.1, center=(5, 0, 0))
     slide = ms.Prismatic(free, origin=(5, 0, 0), axis=(1, 0, 0))
     scene = ms.Scene(ms.Skeleton([rod, free], [hinge, slide]), gravity=(0, 0, -G))
-    move = ms.simulate(
-        scene, steps=200, time_step=1e-2, values={hinge: {"motor_angle": lambda t: 3.0 * t}}
-    )
+    move = ms.simulate(scene, steps=200, time_step=1e-2, values={hinge: {"motor_angle": lambda t: 3.0 * t}})
     np.testing.assert_allclose(move[hinge].angle, 3.0 * move.times, atol=1e-12)
     assert np.isnan(move[hinge].motor_torque[0])
     want = 2.0 * G * 0.5 * np.cos(3.0 * move.times[1:])
@@ -192,7 +190,9 @@ def test_gradient_by_a_moment_in_time():
 
     def tip(torque):
         move = ms.simulate(scene, steps=6, time_step=2e-2, values={joints[1]: {"torque": torque}})
-        return move[links[1]].center[-1] @ (torch.tensor(weights) if isinstance(torque, type(kept)) else weights)
+        return move[links[1]].center[-1] @ (
+            torch.tensor(weights) if isinstance(torque, type(kept)) else weights
+        )
 
     kept = torch.tensor(given, requires_grad=True)
     tip(kept).backward()
@@ -202,7 +202,7 @@ def test_gradient_by_a_moment_in_time():
 @pytest.mark.parametrize(
     ("law", "message"),
     [
-        ({"motor_angle": 1.0, "torque": 1.0}, "prescribes.*torque"),
+        ({"motor_angle": 1.0, "torque": 1.0}, r"prescribes.*torque"),
         ({"motor_angle": 1.0, "target_angle": 1.0, "servo_stiffness": 1.0}, "servo_stiffness"),
         ({"motor_angle": np.nan}, "motor_angle"),
         ({"motor_angle": (1.0, 2.0)}, "motor_angle"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import torch
@@ -18,7 +20,7 @@ DIFFERENCED = 3e-6  # likewise: differences over 0.04 of accelerations that are 
 class Posed:
     """The chain in a pose, that being its rest shape. tilt: of the coordinates, on the right."""
 
-    def __init__(self, pose, rates, torques, tilt=np.zeros(6)):
+    def __init__(self, pose, rates, torques, tilt=(0.0,) * 6):
         self.links, self.joints, self.turns = [], [], []
         frame, origin, at, place = np.eye(3), np.zeros(3), 0, 0
         for kind, axis, placement, offset, mass, sides, com in CHAIN:
@@ -26,7 +28,7 @@ class Posed:
             own = slice(place, place + (3 if kind == "ball" else 1))
             axis = before @ np.array(axis)
             if kind == "ball":
-                turn = Rotation.from_quat(pose[at : at + 4]) * Rotation.from_rotvec(tilt[own])
+                turn = Rotation.from_quat(pose[at : at + 4]) * Rotation.from_rotvec(list(tilt[own]))
                 frame = before @ turn.as_matrix()
             else:
                 along = (pose[at] + tilt[place]) * axis
@@ -61,10 +63,7 @@ class Posed:
             )
             found.append(sum(self._change(move)) / time_step)
         for order in (1, 2, 3, 4):
-            found = [
-                (2**order * fine - rough) / (2**order - 1)
-                for rough, fine in zip(found[:-1], found[1:], strict=True)
-            ]
+            found = [(2**order * fine - rough) / (2**order - 1) for rough, fine in pairwise(found)]
         return found[0]
 
     def _change(self, move):

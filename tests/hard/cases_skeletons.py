@@ -19,9 +19,7 @@ def rods(count: int, masses=None, length: float = 1.0, **law):
         for k, m in enumerate(masses)
     ]
     joints = [
-        ms.Revolute(
-            links[k], links[k - 1] if k else None, origin=(k * length, 0, 0), axis=(0, 1, 0), **law
-        )
+        ms.Revolute(links[k], links[k - 1] if k else None, origin=(k * length, 0, 0), axis=(0, 1, 0), **law)
         for k in range(count)
     ]
     return links, joints
@@ -78,9 +76,7 @@ def whip():
 def masses_apart(mass):
     """A light one swings as from a point that the heavy one moves; a heavy one drags the light one along."""
     links, joints = rods(2, masses=(1.0, mass))
-    move = ms.simulate(
-        ms.Scene(ms.Skeleton(links, joints), gravity=(0, 0, -G)), steps=200, time_step=2.5e-3
-    )
+    move = ms.simulate(ms.Scene(ms.Skeleton(links, joints), gravity=(0, 0, -G)), steps=200, time_step=2.5e-3)
     answers = [connected(move, joints), no_gain(move)]
     if mass < 1.0:
         alone = rods(1)

@@ -81,7 +81,9 @@ def _placed(robot) -> dict[str, np.ndarray]:
         parent_of[joint.child] = joint
     roots = known - parent_of.keys()
     if len(roots) != 1:
-        raise ValueError(f"a URDF file has one root, but this one has {sorted(roots) or 'none: its links make a loop'}")
+        raise ValueError(
+            f"a URDF file has one root, but this one has {sorted(roots) or 'none: its links make a loop'}"
+        )
     placed = dict.fromkeys(roots, np.eye(4))
     while len(placed) < len(known):
         ready = [name for name, joint in parent_of.items() if name not in placed and joint.parent in placed]
@@ -117,7 +119,9 @@ def _joint(given, links: dict[str, Link], frame: np.ndarray, limits: dict | None
     if kind == "fixed":
         return Fixed(**ends)
     if kind not in ("revolute", "continuous", "prismatic"):
-        raise ValueError(f"its type is {kind!r}; revolute, continuous, prismatic, fixed and floating are known")
+        raise ValueError(
+            f"its type is {kind!r}; revolute, continuous, prismatic, fixed and floating are known"
+        )
     law = {}
     if given.dynamics is not None:
         # yourdfpy leaves them as text.
