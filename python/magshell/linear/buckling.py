@@ -106,9 +106,7 @@ def linear_buckling(
         response = stiffness.response(inputs)
         displacement = float(np.abs(model.points(response)).max())
         change = _stiffness_change(scene, stiffness, response, displacement, inputs)
-    factors, vectors = _lowest(
-        stiffness, change, modes, _LARGEST_DISPLACEMENT * scene._bodies.size, displacement
-    )
+    factors, vectors = _lowest(stiffness, change, modes, _LARGEST_DISPLACEMENT * _size(scene), displacement)
     shapes, edge_rotations = mode_shapes(model, vectors)
     return Buckling(
         scene=scene,
@@ -120,13 +118,20 @@ def linear_buckling(
     )
 
 
+def _size(scene: Scene) -> float:
+    """m, of its bodies; of its links, where there is nothing else."""
+    if scene._bodies.size > 0.0:
+        return scene._bodies.size
+    return float(np.ptp(scene._model.points(scene._model.rest_state()), axis=0).max())
+
+
 def _stiffness_change(
     scene: Scene, stiffness: RestStiffness, response: np.ndarray, displacement: float, inputs: Inputs
 ) -> np.ndarray:
     """The values of dK, in the pattern of K, for the controls as they are."""
     # Where nothing moves before buckling, K is linear in the controls and any step is exact.
     edges = scene.mesh.edge_lengths
-    length = float(edges.mean()) if len(edges) else scene._bodies.size
+    length = float(edges.mean()) if len(edges) else _size(scene)
     moves = displacement > _ROUND_OFF * length
     step = _PRE_LOAD * length / displacement if moves else 1.0
 
