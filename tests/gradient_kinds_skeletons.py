@@ -143,7 +143,7 @@ def driven_skeleton_in_motion(integrator, **options) -> Kind:
     controls = {**IN_TIME, "time_step": 5e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     in_time = {"in_time": STEPS} if "keep" in options else {}
-    step = 3e-3 if in_time else 1e-5
+    step = 3e-4 if in_time else 1e-5
     return Kind(_driven_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time)
 
 
@@ -160,7 +160,7 @@ def skeleton_in_motion(integrator, **options) -> Kind:
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     in_time = {"in_time": STEPS} if "keep" in options else {}
     # The small first steps of TR-BDF2 leave their round-off in velocities: longer differences feel less of it.
-    step = 3e-3 if in_time else 1e-5
+    step = 1e-3 if in_time else 1e-5
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time)
 
 

@@ -87,7 +87,7 @@ def test_an_arm_moves_as_the_same_made_by_hand(tmp_path):
 
 
 def test_a_free_base_falls(tmp_path):
-    with pytest.raises(ValueError, match="root 'base'.*no mass"):
+    with pytest.raises(ValueError, match=r"root 'base'.*no mass"):
         ms.Skeleton.from_urdf(written(tmp_path, ARM), fixed_base=False, limits=False)
     heavy = '<link name="base"><inertial><mass value="1"/><inertia ixx="1e-2" iyy="1e-2" izz="1e-2" '
     heavy += 'ixy="0" ixz="0" iyz="0"/></inertial></link>'
@@ -102,15 +102,15 @@ def test_a_free_base_falls(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("<limit", '<mimic joint="shoulder"/><limit', "'elbow'.*mimics"),
-        ('damping="0.4"', 'damping="0.4" friction="0.1"', "'shoulder'.*friction"),
-        ('type="continuous"', 'type="planar"', "'shoulder'.*'planar'"),
+        ("<limit", '<mimic joint="shoulder"/><limit', r"'elbow'.*mimics"),
+        ('damping="0.4"', 'damping="0.4" friction="0.1"', r"'shoulder'.*friction"),
+        ('type="continuous"', 'type="planar"', r"'shoulder'.*'planar'"),
         ('<child link="tool"/>', '<child link="lower"/>', "two joints lead to link 'lower'"),
         ('<child link="tool"/>', '<child link="hand"/>', "'hand', is not a link"),
         ('<link name="base"/>', '<link name="base"/><link name="stray"/>', "one root"),
-        ('<parent link="base"/>', '<parent link="tool"/>', "one root|loop"),
-        ('ixx="0.01"', 'ixx="1.0"', "'upper'.*inertia"),
-        ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "'shoulder'.*axis must not be zero"),
+        ('<parent link="base"/>', '<parent link="tool"/>', r"one root|loop"),
+        ('ixx="0.01"', 'ixx="1.0"', r"'upper'.*inertia"),
+        ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', r"'shoulder'.*axis must not be zero"),
         ("</robot>", "", "not a URDF file"),
     ],
 )
@@ -122,7 +122,7 @@ def test_what_cannot_be_is_refused(tmp_path, old, new, message):
 
 def test_limits_are_not_dropped_in_silence(tmp_path):
     path = written(tmp_path, ARM)
-    with pytest.raises(ValueError, match="'elbow'.*limit_stiffness"):
+    with pytest.raises(ValueError, match=r"'elbow'.*limit_stiffness"):
         ms.Skeleton.from_urdf(path)
     assert ms.Skeleton.from_urdf(path, limits=False).named["elbow"].upper_limit is None
     with pytest.raises(FileNotFoundError, match="no file"):

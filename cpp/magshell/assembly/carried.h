@@ -88,7 +88,7 @@ class Carried {
     };
     struct Chunk {
         std::unique_ptr<Carrier> carrier;
-        Index first = 0;  // among the carriers' coordinates
+        Index first = 0;                   // among the carriers' coordinates
         Eigen::MatrixXd jacobian, driven;  // by what is free, and by what values prescribe
         Eigen::LDLT<Eigen::MatrixXd> normal;
         std::vector<Places> places;

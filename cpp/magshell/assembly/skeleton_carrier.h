@@ -70,7 +70,7 @@ class SkeletonCarrier final : public Carrier {
         double target = 0.0;
     };
     std::vector<Motor> driven_;
-    std::vector<Index> leading_;      // nodes, among all
+    std::vector<Index> leading_;  // nodes, among all
     Index coordinates_ = 0;
 };
 

@@ -47,7 +47,7 @@ void DamperTerm::evaluate(const double* q, const Controls&, Residual& out) {
         const Corners at = each.links.positions(q);
         now_[k] = each.form.at(at);
         now_[k].value = strain(k, at);
-        if (each.form.angle()) last_turn_[k] = now_[k].value;
+        if (each.form.angle() && std::isfinite(now_[k].value)) last_turn_[k] = now_[k].value;
         if (history_.shift)
             each.links.scatter(each.damping * stress_by_damping(k, now_[k].value) * now_[k].first, out);
     }

@@ -113,7 +113,7 @@ void JointTerm::evaluate(const double* q, const Controls&, Residual& out) {
             continue;
         }
         const State now = state(k, q);
-        if (each.kind == JointKind::revolute) last_turn_[k] = now.coordinate;
+        if (each.kind == JointKind::revolute && std::isfinite(now.coordinate)) last_turn_[k] = now.coordinate;
         each.links.scatter(now.by_first * now.form.first, out);
     }
 }

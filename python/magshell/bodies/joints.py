@@ -186,7 +186,8 @@ class Revolute(Joint):
     lower_limit, upper_limit, limit_stiffness, limit_smoothing: rad, rad, N m/rad, rad: beyond a limit the torque grows by
         a parabola of the length of the smoothing, then at this stiffness.
     motor_angle: rad, prescribes the angle: a motor, reached by the shorter way round; `result[hinge].motor_torque` says
-        what it takes. In place of a torque, a servo and limits; what it is to start with, `rate` says.
+        what it takes, in motions to second order, to first in loops that a Closure closes. In place of a torque, a
+        servo and limits. How fast it is to start with, `rate` says.
     rate: rad/s, at the start of a motion from rest positions, in a tree without vertices.
 
     All but the rate and the places may change in ms.simulate, one value a step or at the ends of steps.
@@ -248,7 +249,8 @@ class Prismatic(Joint):
     """Slides a link along an axis. Its displacement [m] is zero at rest.
 
     As Revolute, with lengths for angles and forces [N] for torques: spring_stiffness N/m, rest_displacement m, damping
-    N s/m, force N, motor_displacement m (`result[slide].motor_force`), target_displacement m, servo_stiffness N/m, force_limit N, lower_limit, upper_limit m, limit_stiffness N/m,
+    N s/m, force N, motor_displacement m (`result[slide].motor_force`), target_displacement m, servo_stiffness N/m,
+    force_limit N, lower_limit, upper_limit m, limit_stiffness N/m,
     limit_smoothing m, rate m/s.
     """
 

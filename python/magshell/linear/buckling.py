@@ -17,6 +17,7 @@ from .mode_shapes import mode_shapes
 from .rest import RestStiffness
 
 _LARGEST_CHANGE = 1e100  # over the stiffness itself: its square still is a number
+_ROUND_OFF = 1e-14  # of a length: what moves no more does not move
 _PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured, over the mean edge length
 _LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
 
@@ -107,11 +108,9 @@ def linear_buckling(
     with inputs.in_core():
         stiffness = RestStiffness(scene)
         response = stiffness.response(inputs)
-        displacement = float(np.abs(model.positions(response)).max())
+        displacement = float(np.abs(model.points(response)).max())
         change = _stiffness_change(scene, stiffness, response, displacement, inputs)
-    factors, vectors = _lowest(
-        stiffness, change, modes, _LARGEST_DISPLACEMENT * scene._bodies.size, displacement
-    )
+    factors, vectors = _lowest(stiffness, change, modes, _LARGEST_DISPLACEMENT * _size(scene), displacement)
     shapes, edge_rotations = mode_shapes(model, vectors)
     return Buckling(
         scene=scene,
@@ -123,12 +122,22 @@ def linear_buckling(
     )
 
 
+def _size(scene: Scene) -> float:
+    """m, of its bodies; of its links, where there is nothing else."""
+    if scene._bodies.size > 0.0:
+        return scene._bodies.size
+    return float(np.ptp(scene._model.points(scene._model.rest_state()), axis=0).max())
+
+
 def _stiffness_change(
     scene: Scene, stiffness: RestStiffness, response: np.ndarray, displacement: float, inputs: Inputs
 ) -> np.ndarray:
     """The values of dK, in the pattern of K, for the controls as they are."""
     # Where nothing moves before buckling, K is linear in the controls and any step is exact.
-    step = _PRE_LOAD * float(scene.mesh.edge_lengths.mean()) / displacement if displacement > 0.0 else 1.0
+    edges = scene.mesh.edge_lengths
+    length = float(edges.mean()) if len(edges) else _size(scene)
+    moves = displacement > _ROUND_OFF * length
+    step = _PRE_LOAD * length / displacement if moves else 1.0
 
     def values(t: float) -> np.ndarray:
         return scene._model.hessian(stiffness.rest + t * response, t * inputs.controls)[3]

@@ -314,7 +314,7 @@ def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> 
         scene=scene,
         parameters=np.array([point.parameter for point in points]),
         positions=np.array([model.positions(point.state) for point in points]).reshape(
-            -1, scene.mesh.n_vertices, 3
+            len(points), scene.mesh.n_vertices, 3
         ),
         unstable_directions=np.array([point.unstable_directions for point in points], dtype=int),
         critical=tuple(_critical(model, point) for point in found.critical),
