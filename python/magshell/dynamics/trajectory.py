@@ -153,7 +153,9 @@ class Trajectory:
     def _values_at(self, index: int):
         """With the values in time that muscles had then."""
         return (
-            self._values if self._activations is None else self._activations.values(self._values, self._knot(index))
+            self._values
+            if self._activations is None
+            else self._activations.values(self._values, self._knot(index))
         )
 
     def _knot(self, index: int) -> int:
