@@ -8,7 +8,11 @@ against the other: the strip undulates and swims head first, and the other way w
 
 What comes out:
 
-{table}
+    one muscle of two activated by 0.05    curvature 6.10 1/m, Timoshenko's bilayer 6.06
+    a wave of 2 Hz from head to tail       0.332 body lengths in 2 s, head first
+    the same from tail to head             0.331, tail first
+
+A step of 10 ms takes 45 ms (24x4x2 cells, 1152 quadratic tetrahedra) on a busy machine, all of it a minute.
 
 - The curvature of the bent strip is compared in its middle third, with a Poisson's ratio of 0, for which the formula
   stands; nu = 0.45 for the swimmer.

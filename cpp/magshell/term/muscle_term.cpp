@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "magshell/assembly/element_blocks.h"
 #include "magshell/term/muscle_rate_term.h"
 
 namespace magshell {
@@ -17,7 +16,11 @@ class MuscleEnergy final : public MuscleTerm {
 
   public:
     MuscleEnergy(std::shared_ptr<Shared> fibres, Index body, const Slot& shortening_rate)
-        : body_(body), fibres_(std::move(fibres)), loop_(fibres_->loop), shortening_rate_(shortening_rate) {}
+        : body_(body),
+          fibres_(std::move(fibres)),
+          loop_(fibres_->loop),
+          shortening_rate_(shortening_rate),
+          kept_(loop_.packs()) {}
 
     Index body() const override { return body_; }
     bool driven() const override { return false; }
@@ -49,8 +52,10 @@ class MuscleEnergy final : public MuscleTerm {
             loop_.gather(pack, q, x);
             for (int p = 0; p < points; ++p) {
                 const FibrePlace at(each.m[p].at(x));
-                const Pack tension = fibres_->law.at(at.length, each.activation).tension;
-                const Pack3 pull = (each.volume[p] * each.strength * tension) * at.n;
+                const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
+                kept_[pack].along[p] = law.slope;
+                kept_[pack].across[p] = at.over_length(law);
+                const Pack3 pull = (each.volume[p] * each.strength * law.tension) * at.n;
                 add_pulls<N>(each.m[p], pull, p == 0, g);
             }
             loop_.scatter(pack, g, out);
@@ -63,20 +68,20 @@ class MuscleEnergy final : public MuscleTerm {
             const Pieces& each = fibres_->at(pack);
             Pack3 x[N];
             loop_.gather(pack, q, x);
-            Pack33 h[N * (N + 1) / 2];
+            Symmetric3 stiffness[points];
             for (int p = 0; p < points; ++p) {
-                const FibrePlace at(each.m[p].at(x));
-                const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
-                Pack along = law.slope, across = at.over_length(law);
+                Pack along = kept_[pack].along[p], across = kept_[pack].across[p];
                 if (cautious_) {
                     along = max(along, Pack(0.0));
                     across = max(across, Pack(0.0));
                 }
-                add_blocks<N>(FibreTangent<N>{each.m[p],
-                                              (each.volume[p] * each.strength) * at.stiffness(along, across)},
-                              p == 0, h);
+                const Pack33 m = FibrePlace(each.m[p].at(x)).stiffness(along, across);
+                const Pack scale = each.volume[p] * each.strength;
+                for (int r = 0; r < 3; ++r)
+                    for (int c = 0; c <= r; ++c) stiffness[p].at[lower_index(r, c)] = scale * m.at[3 * r + c];
             }
-            complete_blocks<N>(h);
+            Pack33 h[N * (N + 1) / 2];
+            add_products(each, stiffness, h);
             loop_.scatter(pack, h, out);
         });
     }
@@ -160,15 +165,40 @@ class MuscleEnergy final : public MuscleTerm {
         return out;
     }
 
-    std::size_t bytes() const override { return fibres_->bytes(); }
+    std::size_t bytes() const override { return fibres_->bytes() + bytes_of(kept_); }
 
   private:
+    // At the last evaluated state: T' and T/l.
+    struct Stiffness {
+        Pack along[points], across[points];
+    };
+
+    // sum_p alpha_pk alpha_pl M_p for all pairs of nodes: symmetric blocks, six numbers each.
+    static void add_products(const Pieces& each, const Symmetric3 m[points], Pack33 h[]) {
+        for (int k = 0; k < N; ++k) {
+            Symmetric3 of_node[points];
+            for (int p = 0; p < points; ++p)
+                for (int i = 0; i < 6; ++i) of_node[p].at[i] = each.m[p].alpha[k] * m[p].at[i];
+            for (int l = 0; l <= k; ++l) {
+                Pack sum[6];
+                for (int i = 0; i < 6; ++i) sum[i] = each.m[0].alpha[l] * of_node[0].at[i];
+                for (int p = 1; p < points; ++p)
+                    for (int i = 0; i < 6; ++i) sum[i] += each.m[p].alpha[l] * of_node[p].at[i];
+                Pack33& block = h[lower_index(k, l)];
+                for (int r = 0; r < 3; ++r)
+                    for (int c = 0; c < 3; ++c)
+                        block.at[3 * r + c] = sum[r >= c ? lower_index(r, c) : lower_index(c, r)];
+            }
+        }
+    }
+
     const Index body_;
     const std::shared_ptr<Shared> fibres_;
     const ElementLoop<N>& loop_;
     const Slot shortening_rate_;
     double largest_rate_ = 0.0;
     bool cautious_ = false;
+    std::vector<Stiffness> kept_;
 };
 
 template <class Element>

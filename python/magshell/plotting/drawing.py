@@ -60,6 +60,7 @@ def plot(
         both sides of a sheet) and "von_mises_stress" (the mean of the tetrahedron behind a face; of a sheet the larger of
         both surfaces'), of its solids "volume_ratio" (J), of its sheets "membrane_force" or "bending_moment" (the larger
         principal one),
+        with muscles "activation", "fibre_stretch" or "fibre_tension",
         an array with a number a face or a vertex, a list of such arrays, one a state, or None for plain sheets.
         "auto": magnetization if it varies, else displacement.
     color_label, color_range: the text, with the unit, and the ends of the colour bar.
