@@ -239,7 +239,7 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
     clear(first_nodes_.size() - 1);
     // All terms of a chunk before the next chunk: its share of the matrix is cleared and filled in the cache.
     if (body_contact_) body_contact_->be_cautious(cautious);
-    for (BorderTerm* term : borders_) term->take_extrapolated(extrapolated_stress);
+    for (BorderTerm* term : borders_) term->take_extrapolated(extrapolated_stress, cautious);
     for (const std::unique_ptr<Term>& term : terms_) term->prepare_assembly(q.data(), controls);
     if (layer_ && layer_->version() != coupled_) {
         reduction_.set_pattern(matrix_, &layer_->matrix());

@@ -347,7 +347,9 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         const double contraction = report.residual / last_residual;
         last_residual = report.residual;
         if (report.iterations == 0 || !factor_serves(contraction, report.residual, last_step)) {
-            const bool cautious = contraction > contracting;
+            // Before the first step a liquid's pressure is that of a volume that it is not to have.
+            const bool begins = mixed && !extrapolated && !model_.has_body_contact();
+            const bool cautious = begins || contraction > contracting;
             report.factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
             if (!report.factor.succeeded) return fail(report.factor.reason);
             const Index negative_pivots = report.factor.negative_pivots;
@@ -355,8 +357,9 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             report.lost = model_.bodies().solids().empty() &&
                           negative_pivots > first_negative_pivots + most_new_negative_pivots;
             if (mixed && report.lost) return fail("the iteration lost its way");
-            moved = last_step <= small_move * model_.length_scale() ? 0.0
-                                                                    : std::numeric_limits<double>::infinity();
+            const bool own =
+                last_step <= small_move * model_.length_scale() && (!cautious || model_.low_rank().empty());
+            moved = own ? 0.0 : std::numeric_limits<double>::infinity();
         }
         // Loads at rest leave a remainder of few nodes, which takes few vectors: no digit is given away.
         const VectorXd force = -gradient(q, anchor) - pull.col(0);
