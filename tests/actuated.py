@@ -15,7 +15,7 @@ def box_sheet(size=0.1, cells=(2, 2, 1), thickness=5e-3, modulus=1e6, density=1e
     """A closed box of a sheet."""
     box = ms.meshes.box((size, size, size), cells=cells)
     mesh = ms.TriangleMesh(box.rest_positions, box.faces)
-    return ms.Shell(mesh, thickness=thickness, young_modulus=modulus, mass_density=density)
+    return ms.Shell(mesh, thickness=thickness, young_modulus=modulus, poisson_ratio=0.4, mass_density=density)
 
 
 def hollow_block(element="linear", cells=3, **options) -> ms.Solid:

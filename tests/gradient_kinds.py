@@ -271,8 +271,7 @@ MAKERS = {
     "in motion, sdirk3": lambda: moving(ms.SDIRK3(), "hinge", keep="checkpoints", memory_budget=2e4),
     "from an equilibrium": let_go,
     "actuated at rest": actuated_at_rest,
-    "actuated in motion, tr_bdf2": lambda: actuated_in_motion(ms.TRBDF2()),
-    "actuated in motion, euler": lambda: actuated_in_motion(ms.ImplicitEuler(), keep="factors"),
+    "actuated in motion": lambda: actuated_in_motion(ms.TRBDF2(), keep="factors"),
     "at rest, with a rigid part": rigid_at_rest,
     "in motion, with rigid parts, euler": lambda: rigid_in_motion(ms.ImplicitEuler(), {"inertia": 1.1e-6}),
     "in motion, with rigid parts, tr_bdf2": lambda: rigid_in_motion(

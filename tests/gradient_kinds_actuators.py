@@ -22,7 +22,9 @@ def _actuated() -> tuple[list, list, list]:
         ms.Cells(block, [tetrahedra[:90], tetrahedra[90:120]], stiffness=5e4, volume_ratio=[1.1, 0.9]),
         ms.Cells(block, [tetrahedra[3:5]], stiffness=[4e4], volume_ratio=1.2),
         ms.Tendon(PATH, block, tension=0.4, stiffness=60.0, rest_length=0.03),
-        ms.Tendon(PATH[1:], block, stiffness=40.0, rest_length=0.02, sliding=False, smoothing=4e-3),
+        ms.Tendon(
+            PATH[1:], block, tension=0.1, stiffness=40.0, rest_length=0.02, sliding=False, smoothing=4e-3
+        ),
     ]
     return [block, box], pins, actuators
 

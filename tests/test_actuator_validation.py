@@ -9,7 +9,7 @@ import magshell as ms
 
 def tube_as_cavity(material: str, inside: dict, **moduli) -> tuple[ms.Equilibrium, np.ndarray, ms.Cavity]:
     """All of a ring in plane strain with lids over its two rims: (rest, inner and outer radius, cavity)."""
-    mesh = ms.meshes.tube(1.0, 2.0, 0.5, cells=(4, 12, 1), order=2)
+    mesh = ms.meshes.tube(1.0, 2.0, 0.5, cells=(4, 16, 1), order=2)
     density = ms.StableNeoHookean if material == "stable" else lambda **own: ms.NeoHookean(material, **own)
     solid = ms.Solid(mesh, material=density(**moduli))
     x = solid.mesh.rest_positions
@@ -36,7 +36,7 @@ def test_t9a_tube_as_a_cavity(case):
     )
     assert rest.stable and rest.load_steps == 1 and rest.iterations <= 8
     assert np.allclose(radii, TUBES[case], rtol=2e-3)
-    assert float(rest[cavity].volume) == pytest.approx(0.5 * np.pi * radii[0] ** 2, rel=1e-3)
+    assert float(rest[cavity].volume) == pytest.approx(0.5 * np.pi * radii[0] ** 2, rel=2e-3)
 
 
 @pytest.mark.parametrize("case", INCOMPRESSIBLE, ids=lambda case: f"{case[1]}")

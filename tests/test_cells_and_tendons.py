@@ -107,7 +107,7 @@ def test_a_sliding_tendon_has_one_tension_and_a_fixed_one_many():
 
 def test_slack_it_does_nothing_and_pulls_once_it_is_shortened():
     body = bar()
-    tendon = ms.Tendon(along(), body, stiffness=100.0, rest_length=0.12)
+    tendon = ms.Tendon(along(), body, stiffness=20.0, rest_length=0.12)
     scene = fixed(body, actuators=[tendon])
     slack = ms.equilibrium(scene)
     assert np.abs(slack.displacements).max() < 1e-15 and float(slack[tendon].tension) == 0.0
@@ -116,11 +116,11 @@ def test_slack_it_does_nothing_and_pulls_once_it_is_shortened():
         scene, steps=20, time_step=2e-3, values={tendon: {"rest_length": lengths}}, progress=False
     )
     tensions = move[tendon].tension
-    assert (tensions[lengths > 0.102] == 0).all() and tensions[-1] > 0.1
+    assert (tensions[lengths > 0.102] == 0).all() and tensions[-1] > 0.05
     path = ms.follow(
         scene, start=slack, values={tendon: {"rest_length": 0.09}}, largest_step=0.05, progress=False
     )
-    assert path[tendon].tension[0] == 0.0 and path[tendon].tension[-1] > 0.1
+    assert path[tendon].tension[0] == 0.0 and path[tendon].tension[-1] > 0.05
 
 
 def test_a_tendon_from_body_to_body_and_to_a_link():

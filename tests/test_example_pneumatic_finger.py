@@ -35,4 +35,4 @@ def test_air_that_is_let_in_presses_with_what_its_room_leaves(result, example) -
 def test_picture_and_summary(example, result, tmp_path) -> None:
     example.write(result, tmp_path)
     assert (tmp_path / "pneumatic_finger.png").stat().st_size > 20_000
-    assert "at 30 kPa" in example.summary(result)
+    assert "at 14 kPa" in example.summary(result)

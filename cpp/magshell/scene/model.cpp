@@ -246,7 +246,7 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
     };
     clear(first_nodes_.size() - 1);
     // All terms of a chunk before the next chunk: its share of the matrix is cleared and filled in the cache.
-    for (BorderTerm* term : borders_) term->take_extrapolated(extrapolated_stress);
+    for (BorderTerm* term : borders_) term->take_extrapolated(extrapolated_stress, cautious);
     for (const std::unique_ptr<Term>& term : terms_) {
         term->be_cautious(cautious);
         term->prepare_assembly(q.data(), controls);

@@ -359,7 +359,9 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         const double contraction = report.residual / last_residual;
         last_residual = report.residual;
         if (report.iterations == 0 || !factor_serves(contraction, report.residual, last_step)) {
-            const bool cautious = contraction > contracting;
+            // Before the first step a liquid's pressure is that of a volume that it is not to have.
+            const bool begins = mixed && !extrapolated && !model_.has_body_contact();
+            const bool cautious = begins || contraction > contracting;
             report.factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
             if (!report.factor.succeeded) return fail(report.factor.reason);
             const Index negative_pivots = report.factor.negative_pivots;
@@ -368,7 +370,8 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
                           negative_pivots > first_negative_pivots + most_new_negative_pivots;
             if (mixed && report.lost) return fail("the iteration lost its way");
             // Of a matrix that leaves out what is negative, no pivot tells whether a state is stable.
-            const bool exact = !cautious || (model_.n_muscles() == 0 && !model_.has_body_contact());
+            const bool exact = !cautious || (model_.n_muscles() == 0 && !model_.has_body_contact() &&
+                                             model_.low_rank().empty());
             moved = exact && last_step <= small_move * model_.length_scale()
                         ? 0.0
                         : std::numeric_limits<double>::infinity();

@@ -16,10 +16,14 @@ class BorderTerm : public Term {
 
     /// Whether what it assembles from now on is curved as its extrapolated pressures or tensions have it: in mixed steps
     /// these are unknowns of their own, condensed, which what is stiff needs.
-    void take_extrapolated(bool extrapolated) { extrapolated_ = extrapolated; }
+    /// Cautious: a state's own pressure says nothing where what is stiff is not yet as it should be; it is left out.
+    void take_extrapolated(bool extrapolated, bool cautious) {
+        extrapolated_ = extrapolated;
+        cautious_ = cautious && !extrapolated;
+    }
 
   protected:
-    bool extrapolated_ = false;
+    bool extrapolated_ = false, cautious_ = false;
 };
 
 }  // namespace magshell

@@ -201,7 +201,9 @@ void VolumeTerm::finish_assembly(const double* q, const Controls& controls, Syst
     if (factor == 0.0) return;
     for (const Volume& each : volumes_) {
         const std::vector<Vec3> x = each.at(q);
-        const double slope = factor * (extrapolated_ ? each.extrapolated : each.slope);
+        const bool stiff = each.law == VolumeLaw::liquid || each.law == VolumeLaw::cell;
+        const double own = cautious_ && stiff && each.pairs.empty() ? 0.0 : each.slope;
+        const double slope = factor * (extrapolated_ ? each.extrapolated : own);
         const auto add_faces = [&]<int N>(const std::vector<Face<N>>& faces) {
             for (const Face<N>& face : faces) {
                 Pack33 blocks[N * (N + 1) / 2]{};

@@ -45,7 +45,7 @@ class InTime:
             )
             if isinstance(course.owner, Actuator):
                 self.of_actuators[course.owner, course.name] = numbers.reshape(-1, *course.row)
-                numbers = self._check_actuator(course, numbers)
+                self._check_actuator(course)
             rows += [numbers] * self._add(course, numbers.shape[1])
         self.activations: dict[Muscle, np.ndarray] = {
             course.owner: np.asarray(detached(at_knots), dtype=np.float64)
@@ -80,12 +80,11 @@ class InTime:
             end += width
         return len(labels)
 
-    def _check_actuator(self, course: Course, numbers: np.ndarray) -> np.ndarray:
-        """As many as the core has of it. Raises ValueError where the actuator cannot have one of them."""
+    def _check_actuator(self, course: Course) -> None:
+        """Raises ValueError where the actuator cannot have one of its numbers."""
         at_knots = self.of_actuators[course.owner, course.name]
         for extreme in (at_knots.min(axis=0), at_knots.max(axis=0)):
             course.owner.replaced(**{course.name: extreme})
-        return np.broadcast_to(numbers, (len(numbers), course.owner.count))
 
     def _add_obstacles(self, courses: list[Course]) -> None:
         values, obstacles = self._asked.inputs.values, self._asked.inputs.scene.obstacles
@@ -101,12 +100,9 @@ class _Values:
 
     def __init__(self, in_time: InTime, course: Course):
         self._places, self._key = in_time._places, (id(course.owner), course.name)
-        self._width = int(np.prod(course.row))
 
     def by_knots(self, gradient) -> np.ndarray:
-        total = sum(gradient.of_controls(place) for place in self._places[self._key])
-        # One number for all cells: of each of them.
-        return total if total.shape[-1] == self._width else total.sum(axis=-1, keepdims=True)
+        return sum(gradient.of_controls(place) for place in self._places[self._key])
 
 
 class _Pose:

@@ -20,7 +20,6 @@ class Actuator(Owner):
     for_all = False
     is_spring = True
     bodies: tuple = ()
-    count = 1  # the numbers that the core has of each of its values
     _units: ClassVar[dict[str, str]] = {}
 
     def _unit(self, name: str) -> str:
@@ -47,11 +46,11 @@ def number(name: str, unit: str, value, least: float | None = None, above: bool 
 
 
 def numbers(name: str, unit: str, value, count: int, what: str, least: float, above: bool) -> np.ndarray:
-    """A finite number (), or one a cell (count,). Raises ValueError."""
+    """Finite numbers, one a cell (count,), given so or as one of all. Raises ValueError."""
     array = real_numbers(f"{name} [{unit}]", value)
     if array.shape not in ((), (count,)):
         raise ValueError(f"{name} [{unit}] must be a number or one a {what}, ({count},), got {array.shape}")
-    array = quantity(name, unit, array, array.shape)
+    array = quantity(name, unit, np.broadcast_to(array, (count,)), (count,))
     _check_range(name, unit, array, least, above)
     return array
 

@@ -26,7 +26,8 @@ class Cells(Actuator):
     groups: what each tetrahedron belongs to, (n_t,) integers from 0 up, -1 for none; or a list of arrays of tetrahedra,
         one a cell. By default each tetrahedron is a cell. Of a group only the volume of all of it counts.
     stiffness: K, Pa, of all cells, or one a cell, (k,).
-    volume_ratio: a, 1 by default; a number or one a cell. Both may change in time, and have gradients.
+    volume_ratio: a, 1 by default; of all cells, or one a cell, (k,). Both may change in time, (steps + 1, k), and have
+        gradients.
 
     What a result says: `result[cells].volume_ratios` (..., k) and `.pressures` (..., k) Pa, K (a - J).
 
@@ -69,18 +70,9 @@ class Cells(Actuator):
 
     def pressure_at(self, ratios):
         """(k,) Pa, at volume ratios (k,)."""
-        target, stiffness = (
-            np.broadcast_to(getattr(self, name), (self.count,)) for name in self._replaceable
-        )
-        as_given = (lambda each: each) if isinstance(ratios, np.ndarray) else ratios.new_tensor
-        return as_given(stiffness.copy()) * (as_given(target.copy()) - ratios)
-
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
-        for name in self._replaceable:
-            numbers[label, name] = np.broadcast_to(getattr(self, name), (self.count,))
-
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
-        return {name: gradient.value(label, name) for name in self._replaceable}
+        if isinstance(ratios, np.ndarray):
+            return self.stiffness * (self.volume_ratio - ratios)
+        return ratios.new_tensor(self.stiffness) * (ratios.new_tensor(self.volume_ratio) - ratios)
 
     def _core_input(self, label: str, bodies: Bodies) -> dict:
         of_scene = bodies.original[bodies.of(self).vertices]
