@@ -20,7 +20,7 @@ _MISSED = 0.2  # of the number of tetrahedra that was asked for
 
 def warn_of_loss(mesh: TetMesh, distance: Distance, low, high, spacing: float, wanted: int | None) -> None:
     """low, high: (3,) m, the box around the shape. wanted: the number of tetrahedra asked for."""
-    pitch = max(0.5 * spacing, float((np.prod(high - low) / _MOST_SAMPLES) ** (1 / 3)))
+    pitch = max(0.25 * spacing, float((np.prod(high - low) / _MOST_SAMPLES) ** (1 / 3)))
     counts = np.maximum(np.ceil((high - low) / pitch), 1).astype(int)
     cell = (high - low) / counts
     corners = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -36,7 +36,7 @@ def warn_of_loss(mesh: TetMesh, distance: Distance, low, high, spacing: float, w
         )
     middles = (distance(low + (corners + 0.5) * cell) < 0).reshape(counts)
     _, parts = label(middles, np.ones((3, 3, 3)))
-    if mesh.n_components != parts and pitch <= 0.5 * spacing * (1 + 1e-9):
+    if mesh.n_components != parts and pitch <= 0.5 * spacing:
         said.append(
             f"it has {_parts(mesh.n_components)} where the shape, looked at every {pitch:.3g} m, has {parts}"
         )
