@@ -270,3 +270,45 @@ def test_a_step_that_does_not_converge_hands_back_the_motion():
             scene, steps=3, time_step=5e-2, integrator=ms.ProjectiveDynamics(iterations=2), progress=False
         )
     assert error.value.last_good.steps_done == 0
+
+
+@pytest.mark.parametrize("contact", ["penalty", "coulomb"])
+def test_ctrl_c_hands_back_the_motion_and_leaves_the_scene_as_it_was(contact):
+    calls = {"made": 0, "stop": None}
+
+    def flux(points):
+        calls["made"] += 1
+        if calls["made"] == calls["stop"]:
+            raise KeyboardInterrupt
+        return np.tile((0.0, 0.0, 5e-3), (len(points), 1))
+
+    solid = bar(MATERIALS["Projective"], cells=(3, 1, 1), remanent_magnetization=(2e4, 0.0, 0.0))
+    floor = ms.Contact(ms.obstacles.Plane(center=(0, 0, 0)), friction_coefficient=0.3)
+    field = ms.CustomField(flux, length_scale=0.05)
+    scene = ms.Scene(solid, contacts=[floor], supports=[clamped(solid)], field=field, gravity=(0, 1.0, -9.81))
+    method = ms.ProjectiveDynamics(contact=contact, tolerance=1e-6)
+    given = {"steps": 4, "time_step": 5e-3, "integrator": method, "progress": False}
+    whole = ms.simulate(scene, **given)
+    calls["stop"] = calls["made"] + 9 * calls["made"] // 10
+    with pytest.raises(ms.Interrupted) as error:
+        ms.simulate(scene, **given)
+    done = error.value.last_good
+    assert 0 < done.steps_done < 4
+    assert (done.positions == whole.positions[: len(done)]).all()
+    calls["stop"] = None
+    assert (ms.simulate(scene, **given).positions == whole.positions).all()
+
+
+def test_rounds_without_a_tolerance_do_not_run_away():
+    """The matrix is no bound of Corotated's stiffness: steps that overshoot are cut."""
+    solid = bar(MATERIALS["Corotated"])
+    scene = ms.Scene(solid, supports=[clamped(solid)], gravity=(0, 2.0, -9.81))
+    given = {"steps": 4, "time_step": 2e-2, "progress": False}
+    exact = ms.simulate(scene, integrator=TIGHT, **given).positions
+    errors = [
+        np.abs(
+            ms.simulate(scene, integrator=ms.ProjectiveDynamics(n, None, history=0), **given).positions - exact
+        ).max()
+        for n in (5, 50, 500)
+    ]
+    assert all(later < 0.7 * earlier for earlier, later in pairwise(errors))

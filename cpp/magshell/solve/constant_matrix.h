@@ -45,6 +45,11 @@ class ConstantMatrix {
     /// Whether a node is free.
     bool solves(Index node) const;
 
+    /// Of a node: scale L on the diagonal [N/m].
+    double stiffness(Index node) const {
+        return scale_ * stiffness_.values()[stiffness_.column_starts()[node]];
+    }
+
     int factorizations() const { return factorizations_; }
 
   private:

@@ -16,6 +16,9 @@ constexpr double shortest_share = 1e-9;
 // How far a node may be from where Coulomb's law has it, of the extent of the scene.
 constexpr double law_tolerance = 1e-10;
 
+// Points that begin or cease to touch make another matrix, which is looked for now and then.
+constexpr int rounds_between_looks = 5;
+
 // The penalty of obstacles is off while it lives.
 class StandingAside {
   public:
@@ -35,6 +38,18 @@ ProjectiveSolver::ProjectiveSolver(Newton& newton, const ProjectiveOptions& opti
 
 VectorXd ProjectiveSolver::reduced_gradient(const VectorXd& q, const Anchor& anchor) const {
     return model_.reduction().vector(newton_.gradient(q, anchor));
+}
+
+bool ProjectiveSolver::touches_otherwise(const Anchor& anchor, VectorXd& before) const {
+    if (!model_.has_contact()) return false;
+    constexpr double much = 0.5;  // of the diagonal without it
+    VectorXd now = model_.touching_stiffness();
+    bool changed = false;
+    for (Index node = 0; node < now.size() && !changed; ++node)
+        changed = std::abs(now[node] - before[node]) >
+                  much * ((*anchor.weights)[3 * node] + matrix_.stiffness(node) + before[node]);
+    if (changed) before = std::move(now);
+    return changed;
 }
 
 void ProjectiveSolver::prepare(const Anchor& anchor, double scale) {
@@ -64,15 +79,14 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
     newton_.evaluate(q, controls, anchor);
     prepare(anchor, scale);
     Secants secants(options_.history);
+    VectorXd touched = model_.touching_stiffness();
     VectorXd gradient = reduced_gradient(q, anchor);
     for (;; ++report.iterations, newton_.count_iteration()) {
         const bool last = report.iterations == options_.iterations;
         const bool in_place = move.isZero(0.0);
-        if (options_.tolerance > 0.0 || last) {
-            report.residual = newton_.relative_residual(q, anchor);
-            newton_.watch(report.residual);
-            if (!std::isfinite(report.residual)) return fail("the iteration diverged");
-        }
+        report.residual = newton_.relative_residual(q, anchor);
+        newton_.watch(report.residual);
+        if (!std::isfinite(report.residual)) return fail("the iteration diverged");
         if (in_place && options_.tolerance > 0.0 && report.residual <= options_.tolerance &&
             (report.iterations > 0 || newton_.relative_residual(q, anchor, false) <= options_.tolerance))
             report.converged = true;
@@ -82,6 +96,11 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
             return fail("no convergence in " + std::to_string(report.iterations) +
                         " iterations of Projective Dynamics: the residual is " +
                         std::to_string(report.residual));
+        if (report.iterations % rounds_between_looks == rounds_between_looks - 1 &&
+            touches_otherwise(anchor, touched)) {
+            prepare(anchor, scale);
+            secants.clear();
+        }
         VectorXd direction = -gradient;
         if (!in_place) direction -= reduction.vector(matrix_.times(move));
         secants.solve(direction, [&](VectorXd& rhs) { matrix_.solve(rhs); });
@@ -98,8 +117,7 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
         if (share < 0.0) return report;
         move *= 1.0 - share;
         newton_.evaluate(q, controls, anchor);
-        if (in_place && options_.tolerance > 0.0)
-            share *= newton_.search(q, controls, anchor, from, step, share * slope);
+        if (in_place) share *= newton_.search(q, controls, anchor, from, step, share * slope);
         VectorXd now = reduced_gradient(q, anchor);
         if (in_place) secants.add(share * direction, now - gradient);
         gradient = std::move(now);

@@ -38,6 +38,8 @@ class ProjectiveSolver {
     NewtonReport solve_rounds(VectorXd& q, const Controls& controls, const Anchor& anchor, double scale);
     /// Rounds with Coulomb's law in each.
     NewtonReport solve_touching(VectorXd& q, const Controls& controls, const Anchor& anchor, double scale);
+    /// Whether what obstacles add has changed by much since it was `before`, which then is what it is now.
+    bool touches_otherwise(const Anchor& anchor, VectorXd& before) const;
     void prepare(const Anchor& anchor, double scale);
     VectorXd reduced_gradient(const VectorXd& q, const Anchor& anchor) const;
 
