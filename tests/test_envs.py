@@ -236,6 +236,25 @@ def test_bad_actions_are_refused(action, complaint):
         one.step(action)
 
 
+def test_two_actuators_of_one_value_are_refused():
+    scene, hinge = pendulum()
+    twice = [ms.envs.Actuator(hinge, "torque", lower=-1, upper=1) for _ in range(2)]
+    with pytest.raises(ValueError, match="two actuators set one value: Actuator"):
+        environment(scene=scene, actuators=twice)
+
+
+def test_registered_robots_in_processes_by_their_name():
+    vector = gymnasium.make_vec(
+        "magshell.envs.robots:magshell/MagneticStrip-v0", num_envs=2, vectorization_mode="async"
+    )
+    try:
+        seen, _ = vector.reset(seed=[1, 2])
+        _, rewards, *_ = vector.step(np.zeros((2, 3)))
+    finally:
+        vector.close()
+    assert seen.shape == (2, 4) and (rewards < 0).all()
+
+
 def test_answers_that_change_are_refused():
     growing = environment(observation=lambda now: np.zeros(2 if now.time == 0 else 3))
     growing.reset(seed=0)

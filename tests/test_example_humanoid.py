@@ -1,4 +1,4 @@
-"""The soft figure: fewer tetrahedra, one start."""
+"""The soft figure, from one start."""
 
 import numpy as np
 import pytest
@@ -7,14 +7,11 @@ from test_examples import load
 
 @pytest.fixture(scope="module")
 def figure() -> dict:
-    return load("humanoid").main(n_tetrahedra=900, n_starts=1, slope=False)
+    return load("humanoid").main(n_starts=1, slope=False)
 
 
-def test_the_body_has_the_papers_size() -> None:
-    load("humanoid")
-    from _humanoid.body import Body
-
-    body = Body.of()
+def test_the_body_has_the_papers_size(figure) -> None:
+    body = figure["body"]
     extents = np.ptp(body.mesh.rest_positions, axis=0)
     np.testing.assert_allclose(extents, (4.1, 1.3, 2.9), rtol=0.02)
     assert body.mesh.n_tetrahedra == pytest.approx(3078, rel=0.05) and body.mesh.n_components == 1

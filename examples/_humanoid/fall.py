@@ -155,7 +155,7 @@ def _length(positions: np.ndarray, ends: np.ndarray) -> float:
     return float(np.linalg.norm(positions[ends[0]] - positions[ends[1]]))
 
 
-def slope_error(figure: Figure, start: Start, steps: int = STEPS, step: float = 0.3) -> float:
+def slope_error(figure: Figure, start: Start, steps: int = STEPS, step: float = 1e-2) -> float:
     """Of the mean height of both hands at the end by the torque limits of every step: the slope along the gradient
     against central differences. step: N m."""
     import torch

@@ -90,8 +90,10 @@ class Environment(gymnasium.Env):
         self.scene, self.actuators = scene, checked_list("actuators", actuators, (Actuator,))
         if not self.actuators:
             raise ValueError("actuators must hold at least one ms.envs.Actuator")
-        for each in self.actuators:
+        for k, each in enumerate(self.actuators):
             each.check_in(scene)
+            if any(each.owner is other.owner and each.name == other.name for other in self.actuators[:k]):
+                raise ValueError(f"two actuators set one value: {each!r}")
         functions = {"observation": observation, "reward": reward, "start": start, "finished": finished}
         for name, function in functions.items():
             if not callable(function) and (function is not None or name in ("observation", "reward")):
