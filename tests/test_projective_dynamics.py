@@ -307,7 +307,8 @@ def test_rounds_without_a_tolerance_do_not_run_away():
     exact = ms.simulate(scene, integrator=TIGHT, **given).positions
     errors = [
         np.abs(
-            ms.simulate(scene, integrator=ms.ProjectiveDynamics(n, None, history=0), **given).positions - exact
+            ms.simulate(scene, integrator=ms.ProjectiveDynamics(n, None, history=0), **given).positions
+            - exact
         ).max()
         for n in (5, 50, 500)
     ]
