@@ -66,7 +66,7 @@ struct FaceEnergyInput {
 /// middles of its edges.
 struct RigidInput {
     std::string owner;
-    Rows3 points;                 // (10, 3) at rest, then its surface's: after the bodies' vertices, the tens first
+    Rows3 points;                 // (10, 3) at rest, then its surface's: the tens of all parts come first
     std::vector<Index> vertices;  // the scene's
     bool magnetic = false;
 
