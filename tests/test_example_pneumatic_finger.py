@@ -20,7 +20,8 @@ def test_it_bends_away_from_its_channel_faster_and_faster(result, example) -> No
     assert pressures[0] == 0.0 and pressures[-1] == pytest.approx(example.PRESSURE)
     assert (np.diff(angles) > 0).all() and (np.diff(result["volumes"]) > 0).all()
     half = np.interp(0.5 * example.PRESSURE, pressures, angles)
-    assert 0.3 * angles[-1] < half < 0.5 * angles[-1]
+    assert 0.1 * angles[-1] < half < 0.25 * angles[-1]
+    assert 6.0 < np.degrees(angles[-1]) < 7.0
 
 
 def test_air_that_is_let_in_presses_with_what_its_room_leaves(result, example) -> None:
