@@ -55,7 +55,7 @@ class Muscle(Owner):
     >>> scene = ms.Scene(block, supports=sides, actuators=[muscle])
     >>> rest = ms.equilibrium(scene, values={muscle: {"activation": 1.0}})
     >>> round(float(rest[muscle].stretches.mean()), 4)
-    0.7405
+    0.7331
     """
 
     _replaceable = ("activation", "fibres", "weights", "stiffness", "peak_stress", "shortening_rate")
