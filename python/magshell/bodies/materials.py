@@ -31,6 +31,9 @@ class SolidMaterial:
         unit, wanted, holds = self._ranges[name]
         array = real_numbers(f"{name} [{unit}]", value)
         array = quantity(name, unit, array, array.shape)
+        row = self._row_shapes().get(name, ())
+        if row and array.shape[-1:] != row:
+            raise ValueError(f"{name} [{unit}] must have shape {row} or (n_t, {row[0]}), got {array.shape}")
         bad = ~holds(array)
         if bad.any():
             index = np.argmax(bad)
