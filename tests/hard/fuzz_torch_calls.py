@@ -130,6 +130,19 @@ def _controls(s: Sample) -> Iterator[Call]:
     yield Call("control.fourier", control.fourier, {"times": times, **waves, "mean": (0, 0, 0)})
     yield Call("control.frames_at", control.frames_at, {"times": times, "wanted": (0.2, 0.4)})
     yield Call("control.harmonics", control.harmonics, {"number": 2, "duration": 1.0})
+    windows = {
+        "controls": np.zeros((4, 2)),
+        "lengths": (2, 4),
+        "lower": -1.0,
+        "upper": (1.0, 2.0),
+        "depth": 2,
+    }
+    windows |= {"smoothings": (2.0, 1.0), "max_iterations": 2, "tolerance": 1e-3, "hold": True}
+    yield Call(
+        "control.in_windows",
+        lambda **a: control.in_windows(lambda rows, window: ((rows - 0.5) ** 2).sum(), progress=False, **a),
+        windows,
+    )
     yield Call("control.held", control.held, {"values": fields, "steps": 12})
     frames = {
         "positions": np.ones((6, 4, 3)),
