@@ -147,7 +147,7 @@ IN_SCENES = {
     "no actuator": (
         BLOCK,
         lambda: ms.Pressure(1.0),
-        "actuators must hold Cavity, Cells and Tendon objects, got Pressure",
+        "actuators must hold Muscle, Cavity, Cells and Tendon objects, got Pressure",
     ),
 }
 

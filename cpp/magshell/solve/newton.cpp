@@ -360,7 +360,8 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         last_residual = report.residual;
         if (report.iterations == 0 || !factor_serves(contraction, report.residual, last_step)) {
             // Before the first step a liquid's pressure is that of a volume that it is not to have.
-            const bool begins = mixed && !extrapolated && !model_.has_body_contact();
+            const bool begins =
+                mixed && !extrapolated && model_.n_muscles() == 0 && !model_.has_body_contact();
             const bool cautious = begins || contraction > contracting;
             report.factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
             if (!report.factor.succeeded) return fail(report.factor.reason);
