@@ -32,6 +32,8 @@ struct NewtonReport {
     double residual = 0.0;
     FactorReport factor;    // of the last matrix factorized
     bool in_place = false;  // whether that may stand for the solution's own, nothing having moved since
+    bool touched = false;   // whether bodies touched, or were in each other's way, at any of its iterations
+    std::string blocked;    // what was in the way of the last step of which little could be taken, in words
     bool lost = false;      // far from any solution: a step half as long will hardly do
     std::string reason;     // why not converged
 };
@@ -119,6 +121,11 @@ class Newton {
     /// As far along a step as there are states; the share of it, negative where that leads nowhere, and the report
     /// says why.
     double advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
+    /// Of a step, which is a share of a whole one, the part up to which bodies that touch do not push back by more than it
+    /// expects. It has the energy fall at `slope` [J] at its beginning, the last evaluated state.
+    double part_into_contact(const VectorXd& q, const VectorXd& step, double share, double slope) const;
+    /// The reason of a report, and what touched.
+    void tell_contact(NewtonReport& report) const;
     /// From the end of a step, last evaluated, back towards `from` by secants where the energy has risen again there,
     /// which fell at `slope` [J] at the beginning; the share of the step that is left.
     double search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,

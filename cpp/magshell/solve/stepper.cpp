@@ -36,12 +36,13 @@ VectorXd StepAlgebra::target(const VectorXd& x_hat, const VectorXd& v_hat) const
 Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity)
     : newton_(newton), tableau_(tableau), inertia_(std::move(inertia)), viscosity_(viscosity) {}
 
-const Tableau& Stepper::tableau_from(const MotionState& state) const {
+const Tableau& Stepper::tableau_from(const MotionState& state, bool dissipative) const {
+    if (dissipative) return dissipative_;
     return tableau_.begins_explicitly && state.rates.empty() ? starter_ : tableau_;
 }
 
 const StepAlgebra& Stepper::algebra(double dt, const Tableau& tableau) {
-    if (!algebra_ || algebra_->dt() != dt ||
+    if (!algebra_ || algebra_->dt() != dt || algebra_->tableau().stages != tableau.stages ||
         algebra_->tableau().begins_explicitly != tableau.begins_explicitly)
         algebra_ = std::make_unique<StepAlgebra>(tableau, inertia_, dt);
     return *algebra_;
@@ -52,9 +53,19 @@ std::vector<StageRates> first_rates(const Tableau& tableau, const MotionState& s
     return {state.rates};
 }
 
-bool Stepper::step(MotionState& state, double dt, std::span<const Controls> controls, SubstepRecord* kept,
-                   bool with_factors, std::string& reason) {
-    const StepAlgebra& step = algebra(dt, tableau_from(state));
+StepRates::StepRates(const StepAlgebra& step, const SubstepRecord& substep, Index coordinates)
+    : x_hat(substep.stages.size()),
+      v_hat(substep.stages.size()),
+      all(first_rates(step.tableau(), substep.begin)) {
+    for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
+        step.start_of_stage(i, substep.begin, all, x_hat[i], v_hat[i]);
+        step.finish_stage(substep.stages[i].q, x_hat[i], v_hat[i], coordinates, all.emplace_back());
+    }
+}
+
+bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<const Controls> controls,
+                   SubstepRecord* kept, bool with_factors, std::string& reason) {
+    const StepAlgebra& step = algebra(dt, tableau_from(state, dissipative));
     const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
     const Index coordinates = model.n_coordinates();
@@ -78,8 +89,11 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             ahead.tail(q.size() - coordinates).setZero();
             const VectorXd others = q.tail(q.size() - coordinates);
             q = state.q;
-            // Short of what is in the way, if anything is.
-            if (model.has_body_contact()) ahead *= model.share_of_step(q, ahead);
+            // Well short of what is in the way, if anything is: very near it, a barrier is too steep to begin at.
+            if (model.has_body_contact()) {
+                const double share = model.share_of_step(q, ahead);
+                if (share < 1.0) ahead *= 0.25 * share;
+            }
             model.reduction().advance(q, ahead);
             q.tail(others.size()) = others;
         }
