@@ -245,7 +245,14 @@ void register_dynamics(py::module_& module) {
         .def_property_readonly("last_turns", [](const MotionResult& r) { return r.last.turns; })
         .def_readonly("kinetic_energy", &MotionResult::kinetic_energy)
         .def_readonly("energies", &MotionResult::energies)
-        .def_readonly("halved", &MotionResult::halved)
+        .def_property_readonly("halved",
+                               [](const MotionResult& r) {
+                                   std::map<Index, std::vector<std::tuple<double, double, bool>>> all;
+                                   for (const auto& [step, substeps] : r.halved)
+                                       for (const Substep& each : substeps)
+                                           all[step].emplace_back(each.begin, each.end, each.dissipative);
+                                   return all;
+                               })
         .def_readonly("keep", &MotionResult::keep)
         .def_readonly("iterations", &MotionResult::iterations)
         .def_readonly("factorizations", &MotionResult::factorizations)

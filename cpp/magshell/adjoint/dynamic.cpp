@@ -9,23 +9,6 @@
 namespace magshell {
 namespace {
 
-// The rates of a step, from its states: those it began with, and those of its stages.
-struct Rates {
-    std::vector<VectorXd> x_hat, v_hat;
-    std::vector<StageRates> all;
-
-    Rates(const Model& model, const StepAlgebra& step, const SubstepRecord& substep)
-        : x_hat(substep.stages.size()),
-          v_hat(substep.stages.size()),
-          all(first_rates(model, step.tableau(), substep.begin)) {
-        for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
-            step.start_of_stage(i, substep.begin, all, x_hat[i], v_hat[i]);
-            step.finish_stage(substep.stages[i].q, x_hat[i], v_hat[i], model.n_coordinates(),
-                              all.emplace_back());
-        }
-    }
-};
-
 // What is viscous, stage by stage: elastic terms, and dampers in joints.
 struct Viscous {
     ViscousAdjoint strains, joints;
@@ -107,16 +90,16 @@ class Backward {
         take_in(step);
     }
 
-    void back(Index step, const std::pair<double, double>& substep, const SubstepRecord& record) {
-        const double share = substep.second - substep.first;
-        const StepAlgebra algebra =
-            stepper_.algebra(share * input_.time_step, stepper_.tableau_from(record.begin));
+    void back(Index step, const Substep& substep, const SubstepRecord& record) {
+        const double share = substep.share();
+        const StepAlgebra algebra = stepper_.algebra(
+            share * input_.time_step, stepper_.tableau_from(record.begin, substep.dissipative));
         const Tableau& tableau = algebra.tableau();
         const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
         const double dt = algebra.dt(), adt = algebra.stage_time();
         const VectorXd &mass = input_.inertia.mass, &damping = input_.inertia.damping;
         const Index coordinates = model_.n_coordinates();
-        const Rates at(model_, algebra, record);
+        const StepRates at(model_, algebra, record);
 
         std::vector<VectorXd> by_v(first + n, VectorXd::Zero(model_.size())), by_w = by_v;
         VectorXd by_x = std::move(g_.positions);
@@ -204,19 +187,19 @@ class Backward {
     }
 
     // lambda of a stage, and what its forces say of how it moved; adds what it says of the scene and of the controls.
-    std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const Rates& at, int i,
-                                                         const SubstepRecord& record, Index step,
-                                                         const std::pair<double, double>& substep,
-                                                         VectorXd& by_x, Viscous& viscous) {
+    std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const StepRates& at,
+                                                         int i, const SubstepRecord& record, Index step,
+                                                         const Substep& substep, VectorXd& by_x,
+                                                         Viscous& viscous) {
         const StageState& stage = record.stages[i];
         const ElasticAfterwards elastic_afterwards(model_);
-        const double share = substep.first + algebra.tableau().time(i) * (substep.second - substep.first);
+        const double share = substep.begin + algebra.tableau().time(i) * substep.share();
         const Controls controls = input_.controls_at(step, share);
         model_.take(controls);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
         model_.set_turns(stage.turns);
-        model_.begin_step(record.begin.q, input_.controls_at(step, substep.first));
+        model_.begin_step(record.begin.q, input_.controls_at(step, substep.begin));
         viscous.strains.set_history(i);
         viscous.joints.set_history(i);
         const Anchor anchor{&algebra.weights(), &target, &motion};
@@ -243,7 +226,7 @@ class Backward {
         }
         model_.varying().move_gradient(scene_);
         add_by_controls(step, share, scene_.controls);
-        if (model_.has_forces()) add_by_controls(step, substep.first, by_forces.begin_controls);
+        if (model_.has_forces()) add_by_controls(step, substep.begin, by_forces.begin_controls);
         return {lambda, std::move(by_forces)};
     }
 

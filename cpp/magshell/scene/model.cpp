@@ -322,6 +322,10 @@ double Model::largest_share(const VectorXd& q, const VectorXd& p) const {
     return share;
 }
 
+bool Model::touches() const {
+    return body_contact_ && !body_contact_->touching().empty();
+}
+
 std::string Model::refusal(const VectorXd& q) const {
     for (const Term* term : refusing_)
         if (std::string reason = term->refusal(q.data()); !reason.empty()) return reason;

@@ -111,6 +111,8 @@ class Model {
     /// Whether bodies keep each other, or themselves, out.
     bool has_body_contact() const { return body_contact_ != nullptr; }
     const BodyContactTerm* body_contact() const { return body_contact_; }
+    /// Whether any pair of them touches at the last evaluated state.
+    bool touches() const;
     /// Why a step from q to `end` cannot be: a point would be on the other side of an obstacle. Else empty.
     std::string blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
                         const Controls& controls_at_end) const;

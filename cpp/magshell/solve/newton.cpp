@@ -239,12 +239,13 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
     const VectorXd from = q;
     const Model::Turns turns = model_.turns();
     NewtonReport report = iterate(q, controls, anchor, max_iterations, options_.mixed);
-    if (report.converged) return report;
+    if (report.converged || !report.touched) return report;
     const int iterations = report.iterations;
     q = from;
     model_.set_turns(turns);
     report = solve_searching(q, controls, anchor, searched * max_iterations);
     report.iterations += iterations;
+    if (!report.converged) tell_contact(report);
     return report;
 }
 
@@ -340,6 +341,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
     if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
     evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
+        report.touched |= model_.touches();
         report.residual = relative_residual(q, anchor);
         watch(report.residual);
         if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent())
@@ -382,8 +384,18 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         VectorXd step =
             move + (anchor.motion ? solve_with_factor(force, deserved(report.residual, options_.tolerance))
                                   : solve_with_factor(force));
-        const double share = advance(q, step, shortest_share, report);
+        const VectorXd from = model_.has_body_contact() && in_place ? q : VectorXd();
+        double share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
+        if (from.size() > 0) {
+            const double less = part_into_contact(from, step, share, force.dot(step));
+            if (less < 1.0) {
+                share *= less;
+                step *= less;
+                q = from;
+                model_.reduction().advance(q, step);
+            }
+        }
         move = left_of(move, share, q, controls);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&

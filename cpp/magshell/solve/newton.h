@@ -32,6 +32,8 @@ struct NewtonReport {
     double residual = 0.0;
     FactorReport factor;    // of the last matrix factorized
     bool in_place = false;  // whether that may stand for the solution's own, nothing having moved since
+    bool touched = false;   // whether bodies touched, or were in each other's way, at any of its iterations
+    std::string blocked;    // what was in the way of the last step of which little could be taken, in words
     bool lost = false;      // far from any solution: a step half as long will hardly do
     std::string reason;     // why not converged
 };
@@ -129,6 +131,11 @@ class Newton {
                          bool mixed);
     /// What is left of a motion that supports and motors prescribe after a share of it.
     VectorXd left_of(const VectorXd& move, double share, const VectorXd& q, const Controls& controls) const;
+    /// Of a step, which is a share of a whole one, the part up to which bodies that touch do not push back by more than it
+    /// expects. It has the energy fall at `slope` [J] at its beginning, the last evaluated state.
+    double part_into_contact(const VectorXd& q, const VectorXd& step, double share, double slope) const;
+    /// The reason of a report, and what touched.
+    void tell_contact(NewtonReport& report) const;
     /// Shortened steps with held normal forces, from the last evaluated state until the residual is small
     /// enough or so many are done; false where none can be taken, and the report says why.
     bool descend(VectorXd& q, const Controls& controls, const Anchor& anchor, double enough, int most_steps,

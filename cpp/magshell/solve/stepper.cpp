@@ -57,12 +57,13 @@ NewtonReport Stepper::solve(VectorXd& q, const Controls& controls, const Anchor&
     return report;
 }
 
-const Tableau& Stepper::tableau_from(const MotionState& state) const {
+const Tableau& Stepper::tableau_from(const MotionState& state, bool dissipative) const {
+    if (dissipative) return dissipative_;
     return tableau_.begins_explicitly && state.rates.empty() ? starter_ : tableau_;
 }
 
 const StepAlgebra& Stepper::algebra(double dt, const Tableau& tableau) {
-    if (!algebra_ || algebra_->dt() != dt ||
+    if (!algebra_ || algebra_->dt() != dt || algebra_->tableau().stages != tableau.stages ||
         algebra_->tableau().begins_explicitly != tableau.begins_explicitly)
         algebra_ = std::make_unique<StepAlgebra>(tableau, inertia_, dt);
     return *algebra_;
@@ -91,9 +92,19 @@ VectorXd Stepper::driving(const MotionState& begin, double dt, const VectorXd& q
     return newton_.model().reduction().driving(force);
 }
 
-bool Stepper::step(MotionState& state, double dt, std::span<const Controls> controls, SubstepRecord* kept,
-                   bool with_factors, std::string& reason) {
-    const StepAlgebra& step = algebra(dt, tableau_from(state));
+StepRates::StepRates(const Model& model, const StepAlgebra& step, const SubstepRecord& substep)
+    : x_hat(substep.stages.size()),
+      v_hat(substep.stages.size()),
+      all(first_rates(model, step.tableau(), substep.begin)) {
+    for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
+        step.start_of_stage(i, substep.begin, all, x_hat[i], v_hat[i]);
+        step.finish_stage(substep.stages[i].q, x_hat[i], v_hat[i], model.n_coordinates(), all.emplace_back());
+    }
+}
+
+bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<const Controls> controls,
+                   SubstepRecord* kept, bool with_factors, std::string& reason) {
+    const StepAlgebra& step = algebra(dt, tableau_from(state, dissipative));
     const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
     const Index coordinates = model.n_coordinates();
@@ -120,8 +131,11 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             ahead.tail(q.size() - coordinates).setZero();
             const VectorXd others = q.tail(q.size() - coordinates);
             q = state.q;
-            // Short of what is in the way, if anything is.
-            if (model.has_body_contact()) ahead *= model.share_of_step(q, ahead);
+            // Well short of what is in the way, if anything is: very near it, a barrier is too steep to begin at.
+            if (model.has_body_contact()) {
+                const double share = model.share_of_step(q, ahead);
+                if (share < 1.0) ahead *= 0.25 * share;
+            }
             model.reduction().advance(q, ahead);
             q.tail(others.size()) = others;
         }
@@ -169,8 +183,8 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         model.set_turns(state.turns);
         return false;
     }
-    MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {},
-                    std::move(driving), std::move(held)};
+    MotionState end{std::move(q), rates.back().v,     model.turns(),  std::move(e),
+                    {},           std::move(driving), std::move(held)};
     if (model.reduction().drives()) {
         end.v_before = state.v;
         end.dt_before = dt;

@@ -74,14 +74,14 @@ class Stepper {
     Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity,
             const ProjectiveOptions& projective);
 
-    /// Takes the state over a step with these controls at its beginning and at its stages. On failure the
-    /// state stays, and the reason tells why. `kept`, if given, gets the step; with_factors: Newton's last
+    /// Takes the state over a step with these controls at its beginning and at its stages, as tableau_from() says. On
+    /// failure the state stays, and the reason tells why. `kept`, if given, gets the step; with_factors: Newton's last
     /// factorizations too.
-    bool step(MotionState& state, double dt, std::span<const Controls> controls, SubstepRecord* kept,
-              bool with_factors, std::string& reason);
+    bool step(MotionState& state, double dt, bool dissipative, std::span<const Controls> controls,
+              SubstepRecord* kept, bool with_factors, std::string& reason);
 
-    /// The method of a step from this state: SDIRK2 where there are no rates to begin with.
-    const Tableau& tableau_from(const MotionState& state) const;
+    /// The method of a step from this state: SDIRK2 where there are no rates to begin with; dissipative: implicit Euler.
+    const Tableau& tableau_from(const MotionState& state, bool dissipative) const;
     const StepAlgebra& algebra(double dt, const Tableau& tableau);
 
   private:
@@ -93,7 +93,7 @@ class Stepper {
 
     Newton& newton_;
     std::unique_ptr<ProjectiveSolver> projective_;  // nullptr: Newton's steps
-    Tableau tableau_, starter_ = sdirk2();
+    Tableau tableau_, starter_ = sdirk2(), dissipative_ = implicit_euler();
     Inertia inertia_;
     Viscosity viscosity_;
     std::unique_ptr<StepAlgebra> algebra_;  // of the last step
@@ -101,5 +101,13 @@ class Stepper {
 
 /// The rates that a step begins with: those of the state, if the method takes them.
 std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, const MotionState& state);
+
+/// The rates of a step that was taken, from its states: those it began with, and those of its stages.
+struct StepRates {
+    std::vector<VectorXd> x_hat, v_hat;
+    std::vector<StageRates> all;
+
+    StepRates(const Model& model, const StepAlgebra& step, const SubstepRecord& substep);
+};
 
 }  // namespace magshell

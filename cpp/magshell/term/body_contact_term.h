@@ -6,6 +6,7 @@
 // Where a pair has no gap there is no energy: the term refuses such states, and steps that lead through them.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -31,8 +32,15 @@ class BodyContactTerm final : public Term {
                     const std::vector<BodyContactInput>& contacts, ContactLayer& layer, Registry& registry);
 
     /// The pairs that touch at q, always in the same order; and those at the last evaluated state.
-    std::vector<Touch> touches(const double* q) const;
-    const std::vector<Touch>& touching() const { return touching_; }
+    std::vector<Touch> touches(const double* q) const { return *found(q); }
+    const std::vector<Touch>& touching() const { return *touching_; }
+    /// Whether any pair touches at q.
+    bool acts(const double* q) const { return !found(q)->empty(); }
+    /// How the energy at q changes along p [J], and how fast that changes, but for what turns, at the last evaluated state.
+    double slope(const double* q, const double* p) const;
+    double curvature(const double* p) const;
+    /// The faces that push each other hardest at the last evaluated state, in words; empty: none touch.
+    std::string hardest() const;
     const FrictionLaw& friction(const Touch& touch) const { return friction_[touch.near.contact]; }
 
     /// Which faces are in the way of a step p from q, in words.
@@ -48,6 +56,7 @@ class BodyContactTerm final : public Term {
     /// From now on as if no state had been looked at: a solve has the same bits whatever came before it.
     void forget() const {
         candidates_.forget();
+        found_at_.resize(0);
         layer_.couple({});
     }
     /// The layer couples these as well, whether they still touch or not, until others take their place.
@@ -72,6 +81,10 @@ class BodyContactTerm final : public Term {
         Slot stiffness, reach, distance, smoothing, kinetic, fixed, sticking_speed;
     };
 
+    using Touches = std::shared_ptr<const std::vector<Touch>>;
+
+    /// Those that touch at q; asked again at the same place, the same.
+    Touches found(const double* q) const;
     /// Calls found(pair, share) where a pair lets a step go less far than all before it; nullptr: its length does.
     template <class Found>
     void each_limit(const double* q, const double* p, const Found& found) const;
@@ -82,7 +95,9 @@ class BodyContactTerm final : public Term {
     std::vector<double> least_;  // of each contact, what no distance goes below [m]
     mutable ContactCandidates candidates_;
     ContactLayer& layer_;
-    std::vector<Touch> touching_;
+    mutable VectorXd found_at_;  // where those that were found last are; empty: nowhere
+    mutable Touches found_;
+    Touches touching_ = std::make_shared<const std::vector<Touch>>();
     std::vector<ContactLayer::Group> kept_;
     bool cautious_ = false;
 };

@@ -227,7 +227,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         largest_bending_strain=strain.bending,
         steps=asked.steps,
         steps_done=found.steps_done,
-        halved={step: len(parts) for step, parts in found.halved.items()},
+        halved={step: len(parts) for step, parts in found.halved.items() if len(parts) > 1},
+        calmed=tuple(step for step, parts in found.halved.items() if any(calm for _, _, calm in parts)),
         end=MotionState(
             ended.time,
             found.last_state,

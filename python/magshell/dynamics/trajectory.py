@@ -105,7 +105,8 @@ class Trajectory:
     largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
         leaves the model, of which ms.LargeStrainWarning warns.
     steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
-    taken}. end: the last state, from which another simulation goes on. bytes: kept for gradients.
+    taken}. calmed: the steps, or steps with parts, that implicit Euler took instead of the integrator, because bodies
+    touched and the step would have gained energy that nothing put in. end: the last state, from which another simulation goes on. bytes: kept for gradients.
     """
 
     scene: Scene
@@ -123,6 +124,7 @@ class Trajectory:
     steps: int
     steps_done: int
     halved: dict[int, int]
+    calmed: tuple[int, ...]
     end: MotionState
     iterations: int
     factorizations: int
@@ -253,6 +255,7 @@ class Trajectory:
     def __repr__(self) -> str:
         stopped = "" if self.steps_done == self.steps else f" of {self.steps}"
         halved = f", {len(self.halved)} of them in parts" if self.halved else ""
+        halved += f", {len(self.calmed)} by implicit Euler" if self.calmed else ""
         strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
         crossings = told(self.scene.mesh, detached(self.positions))
         a_step = 1e3 * self.wall_time / max(self.steps_done, 1)
