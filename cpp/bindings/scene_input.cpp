@@ -89,41 +89,6 @@ std::vector<PressureInput> pressures_of(const py::list& given) {
     return pressures;
 }
 
-std::vector<VolumeInput> volumes_of(const py::list& given) {
-    const std::map<std::string, VolumeLaw> laws = {{"pressure", VolumeLaw::pressure},
-                                                   {"gas", VolumeLaw::gas},
-                                                   {"liquid", VolumeLaw::liquid},
-                                                   {"cell", VolumeLaw::cell}};
-    std::vector<VolumeInput> volumes;
-    for (const py::handle each : given) {
-        VolumeInput& volume = volumes.emplace_back();
-        volume.owner = each["owner"].cast<std::string>();
-        volume.law = laws.at(each["law"].cast<std::string>());
-        volume.stays_open = each["stays_open"].cast<bool>();
-        volume.coupled = each["coupled"].cast<bool>();
-        for (const py::handle surface : each["surfaces"])
-            volume.surfaces.push_back({surface["triangles"].cast<std::vector<Index>>(),
-                                       surface["curved"].cast<std::vector<Index>>(),
-                                       surface["weights"].cast<std::vector<double>>(),
-                                       surface["curved_weights"].cast<std::vector<double>>()});
-    }
-    return volumes;
-}
-
-std::vector<TendonInput> tendons_of(const py::list& given) {
-    std::vector<TendonInput> tendons;
-    for (const py::handle each : given) {
-        TendonInput& tendon = tendons.emplace_back();
-        tendon.owner = each["owner"].cast<std::string>();
-        tendon.slides = each["slides"].cast<bool>();
-        tendon.shares = each["shares"].cast<std::vector<double>>();
-        for (const py::handle point : each["points"])
-            tendon.points.push_back(
-                {point["vertices"].cast<std::vector<Index>>(), point["weights"].cast<std::vector<double>>()});
-    }
-    return tendons;
-}
-
 std::vector<RigidInput> rigid_of(const py::list& given) {
     std::vector<RigidInput> rigid;
     for (const py::handle each : given)
