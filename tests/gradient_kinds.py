@@ -3,12 +3,14 @@
 from functools import cache
 
 import numpy as np
+from gradient_kinds_actuators import actuated_at_rest, actuated_in_motion
 from gradient_kinds_bodies import (
     magnetized_solid_at_rest,
     magnetized_solid_in_motion,
     rigid_at_rest,
     rigid_in_motion,
     solid_at_rest,
+    solid_by_projective_dynamics,
     solid_in_motion,
     solid_with_company,
     tied,
@@ -16,8 +18,15 @@ from gradient_kinds_bodies import (
     two_sheets_in_motion,
 )
 from gradient_kinds_contact import CONTACT_MAKERS
+from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
-from gradient_kinds_skeletons import skeleton_at_rest, skeleton_in_motion, thrown_skeleton
+from gradient_kinds_skeletons import (
+    driven_skeleton_at_rest,
+    driven_skeleton_in_motion,
+    skeleton_at_rest,
+    skeleton_in_motion,
+    thrown_skeleton,
+)
 from gradient_scenes import Kind
 from gradient_world import (
     BEGIN,
@@ -246,17 +255,23 @@ MAKERS = {
     **CONTACT_MAKERS,
     "a solid at rest": solid_at_rest,
     "a solid in motion": solid_in_motion,
+    "a solid by Projective Dynamics": solid_by_projective_dynamics,
     "a magnetized solid at rest": magnetized_solid_at_rest,
     "a magnetized solid in motion, in water": magnetized_solid_in_motion,
     "a solid under pressure at rest": lambda: pressed_solid(False),
     "a solid under pressure in motion": lambda: pressed_solid(True),
     "a sheet under pressure at rest": lambda: pressed_sheet(False),
     "a sheet under pressure in motion": lambda: pressed_sheet(True),
+    "a solid with muscles at rest": muscles_at_rest,
+    "a solid with muscles in motion, euler": lambda: muscles_in_motion(ms.ImplicitEuler(), in_time=3),
+    "a solid with muscles in motion, tr_bdf2": lambda: muscles_in_motion(ms.TRBDF2()),
     "in motion, euler": lambda: moving(ms.ImplicitEuler(), "hinge"),
     "in motion, tr_bdf2": lambda: moving(ms.TRBDF2()),
     "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),
     "in motion, sdirk3": lambda: moving(ms.SDIRK3(), "hinge", keep="checkpoints", memory_budget=2e4),
     "from an equilibrium": let_go,
+    "actuated at rest": actuated_at_rest,
+    "actuated in motion": lambda: actuated_in_motion(ms.TRBDF2(), keep="factors"),
     "at rest, with a rigid part": rigid_at_rest,
     "in motion, with rigid parts, euler": lambda: rigid_in_motion(ms.ImplicitEuler(), {"inertia": 1.1e-6}),
     "in motion, with rigid parts, tr_bdf2": lambda: rigid_in_motion(
@@ -267,6 +282,9 @@ MAKERS = {
         ms.TRBDF2(), keep="checkpoints", memory_budget=2e4
     ),
     "a thrown skeleton": thrown_skeleton,
+    "at rest, with a driven skeleton": driven_skeleton_at_rest,
+    "in motion, with a driven skeleton, euler": lambda: driven_skeleton_in_motion(ms.ImplicitEuler()),
+    "in motion, with a driven skeleton": lambda: driven_skeleton_in_motion(ms.TRBDF2(), keep="stages"),
     "in motion, with a skeleton, euler": lambda: skeleton_in_motion(ms.ImplicitEuler()),
     "onto a Plane": lambda: thrown(ob.Plane),
     "onto a Plane, rubbing": lambda: thrown(ob.Plane, **RUBS),

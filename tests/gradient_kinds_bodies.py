@@ -273,6 +273,15 @@ def solid_in_motion() -> Kind:
     return Kind(still.scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)
 
 
+def solid_by_projective_dynamics() -> Kind:
+    still = solid_at_rest(ms.Projective(young_modulus=1e5, poisson_ratio=0.3), "linear")
+    tight = ms.ProjectiveDynamics(tolerance=1e-12, iterations=5000)
+    controls = {"time_step": 2e-3, "gravity_factor": 1.1, **VISCOUS}
+    return Kind(
+        still.scene, controls, ms.simulate, fixed={"steps": 3, "integrator": tight}, step=1e-5, reach=REACH
+    )
+
+
 def solid_with_company(moves: bool) -> Kind:
     """A bar with a magnetized sheet welded to its top and a magnet glued into its end."""
     mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(3, 1, 1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import torch
+from scipy.optimize import minimize
 
 from magshell import _core
 from magshell.scene.layout import Layout
@@ -12,9 +13,19 @@ EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
 
 # By the core's names. Those of the second list have an energy where elements are inverted.
 REFUSING = ["NeoHookean ln J", "NeoHookean J", "NeoHookean isochoric"]
-STABLE = ["StableNeoHookean", "StableNeoHookean barrier", "StVenantKirchhoff", "Corotated", "Guccione"]
+STABLE = [
+    "StableNeoHookean",
+    "StableNeoHookean barrier",
+    "StVenantKirchhoff",
+    "Corotated",
+    "Guccione",
+    "Projective",
+]
 MATERIALS = REFUSING + STABLE
 ELEMENTS = ["linear", "quadratic", "mean"]
+MADE = [
+    (m, e) for m in MATERIALS for e in ELEMENTS if (m, e) != ("Projective", "mean")
+]  # that one is refused
 
 LAME = {"young_modulus": 1.0e3, "poisson_ratio": 0.3}
 GUCCIONE = {
@@ -50,10 +61,11 @@ def second_order(nodes, tetrahedra):
 class SolidModel:
     """nodes (n, 3) m, tetrahedra (n_t, 4 or 10); values by the core's names, a number or one an element.
 
-    held: nodes that are held entirely.
+    held: nodes that are held entirely. muscles: as the core takes them; their numbers go into `others`, {(owner, name):
+    array}, before `set`.
     """
 
-    def __init__(self, nodes, tetrahedra, material, mean=False, values=None, held=()):
+    def __init__(self, nodes, tetrahedra, material, mean=False, values=None, held=(), muscles=()):
         self.nodes, self.tetrahedra = np.asarray(nodes, dtype=float), np.asarray(tetrahedra)
         held = np.asarray(held, dtype=np.int32)
         self.core = _core.Model(
@@ -64,8 +76,11 @@ class SolidModel:
             rigid=[],
             skeletons=[],
             closures=[],
+            muscles=list(muscles),
             face_energies=[],
             pressures=[],
+            volumes=[],
+            tendons=[],
             solids=[
                 {
                     "owner": "body 0",
@@ -95,6 +110,7 @@ class SolidModel:
             water=None,
         )
         self.layout = Layout(self.core.parameters)
+        self.others = {key: np.zeros(1) for key in self.layout if key[0] != "body 0"}
         self.controls = np.zeros(sum(entry[4] * entry[5] for entry in self.core.controls))
         self.set(values_of(material) if values is None else values)
         marks = np.arange(3.0 * len(self.nodes)).reshape(-1, 3)
@@ -107,9 +123,8 @@ class SolidModel:
             else np.asarray(value)
             for name, value in values.items()
         }
-        self.core.set_values(
-            self.layout.packed({("body 0", name): each for name, each in self.values.items()})
-        )
+        own = {("body 0", name): each for name, each in self.values.items()}
+        self.core.set_values(self.layout.packed({**own, **self.others}))
 
     def state(self, x):
         return self.core.state(np.asarray(x, dtype=float), np.zeros(0))
@@ -133,8 +148,16 @@ class SolidModel:
 
     def vjp(self, x, adjoint) -> dict[str, np.ndarray]:
         """adjoint . dg/dk of every value k, by name; adjoint (n, 3)."""
-        found = _core.vjp(self.core, self.state(x), self.controls, self.state(adjoint))
-        return {name: self.layout.of(np.asarray(found), "body 0", name) for name in self.values}
+        found = self._vjp(x, adjoint)
+        return {name: self.layout.of(found, "body 0", name) for name in self.values}
+
+    def other_vjp(self, x, adjoint) -> dict[tuple[str, str], np.ndarray]:
+        """Likewise of the numbers in `others`."""
+        found = self._vjp(x, adjoint)
+        return {key: self.layout.of(found, *key) for key in self.others}
+
+    def _vjp(self, x, adjoint) -> np.ndarray:
+        return np.asarray(_core.vjp(self.core, self.state(x), self.controls, self.state(adjoint)))
 
 
 def shape_gradients(nodes, tetrahedra):
@@ -222,8 +245,34 @@ def density(material, f, values, averaged):
     u, s, vh = torch.linalg.svd(f)
     sign = torch.sign(torch.linalg.det(u) * torch.linalg.det(vh))
     s = torch.cat([s[..., :2], sign[..., None] * s[..., 2:]], dim=-1)
+    if material == "Projective":
+        return mu * ((s - 1) ** 2).sum(-1) + lam / 2 * ((s - nearest_of_product_one(s)) ** 2).sum(-1)
     trace = s.sum(-1)  # tr(R^T F)
     return mu * ((s - 1) ** 2).sum(-1) + lam / 2 * (averaged(trace) - 3) ** 2
+
+
+def nearest_of_product_one(s):
+    """The d with d1 d2 d3 = 1 that are nearest to s, (..., 3): by a search among positive ones, from many starts; two steps
+    of Newton on d - k/d = s with that product then carry the derivatives."""
+    rows = []
+    for row in s.detach().reshape(-1, 3).numpy():
+        away = lambda p, row=row: float(((np.array([*np.exp(p), np.exp(-p.sum())]) - row) ** 2).sum())  # noqa: E731
+        found = min(
+            (minimize(away, (a, b), method="BFGS") for a in (-1.0, 0.3, 1.5) for b in (-1.2, 0.2, 1.0)),
+            key=lambda each: each.fun,
+        )
+        rows.append([*np.exp(found.x), np.exp(-found.x.sum())])
+    d = torch.tensor(np.array(rows)).reshape(s.shape)
+    k = ((d - s) * d).mean(-1, keepdim=True).detach()
+    for _ in range(6):
+        # (1 + k/d^2) dd - dk/d = s - d + k/d,  sum dd/d = - ln(product)
+        b = 1 + k / d**2
+        rest = s - d + k / d
+        dk = (-torch.log(d.prod(-1, keepdim=True)) - (rest / (b * d)).sum(-1, keepdim=True)) / (
+            1 / (b * d**2)
+        ).sum(-1, keepdim=True)
+        d, k = d + (rest + dk / d) / b, k + dk
+    return d
 
 
 def sample_element(element: str, curved: bool = True):

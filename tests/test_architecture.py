@@ -54,17 +54,19 @@ ROOMS = [
     "statics",
     "dynamics",
     "linear",
-    "control",
     "optim",
     "design",
+    "control",
     "starts",
     "states",
     "plotting",
+    "envs",
     "__init__",
     "bench",
 ]
 OFFERED_ROOMS = {
     "control",
+    "envs",
     "meshes",
     "objectives",
     "obstacles",
@@ -84,6 +86,7 @@ HIDDEN_MODULES = {
     "torch.autograd": ("adjoint/autograd.py",),
     "matplotlib": ("plotting/", "bench/"),  # the bench draws curves, never a sheet
     "pyvista": ("plotting/",),
+    "gymnasium": ("envs/", "bench/"),
 }
 OPTIONAL_MODULES = [
     "torch",
@@ -97,6 +100,7 @@ OPTIONAL_MODULES = [
     "ipctk",
     "distributed",
     "cloudpickle",
+    "gymnasium",
 ]
 LONGEST_FILE = 400
 SPELLINGS = {"cent" + "re": "center"}  # in two halves, as this file is read as well

@@ -76,6 +76,9 @@ def test_dynamics(tmp_path, capsys) -> None:
     assert "With contact and friction" in printed
     assert "A step of implicit Euler" in printed and results["solid steps"][0]["tetrahedra"] == 648
     assert [each["kept"] for each in results["solid gradients"]] == ["factors", "checkpoints"]
+    projective = results["projective errors"]["Projective"]
+    assert projective["accelerated"]["error"][-1] < projective["accelerated"]["error"][0]
+    assert [each["kept"] for each in results["projective memory"]] == ["stages", "checkpoints"]
     (surroundings,) = results["surroundings"].values()
     assert min(row["step"] for row in surroundings.values()) > 0
     assert surroundings["contact"]["way"] != surroundings["contact, friction"]["way"]

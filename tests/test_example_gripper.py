@@ -36,6 +36,21 @@ def test_nothing_passes(result) -> None:
     assert result["lift"]["forces"].max() > 4.3e-3  # N: more than the ball's weight
 
 
+def test_longer_arms_meet_and_do_not_pass(example, monkeypatch) -> None:
+    """Of 18 mm, with ends that curl under the ball; without contact of the sheet with itself hundreds of faces cross."""
+    import sys
+
+    model, lift = (sys.modules[f"_gripper.{name}"] for name in ("model", "lift"))
+    monkeypatch.setattr(model, "ARM", 18e-3)
+    gripper = model.Gripper(1.5e-3)
+    outer = np.abs(gripper.mesh.face_barycenters[:, :2]).max(axis=1) >= 11e-3
+    share = np.where(outer[:, None], [0, 0, 0.9], 0.9 * gripper.outwards)
+    found = lift.closing_and_lift(gripper, model.LIMIT * share, 60)
+    own = gripper.lifting.contacts[2]
+    assert found["crossings"] == 0
+    assert max(len(found["motion"].touching(own, k).pairs) for k in range(61)) > 10
+
+
 def test_picture_and_summary(example, result, tmp_path) -> None:
     example.plot(result).savefig(tmp_path / "gripper.png")
     assert (tmp_path / "gripper.png").stat().st_size > 50_000

@@ -228,3 +228,31 @@ def test_a_skin_with_mass_weighs_and_is_inert(element):
         ValueError, match=r"mass_density \[kg/m3\] of a Skin must be a number or have shape \(k,\)"
     ):
         block(element, skin=ms.Skin(thickness=1e-3, mass_density=np.ones(3)))
+
+
+def test_a_skin_that_only_weighs_needs_no_field():
+    mesh = ms.meshes.box((0.04, 0.01, 0.01), cells=(4, 1, 1))
+    soft = ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.3)
+    skin = ms.Skin(thickness=1e-3, faces=mesh.faces_at(z=0.01), mass_density=5e3)
+    bodies = [ms.Solid(mesh, material=soft, mass_density=1e3, skin=each) for each in (None, skin)]
+    scenes = [
+        ms.Scene(body, supports=[ms.Pin(body.mesh.vertices_at(x=0.0))], gravity=(0, 0, -9.81))
+        for body in bodies
+    ]
+    bare, coated = (ms.equilibrium(scene) for scene in scenes)
+    held = coated.reaction(scenes[1].supports[0]).force[2] - bare.reaction(scenes[0].supports[0]).force[2]
+    assert held == pytest.approx(9.81 * 5e3 * 1e-3 * 0.04 * 0.01, rel=1e-9)
+    torch = pytest.importorskip("torch")
+    own = bodies[1].skin
+    thickness = torch.full((len(own.faces),), 1e-3, dtype=torch.float64, requires_grad=True)
+
+    def end(values):
+        return ms.equilibrium(scenes[1], values={own: {"thickness": values}}).positions[-1, 2]
+
+    end(thickness).backward()
+    step = 1e-6
+    difference = (end(thickness.detach() + step) - end(thickness.detach() - step)) / (2 * step)
+    assert float(thickness.grad.sum()) == pytest.approx(float(difference), rel=1e-6)
+    idle = ms.Solid(mesh, material=soft, skin=ms.Skin(thickness=1e-3))
+    with pytest.raises(ValueError, match="has a skin, but the scene has no field"):
+        ms.Scene(idle, allow_rigid_motions=True)

@@ -45,7 +45,7 @@ def solved(scene, values, moving):
 
 @pytest.mark.parametrize("moving", [False, True], ids=["rest", "motion"])
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
-@pytest.mark.parametrize("material", ["NeoHookean", "Corotated", "Guccione"])
+@pytest.mark.parametrize("material", ["NeoHookean", "Corotated", "Projective", "Guccione"])
 def test_gradients_by_every_value_are_differences(material, element, moving):
     kind = getattr(ms, material)
     given = kind(**(GUCCIONE if material == "Guccione" else MODULI))
@@ -157,6 +157,12 @@ def test_copies_solve_alike():
         (lambda m: ms.NeoHookean("cubic", **MODULI), "volume must be one of"),
         (lambda m: ms.StableNeoHookean(log_barrier=1, **MODULI), "log_barrier"),
         (lambda m: ms.Guccione(**{**GUCCIONE, "fibres": (0.0, 0.0, 0.0)}), "fibres.*no zero vectors"),
+        (lambda m: ms.Guccione(**{**GUCCIONE, "fibres": 1.0}), r"fibres.*shape \(3,\).*got \(\)"),
+        (lambda m: ms.Projective(young_modulus=1e5, poisson_ratio=-0.1), r"poisson_ratio.*\[0, 1/2\)"),
+        (
+            lambda m: ms.Solid(m, material=ms.Projective(**MODULI), mean_volume=True),
+            "mean_volume is not for Projective",
+        ),
         (lambda m: ms.Solid(m, material="rubber"), "material must be one of a solid"),
         (lambda m: ms.Solid(m.surface, material=ms.NeoHookean(**MODULI)), "mesh must be a TetMesh"),
         (lambda m: ms.Solid(m, material=ms.NeoHookean(**MODULI), element="cubic"), "element must be one of"),

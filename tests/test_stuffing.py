@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
+from magshell import shapes
 from magshell.mesh.tet_quality import TetQuality
 from magshell.mesh.tet_topology import face_table
 from magshell.meshes._bcc_lattice import lattice_inside
@@ -260,3 +261,41 @@ def test_what_is_refused(arguments, message):
                 **arguments,
             }
         )
+
+
+BALLS = shapes.ball(1.0) | shapes.ball(1.0, center=(3, 0, 0))
+
+
+@pytest.mark.parametrize(
+    "shape, given, said",
+    [
+        # walls of 60 mm around a ball
+        (
+            (shapes.box((1, 1, 1)) - shapes.box((0.88, 0.88, 0.88))) | shapes.ball(0.3),
+            0.1,
+            "of the shape's volume",
+        ),
+        # a thread between two balls
+        (BALLS | shapes.capsule((0, 0, 0), (3, 0, 0), 0.1), 0.4, r"it has 2 parts where the shape, .* has 1"),
+        (shapes.box((1, 1, 0.2)), 300, "440 tetrahedra are the nearest to the 300 asked for"),
+    ],
+)
+def test_what_is_lost_is_told(shape, given, said):
+    how = {"n_tetrahedra": given} if isinstance(given, int) else {"spacing": given}
+    with pytest.warns(ms.MeshQualityWarning, match=said):
+        ms.meshes.from_distance(shape, **how)
+
+
+@pytest.mark.parametrize(
+    "shape, spacing",
+    [
+        (shapes.ball(1.0), 0.5),
+        (shapes.box((1, 1, 1)), 0.5),
+        (shapes.box((1, 1, 0.3)), 0.15),
+        (BALLS | shapes.capsule((0, 0, 0), (3, 0, 0), 0.25), 0.2),
+        (BALLS, 0.35),
+    ],
+)
+def test_what_is_whole_is_not_warned_of(shape, spacing, recwarn):
+    ms.meshes.from_distance(shape, spacing)
+    assert not recwarn.list

@@ -26,6 +26,7 @@ void register_linalg(py::module_& module);
 void register_model(py::module_& module);
 void register_obstacle(py::module_& module);
 void register_sheet(py::module_& module);
+void register_muscle(py::module_& module);
 void register_solid(py::module_& module);
 void register_statics(py::module_& module);
 

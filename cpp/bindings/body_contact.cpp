@@ -1,6 +1,7 @@
 // What touches in a state, for results.
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "magshell/contact/pair_friction.h"
 #include "magshell/core/errors.h"
 #include "magshell/scene/model.h"
 #include "magshell/term/body_contact_term.h"
@@ -8,42 +9,75 @@
 namespace magshell::bindings {
 namespace {
 
-// The pairs of all contacts: (contact (n,), the caller's vertices (n, 4), -1 where there are fewer, distances (n,) [m],
-// normal forces (n,) [N], forces (n, 4, 3) [N]).
-py::tuple touching_pairs(Model& model, const VectorXd& q) {
+// The pairs of all contacts at q, with these velocities of all unknowns. What there is not, of pairs of fewer vertices, is
+// -1 and zero.
+py::dict touching_pairs(Model& model, const VectorXd& q, const VectorXd& v) {
     std::vector<BodyContactTerm::Touch> all;
+    std::vector<FrictionLaw> laws;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
         if (!model.has_body_contact()) throw InvalidInput("the scene has no contact of bodies");
+        if (q.size() != model.size() || v.size() != model.size())
+            throw InvalidInput("q and v must have a number for each of all unknowns");
         all = model.body_contact()->touches(q.data());
+        for (const BodyContactTerm::Touch& touch : all) laws.push_back(model.body_contact()->friction(touch));
     }
     const py::ssize_t n = static_cast<py::ssize_t>(all.size());
     IndexArray contacts(n), vertices({n, py::ssize_t{4}});
+    py::array_t<bool> swapped(n);
     Array distances(n), normal_forces(n), forces({n, py::ssize_t{4}, py::ssize_t{3}});
+    Array weights({n, py::ssize_t{4}}), normals({n, py::ssize_t{3}});
+    Array friction({n, py::ssize_t{3}}), sliding({n, py::ssize_t{3}});
     for (py::ssize_t k = 0; k < n; ++k) {
         const BodyContactTerm::Touch& touch = all[k];
+        const Proximity& near = touch.at.near();
         const PairVectors gradient = touch.at.gradient();
+        const PairPlaces moving = places_of(touch.near.pair, v.data());
         contacts.mutable_at(k) = touch.near.contact;
-        distances.mutable_at(k) = touch.at.near().distance;
+        swapped.mutable_at(k) = touch.near.swapped;
+        distances.mutable_at(k) = near.distance;
         normal_forces.mutable_at(k) = touch.at.normal_force();
+        Vec3 velocity = Vec3::Zero();
         for (int i = 0; i < 4; ++i) {
             const bool there = i < touch.at.count();
             vertices.mutable_at(k, i) = there ? model.nodes().user_vertex(touch.near.pair.nodes[i]) : -1;
+            weights.mutable_at(k, i) = there ? near.weights[i] : 0.0;
+            if (there) velocity += near.weights[i] * moving[i];
             for (int axis = 0; axis < 3; ++axis)
                 forces.mutable_at(k, i, axis) = there ? -gradient[i][axis] : 0.0;
         }
+        const Vec3 force = PairFriction(touch.at, moving, laws[k]).friction().force;
+        const Vec3 along = velocity - near.normal.dot(velocity) * near.normal;
+        for (int axis = 0; axis < 3; ++axis) {
+            normals.mutable_at(k, axis) = near.normal[axis];
+            friction.mutable_at(k, axis) = force[axis];
+            sliding.mutable_at(k, axis) = along[axis];
+        }
     }
-    return py::make_tuple(contacts, vertices, distances, normal_forces, forces);
+    py::dict found;
+    found["contacts"] = contacts;
+    found["pairs"] = vertices;
+    found["swapped"] = swapped;
+    found["distances"] = distances;
+    found["normal_forces"] = normal_forces;
+    found["forces"] = forces;
+    found["weights"] = weights;
+    found["normals"] = normals;
+    found["friction_forces"] = friction;
+    found["sliding_velocities"] = sliding;
+    return found;
 }
 
 }  // namespace
 
 void register_body_contact(py::module_& module) {
-    module.def("touching_pairs", &touching_pairs, py::arg("model"), py::arg("q"),
-               "Pairs of bodies in contact: contact (n,), vertices (n, 4), distances (n,), normal forces "
-               "(n,), forces "
-               "(n, 4, 3).");
+    module.def(
+        "touching_pairs", &touching_pairs, py::arg("model"), py::arg("q"), py::arg("v"),
+        "Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) "
+        "[N], "
+        "forces (n, 4, 3) [N], weights (n, 4) of the difference of the closest points, normals (n, 3) on the "
+        "first part, friction_forces (n, 3) [N] on it and sliding_velocities (n, 3) [m/s] of it.");
 }
 
 }  // namespace magshell::bindings

@@ -1,5 +1,7 @@
 // Motions and their adjoint to Python: whole runs with the GIL released.
+#include <limits>
 #include <string>
+#include <tuple>
 
 #include "bindings/arrays.h"
 #include "bindings/gradients.h"
@@ -42,11 +44,11 @@ Knots rows_of(const std::vector<Controls>& controls) {
 StrainSet strains_of(Model& model, const Array& numbers) {
     StrainSet strains;
     if (numbers.size() == 0) return strains;
-    if (numbers.size() != model.n_strains())
-        throw InvalidInput("the scene has " + std::to_string(model.n_strains()) + " strains, got " +
+    if (numbers.size() != model.elastic().size())
+        throw InvalidInput("the scene has " + std::to_string(model.elastic().size()) + " strains, got " +
                            std::to_string(numbers.size()));
     const double* from = numbers.data();
-    strains = model.no_strains();
+    strains = model.elastic().zeros();
     for (Strains& part : strains.of_terms)
         for (Index element = 0; element < part.elements; ++element)
             for (int i = 0; i < part.width; ++i) part.set(element, i, *from++);
@@ -54,7 +56,7 @@ StrainSet strains_of(Model& model, const Array& numbers) {
 }
 
 VectorXd numbers_of(const Model& model, const StrainSet& strains) {
-    VectorXd numbers(strains.empty() ? 0 : model.n_strains());
+    VectorXd numbers(strains.empty() ? 0 : model.elastic().size());
     double* to = numbers.data();
     for (const Strains& part : strains.of_terms)
         for (Index element = 0; element < part.elements; ++element)
@@ -74,8 +76,8 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.start.rates.w = to_vector(array("acceleration"));
     if (input.start.rates.w.size() > 0) {
         input.start.rates.v = input.start.v;
-        input.start.rates.d = strains_of(model, given["strain_rates"].cast<Array>());
-        input.start.rates.e = strains_of(model, given["maxwell_strain_rates"].cast<Array>());
+        input.start.rates.elastic.d = strains_of(model, given["strain_rates"].cast<Array>());
+        input.start.rates.elastic.e = strains_of(model, given["maxwell_strain_rates"].cast<Array>());
     }
     input.rotations_given = given["rotations_given"].cast<bool>();
     input.viscosity = {given["stiffness_damping"].cast<double>(), given["maxwell_modulus"].cast<double>(),
@@ -86,6 +88,12 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.varying = Varying(model.registry(), given["varying"].cast<std::vector<Index>>());
     input.controls = controls_of(model, input.varying, array("controls"));
     input.newton = given["newton"].cast<NewtonOptions>();
+    if (const py::object projective = given["projective"]; !projective.is_none()) {
+        const auto [iterations, tolerance, history, coulomb] =
+            projective.cast<std::tuple<int, double, int, bool>>();
+        input.projective = {true, iterations, tolerance, history, coulomb};
+        if (tolerance > 0.0) input.newton.tolerance = tolerance;
+    }
     input.record_every = given["record_every"].cast<Index>();
     return input;
 }
@@ -119,6 +127,32 @@ Array directions_of(const MotionResult& motion, const Model& model) {
     for (py::ssize_t k = 0; k < n; ++k)
         Eigen::Map<VectorXd>(rows.mutable_data() + k * size, size) =
             motion.recorded[k].q.segment(3 * n_v, size);
+    return rows;
+}
+
+// (n, m): what motors do in every recorded state; NaN in one that no step led to.
+Knots driving_of(const MotionResult& motion) {
+    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()), m = motion.last.driving.size();
+    Knots rows = Knots::Constant(n, m, std::numeric_limits<double>::quiet_NaN());
+    for (Eigen::Index k = 0; k < n; ++k)
+        if (motion.recorded[k].driving.size() == m) rows.row(k) = motion.recorded[k].driving.transpose();
+    return rows;
+}
+
+// (n, m, 3) [N], of the held nodes in the order in which they were given; NaN in states that no step led to.
+Array held_forces_of(const MotionResult& motion, const Model& model) {
+    const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size());
+    const VectorXd none = model.reduction().held(VectorXd::Zero(model.size()));
+    const py::ssize_t size = none.size();
+    Array rows({n, size / 3, py::ssize_t{3}});
+    for (py::ssize_t k = 0; k < n; ++k) {
+        const VectorXd& held = motion.recorded[k].held;
+        Eigen::Map<VectorXd> row(rows.mutable_data() + k * size, size);
+        if (held.size() == size)
+            row = held;
+        else
+            row.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
     return rows;
 }
 
@@ -205,13 +239,20 @@ void register_dynamics(py::module_& module) {
         .def("last_maxwell_strains",
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.e); })
         .def("last_strain_rates",
-             [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.d); })
+             [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.elastic.d); })
         .def("last_maxwell_strain_rates",
-             [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.e); })
+             [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.elastic.e); })
         .def_property_readonly("last_turns", [](const MotionResult& r) { return r.last.turns; })
         .def_readonly("kinetic_energy", &MotionResult::kinetic_energy)
         .def_readonly("energies", &MotionResult::energies)
-        .def_readonly("halved", &MotionResult::halved)
+        .def_property_readonly("halved",
+                               [](const MotionResult& r) {
+                                   std::map<Index, std::vector<std::tuple<double, double, bool>>> all;
+                                   for (const auto& [step, substeps] : r.halved)
+                                       for (const Substep& each : substeps)
+                                           all[step].emplace_back(each.begin, each.end, each.dissipative);
+                                   return all;
+                               })
         .def_readonly("keep", &MotionResult::keep)
         .def_readonly("iterations", &MotionResult::iterations)
         .def_readonly("factorizations", &MotionResult::factorizations)
@@ -227,6 +268,11 @@ void register_dynamics(py::module_& module) {
              })
         .def("edge_rotations", [](const MotionResult& r, const Model& m) { return rotations_of(m, r); })
         .def("directions", &directions_of)
+        .def("driving", &driving_of)
+        .def("held_forces", &held_forces_of,
+             "(n, m, 3) [N], with which supports pulled at the held nodes of recorded states; NaN where no "
+             "step "
+             "led to.")
         .def("largest_strains", &largest_strains, py::arg("model"), py::arg("thickness"));
 
     module.def("simulate", &run, py::arg("model"), py::arg("input"), py::arg("gradients"), py::arg("budget"),

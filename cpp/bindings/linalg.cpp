@@ -10,6 +10,7 @@
 #include "magshell/core/parallel.h"
 #include "magshell/linalg/build_info.h"
 #include "magshell/linalg/factor.h"
+#include "magshell/linalg/low_rank_factor.h"
 
 namespace magshell::bindings {
 namespace {
@@ -59,7 +60,7 @@ class SharedFactor {
         factor_ = analyze(std::move(pattern), options);
     }
 
-    FactorReport factorize(const Array& values) {
+    FactorReport factorize(const Array& values, const Eigen::MatrixXd& columns, const VectorXd& stiffness) {
         if (values.ndim() != 1 || values.size() != entries_) {
             throw InvalidInput("values must have one axis and an entry for each of the " +
                                std::to_string(entries_) + " rows of the pattern, got " +
@@ -67,6 +68,14 @@ class SharedFactor {
         }
         const py::gil_scoped_release release;
         const std::unique_lock lock(mutex_);
+        if (columns.cols() > 0 && (columns.rows() != factor_->size() || columns.cols() != stiffness.size()))
+            throw InvalidInput("columns must have shape (n, k), with a stiffness each, (k,)");
+        if (columns.cols() > 0 && !bordered_) {
+            std::unique_ptr<LowRankFactor> bordered = std::make_unique<LowRankFactor>(std::move(factor_));
+            bordered_ = bordered.get();
+            factor_ = std::move(bordered);
+        }
+        if (bordered_) bordered_->set_low_rank(columns, stiffness);
         std::copy_n(values.data(), values.size(), factor_->values().begin());
         return factor_->factorize();
     }
@@ -94,6 +103,7 @@ class SharedFactor {
   private:
     py::ssize_t entries_;
     std::unique_ptr<Factor> factor_;
+    LowRankFactor* bordered_ = nullptr;  // factor_, once there were columns
     mutable std::shared_mutex mutex_;
 };
 
@@ -122,7 +132,9 @@ void register_linalg(py::module_& module) {
     py::class_<SharedFactor>(
         module, "Factor", "An analysed sparse symmetric pattern; factorize() it with values, then solve().")
         .def("factorize", &SharedFactor::factorize, py::arg("values"),
-             "Factorizes the matrix with these values (nnz,), in the order of the pattern's rows.")
+             py::arg("columns") = Eigen::MatrixXd(0, 0), py::arg("stiffness") = VectorXd(0),
+             "Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with "
+             "columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T.")
         .def("solve", &SharedFactor::solve, py::arg("rhs"),
              "The solution for the right-hand side (n,) or (n, k).")
         .def_property_readonly("name", [](const SharedFactor& f) { return f.factor().name(); })

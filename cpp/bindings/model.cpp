@@ -1,192 +1,19 @@
 // The model of a scene to Python: checked arrays in, numbers out. Scene in the package builds it.
 #include "magshell/scene/model.h"
 
-#include <map>
 #include <string>
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
-#include "bindings/solid.h"
+#include "bindings/scene_input.h"
 #include "bindings/strains.h"
 #include "magshell/core/errors.h"
 
 namespace magshell::bindings {
 namespace {
 
-std::vector<DirectedEdge> directed_edges(const IndexArray& pairs) {
-    std::vector<DirectedEdge> edges;
-    for (py::ssize_t k = 0; k < pairs.shape(0); ++k) edges.push_back({pairs.at(k, 0), pairs.at(k, 1)});
-    return edges;
-}
-
-std::vector<HeldNode> held_nodes(const IndexArray& nodes, const Array& frames) {
-    std::vector<HeldNode> held;
-    for (py::ssize_t k = 0; k < nodes.shape(0); ++k) {
-        Mat3 frame;
-        for (int r = 0; r < 3; ++r)
-            for (int c = 0; c < 3; ++c) frame(r, c) = frames.at(k, r, c);
-        held.push_back(
-            {nodes.at(k, 0), nodes.at(k, 1), frame, {nodes.at(k, 2), nodes.at(k, 3), nodes.at(k, 4)}});
-    }
-    return held;
-}
-
-std::vector<ContactInput> contacts_of(const py::list& given) {
-    std::vector<ContactInput> contacts;
-    for (const py::handle each : given) {
-        ContactInput& contact = contacts.emplace_back();
-        contact.obstacles = each["obstacles"].cast<std::vector<Index>>();
-        contact.rubs = each["rubs"].cast<bool>();
-        contact.lagged = each["lagged"].cast<bool>();
-        const IndexArray vertices = each["vertices"].cast<IndexArray>();
-        const Array weights = each["weights"].cast<Array>();
-        for (py::ssize_t p = 0; p < vertices.shape(0); ++p)
-            contact.points.push_back(
-                {{vertices.at(p, 0), vertices.at(p, 1), vertices.at(p, 2)}, Vec3(weights.data(p, 0))});
-    }
-    return contacts;
-}
-
-std::vector<ContactSurfaceInput> contact_surfaces_of(const py::list& given) {
-    std::vector<ContactSurfaceInput> surfaces;
-    for (const py::handle each : given) {
-        ContactSurfaceInput& surface = surfaces.emplace_back();
-        surface.name = each["name"].cast<std::string>();
-        surface.numbers = each["numbers"].cast<std::vector<Index>>();
-        const IndexArray faces = each["faces"].cast<IndexArray>();
-        for (py::ssize_t f = 0; f < faces.shape(0); ++f)
-            surface.faces.push_back({faces.at(f, 0), faces.at(f, 1), faces.at(f, 2)});
-    }
-    return surfaces;
-}
-
-std::vector<BodyContactInput> body_contacts_of(const py::list& given) {
-    std::vector<BodyContactInput> contacts;
-    for (const py::handle each : given)
-        contacts.push_back({each["a"].cast<Index>(), each["b"].cast<Index>(), each["penalty"].cast<bool>(),
-                            each["rubs"].cast<bool>(), each["lagged"].cast<bool>()});
-    return contacts;
-}
-
-std::vector<SheetInput> sheets_of(const py::list& given) {
-    std::vector<SheetInput> sheets;
-    for (const py::handle each : given) {
-        SheetInput& sheet = sheets.emplace_back();
-        sheet.owner = each["owner"].cast<std::string>();
-        sheet.mesh = each["mesh"].cast<std::shared_ptr<TriangleMesh>>();
-        sheet.vertices = each["vertices"].cast<std::vector<Index>>();
-        sheet.curvature_scale = to_vector(each["curvature_scale"].cast<Array>());
-        sheet.directors = each["directors"].cast<bool>();
-        sheet.magnetic = each["magnetic"].cast<bool>();
-        sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
-    }
-    return sheets;
-}
-
-std::vector<SixNodeSheetInput> six_node_sheets_of(const py::list& given) {
-    std::vector<SixNodeSheetInput> sheets;
-    for (const py::handle each : given) {
-        SixNodeSheetInput& sheet = sheets.emplace_back();
-        sheet.owner = each["owner"].cast<std::string>();
-        sheet.mesh.rest_positions = to_rows3(each["rest_positions"].cast<Array>());
-        const IndexArray faces = each["faces"].cast<IndexArray>();
-        for (py::ssize_t f = 0; f < faces.shape(0); ++f)
-            for (std::array<Index, 6>& nodes = sheet.mesh.faces.emplace_back();
-                 const int k : {0, 1, 2, 3, 4, 5})
-                nodes[k] = faces.at(f, k);
-        sheet.mesh.corners = each["corners"].cast<std::shared_ptr<TriangleMesh>>();
-        sheet.mesh.vertices = each["vertices"].cast<std::vector<Index>>();
-        sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
-    }
-    return sheets;
-}
-
-std::vector<PressureInput> pressures_of(const py::list& given) {
-    std::vector<PressureInput> pressures;
-    for (const py::handle each : given)
-        pressures.push_back({each["owner"].cast<std::string>(), each["rows"].cast<Index>(),
-                             each["nodes_per_face"].cast<int>(), each["nodes"].cast<std::vector<Index>>(),
-                             each["row"].cast<std::vector<Index>>()});
-    return pressures;
-}
-
-std::vector<RigidInput> rigid_of(const py::list& given) {
-    std::vector<RigidInput> rigid;
-    for (const py::handle each : given)
-        rigid.push_back({each["owner"].cast<std::string>(), to_rows3(each["points"].cast<Array>()),
-                         each["vertices"].cast<std::vector<Index>>(), each["magnetic"].cast<bool>()});
-    return rigid;
-}
-
-Vec3 to_vec3(const py::handle& given) {
-    const Array numbers = given.cast<Array>();
-    return {numbers.at(0), numbers.at(1), numbers.at(2)};
-}
-
-JointKind joint_kind(const std::string& name) {
-    const std::map<std::string, JointKind> kinds = {{"free", JointKind::free},
-                                                    {"fixed", JointKind::fixed},
-                                                    {"revolute", JointKind::revolute},
-                                                    {"prismatic", JointKind::prismatic},
-                                                    {"ball", JointKind::ball}};
-    return kinds.at(name);
-}
-
-std::vector<SkeletonInput> skeletons_of(const py::list& given) {
-    std::vector<SkeletonInput> skeletons;
-    for (const py::handle each : given) {
-        SkeletonInput& skeleton = skeletons.emplace_back();
-        skeleton.links = each["links"].cast<std::vector<Index>>();
-        skeleton.owners = each["owners"].cast<std::vector<std::string>>();
-        for (const py::handle joint : each["joints"])
-            skeleton.joints.push_back({joint_kind(joint["kind"].cast<std::string>()),
-                                       joint["parent"].cast<Index>(), to_vec3(joint["origin"]),
-                                       to_vec3(joint["axis"])});
-    }
-    return skeletons;
-}
-
-std::vector<ClosureInput> closures_of(const py::list& given) {
-    std::vector<ClosureInput> closures;
-    for (const py::handle each : given)
-        closures.push_back({each["owner"].cast<std::string>(), each["parent"].cast<Index>(),
-                            each["child"].cast<Index>(), to_vec3(each["place"])});
-    return closures;
-}
-
 std::unique_ptr<Model> make_model(const py::kwargs& given) {
-    const auto array = [&](const char* name) { return given[name].cast<Array>(); };
-    const auto indices = [&](const char* name) { return given[name].cast<IndexArray>(); };
-    SceneInput input;
-    input.n_vertices = given["n_vertices"].cast<Index>();
-    input.original = given["original"].cast<std::vector<Index>>();
-    input.sheets = sheets_of(given["sheets"]);
-    input.six_node_sheets = six_node_sheets_of(given["six_node_sheets"]);
-    input.solids = solids_of(given["solids"]);
-    input.skins = skins_of(given["skins"]);
-    input.rigid = rigid_of(given["rigid"]);
-    input.skeletons = skeletons_of(given["skeletons"]);
-    input.closures = closures_of(given["closures"]);
-    input.directions = to_rows3(array("directions"));
-    input.held = held_nodes(indices("held_nodes"), array("held_frames"));
-    input.moves = given["moves"].cast<Index>();
-    const IndexArray couples = indices("couples");
-    for (py::ssize_t k = 0; k < couples.shape(0); ++k)
-        input.couples.push_back({couples.at(k, 0), couples.at(k, 1), couples.at(k, 2)});
-    for (const py::handle each : given["face_energies"])
-        input.face_energies.push_back({each["owner"].cast<std::string>(), each["body"].cast<Index>(),
-                                       each["energy"].cast<std::shared_ptr<FaceEnergy>>()});
-    input.pressures = pressures_of(given["pressures"]);
-    input.gravity = given["gravity"].cast<bool>();
-    input.loads = given["loads"].cast<bool>();
-    for (const py::handle source : given["field_sources"])
-        input.field_sources.push_back(source.cast<std::shared_ptr<AppliedField>>());
-    input.contacts = contacts_of(given["contacts"]);
-    input.contact_surfaces = contact_surfaces_of(given["contact_surfaces"]);
-    input.body_contacts = body_contacts_of(given["body_contacts"]);
-    for (const py::handle obstacle : given["obstacles"])
-        input.obstacles.push_back(obstacle.cast<std::shared_ptr<Obstacle>>());
-    input.water = given["water"].cast<std::shared_ptr<Water>>();
+    const SceneInput input = scene_input(given);
     const py::gil_scoped_release unlocked;
     return std::make_unique<Model>(input);
 }
@@ -211,6 +38,21 @@ py::dict energies(const Model& model, const VectorXd& q, const Controls& control
         const py::str key(name.data(), name.size());
         energies[key] = value + (energies.contains(key) ? energies[key].cast<double>() : 0.0);
     }
+    return energies;
+}
+
+// [(name, J)], of each term: those of one name, of several bodies, follow each other.
+py::list term_energies(Model& model, const VectorXd& q, const Model::Turns& turns, const Controls& controls) {
+    std::vector<std::pair<std::string_view, double>> of_terms;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        model.set_turns(turns);
+        of_terms = model.energies(q, controls);
+    }
+    py::list energies;
+    for (const auto& [name, value] : of_terms)
+        energies.append(py::make_tuple(py::str(name.data(), name.size()), value));
     return energies;
 }
 
@@ -302,7 +144,7 @@ void register_model(py::module_& module) {
             "Where each free unknown is at rest (n, 3) [m]: its vertex, or the middle of its edge.")
         .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
         .def_property_readonly("bytes", &Model::bytes)
-        .def_property_readonly("n_strains", &Model::n_strains)
+        .def_property_readonly("n_strains", [](const Model& m) { return m.elastic().size(); })
         .def("rest_state", [](const Model& m) { return m.bodies().rest_state(); })
         .def("state",
              [](const Model& m, const Array& x, const Array& r) {
@@ -360,6 +202,8 @@ void register_model(py::module_& module) {
                                    return names;
                                })
         .def("energies", &energies)
+        .def("term_energies", &term_energies, "[(name, J)] of each term, at a state with these turns.",
+             py::arg("q"), py::arg("turns"), py::arg("controls"))
         .def("refusal", &Model::refusal, "What is wrong with a state, in words; empty where nothing is.",
              py::call_guard<py::gil_scoped_release>())
         .def(
@@ -371,6 +215,27 @@ void register_model(py::module_& module) {
             },
             py::call_guard<py::gil_scoped_release>())
         .def(
+            "driving",
+            [](Model& model, const VectorXd& q, const Controls& controls, const Model::Turns& turns) {
+                const std::lock_guard lock(model.in_use());
+                model.set_turns(turns);
+                model.evaluate(q, controls);
+                return model.reduction().driving(model.residual().gradient);
+            },
+            py::arg("q"), py::arg("controls"), py::arg("turns"),
+            "What the motors of joints do in an equilibrium q, N and N m, one after another.",
+            py::call_guard<py::gil_scoped_release>())
+        .def(
+            "held_forces",
+            [](Model& model, const VectorXd& q, const Model::Turns& turns, const Controls& controls) {
+                const std::lock_guard lock(model.in_use());
+                model.set_turns(turns);
+                model.evaluate(q, controls);
+                return model.reduction().held(model.residual().gradient);
+            },
+            "(3 m,) [N], with which supports pull at the held nodes of a scene at rest.", py::arg("q"),
+            py::arg("turns"), py::arg("controls"), py::call_guard<py::gil_scoped_release>())
+        .def(
             "assemble",
             [](Model& model, const VectorXd& q, const Controls& controls) {
                 const std::lock_guard lock(model.in_use());
@@ -379,6 +244,19 @@ void register_model(py::module_& module) {
             },
             "Gradient and Hessian, left in the core: what `python -m magshell.bench kernels` times.",
             py::call_guard<py::gil_scoped_release>())
+        .def(
+            "low_rank",
+            [](Model& model, bool reduced) {
+                const std::lock_guard lock(model.in_use());
+                const LowRank& rest = model.low_rank();
+                return py::make_tuple(
+                    reduced ? rest.reduced(model.reduction(), model.size()) : rest.columns(model.size()),
+                    rest.stiffness());
+            },
+            py::arg("reduced") = true,
+            "What hessian(), called last, leaves out: columns u (n, k) and stiffnesses s (k,), the sum of s "
+            "u u^T. Of "
+            "cavities, cells and tendons, which couple all of their nodes.")
         .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true);
 }
 

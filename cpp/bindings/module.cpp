@@ -20,6 +20,7 @@ PYBIND11_MODULE(_core, module) {
     b::register_model(module);
     b::register_sheet(module);
     b::register_body_contact(module);  // of models
+    b::register_muscle(module);
     b::register_solid(module);
     b::register_statics(module);
     b::register_adjoint(module);       // takes what a solve found

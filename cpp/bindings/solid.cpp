@@ -1,6 +1,7 @@
 #include "bindings/solid.h"
 
 #include <algorithm>
+#include <map>
 
 #include "bindings/arrays.h"
 #include "magshell/core/pack_functions.h"
@@ -78,6 +79,41 @@ void register_solid(py::module_& module) {
         "(n_t, p, 3, 3) twice and (n_t, p).");
     module.def("lane_logarithms", &lane_logarithms, py::arg("numbers"),
                "ln of an array's numbers as the element kernels take it, to be tested.");
+}
+
+std::vector<VolumeInput> volumes_of(const py::list& given) {
+    const std::map<std::string, VolumeLaw> laws = {{"pressure", VolumeLaw::pressure},
+                                                   {"gas", VolumeLaw::gas},
+                                                   {"liquid", VolumeLaw::liquid},
+                                                   {"cell", VolumeLaw::cell}};
+    std::vector<VolumeInput> volumes;
+    for (const py::handle each : given) {
+        VolumeInput& volume = volumes.emplace_back();
+        volume.owner = each["owner"].cast<std::string>();
+        volume.law = laws.at(each["law"].cast<std::string>());
+        volume.stays_open = each["stays_open"].cast<bool>();
+        volume.coupled = each["coupled"].cast<bool>();
+        for (const py::handle surface : each["surfaces"])
+            volume.surfaces.push_back({surface["triangles"].cast<std::vector<Index>>(),
+                                       surface["curved"].cast<std::vector<Index>>(),
+                                       surface["weights"].cast<std::vector<double>>(),
+                                       surface["curved_weights"].cast<std::vector<double>>()});
+    }
+    return volumes;
+}
+
+std::vector<TendonInput> tendons_of(const py::list& given) {
+    std::vector<TendonInput> tendons;
+    for (const py::handle each : given) {
+        TendonInput& tendon = tendons.emplace_back();
+        tendon.owner = each["owner"].cast<std::string>();
+        tendon.slides = each["slides"].cast<bool>();
+        tendon.shares = each["shares"].cast<std::vector<double>>();
+        for (const py::handle point : each["points"])
+            tendon.points.push_back(
+                {point["vertices"].cast<std::vector<Index>>(), point["weights"].cast<std::vector<double>>()});
+    }
+    return tendons;
 }
 
 }  // namespace magshell::bindings

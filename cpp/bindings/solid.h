@@ -8,5 +8,8 @@ namespace magshell::bindings {
 
 std::vector<SolidInput> solids_of(const py::list& given);
 std::vector<SkinInput> skins_of(const py::list& given);
+/// Volumes of cavities and cells, and tendons.
+std::vector<VolumeInput> volumes_of(const py::list& given);
+std::vector<TendonInput> tendons_of(const py::list& given);
 
 }  // namespace magshell::bindings

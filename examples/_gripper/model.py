@@ -73,7 +73,7 @@ class Gripper:
         return ms.Scene(
             [self.sheet, self.ball],
             supports=[ms.Clamp(self.held_edges, body=self.sheet), ms.Pin(standing, body=self.ball)],
-            contacts=[ms.Contact(self.sheet, self.ball)],
+            contacts=[ms.Contact(self.sheet, self.ball), ms.SelfContact(self.sheet)],
             field=ms.UniformField(),
             gravity=GRAVITY,
         )
@@ -89,6 +89,7 @@ class Gripper:
             contacts=[
                 ms.Contact(self.sheet, self.ball, friction_coefficient=FRICTION),
                 ms.Contact(table, body=self.ball, friction_coefficient=FRICTION),
+                ms.SelfContact(self.sheet, friction_coefficient=FRICTION),
             ],
             field=ms.UniformField(),
             gravity=GRAVITY,

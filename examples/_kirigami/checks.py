@@ -27,7 +27,7 @@ def checks(sheet: Kirigami, found: dict, trials: int = 30) -> dict:
         "way": sheet.longest_way(),
         "energies": rest.energies,
         "magnetic_at_most": float(lifted),
-        "switched_on": switched_on(sheet, magnetization),
+        "switched_on": switched_on(magnetization),
         "disturbed": disturbed(sheet, rest, magnetization, trials),
         "first_order": {
             "start": to_first_order(sheet, np.zeros_like(magnetization)),
@@ -49,17 +49,29 @@ def solve(sheet: Kirigami, magnetization, share: float = 1.0, **options) -> ms.E
     )
 
 
-def switched_on(sheet: Kirigami, magnetization: np.ndarray) -> dict:
-    """The sheet lies on the floor, which carries it while the field grows; then it has to carry itself."""
-    fields, heights, rest = np.linspace(0.0, 1.0, 21), [], None
+def switched_on(magnetization: np.ndarray) -> dict:
+    """The sheet lies on the floor, on which parts of it stay while the field grows, and its rings pass each other."""
+    sheet = kirigami(touching=True)
+    floor, own = sheet.scene.contacts
+    fields, rest = np.linspace(0.0, 1.0, 21), None
+    heights, lowest, on_floor, on_itself = [], [], [], []
     for share in fields:
-        rest = solve(sheet, magnetization, share, gravity_factor=0.0, start=rest)
+        rest = solve(sheet, magnetization, share, start=rest)
         heights.append(float(sheet.height(rest.positions)))
-    rest = solve(sheet, magnetization, start=rest)
+        lowest.append(float(rest.positions[:, 2].min()))
+        on_floor.append(rest.touching(floor).normal_force)
+        on_itself.append(rest.touching(own).normal_force)
     return {
         "fields": fields * FIELD[2],
         "heights": np.array(heights),
-        "height": float(sheet.height(rest.positions)),
+        "height": heights[-1],
+        "lowest": np.array(lowest),
+        "on_floor": np.array(on_floor),
+        "on_itself": np.array(on_itself),
+        "crossings": len(rest.self_intersections()),
+        "stable": rest.stable,
+        "mesh": sheet.mesh,
+        "positions": rest.positions,
     }
 
 

@@ -18,6 +18,7 @@ RINGS, AROUND = 6, 18  # rings around the disc in the middle, the glued one incl
 RADIUS = 20e-3  # m
 SYMMETRY = 3  # bridges between neighbouring rings; those of the next pair stand half-way between them
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2
+KERF = 0.4e-3  # m, the width of the cuts of a kirigami that touches itself; half of it always stays open
 
 
 @dataclass(frozen=True)
@@ -45,16 +46,19 @@ class Kirigami:
         return float(lengths[mesh.faces[self.rings == RINGS]].min())
 
 
-def kirigami(refined: int = 1) -> Kirigami:
+def kirigami(refined: int = 1, touching: bool = False) -> Kirigami:
     """The sheet at rest in the plane z = 0, in a uniform field to be given, with its weight.
 
-    refined: into how many parts the cells are divided each way; the cuts stay where they are.
+    refined: into how many parts the cells are divided each way; the cuts stay where they are. touching: it lies on a floor,
+    and its rings do not pass through each other, for which the cuts have a width; faces are the same ones.
     """
     width = RADIUS / (RINGS + 1)
     cells = (refined * (RINGS + 1), refined * AROUND)
     disc = ms.meshes.sector(0.0, RADIUS, 2 * np.pi, cells)
     mesh = ms.meshes.cut(disc, _slits(disc, width))
     rings = np.floor(np.linalg.norm(mesh.face_barycenters, axis=1) / width).astype(np.int64)
+    if touching:
+        mesh = _opened(mesh, rings, width)
     shell = ms.Shell(
         mesh,
         thickness=THICKNESS,
@@ -63,8 +67,32 @@ def kirigami(refined: int = 1) -> Kirigami:
         mass_density=MASS_DENSITY,
     )
     glued = mesh.edges_between(np.unique(mesh.faces[rings == RINGS]))
-    scene = ms.Scene(shell, supports=[ms.Clamp(glued)], field=ms.UniformField(), gravity=GRAVITY)
+    floor = ms.obstacles.Plane(center=(0, 0, -0.5 * THICKNESS))
+    contacts = [
+        ms.Contact(floor, offset=0.5 * THICKNESS, contact_stiffness=20.0),
+        ms.SelfContact(shell, minimal_distance=0.5 * KERF, reach=0.25 * KERF),
+    ]
+    scene = ms.Scene(
+        shell,
+        supports=[ms.Clamp(glued)],
+        contacts=contacts if touching else (),
+        field=ms.UniformField(),
+        gravity=GRAVITY,
+    )
     return Kirigami(scene, rings, mesh.nearest_vertex((0, 0, 0)))
+
+
+def _opened(mesh: ms.TriangleMesh, rings: np.ndarray, width: float) -> ms.TriangleMesh:
+    """With cuts as wide as KERF: vertices at them, of which there are two at one place, go towards their own faces."""
+    points = mesh.rest_positions.copy()
+    _, place, count = np.unique(np.round(points, 9), axis=0, return_inverse=True, return_counts=True)
+    at_cut = count[place.ravel()] > 1
+    radius = np.linalg.norm(points, axis=1)
+    own = np.zeros(len(points))
+    own[mesh.faces] = (rings[:, None] + 0.5) * width  # of vertices at a cut, all faces are of one ring
+    away = np.sign(own - radius)[at_cut] * 0.5 * KERF
+    points[at_cut] *= 1.0 + (away / radius[at_cut])[:, None]
+    return ms.TriangleMesh(points, mesh.faces)
 
 
 def _slits(disc: ms.TriangleMesh, width: float) -> np.ndarray:

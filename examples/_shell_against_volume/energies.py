@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 import magshell as ms
-from magshell.scene.inputs import Inputs
 
 
 class Plate:
@@ -77,10 +76,5 @@ def _edges(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def _magnetic_energy(scene: ms.Scene, positions: np.ndarray, magnetization, flux_density) -> float:
-    """The library's, in a shape that is no equilibrium; only the core itself says that."""
-    body, model, layout = scene.bodies[0], scene._model, scene._control_layout
-    controls = layout.packed({("scene", "applied_flux_density"): np.array(flux_density)}, layout.zeros())
-    state = model.state(positions, np.zeros(scene.mesh.n_edges))
-    magnetized = {body: {"remanent_magnetization": np.array(magnetization)}}
-    with Inputs(scene, None, flux_density, replaced=magnetized).in_core():
-        return model.energies(state, controls)["magnetic"]
+    magnetized = {scene.bodies[0]: {"remanent_magnetization": np.array(magnetization)}}
+    return ms.energies(scene, positions, applied_flux_density=flux_density, values=magnetized)["magnetic"]

@@ -1,13 +1,16 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
-from . import control, meshes, objectives, obstacles, optim, parametrize, shapes
+from . import control, envs, meshes, objectives, obstacles, optim, parametrize, shapes
 from ._core import __version__
 from ._machine.threads import num_threads, set_num_threads, show_config
 from .bodies.body_result import BodyResult
+from .bodies.fibres import Fibres, fibres_along
 from .bodies.joint_result import JointResult
 from .bodies.joints import Ball, Closure, Fixed, Joint, Prismatic, Revolute
 from .bodies.link import Link
-from .bodies.materials import Corotated, Guccione, NeoHookean, StableNeoHookean, StVenantKirchhoff
+from .bodies.materials import Corotated, Guccione, NeoHookean, Projective, StableNeoHookean, StVenantKirchhoff
+from .bodies.muscle import Muscle
+from .bodies.muscle_result import MuscleResult
 from .bodies.rigid import Rigid
 from .bodies.rigid_result import RigidResult
 from .bodies.shell import Shell
@@ -43,25 +46,31 @@ from .mesh.tet_mesh import TetMesh
 from .mesh.triangle_mesh import TriangleMesh
 from .mesh.welding import Weld, weld
 from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
+from .methods.projective_dynamics import ProjectiveDynamics
 from .methods.solvers import MixedNewton, Newton
 from .plotting import Picture, animate, plot, write_page
+from .scene.reactions import Reaction
 from .scene.scene import Scene
 from .scene.touching import Touching
 from .starts.multistart import multistart
 from .starts.sampling import random_starts
 from .starts.starts import Multistart
 from .states.series import write_series
+from .statics.energies_at import energies
 from .statics.equilibria import Equilibria
 from .statics.equilibrium import Equilibrium
 from .statics.path import CriticalPoint, Path, follow
 from .statics.solve import equilibrium
 from .statics.warm_start import WarmStart
 from .surroundings.body_contact import BodyContact, SelfContact
+from .surroundings.cavity import Cavity
+from .surroundings.cells import Cells
 from .surroundings.contact import Contact
 from .surroundings.face_energies import SurfaceTension
 from .surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .surroundings.pressure import Pressure
 from .surroundings.supports import Clamp, Pin, SymmetryPlane
+from .surroundings.tendon import Tendon
 from .surroundings.water import Water
 
 __all__ = [
@@ -74,6 +83,8 @@ __all__ = [
     "BodyContact",
     "BodyResult",
     "Buckling",
+    "Cavity",
+    "Cells",
     "Clamp",
     "Closure",
     "Contact",
@@ -89,6 +100,7 @@ __all__ = [
     "Equilibria",
     "Equilibrium",
     "EquilibriumJumped",
+    "Fibres",
     "Fixed",
     "Guccione",
     "ImplicitEuler",
@@ -105,6 +117,8 @@ __all__ = [
     "MotionState",
     "Multistart",
     "MultistartFailed",
+    "Muscle",
+    "MuscleResult",
     "NeoHookean",
     "Newton",
     "NoGradient",
@@ -117,6 +131,9 @@ __all__ = [
     "PointLoad",
     "Pressure",
     "Prismatic",
+    "Projective",
+    "ProjectiveDynamics",
+    "Reaction",
     "Revolute",
     "Rigid",
     "RigidResult",
@@ -132,6 +149,7 @@ __all__ = [
     "Strains",
     "SurfaceTension",
     "SymmetryPlane",
+    "Tendon",
     "TetMesh",
     "Tie",
     "Touching",
@@ -145,7 +163,10 @@ __all__ = [
     "__version__",
     "animate",
     "control",
+    "energies",
+    "envs",
     "equilibrium",
+    "fibres_along",
     "follow",
     "linear_buckling",
     "linear_response",

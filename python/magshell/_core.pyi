@@ -103,9 +103,14 @@ class Factor:
     """
     An analysed sparse symmetric pattern; factorize() it with values, then solve().
     """
-    def factorize(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> FactorReport:
+    def factorize(
+        self,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        columns: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
+        stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+    ) -> FactorReport:
         """
-        Factorizes the matrix with these values (nnz,), in the order of the pattern's rows.
+        Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T.
         """
     def solve(self, rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
         """
@@ -396,11 +401,33 @@ class Model:
         """
         Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.
         """
+    def driving(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        turns: collections.abc.Sequence[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+        ],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        What the motors of joints do in an equilibrium q, N and N m, one after another.
+        """
     def gradient(
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def held_forces(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        turns: collections.abc.Sequence[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+        ],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (3 m,) [N], with which supports pull at the held nodes of a scene at rest.
+        """
     def hessian(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -417,6 +444,10 @@ class Model:
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
         Positions, then the own points of rigid parts (10 each).
+        """
+    def low_rank(self, reduced: bool = True) -> tuple:
+        """
+        What hessian(), called last, leaves out: columns u (n, k) and stiffnesses s (k,), the sum of s u u^T. Of cavities, cells and tendons, which couple all of their nodes.
         """
     def positions(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
@@ -457,6 +488,17 @@ class Model:
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def term_energies(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        turns: collections.abc.Sequence[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+        ],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> list:
+        """
+        [(name, J)] of each term, at a state with these turns.
+        """
     @property
     def analyses(self) -> int: ...
     @property
@@ -744,7 +786,12 @@ class Keep:
 
 class MotionResult:
     def directions(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    def driving(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
     def edge_rotations(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]: ...
+    def held_forces(self, arg0: Model) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, m, 3) [N], with which supports pulled at the held nodes of recorded states; NaN where no step led to.
+        """
     def largest_strains(
         self, model: Model, thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> list: ...
@@ -768,7 +815,7 @@ class MotionResult:
     @property
     def factorizations(self) -> int: ...
     @property
-    def halved(self) -> dict[int, list[tuple[float, float]]]: ...
+    def halved(self) -> dict[int, list[tuple[float, float, bool]]]: ...
     @property
     def iterations(self) -> int: ...
     @property
@@ -833,6 +880,16 @@ def drag_gradients(
 
 def factor_backends() -> list[str]: ...
 def factor_orderings() -> list[str]: ...
+def fibre_states(
+    model: Model,
+    muscle: typing.SupportsInt | typing.SupportsIndex,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None,
+) -> tuple:
+    """
+    (stretches |F m|, tensions [Pa] a rest area, rest volumes [m3]) at the points of integration of a muscle's elements, (n, p) each. v: velocities of all unknowns [m/s], or None.
+    """
+
 def find_equilibrium(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -997,10 +1054,12 @@ def solid_point_states(
     """
 
 def touching_pairs(
-    model: Model, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
-) -> tuple:
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> dict:
     """
-    Pairs of bodies in contact: contact (n,), vertices (n, 4), distances (n,), normal forces (n,), forces (n, 4, 3).
+    Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) [N], forces (n, 4, 3) [N], weights (n, 4) of the difference of the closest points, normals (n, 3) on the first part, friction_forces (n, 3) [N] on it and sliding_velocities (n, 3) [m/s] of it.
     """
 
 def vjp(

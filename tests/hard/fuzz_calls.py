@@ -212,6 +212,8 @@ def _solves(s: Sample) -> Iterator[Call]:
         "vertex_loads": np.zeros((n_v, 3)),
         "values": {s.clamp: {"displacement": (0, 0, 2e-4)}, s.dipoles: {"moments": [(0, 0, 0.2)]}},
     }
+    places = {"positions": s.positions, "edge_rotations": np.zeros(n_e), "body": None}
+    yield Call("energies", ms.energies, {**magnetic, **replaced, **places})
     quick = ms.MixedNewton(max_iterations=10, max_relaxation_steps=5)
     search = dict(start=s.positions, require_stable=True, at_rest=False, solver=quick, progress=None)
     yield Call("equilibrium", ms.equilibrium, {**magnetic, **replaced, **search})
@@ -263,6 +265,11 @@ def _solves(s: Sample) -> Iterator[Call]:
     }
     for kind in (ms.Newton, ms.MixedNewton):
         yield Call(kind.__name__, lambda kind=kind, **a: ms.equilibrium(s.scene, solver=kind(**a)), newton)
+    yield Call(
+        "ProjectiveDynamics",
+        ms.ProjectiveDynamics,
+        {"iterations": 20, "tolerance": 1e-6, "history": 4, "contact": "coulomb"},
+    )
     yield Call(
         "WarmStart",
         lambda start, **a: ms.WarmStart(s.magnetic, start=start, solver=quick)(**a),

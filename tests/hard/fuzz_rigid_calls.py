@@ -36,16 +36,19 @@ def rigid_calls(s: Sample) -> Iterator[Call]:
         {**jointed, "shape": mesh},
     )
     limits = {"lower_limit": -1.0, "upper_limit": 1.0, "limit_stiffness": 1.0, "limit_smoothing": 0.1}
-    pulls = {"spring_stiffness": 1.0, "servo_stiffness": 1.0, **limits}
+    pulls = {"spring_stiffness": 1.0, "damping": 1.0, "servo_stiffness": 1.0, **limits}
     place = {"origin": (0, 0, 0), "axis": (0, 1, 0)}
     turns = {"rest_angle": 0.1, "torque": 1.0, "target_angle": 0.1, "torque_limit": 1.0}
     slides = {"rest_displacement": 0.1, "force": 1.0, "target_displacement": 0.1, "force_limit": 1.0}
-    of_balls = {name: pulls[name] for name in ("spring_stiffness", *list(limits)[1:])}
+    of_balls = {name: pulls[name] for name in ("spring_stiffness", "damping", *list(limits)[1:])}
+    of_balls |= {"torque": (1.0, 0, 0), "rate": (1.0, 0, 0)}
     link, base = (ms.Link(mass=1e-3, inertia=1e-8, center=(x, 0, 0)) for x in (0.1, 0.2))
     for joint, own in (
         (ms.Revolute, {**place, **pulls, **turns}),
         (ms.Prismatic, {**place, **pulls, **slides}),
         (ms.Ball, {"origin": (0, 0, 0), **of_balls}),
+        (ms.Revolute, {**place, "motor_angle": 0.1, "rate": 1.0}),
+        (ms.Prismatic, {**place, "motor_displacement": 0.1, "rate": 1.0}),
         (ms.Fixed, {"origin": (0, 0, 0)}),
         (ms.Closure, {"origin": (0, 0, 0), "stiffness": 1.0}),
     ):

@@ -30,6 +30,7 @@ os.environ.setdefault("MAGSHELL_NUM_THREADS", "2")
 import numpy as np
 from fuzz_calls import Call, Sample, calls
 from fuzz_contact_calls import contact_calls
+from fuzz_env_calls import env_calls
 from fuzz_rigid_calls import rigid_calls
 from fuzz_solid_calls import solid_calls
 from fuzz_values import junk, spoilt
@@ -74,6 +75,7 @@ def everything(folder: Path) -> list[Call]:
     return [
         *calls(sample),
         *contact_calls(sample),
+        *env_calls(sample),
         *rigid_calls(sample),
         *solid_calls(sample),
         *torch_calls(sample),

@@ -17,6 +17,8 @@ def solid_calls(s: Sample) -> Iterator[Call]:
     yield from _generators(s)
     yield from _shapes()
     yield from _solids()
+    yield from _muscles()
+    yield from _actuators()
     block = meshes.box((1.0, 1.0, 1.0), cells=(2, 1, 1))
     parts = np.arange(block.n_tetrahedra) % 2
     given = {"rest_positions": block.rest_positions, "tetrahedra": block.tetrahedra, "parts": parts}
@@ -75,6 +77,32 @@ def _generators(s: Sample) -> Iterator[Call]:
     yield Call("meshes.tetrahedralize", meshes.tetrahedralize, closed, cost=20)
 
 
+def _actuators() -> Iterator[Call]:
+    mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1))
+    solid = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3), element="linear")
+    sheet = ms.Shell(mesh.surface, thickness=1e-3, young_modulus=1e6)
+
+    def acting(body, kind):
+        return lambda **a: ms.Scene(body, actuators=[kind(body, **a)], allow_rigid_motions=True)
+
+    around = {"faces": np.arange(mesh.n_faces), "cap_rims": False}
+    gas = {"filling_pressure": 1e5, "outside_pressure": 1e5}
+    yield Call("Cavity", acting(sheet, ms.Cavity), {**around, "pressure": 1e3})
+    yield Call("Cavity of gas", acting(sheet, ms.Cavity), {**around, **gas})
+    yield Call("Cavity of liquid", acting(sheet, ms.Cavity), {**around, "volume": 1e-4, "bulk_modulus": 1e5})
+    groups = np.arange(mesh.n_tetrahedra) % 2
+    yield Call(
+        "Cells", acting(solid, ms.Cells), {"groups": groups, "stiffness": 1e4, "volume_ratio": [1.1, 0.9]}
+    )
+    path = [(0.01, 0.01, 0.01), (0.05, 0.01, 0.015), (0.09, 0.01, 0.01)]
+    spring = {"tension": 1.0, "stiffness": 10.0, "rest_length": 0.05, "smoothing": 1e-3, "sliding": True}
+
+    def tendon(body, points, **a):
+        return ms.Tendon(points, body, **a)
+
+    yield Call("Tendon", acting(solid, tendon), {"points": path, **spring})
+
+
 def _shapes() -> Iterator[Call]:
     points = np.random.default_rng(0).normal(size=(5, 3))
     ball, other = shapes.ball(1.0).named("a"), shapes.box((1.0, 1.0, 1.0))
@@ -129,6 +157,30 @@ def _solids() -> Iterator[Call]:
     yield Call("StableNeoHookean", ms.StableNeoHookean, {"log_barrier": True, **moduli})
     yield Call("StVenantKirchhoff", ms.StVenantKirchhoff, moduli)
     yield Call("Corotated", ms.Corotated, moduli)
+    yield Call("Projective", ms.Projective, moduli)
     exponents = dict.fromkeys(("fibre_exponent", "cross_fibre_exponent", "fibre_shear_exponent"), 2.0)
     fibres = {"stiffness": 1e3, "bulk_modulus": 1e5, "fibres": (1.0, 0.0, 0.0)}
     yield Call("Guccione", ms.Guccione, {**exponents, **fibres})
+
+
+def _muscles() -> Iterator[Call]:
+    mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1))
+    body = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3), element="linear")
+    pins = [ms.Pin(mesh.vertices_at(x=0.0))]
+    line = {"line": [(0, 0.01, 0.01), (0.1, 0.01, 0.01)], "body": body, "reach": 0.01}
+    yield Call("fibres_along", ms.fibres_along, {**line, "elements": np.arange(12)})
+    some = {"elements": [0, 3], "directions": np.ones((2, 3)), "weights": (1.0, 0.5)}
+    yield Call("Fibres", ms.Fibres, {**some, "coordinates": (0.0, 0.05), "length": 0.1})
+
+    def pulled(**arguments):
+        muscle = ms.Muscle(**arguments)
+        return ms.Scene(body, supports=pins, actuators=[muscle]), muscle.places
+
+    common = {"body": body, "fibres": ms.fibres_along(**line), "activation": 0.5, "segments": 3}
+    yield Call("Muscle", pulled, {**common, "stiffness": 1e4, "weights": 1.0})
+    table = [(0.5, 0.2), (1.0, 1.0), (1.5, 0.2)]
+    hill = {"peak_stress": 1e4, "force_length": table, "passive": table, "shortening_rate": 1.0}
+    hill["force_velocity"] = [(-1, 0.0), (0, 1), (1, 1.5)]
+    yield Call("Muscle of Hill's", pulled, {**common, **hill})
+    one = {"body": body, "fibres": (1, 0, 0), "elements": [0, 1], "stiffness": 1e4}
+    yield Call("Muscle in some", lambda **a: repr(ms.Muscle(**a)), one)

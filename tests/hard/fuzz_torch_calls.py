@@ -129,7 +129,23 @@ def _controls(s: Sample) -> Iterator[Call]:
     yield Call("control.fit_spline", control.fit_spline, fit)
     yield Call("control.fourier", control.fourier, {"times": times, **waves, "mean": (0, 0, 0)})
     yield Call("control.frames_at", control.frames_at, {"times": times, "wanted": (0.2, 0.4)})
+    travelling = {"times": times, "places": (0.1, 0.2), "speed": 0.3, "amplitude": 0.5, "delay": (0.0, 0.1)}
+    yield Call("control.wave", control.wave, {**travelling, "wavelength": 0.2, "mean": 0.5, "ramp": 0.1})
+    yield Call("control.pulse", control.pulse, {**travelling, "width": 0.2, "period": 1.0})
     yield Call("control.harmonics", control.harmonics, {"number": 2, "duration": 1.0})
+    windows = {
+        "controls": np.zeros((4, 2)),
+        "lengths": (2, 4),
+        "lower": -1.0,
+        "upper": (1.0, 2.0),
+        "depth": 2,
+    }
+    windows |= {"smoothings": (2.0, 1.0), "max_iterations": 2, "tolerance": 1e-3, "hold": True}
+    yield Call(
+        "control.in_windows",
+        lambda **a: control.in_windows(lambda rows, window: ((rows - 0.5) ** 2).sum(), progress=False, **a),
+        windows,
+    )
     yield Call("control.held", control.held, {"values": fields, "steps": 12})
     frames = {
         "positions": np.ones((6, 4, 3)),

@@ -1,4 +1,4 @@
-"""Random drops, throws and squeezes never intersect, are finite, end, and with implicit Euler gain no energy.
+"""Random drops, throws and squeezes never intersect, are finite, end, and gain no energy, with every integrator.
 
 MAGSHELL_CONTACT_SCENES says how many: 500 take two or three minutes.
 """

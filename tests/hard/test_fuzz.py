@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from fuzz_calls import Sample, calls
 from fuzz_contact_calls import contact_calls
+from fuzz_env_calls import env_calls
 from fuzz_not_called import NOT_CALLED
 from fuzz_rigid_calls import rigid_calls
 from fuzz_solid_calls import solid_calls
@@ -51,6 +52,7 @@ def table(tmp_path):
     return [
         *calls(sample),
         *contact_calls(sample),
+        *env_calls(sample),
         *rigid_calls(sample),
         *solid_calls(sample),
         *torch_calls(sample),

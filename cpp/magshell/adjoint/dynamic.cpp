@@ -9,20 +9,9 @@
 namespace magshell {
 namespace {
 
-// The rates of a step, from its states: those it began with, and those of its stages.
-struct Rates {
-    std::vector<VectorXd> x_hat, v_hat;
-    std::vector<StageRates> all;
-
-    Rates(const StepAlgebra& step, const SubstepRecord& substep, Index coordinates)
-        : x_hat(substep.stages.size()),
-          v_hat(substep.stages.size()),
-          all(first_rates(step.tableau(), substep.begin)) {
-        for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
-            step.start_of_stage(i, substep.begin, all, x_hat[i], v_hat[i]);
-            step.finish_stage(substep.stages[i].q, x_hat[i], v_hat[i], coordinates, all.emplace_back());
-        }
-    }
+// What is viscous, stage by stage: elastic terms, and dampers in joints.
+struct Viscous {
+    ViscousAdjoint strains, joints;
 };
 
 class Backward {
@@ -35,7 +24,7 @@ class Backward {
           motion_(motion),
           by_q_(by_q),
           by_v_(by_v),
-          stepper_(newton, input.tableau, input.inertia, input.viscosity),
+          stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
           scene_(model_.registry()) {
         scene_.controls = model_.no_controls();
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
@@ -101,23 +90,25 @@ class Backward {
         take_in(step);
     }
 
-    void back(Index step, const std::pair<double, double>& substep, const SubstepRecord& record) {
-        const double share = substep.second - substep.first;
-        const StepAlgebra algebra =
-            stepper_.algebra(share * input_.time_step, stepper_.tableau_from(record.begin));
+    void back(Index step, const Substep& substep, const SubstepRecord& record) {
+        const double share = substep.share();
+        const StepAlgebra algebra = stepper_.algebra(
+            share * input_.time_step, stepper_.tableau_from(record.begin, substep.dissipative));
         const Tableau& tableau = algebra.tableau();
         const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
         const double dt = algebra.dt(), adt = algebra.stage_time();
         const VectorXd &mass = input_.inertia.mass, &damping = input_.inertia.damping;
         const Index coordinates = model_.n_coordinates();
-        const Rates at(algebra, record, coordinates);
+        const StepRates at(model_, algebra, record);
 
         std::vector<VectorXd> by_v(first + n, VectorXd::Zero(model_.size())), by_w = by_v;
         VectorXd by_x = std::move(g_.positions);
         by_v.back() = std::move(g_.velocities);
         if (by_w_.size() > 0) by_w.back() = std::move(by_w_);
         g_.positions = g_.velocities = VectorXd::Zero(model_.size());
-        ViscousAdjoint viscous(model_, input_.viscosity, algebra, record, by_strains_);
+        Viscous viscous{
+            {model_, model_.elastic(), input_.viscosity, &StageRates::elastic, algebra, record, by_strains_},
+            {model_, model_.dampers(), damper_law, &StageRates::joints, algebra, record, {}}};
         double by_dt = 0.0;
         for (int i = n - 1; i >= 0; --i) {
             const VectorXd &v = at.all[first + i].v, &w = at.all[first + i].w;
@@ -161,12 +152,21 @@ class Backward {
         }
         if (input_.viscosity.any()) {
             model_.evaluate(record.begin.q, model_.no_controls());
-            g_.positions += model_.strain_forces(viscous.by_d_begin);
-            by_strains_ = std::move(viscous.by_begin);
-            by_dt += viscous.by_dt;
-            g_.viscosity.stiffness_damping += viscous.by_law.stiffness_damping;
-            g_.viscosity.maxwell_modulus += viscous.by_law.maxwell_modulus;
-            g_.viscosity.maxwell_time += viscous.by_law.maxwell_time;
+            ViscousAdjoint& strains = viscous.strains;
+            g_.positions += model_.elastic().forces(strains.by_d_begin, model_.size());
+            by_strains_ = std::move(strains.by_begin);
+            by_dt += strains.by_dt;
+            g_.viscosity.stiffness_damping += strains.by_law.stiffness_damping;
+            g_.viscosity.maxwell_modulus += strains.by_law.maxwell_modulus;
+            g_.viscosity.maxwell_time += strains.by_law.maxwell_time;
+        }
+        if (!model_.dampers().empty()) {
+            if (!input_.viscosity.any()) model_.evaluate(record.begin.q, model_.no_controls());
+            g_.positions += model_.dampers().forces(viscous.joints.by_d_begin, model_.size());
+            by_dt += viscous.joints.by_dt;
+            if (tableau.begins_explicitly)
+                model_.damper_rates_vjp(record.begin.q, record.begin.v, viscous.joints.by_begin.d_rate,
+                                        g_.positions, g_.velocities);
         }
         g_.time_step += share * by_dt;
     }
@@ -187,25 +187,28 @@ class Backward {
     }
 
     // lambda of a stage, and what its forces say of how it moved; adds what it says of the scene and of the controls.
-    std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const Rates& at, int i,
-                                                         const SubstepRecord& record, Index step,
-                                                         const std::pair<double, double>& substep,
-                                                         VectorXd& by_x, ViscousAdjoint& viscous) {
+    std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const StepRates& at,
+                                                         int i, const SubstepRecord& record, Index step,
+                                                         const Substep& substep, VectorXd& by_x,
+                                                         Viscous& viscous) {
         const StageState& stage = record.stages[i];
         const ElasticAfterwards elastic_afterwards(model_);
-        const double share = substep.first + algebra.tableau().time(i) * (substep.second - substep.first);
+        const double share = substep.begin + algebra.tableau().time(i) * substep.share();
         const Controls controls = input_.controls_at(step, share);
         model_.take(controls);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
         model_.set_turns(stage.turns);
-        model_.begin_step(record.begin.q, input_.controls_at(step, substep.first));
-        viscous.set_history(i);
+        model_.begin_step(record.begin.q, input_.controls_at(step, substep.begin));
+        viscous.strains.set_history(i);
+        viscous.joints.set_history(i);
         const Anchor anchor{&algebra.weights(), &target, &motion};
         newton_.evaluate(stage.q, controls, anchor);
-        viscous.before_solve(i, by_x);
+        viscous.strains.before_solve(i, by_x);
+        viscous.joints.before_solve(i, by_x);
         const VectorXd lambda = solve(stage, controls, anchor, -by_x);
-        viscous.after_solve(i, lambda);
+        viscous.strains.after_solve(i, lambda);
+        viscous.joints.after_solve(i, lambda);
 
         scene_.controls.setZero();
         model_.vjp(stage.q, controls, lambda, scene_);
@@ -218,12 +221,12 @@ class Backward {
             VectorXd reaction(model_.size());
             model_.multiply(lambda, reaction);
             model_.remainder().add_product(lambda, true, reaction);
-            reaction += by_x;
-            model_.reduction().vjp(reaction, controls, scene_);
+            reaction += by_x + algebra.weights().cwiseProduct(lambda);
+            model_.reduction().vjp(reaction, lambda, newton_.gradient(stage.q, anchor), controls, scene_);
         }
         model_.varying().move_gradient(scene_);
         add_by_controls(step, share, scene_.controls);
-        if (model_.has_forces()) add_by_controls(step, substep.first, by_forces.begin_controls);
+        if (model_.has_forces()) add_by_controls(step, substep.begin, by_forces.begin_controls);
         return {lambda, std::move(by_forces)};
     }
 
@@ -240,7 +243,7 @@ class Backward {
         model_.take(input_.controls_at(0, 0.0));
         if (input_.viscosity.maxwell() && input_.start.e.empty()) {
             model_.evaluate(q, input_.controls_at(0, 0.0));
-            g_.positions += model_.strain_forces(by_strains_.e);
+            g_.positions += model_.elastic().forces(by_strains_.e, model_.size());
         }
         if (input_.rotations_given) return;
         model_.set_turns(input_.start.turns);

@@ -25,7 +25,7 @@ Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorX
         model.multiply(lambda, reaction);
         model.remainder().add_product(lambda, true, reaction);
         reaction += by_state;
-        reduction.vjp(reaction, controls, gradient);
+        reduction.vjp(reaction, lambda, model.residual().gradient, controls, gradient);
     }
     return gradient;
 }

@@ -2,18 +2,21 @@
 
 namespace magshell {
 
-ViscousAdjoint::ViscousAdjoint(Model& model, const Viscosity& law, const StepAlgebra& step,
-                               const SubstepRecord& substep, const ViscousGradient& by_end)
-    : model_(model), law_(law), step_(step) {
-    if (!law.any()) return;
-    const StrainSet d_begin = model.strains(substep.begin.q), zero = d_begin.times(0.0);
-    rates_ = first_rates(step.tableau(), substep.begin);
+ViscousAdjoint::ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosity& law,
+                               ViscousStage::Kind kind, const StepAlgebra& step, const SubstepRecord& substep,
+                               const ViscousGradient& by_end)
+    : terms_(terms), unknowns_(model.size()), law_(law), kind_(kind), step_(step) {
+    if (!law.any() || terms.empty()) return;
+    model.set_turns(substep.begin.turns);
+    const StrainSet d_begin = terms.strains(substep.begin.q), zero = d_begin.times(0.0);
+    rates_ = first_rates(model, step.tableau(), substep.begin);
     first_ = rates_.size();
     for (std::size_t i = 0; i < substep.stages.size(); ++i) {
-        stages_.push_back(ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], rates_,
+        stages_.push_back(ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], rates_, kind,
                                        d_begin, substep.begin.e));
-        stages_.back().finish(law, step.stage_time(), model.strains(substep.stages[i].q),
-                              rates_.emplace_back());
+        model.set_turns(substep.stages[i].turns);
+        stages_.back().finish(law, step.stage_time(), terms.strains(substep.stages[i].q),
+                              rates_.emplace_back().*kind);
     }
     const std::size_t n = substep.stages.size();
     by_d_hat_.assign(n, zero);
@@ -30,13 +33,13 @@ ViscousAdjoint::ViscousAdjoint(Model& model, const Viscosity& law, const StepAlg
 }
 
 void ViscousAdjoint::set_history(int i) const {
-    if (law_.any()) model_.set_history(law_.scale(step_.stage_time()), &stages_[i].shift);
+    if (!idle()) terms_.set_history(law_.scale(step_.stage_time()), &stages_[i].shift);
 }
 
 void ViscousAdjoint::before_solve(int i, VectorXd& by_q) {
-    if (!law_.any()) return;
+    if (idle()) return;
     const ViscousStage& stage = stages_[i];
-    const StageRates& rates = rates_[first_ + i];
+    const StrainRates& rates = this->rates(first_ + i);
     const StrainSet &by_d_rate = by_d_rate_[first_ + i], &by_e_rate = by_e_rate_[first_ + i];
     const double T = step_.stage_time();
     StrainSet by_d = by_d_rate.times(1.0 / T);  // d' = (d - d^)/T
@@ -51,15 +54,15 @@ void ViscousAdjoint::before_solve(int i, VectorXd& by_q) {
         by_d.add(r / (1.0 + r), by_e_[i]);
         by_ratio_[i] += (by_e_[i].dot(stage.d) - by_e_[i].dot(stage.e_hat)) / ((1.0 + r) * (1.0 + r));
     }
-    by_q += model_.strain_forces(by_d);
+    by_q += terms_.forces(by_d, unknowns_);
 }
 
 void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {
-    if (!law_.any()) return;
+    if (idle()) return;
     const ViscousStage& stage = stages_[i];
     const double T = step_.stage_time(), beta = law_.stiffness_damping;
     // lambda . J^T C (scale d - shift)
-    const StrainSet along = model_.stresses(model_.strain_rates(lambda));
+    const StrainSet along = terms_.stresses(terms_.rates(lambda));
     const double by_scale = along.dot(stage.d), by_d_share = -along.dot(stage.d_hat);
     by_d_hat_[i].add(-beta / T, along);
     by_law.stiffness_damping += (by_scale + by_d_share) / T;
@@ -84,10 +87,10 @@ void ViscousAdjoint::pass_on(int i) {
     for (std::size_t j = 0; j < first_ + i; ++j) {
         const double a = step_.tableau().a[i][j];
         by_d_rate_[j].add(a * step_.dt(), by_d_hat_[i]);
-        by_dt += a * rates_[j].d.dot(by_d_hat_[i]);
+        by_dt += a * rates(j).d.dot(by_d_hat_[i]);
         if (!law_.maxwell()) continue;
         by_e_rate_[j].add(a * step_.dt(), by_e_hat_[i]);
-        by_dt += a * rates_[j].e.dot(by_e_hat_[i]);
+        by_dt += a * rates(j).e.dot(by_e_hat_[i]);
     }
     if (i > 0 || first_ == 0) return;
     by_begin.d_rate = by_d_rate_.front();

@@ -12,9 +12,10 @@ struct ViscousGradient {
 
 class ViscousAdjoint {
   public:
-    /// Finds the strains of the stages again. by_end: what later steps say of the end of this one.
-    ViscousAdjoint(Model& model, const Viscosity& law, const StepAlgebra& step, const SubstepRecord& substep,
-                   const ViscousGradient& by_end);
+    /// Finds the strains of the stages again. kind: of the rates, those of `terms`. by_end: what later steps say of the
+    /// end of this one.
+    ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosity& law, ViscousStage::Kind kind,
+                   const StepAlgebra& step, const SubstepRecord& substep, const ViscousGradient& by_end);
 
     /// The stresses of stage i have their history from now on.
     void set_history(int i) const;
@@ -31,8 +32,13 @@ class ViscousAdjoint {
   private:
     void pass_on(int i);
 
-    Model& model_;
+    const StrainRates& rates(std::size_t j) const { return rates_[j].*kind_; }
+    bool idle() const { return stages_.empty(); }
+
+    ViscousTerms& terms_;
+    const Index unknowns_;
     const Viscosity& law_;
+    const ViscousStage::Kind kind_;
     const StepAlgebra& step_;
     std::size_t first_ = 0;  // stage among all rates
     std::vector<ViscousStage> stages_;

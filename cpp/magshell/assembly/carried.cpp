@@ -14,6 +14,7 @@ Carried::Carried(Carriers carriers, const SystemMatrix& matrix)
         chunk.carrier = std::move(carrier);
         chunk.first = coordinates_;
         coordinates_ += chunk.carrier->coordinates();
+        drives_ |= chunk.carrier->driven() > 0;
         Index row = 0;
         for (const Index node : chunk.carrier->nodes())
             for (int c = 0; c < 3; ++c) {
@@ -113,7 +114,12 @@ void Carried::find_places(std::size_t which, const SystemMatrix& matrix, const s
 void Carried::linearize(const VectorXd& q) {
     at_ = q;
     for (Chunk& chunk : chunks_) {
-        chunk.jacobian = chunk.carrier->jacobian(q);
+        MatrixXd all = chunk.carrier->jacobian(q);
+        if (chunk.carrier->driven() > 0) {
+            chunk.driven = all.rightCols(chunk.carrier->driven());
+            chunk.jacobian = all.leftCols(chunk.carrier->coordinates());
+        } else
+            chunk.jacobian = std::move(all);
         chunk.normal.compute(chunk.jacobian.transpose() * chunk.jacobian);
     }
 }
@@ -157,14 +163,82 @@ void Carried::add_weights(const VectorXd& weights, double* values) const {
 }
 
 void Carried::add_curvature(const VectorXd& gradient, double* values) const {
-    for (const Chunk& chunk : chunks_) add_lower(chunk, chunk.carrier->curvature(at_, gradient), values);
+    for (const Chunk& chunk : chunks_) {
+        const Index n = chunk.carrier->coordinates();
+        add_lower(chunk, chunk.carrier->curvature(at_, gradient).topLeftCorner(n, n), values);
+    }
 }
 
 void Carried::add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const {
     for (const Chunk& chunk : chunks_) {
         const Index n = chunk.carrier->coordinates(), first = free_ + chunk.first;
-        out.segment(first, n) += chunk.carrier->curvature(at_, gradient) * reduced.segment(first, n);
+        out.segment(first, n) +=
+            chunk.carrier->curvature(at_, gradient).topLeftCorner(n, n) * reduced.segment(first, n);
     }
+}
+
+void Carried::set_values(const Values& values) {
+    for (Chunk& chunk : chunks_) chunk.carrier->set_values(values);
+}
+
+void Carried::add_driven_increment(const VectorXd& q, VectorXd& increment) const {
+    for (const Chunk& chunk : chunks_) {
+        if (chunk.carrier->driven() == 0) continue;
+        const VectorXd z = chunk.carrier->driven_increment(q);
+        if (z.isZero(0.0)) continue;
+        const MatrixXd b = chunk.carrier->jacobian(q);
+        chunk.carrier->scatter(b.rightCols(z.size()) * z, increment);
+    }
+}
+
+VectorXd Carried::free_part(const Chunk& chunk, const VectorXd& full) const {
+    return chunk.normal.solve(chunk.jacobian.transpose() * chunk.carrier->gather(full));
+}
+
+VectorXd Carried::driven_part(const Chunk& chunk, const VectorXd& full) const {
+    MatrixXd b(chunk.jacobian.rows(), chunk.jacobian.cols() + chunk.driven.cols());
+    b << chunk.jacobian, chunk.driven;
+    return (b.transpose() * b)
+        .ldlt()
+        .solve(b.transpose() * chunk.carrier->gather(full))
+        .tail(chunk.driven.cols());
+}
+
+void Carried::add_driven_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const {
+    for (const Chunk& chunk : chunks_) {
+        const Index n = chunk.carrier->coordinates(), m = chunk.carrier->driven();
+        if (m == 0 || n == 0) continue;
+        const VectorXd pull =
+            chunk.carrier->curvature(at_, gradient).topRightCorner(n, m) * driven_part(chunk, move);
+        VectorXd own = chunk.carrier->gather(forces);
+        own += chunk.jacobian * chunk.normal.solve(pull);
+        chunk.carrier->scatter(own, forces);
+    }
+}
+
+void Carried::driven_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+                         Gradient& out) const {
+    for (const Chunk& chunk : chunks_) {
+        const Index n = chunk.carrier->coordinates(), m = chunk.carrier->driven();
+        if (m == 0) continue;
+        VectorXd by_driven = chunk.driven.transpose() * chunk.carrier->gather(by_state);
+        if (n > 0)
+            by_driven +=
+                chunk.carrier->curvature(at_, gradient).bottomLeftCorner(m, n) * free_part(chunk, lambda);
+        chunk.carrier->driven_vjp(by_driven, out);
+    }
+}
+
+VectorXd Carried::driving(const VectorXd& gradient) const {
+    VectorXd all;
+    for (const Chunk& chunk : chunks_) {
+        const Index m = chunk.carrier->driven();
+        if (m == 0) continue;
+        all.conservativeResize(all.size() + m);
+        all.tail(m) = chunk.carrier->driven_units().cwiseProduct(chunk.driven.transpose() *
+                                                                 chunk.carrier->gather(gradient));
+    }
+    return all;
 }
 
 void Carried::pull_back(const VectorXd& full, VectorXd& reduced) const {
@@ -187,8 +261,7 @@ void Carried::push_forward(const VectorXd& reduced, VectorXd& full) const {
 
 void Carried::project(VectorXd& full) const {
     for (const Chunk& chunk : chunks_) {
-        const VectorXd z = chunk.normal.solve(chunk.jacobian.transpose() * chunk.carrier->gather(full));
-        chunk.carrier->scatter(chunk.jacobian * z, full);
+        chunk.carrier->scatter(chunk.jacobian * free_part(chunk, full), full);
     }
 }
 

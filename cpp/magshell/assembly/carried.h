@@ -41,6 +41,18 @@ class Carried {
     void add_curvature(const VectorXd& gradient, double* values) const;
     void add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const;
 
+    /// Values may prescribe some coordinates of carriers, which are not among the unknowns then. Adds the motion that
+    /// brings the nodes there; adds to the forces that a motion of all nodes causes what comes of how driven nodes curve
+    /// away; and adds the gradients by those values, of a number whose gradient by all nodes is `by_state`, at an adjoint
+    /// lambda of all unknowns under a gradient g. driving: the forces [N], or moments [N m], that hold them, by g.
+    bool drives() const { return drives_; }
+    void set_values(const Values& values);
+    void add_driven_increment(const VectorXd& q, VectorXd& increment) const;
+    void add_driven_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const;
+    void driven_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+                    Gradient& out) const;
+    VectorXd driving(const VectorXd& gradient) const;
+
     /// The last numbers of a reduced vector: B^T f, and the diagonal of B^T w B.
     void pull_back(const VectorXd& full, VectorXd& reduced) const;
     void diagonal(const VectorXd& weights, VectorXd& reduced) const;
@@ -76,8 +88,8 @@ class Carried {
     };
     struct Chunk {
         std::unique_ptr<Carrier> carrier;
-        Index first = 0;  // among the carriers' coordinates
-        Eigen::MatrixXd jacobian;
+        Index first = 0;                   // among the carriers' coordinates
+        Eigen::MatrixXd jacobian, driven;  // by what is free, and by what values prescribe
         Eigen::LDLT<Eigen::MatrixXd> normal;
         std::vector<Places> places;
         std::set<Index> later;                       // carriers after it that it is coupled with
@@ -87,10 +99,14 @@ class Carried {
 
     void find_places(std::size_t which, const SystemMatrix& matrix, const std::vector<Index>& reduced,
                      const SparsePattern& pattern);
+    /// The free coordinates of a motion of all nodes; those of driven ones; forces with which B^T gives these.
+    VectorXd free_part(const Chunk& chunk, const VectorXd& full) const;
+    VectorXd driven_part(const Chunk& chunk, const VectorXd& full) const;
     void add_lower(const Chunk& chunk, const Eigen::MatrixXd& block, double* values) const;
 
     std::vector<Chunk> chunks_;
     Index coordinates_ = 0, free_ = 0;
+    bool drives_ = false;
     VectorXd at_;                               // q of the linearization
     std::vector<Index> carrier_of_, row_of_;    // by unknown: its carrier, its row of B there
     std::map<Index, std::set<Index>> coupled_;  // by free unknown: carriers

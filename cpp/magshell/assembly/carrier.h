@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "magshell/core/parameters.h"
 #include "magshell/core/types.h"
 
 namespace magshell {
@@ -20,15 +21,24 @@ class Carrier {
     virtual ~Carrier() = default;
 
     const std::vector<Index>& nodes() const { return nodes_; }
+    /// How many are free; the last of all, so many, are prescribed by values.
     virtual Index coordinates() const = 0;
+    virtual Index driven() const { return 0; }
 
-    /// B at q: a row for each component of its nodes, a column a coordinate.
+    /// B at q: a row for each component of its nodes, a column a coordinate, driven ones too.
     virtual Eigen::MatrixXd jacobian(const VectorXd& q) const = 0;
 
-    /// sum_i g_i d2x_i/dz2 at q, for a gradient of all unknowns; symmetric.
+    /// sum_i g_i d2x_i/dz2 at q, for a gradient of all unknowns; symmetric. Of all coordinates.
     virtual Eigen::MatrixXd curvature(const VectorXd& q, const VectorXd& gradient) const = 0;
 
-    /// Moves its nodes in q along z.
+    /// What prescribes the driven coordinates; how far they are from there, nothing where it is but round-off; what they
+    /// are in a unit of the values [m]; and by the values, where a number has these gradients by the coordinates.
+    virtual void set_values(const Values&) {}
+    virtual VectorXd driven_increment(const VectorXd& /*q*/) const { return {}; }
+    virtual VectorXd driven_units() const { return {}; }
+    virtual void driven_vjp(const VectorXd& /*by_driven*/, Gradient& /*out*/) const {}
+
+    /// Moves its nodes in q along z, all coordinates.
     virtual void advance(VectorXd& q, const VectorXd& z) const = 0;
 
     /// A start, where the caller says where the vertices are: nodes of its own join them, and what rounding left of

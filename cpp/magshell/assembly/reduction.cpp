@@ -96,6 +96,7 @@ void Reduction::set_values(const Values& values) {
     for (std::size_t k = 0; k < slots_.size(); ++k)
         moves_[k] = {values.vector(slots_[k].center), values.vector(slots_[k].rotation),
                      values.vector(slots_[k].displacement)};
+    if (carried_) carried_->set_values(values);
 }
 
 VectorXd Reduction::prescribed_increment(const VectorXd& q, const Controls& controls) const {
@@ -104,7 +105,16 @@ VectorXd Reduction::prescribed_increment(const VectorXd& q, const Controls& cont
     for (const HeldNode& h : held_)
         increment.segment<3>(3 * h.node) = held_part(
             h, [&](Index move) -> Vec3 { return place(h.node, move, t) - q.segment<3>(3 * h.node); });
+    if (drives()) carried_->add_driven_increment(q, increment);
     return increment;
+}
+
+VectorXd Reduction::held(const VectorXd& full) const {
+    VectorXd parts(3 * held_.size());
+    for (std::size_t k = 0; k < held_.size(); ++k)
+        parts.segment<3>(3 * static_cast<Index>(k)) =
+            held_part(held_[k], [&](Index) -> Vec3 { return full.segment<3>(3 * held_[k].node); });
+    return parts;
 }
 
 Mat3 Reduction::free_motions(Index node) const {
@@ -145,7 +155,9 @@ Vec3 Reduction::rate(Index node, Index move, double progress) const {
                                       : moves_[move].direction_rate(rest, progress);
 }
 
-void Reduction::vjp(const VectorXd& by_state, const Controls& controls, Gradient& out) const {
+void Reduction::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+                    const Controls& controls, Gradient& out) const {
+    if (drives()) carried_->driven_vjp(by_state, lambda, gradient, out);
     const double t = progress(controls);
     std::vector<SupportMove> by_move(moves_.size());
     for (const HeldNode& h : held_)

@@ -34,7 +34,14 @@ class Reduction {
               Registry& registry, Carriers carriers = {});
 
     void set_values(const Values& values);
-    bool moves() const { return !moves_.empty(); }
+    bool moves() const { return !moves_.empty() || drives(); }
+    /// Whether values prescribe coordinates of carriers.
+    bool drives() const { return carried_ && carried_->drives(); }
+
+    /// The free unknowns that are no coordinates of carriers, ascending: these come first in the reduced order. Those of a
+    /// framed node count along its frame.
+    const std::vector<Index>& free_unknowns() const { return free_unknowns_; }
+    bool framed(Index node) const { return !frame_of_.empty() && frame_of_[node] >= 0; }
 
     /// How far the moves have gone: 0 at rest, 1 at their end.
     double progress(const Controls& controls) const { return controls[progress_.first]; }
@@ -50,8 +57,23 @@ class Reduction {
     /// d(where the supports want their nodes)/d(progress).
     VectorXd prescribed_rate(const Controls& controls) const;
 
-    /// Adds the gradients by the moves and by their progress, given the gradient by what supports hold.
-    void vjp(const VectorXd& by_state, const Controls& controls, Gradient& out) const;
+    /// Adds the gradients by the moves and by their progress, given the gradient by what supports hold; and by what
+    /// carriers are driven to, at an adjoint lambda under the gradient of the energy, with inertia in a motion.
+    void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+             const Controls& controls, Gradient& out) const;
+    /// Adds to the forces that prescribed increments cause, K p, what a curved way of carried nodes adds.
+    void add_driven_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const {
+        if (drives()) carried_->add_driven_forces(gradient, move, forces);
+    }
+    /// Forces [N] and moments [N m] that drive, one after another, where the gradient of the energy is this.
+    VectorXd driving(const VectorXd& gradient) const {
+        return drives() ? carried_->driving(gradient) : VectorXd();
+    }
+
+    /// Whether supports hold anything; and what of a vector of all unknowns lies along what they hold, three numbers for
+    /// each of the nodes that were given, in their order.
+    bool holds() const { return !held_.empty(); }
+    VectorXd held(const VectorXd& full) const;
 
     /// Whether [axis]x between two nodes does anything along motions of the free ones.
     bool feels_skew(Index a, Index b, const Vec3& axis) const;

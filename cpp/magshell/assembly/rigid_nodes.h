@@ -38,6 +38,7 @@ class RigidNodes {
     void place(const Pose& pose, VectorXd& q) const;
 
     static constexpr Index corners = 4;
+    static constexpr Index points = 10;  // of its own, that tell where it starts; more are on its surface
 
   private:
     std::vector<Index> nodes_;

@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "magshell/core/rotation_vector.h"
@@ -13,7 +14,8 @@ namespace {
 using Eigen::MatrixXd;
 
 constexpr int most_fits = 30;
-constexpr double fitted = 1e-14;  // of a length
+constexpr double fitted = 1e-14;    // of a length
+constexpr double rounding = 1e-14;  // likewise
 
 Vec3 across(const Vec3& axis) {
     Index smallest;
@@ -40,7 +42,8 @@ auto solver_of(const MatrixXd& rows) {
 
 }  // namespace
 
-SkeletonCarrier::SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Joint> joints)
+SkeletonCarrier::SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Joint> joints,
+                                 std::vector<Slot> motors)
     : Carrier(nodes_of(links)), links_(std::move(links)), joints_(std::move(joints)) {
     Index row = 0;
     bool vertices = false;
@@ -50,9 +53,14 @@ SkeletonCarrier::SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Join
         row_.push_back(row);
         row += links_[k].size();
         vertices |= links_[k].has_vertices();
+        if (joints_[k].driven) driven_.push_back({k, motors[k]});
     }
+    Index free = 0, held = coordinates();
+    for (const Joint& joint : joints_)
+        for (Index j = 0; j < joint.freedom(); ++j) place_.push_back(joint.driven ? held++ : free++);
     for (Index k = 0; k < n_links(); ++k)
-        for (Index n = vertices ? links_[k].own() : 0; n < links_[k].size(); ++n)
+        for (Index n = vertices ? links_[k].own() : 0; n < (vertices ? links_[k].size() : RigidNodes::points);
+             ++n)
             leading_.push_back(row_[k] + n);
 }
 
@@ -98,7 +106,8 @@ MatrixXd SkeletonCarrier::jacobian(const VectorXd& q) const {
                 const Vec3 axis = column.share * column.axis;
                 for (Index n = 0; n < links_[k].size(); ++n) {
                     const Vec3 x = q.segment<3>(3 * links_[k].nodes()[n]);
-                    b.block<3, 1>(3 * (row_[k] + n), j) = column.turns ? axis.cross(x - column.origin) : axis;
+                    b.block<3, 1>(3 * (row_[k] + n), place_[j]) =
+                        column.turns ? axis.cross(x - column.origin) : axis;
                 }
             }
     return b;
@@ -139,8 +148,9 @@ MatrixXd SkeletonCarrier::second_derivative(const VectorXd& q, const VectorXd& g
                 for (Index a = first_[above]; a < first_[above] + joints_[above].freedom(); ++a) {
                     const Column& outer = columns[a];
                     if (!outer.turns || (above == k && !inner.turns)) continue;
-                    out(a, b) = outer.share * inner.share * turn_and(outer);
-                    if (above != k) out(b, a) = out(a, b);
+                    const Index i = place_[a], j = place_[b];
+                    out(i, j) = outer.share * inner.share * turn_and(outer);
+                    if (above != k) out(j, i) = out(i, j);
                 }
         }
     }
@@ -150,6 +160,54 @@ MatrixXd SkeletonCarrier::second_derivative(const VectorXd& q, const VectorXd& g
 MatrixXd SkeletonCarrier::curvature(const VectorXd& q, const VectorXd& gradient) const {
     const MatrixXd second = second_derivative(q, gradient);
     return 0.5 * (second + second.transpose());
+}
+
+double SkeletonCarrier::coordinate(Index link, const std::vector<Pose>& poses) const {
+    const Joint& joint = joints_[link];
+    const Mat3 frame = joint.parent < 0 ? Mat3(Mat3::Identity()) : poses[joint.parent].rotation;
+    if (joint.kind == JointKind::revolute)
+        return angle_about(joint.axis, frame.transpose() * poses[link].rotation);
+    const Vec3 own = poses[link].center - poses[link].rotation * (links_[link].middle() - joint.origin);
+    return joint.axis.dot(frame.transpose() * (own - joint_place(link, poses)));
+}
+
+void SkeletonCarrier::set_values(const Values& values) {
+    for (Motor& motor : driven_) motor.target = values.number(motor.slot);
+}
+
+// By the shorter way round.
+VectorXd SkeletonCarrier::driven_increment(const VectorXd& q) const {
+    if (driven_.empty()) return {};
+    const std::vector<Pose> poses = this->poses(q);
+    VectorXd increment(driven());
+    for (Index m = 0; m < driven(); ++m) {
+        const Index link = driven_[m].link;
+        const double length = links_[link].length(),
+                     reach = poses[link].center.cwiseAbs().maxCoeff() + length;
+        const bool turns = joints_[link].kind == JointKind::revolute;
+        double off = driven_[m].target - coordinate(link, poses),
+               rounds = reach + std::abs(driven_[m].target);
+        if (turns) {
+            off = length * std::remainder(off, 2.0 * std::numbers::pi);
+            rounds = reach + length * std::abs(driven_[m].target);
+        }
+        increment[m] = std::abs(off) > rounding * rounds ? off : 0.0;
+    }
+    return increment;
+}
+
+VectorXd SkeletonCarrier::driven_units() const {
+    VectorXd units(driven());
+    for (Index m = 0; m < driven(); ++m) {
+        const Index link = driven_[m].link;
+        units[m] = joints_[link].kind == JointKind::revolute ? links_[link].length() : 1.0;
+    }
+    return units;
+}
+
+void SkeletonCarrier::driven_vjp(const VectorXd& by_driven, Gradient& out) const {
+    const VectorXd units = driven_units();
+    for (Index m = 0; m < driven(); ++m) out.values[driven_[m].slot.first] += units[m] * by_driven[m];
 }
 
 SkeletonCarrier::Pose SkeletonCarrier::moved(Index link, const std::vector<Pose>& from,
@@ -164,22 +222,17 @@ SkeletonCarrier::Pose SkeletonCarrier::moved(Index link, const std::vector<Pose>
     const bool root = joint.parent < 0;
     const Mat3 before = root ? Mat3::Identity() : from[joint.parent].rotation,
                after = root ? Mat3::Identity() : to[joint.parent].rotation;
-    const Mat3 relative = before.transpose() * from[link].rotation;
     Pose pose{joint_place(link, to), after};
     switch (joint.kind) {
         case JointKind::revolute:
-            pose.rotation =
-                after * rotation((angle_about(joint.axis, relative) + z[0] / nodes.length()) * joint.axis);
+            pose.rotation = after * rotation((coordinate(link, from) + z[0] / nodes.length()) * joint.axis);
             break;
         case JointKind::ball:
             pose.rotation = after * orthonormal(before.transpose() * turn(z) * from[link].rotation);
             break;
-        case JointKind::prismatic: {
-            const Vec3 at_rest = from[link].center - from[link].rotation * (nodes.middle() - joint.origin);
-            const double slid = joint.axis.dot(before.transpose() * (at_rest - joint_place(link, from)));
-            pose.center += (slid + z[0]) * (after * joint.axis);
+        case JointKind::prismatic:
+            pose.center += (coordinate(link, from) + z[0]) * (after * joint.axis);
             break;
-        }
         default:
             break;
     }
@@ -189,8 +242,10 @@ SkeletonCarrier::Pose SkeletonCarrier::moved(Index link, const std::vector<Pose>
 
 void SkeletonCarrier::move_on(VectorXd& q, std::vector<Pose> from, const VectorXd& z) const {
     std::vector<Pose> to(n_links());
+    VectorXd by_joint(coordinates_);
+    for (Index j = 0; j < coordinates_; ++j) by_joint[j] = z[place_[j]];
     for (Index k = 0; k < n_links(); ++k) {
-        to[k] = moved(k, from, to, z.data() + first_[k]);
+        to[k] = moved(k, from, to, by_joint.data() + first_[k]);
         links_[k].place(to[k], q);
     }
 }

@@ -18,10 +18,15 @@ namespace magshell {
 
 class SkeletonCarrier final : public Carrier {
   public:
-    /// joints[k] leads to links[k]; parents come first.
-    SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Joint> joints);
+    /// joints[k] leads to links[k]; parents come first. motors: where the values of driven joints stand.
+    SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Joint> joints, std::vector<Slot> motors = {});
 
-    Index coordinates() const override { return coordinates_; }
+    Index coordinates() const override { return coordinates_ - driven(); }
+    Index driven() const override { return static_cast<Index>(driven_.size()); }
+    void set_values(const Values& values) override;
+    VectorXd driven_increment(const VectorXd& q) const override;
+    VectorXd driven_units() const override;
+    void driven_vjp(const VectorXd& by_driven, Gradient& out) const override;
     Eigen::MatrixXd jacobian(const VectorXd& q) const override;
     Eigen::MatrixXd curvature(const VectorXd& q, const VectorXd& gradient) const override;
     void advance(VectorXd& q, const VectorXd& z) const override;
@@ -39,9 +44,11 @@ class SkeletonCarrier final : public Carrier {
 
     Index n_links() const { return static_cast<Index>(links_.size()); }
     std::vector<Pose> poses(const VectorXd& q) const;
-    /// Of all coordinates.
+    /// Of all coordinates, joint by joint.
     std::vector<Column> columns(const std::vector<Pose>& poses) const;
     Vec3 joint_place(Index link, const std::vector<Pose>& poses) const;
+    /// The angle or displacement of a joint with an axis.
+    double coordinate(Index link, const std::vector<Pose>& poses) const;
     /// Where a link comes to, its parent being there already, as its own coordinates change by z.
     Pose moved(Index link, const std::vector<Pose>& from, const std::vector<Pose>& to, const double* z) const;
     /// sum_i g_i d2x_i/dz2, where columns of turns of one joint do not turn with it.
@@ -56,7 +63,14 @@ class SkeletonCarrier final : public Carrier {
     std::vector<RigidNodes> links_;
     std::vector<Joint> joints_;
     std::vector<Index> first_, row_;  // of each link: its joint's first coordinate; its first node among all
-    std::vector<Index> leading_;      // nodes, among all
+    std::vector<Index> place_;        // of each coordinate, joint by joint: its column, those of motors last
+    struct Motor {
+        Index link;
+        Slot slot;
+        double target = 0.0;
+    };
+    std::vector<Motor> driven_;
+    std::vector<Index> leading_;  // nodes, among all
     Index coordinates_ = 0;
 };
 

@@ -18,6 +18,9 @@ struct Joint {
     JointKind kind = JointKind::free;
     Index parent = -1;  // a link of the same skeleton, before this one; negative: the world
     Vec3 origin = Vec3::Zero(), axis = Vec3::Zero();
+    bool driven = false;   // a motor prescribes its coordinate
+    bool damped = false;   // a damper acts in it
+    bool twisted = false;  // a ball joint with a moment in it
 
     bool has_axis() const { return kind == JointKind::revolute || kind == JointKind::prismatic; }
     /// How many coordinates it has.

@@ -15,20 +15,18 @@
 
 #include "magshell/core/vector3.h"
 #include "magshell/energy/magnetic.h"
+#include "magshell/strain/carried_vector.h"
 #include "magshell/strain/deformation.h"
 
 namespace magshell {
 
 template <int N>
-struct MagneticSolid {
-    Pack volume;    // V_p [m3]
-    Pack alpha[N];  // g_k . M~_r [A/m2]
+struct MagneticSolid : CarriedVector<N> {  // alpha_k [A/m2]
+    using CarriedVector<N>::alpha;
 
-    Pack3 magnetization(const Pack3 x[N]) const {
-        Pack3 m = alpha[0] * x[0];
-        for (int k = 1; k < N; ++k) m += alpha[k] * x[k];
-        return m;
-    }
+    Pack volume;  // V_p [m3]
+
+    Pack3 magnetization(const Pack3 x[N]) const { return this->at(x); }
 
     static Pack3 place(const std::array<double, N>& shapes, const Pack3 x[N]) {
         Pack3 at = Pack(shapes[0]) * x[0];

@@ -8,7 +8,9 @@ namespace magshell {
 
 Bodies::Bodies(const SceneInput& input) {
     n_body_vertices_ = input.n_vertices;
-    NodeNumbering numbering(input.n_vertices + RigidInput::own * static_cast<Index>(input.rigid.size()));
+    Index n_points = input.n_vertices;
+    for (const RigidInput& part : input.rigid) n_points += static_cast<Index>(part.points.rows());
+    NodeNumbering numbering(n_points);
     for (const SheetInput& sheet : input.sheets)
         owned_.push_back(std::make_unique<Sheet>(sheet.owner, *sheet.mesh, sheet.vertices, numbering));
     for (const SolidInput& solid : input.solids)
@@ -23,6 +25,7 @@ Bodies::Bodies(const SceneInput& input) {
     add_rigid(input.rigid, numbering);
     couple_links(input);
     nodes_ = numbering.finish(input.directions, input.original);
+    couple_volumes_and_tendons(input);
     for (Index user = 0; user < nodes_.n_user_vertices(); ++user)
         if (nodes_.vertices.is_copy(user)) copies_.push_back(user);
     for (std::size_t k = 0; k < owned_.size(); ++k) {
@@ -47,6 +50,13 @@ Bodies::Bodies(const SceneInput& input) {
         six_node_sheets_.push_back(owned_six_node_sheets_[k].get());
         all_.push_back(owned_six_node_sheets_[k].get());
     }
+    for (const MuscleInput& muscle : input.muscles) {
+        const Fibres* fibres =
+            owned_fibres_.emplace_back(std::make_unique<Fibres>(*solids_[muscle.solid], muscle.elements))
+                .get();
+        fibres_.push_back({fibres, static_cast<Index>(all_.size())});
+        all_.push_back(fibres);
+    }
 }
 
 void Bodies::add_surface(const Surface* surface) {
@@ -57,11 +67,13 @@ void Bodies::add_surface(const Surface* surface) {
 }
 
 void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering) {
-    Index user = n_body_vertices_;
+    // The ten of each part, then those of their surfaces.
+    Index user = n_body_vertices_, on_surface = user + RigidInput::own * static_cast<Index>(rigid.size());
     for (const RigidInput& part : rigid) {
         std::vector<Index>& nodes = rigid_nodes_.emplace_back();
-        for (Index k = 0; k < RigidInput::own; ++k)
-            nodes.push_back(numbering.number(user++, part.points.row(k).transpose()));
+        for (Index k = 0; k < static_cast<Index>(part.points.rows()); ++k)
+            nodes.push_back(numbering.number(k < RigidInput::own ? user++ : on_surface++,
+                                             part.points.row(k).transpose()));
         for (const Index vertex : part.vertices) nodes.push_back(numbering.number(vertex, Vec3::Zero()));
         rigid_points_.push_back(part.points);
     }
@@ -69,7 +81,7 @@ void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numb
 
 void Bodies::couple_links(const SceneInput& input) {
     const auto couple = [&](Index a, Index b) {
-        std::vector<Index>& corners = coupled_corners_.emplace_back();
+        std::vector<Index>& corners = coupled_.emplace_back();
         for (const Index part : {a, b})
             if (part >= 0)
                 corners.insert(corners.end(), rigid_nodes_[part].begin(), rigid_nodes_[part].begin() + 4);
@@ -81,6 +93,40 @@ void Bodies::couple_links(const SceneInput& input) {
                 couple(parent < 0 ? -1 : skeleton.links[parent], skeleton.links[k]);
             }
     for (const ClosureInput& closure : input.closures) couple(closure.parent, closure.child);
+}
+
+void Bodies::couple_volumes_and_tendons(const SceneInput& input) {
+    const auto add = [&](std::vector<Index>& nodes, auto first, auto last) {
+        for (; first != last; ++first) nodes.push_back(nodes_.vertices.core[*first]);
+    };
+    const auto close = [](std::vector<Index>& nodes) {
+        std::sort(nodes.begin(), nodes.end());
+        nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    };
+    for (const VolumeInput& volume : input.volumes)
+        for (const ClosedSurface& surface : volume.surfaces) {
+            const auto &flat = surface.triangles, &curved = surface.curved;
+            if (volume.coupled) {
+                std::vector<Index>& nodes = coupled_.emplace_back();
+                add(nodes, flat.begin(), flat.end());
+                add(nodes, curved.begin(), curved.end());
+                close(nodes);
+                continue;
+            }
+            // Faces of bodies are coupled by their elements; those of caps are nobody's.
+            for (std::size_t f = 0; f + 2 < flat.size(); f += 3) {
+                std::vector<Index>& nodes = coupled_.emplace_back();
+                add(nodes, flat.begin() + f, flat.begin() + f + 3);
+                close(nodes);
+            }
+        }
+    for (const TendonInput& tendon : input.tendons)
+        for (std::size_t k = 0; k + 1 < tendon.points.size(); ++k) {
+            std::vector<Index>& nodes = coupled_.emplace_back();
+            for (const RidingPoint& point : {tendon.points[k], tendon.points[k + 1]})
+                add(nodes, point.vertices.begin(), point.vertices.end());
+            close(nodes);
+        }
 }
 
 std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
@@ -108,7 +154,7 @@ std::vector<Clique> Bodies::cliques() const {
     for (const SixNodeSheet* sheet : six_node_sheets_)
         for (Index face = 0; face < sheet->n_faces(); ++face)
             all.push_back({sheet->nodes_of(face), sheet->scalars_of(face)});
-    for (const std::vector<Index>& corners : coupled_corners_) all.push_back({corners});
+    for (const std::vector<Index>& nodes : coupled_) all.push_back({nodes});
     return all;
 }
 
@@ -123,8 +169,11 @@ VectorXd Bodies::state(const Rows3& positions, const VectorXd& edge_rotations) c
     add_rotations(edge_rotations, q);
     for (Index node = nodes_.n_vertices(); node < nodes_.n_nodes(); ++node)
         q.segment<3>(3 * node) = nodes_.rest[node];
-    for (const std::vector<Index>& part : rigid_nodes_)
-        for (Index k = 0; k < RigidInput::own; ++k) q.segment<3>(3 * part[k]) = nodes_.rest[part[k]];
+    for (std::size_t part = 0; part < rigid_nodes_.size(); ++part)
+        for (Index k = 0; k < n_own(part); ++k) {
+            const Index node = rigid_nodes_[part][k];
+            q.segment<3>(3 * node) = nodes_.rest[node];
+        }
     return q;
 }
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "magshell/body/fibres.h"
 #include "magshell/body/surface_body.h"
 #include "magshell/scene/scene_input.h"
 
@@ -17,7 +18,8 @@ class Bodies {
     const std::vector<const Sheet*>& sheets() const { return sheets_; }
     const std::vector<const Solid*>& solids() const { return solids_; }
     const std::vector<const SixNodeSheet*>& six_node_sheets() const { return six_node_sheets_; }
-    /// Sheets, then solids, then the surfaces of solids that something acts on, then skins, then sheets of six-node faces.
+    /// Sheets, then solids, then the surfaces of solids that something acts on, then skins, then sheets of six-node faces,
+    /// then fibres of muscles.
     const std::vector<const Body*>& all() const { return all_; }
     /// Triangles of bodies, and which of all() has their chunks: of sheets, of solids (none where nothing acts on them), of
     /// skins.
@@ -26,8 +28,16 @@ class Bodies {
         Index body = -1;
     };
     const std::vector<Faces>& faces() const { return faces_; }
+    /// Of each muscle, and which of all() has their chunks.
+    struct OfMuscle {
+        const Fibres* fibres;
+        Index body;
+    };
+    const std::vector<OfMuscle>& fibres() const { return fibres_; }
     /// The nodes of each rigid part, its own first.
     const std::vector<std::vector<Index>>& rigid_nodes() const { return rigid_nodes_; }
+    /// How many those are: ten, and the vertices of its surface.
+    Index n_own(std::size_t part) const { return static_cast<Index>(rigid_points_[part].rows()); }
     /// Of the smallest rigid part, half the edge of the cube around its tetrahedron [m]; infinite without.
     double rigid_length() const;
     /// How many vertices the caller's sheets and solids have; those of rigid parts follow.
@@ -37,7 +47,8 @@ class Bodies {
     /// What each element of a sheet couples, and each couple.
     std::vector<Stencil> stencils(const SceneInput& input) const;
 
-    /// What each element of a solid or of a sheet of six-node faces couples, and the corners of rigid parts that a joint couples.
+    /// What each element of a solid or of a sheet of six-node faces couples, the corners of rigid parts that a joint couples, and what volumes and tendons
+    /// couple beyond that.
     std::vector<Clique> cliques() const;
 
     VectorXd rest_state() const;
@@ -74,23 +85,26 @@ class Bodies {
     void add_surface(const Surface* surface);
     void add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering);
     void couple_links(const SceneInput& input);
+    void couple_volumes_and_tendons(const SceneInput& input);
 
     std::vector<std::unique_ptr<Sheet>> owned_;
     std::vector<std::unique_ptr<Solid>> owned_solids_;
     std::vector<std::unique_ptr<SixNodeSheet>> owned_six_node_sheets_;
     std::vector<std::unique_ptr<Surface>> owned_skins_;
     std::vector<std::unique_ptr<SurfaceBody>> owned_surfaces_;
+    std::vector<std::unique_ptr<Fibres>> owned_fibres_;
     std::vector<const Sheet*> sheets_;
     std::vector<const Solid*> solids_;
     std::vector<const SixNodeSheet*> six_node_sheets_;
     std::vector<const Body*> all_;
     std::vector<Faces> faces_;
+    std::vector<OfMuscle> fibres_;
     Nodes nodes_;
     std::vector<Index> copies_;  // the caller's vertices that are welded to an earlier one
     Index n_edges_ = 0, n_body_vertices_ = 0;
     std::vector<std::vector<Index>> rigid_nodes_;
     std::vector<Rows3> rigid_points_;
-    std::vector<std::vector<Index>> coupled_corners_;
+    std::vector<std::vector<Index>> coupled_;
 };
 
 }  // namespace magshell

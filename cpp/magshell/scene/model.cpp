@@ -6,7 +6,10 @@
 
 #include "magshell/assembly/skeleton_carrier.h"
 #include "magshell/core/errors.h"
+#include "magshell/linalg/low_rank_factor.h"
 #include "magshell/term/body_contact_term.h"
+#include "magshell/term/border_term.h"
+#include "magshell/term/damper_term.h"
 
 namespace magshell {
 namespace {
@@ -21,9 +24,9 @@ std::vector<HeldNode> renumbered(std::vector<HeldNode> held, const Bodies& bodie
 }
 
 // Of skeletons, then of the parts that are no links.
-Carriers carriers_of(const Bodies& bodies, const std::vector<SkeletonInput>& skeletons) {
+Carriers carriers_of(const Bodies& bodies, const std::vector<SkeletonInput>& skeletons, Registry& registry) {
     const auto link = [&](Index part) {
-        return RigidNodes(bodies.rigid_nodes()[part], RigidInput::own, bodies.nodes().rest);
+        return RigidNodes(bodies.rigid_nodes()[part], bodies.n_own(part), bodies.nodes().rest);
     };
     std::vector<char> joined(bodies.rigid_nodes().size(), 0);
     Carriers carriers;
@@ -33,7 +36,15 @@ Carriers carriers_of(const Bodies& bodies, const std::vector<SkeletonInput>& ske
             links.push_back(link(part));
             joined[part] = 1;
         }
-        carriers.push_back(std::make_unique<SkeletonCarrier>(std::move(links), skeleton.joints));
+        std::vector<Slot> motors(skeleton.joints.size());
+        for (std::size_t k = 0; k < motors.size(); ++k)
+            if (skeleton.joints[k].driven)
+                motors[k] = registry.values.add(
+                    skeleton.owners[k],
+                    skeleton.joints[k].kind == JointKind::revolute ? "motor_angle" : "motor_displacement",
+                    "SI", 1, 1);
+        carriers.push_back(
+            std::make_unique<SkeletonCarrier>(std::move(links), skeleton.joints, std::move(motors)));
     }
     for (Index part = 0; part < static_cast<Index>(joined.size()); ++part)
         if (!joined[part])
@@ -48,7 +59,7 @@ Model::Model(const SceneInput& input)
     : bodies_(input),
       matrix_(nodes().n_nodes(), nodes().scalars, bodies_.stencils(input), bodies_.cliques()),
       reduction_(matrix_, renumbered(input.held, bodies_), nodes(), input.moves, registry_,
-                 carriers_of(bodies_, input.skeletons)),
+                 carriers_of(bodies_, input.skeletons, registry_)),
       schedule_(nodes().n_nodes(), bodies_.all()),
       sources_(input.field_sources, registry_),
       of_body_(bodies_.all().size()),
@@ -107,6 +118,23 @@ void Model::hand_out_values() {
     }
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->set_values(values_);
     if (cancels_otherwise) cancelling_forces_.resize(0);
+    ++values_version_;
+}
+
+NodeMatrix Model::surrogate() const {
+    NodeMatrix sum(nodes().n_nodes());
+    for (const std::unique_ptr<Term>& term : terms_)
+        if (!term->add_surrogate(sum))
+            throw InvalidInput("Projective Dynamics has no constant matrix for the " +
+                               std::string(term->name()) + " energy of this scene");
+    sum.finish();
+    return sum;
+}
+
+VectorXd Model::touching_stiffness() const {
+    VectorXd of_nodes = VectorXd::Zero(nodes().n_nodes());
+    for (const std::unique_ptr<Term>& term : terms_) term->add_touching_stiffness(of_nodes);
+    return of_nodes;
 }
 
 // A sheet that has fallen or flown far knows its shape less exactly. By powers of two, so that most states
@@ -122,50 +150,32 @@ VectorXd Model::cancelling_forces(const VectorXd& q) {
         for (const std::unique_ptr<Term>& term : terms_)
             term->add_cancelling_forces(beyond, cancelling_forces_);
     }
-    return history_scale_ * cancelling_forces_;
+    VectorXd forces = elastic_.scale() * cancelling_forces_;
+    if (damper_term_) damper_term_->add_cancelling_stage_forces(beyond_, forces);
+    return forces;
 }
 
 void Model::vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda, Gradient& out) {
     for (const std::unique_ptr<Term>& term : terms_) term->vjp(q.data(), controls, lambda.data(), out);
 }
 
-void Model::set_history(double scale, const StrainSet* shift) {
-    history_scale_ = scale;
-    for (std::size_t k = 0; k < elastic_.size(); ++k)
-        elastic_[k]->set_history({scale, shift ? &shift->of_terms[k] : nullptr});
-}
-
-StrainSet Model::strains(const VectorXd& q) {
-    StrainSet strains;
-    for (ElasticTerm* term : elastic_) strains.of_terms.push_back(term->strains(q.data()));
-    return strains;
-}
-
-StrainSet Model::strain_rates(const VectorXd& p) {
+StrainSet Model::damper_rates(const VectorXd& q, const VectorXd& v) const {
     StrainSet rates;
-    for (ElasticTerm* term : elastic_) rates.of_terms.push_back(term->strain_rates(p.data()));
+    if (damper_term_) rates.of_terms.push_back(damper_term_->rates(q.data(), v.data()));
     return rates;
 }
 
-VectorXd Model::strain_forces(const StrainSet& stresses) {
-    Residual forces;
-    forces.reset(size());
-    for (std::size_t k = 0; k < elastic_.size(); ++k) elastic_[k]->add_forces(stresses.of_terms[k], forces);
-    return std::move(forces.gradient);
+void Model::damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates, VectorXd& by_q,
+                             VectorXd& by_v) const {
+    if (damper_term_) damper_term_->rates_vjp(q.data(), v.data(), by_rates.of_terms.front(), by_q, by_v);
 }
 
 const ElasticTerm& Model::elastic_term(Index sheet, std::string_view name) const {
-    const auto found = std::find_if(elastic_.begin(), elastic_.end(), [&](const ElasticTerm* term) {
+    const std::vector<ElasticTerm*>& all = elastic_.all();
+    const auto found = std::find_if(all.begin(), all.end(), [&](const ElasticTerm* term) {
         return term->body() == sheet && term->name() == name;
     });
     return **found;
-}
-
-StrainSet Model::stresses(const StrainSet& strains) const {
-    StrainSet stresses;
-    for (std::size_t k = 0; k < elastic_.size(); ++k)
-        stresses.of_terms.push_back(elastic_[k]->stresses(strains.of_terms[k]));
-    return stresses;
 }
 
 std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
@@ -173,6 +183,7 @@ std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
     spare_ = nullptr;
     if (!analysed_ || analysed_->pattern() != reduction_.pattern()) {
         analysed_ = analyze(reduction_.pattern(), {.points = free_points(), .watch = watch});
+        if (!borders_.empty()) analysed_ = std::make_unique<LowRankFactor>(std::move(analysed_));
         ++analyses_;
     }
     return analysed_->sibling();
@@ -235,8 +246,11 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
     };
     clear(first_nodes_.size() - 1);
     // All terms of a chunk before the next chunk: its share of the matrix is cleared and filled in the cache.
-    if (body_contact_) body_contact_->be_cautious(cautious);
-    for (const std::unique_ptr<Term>& term : terms_) term->prepare_assembly(q.data(), controls);
+    for (BorderTerm* term : borders_) term->take_extrapolated(extrapolated_stress, cautious);
+    for (const std::unique_ptr<Term>& term : terms_) {
+        term->be_cautious(cautious);
+        term->prepare_assembly(q.data(), controls);
+    }
     if (layer_ && layer_->version() != coupled_) {
         reduction_.set_pattern(matrix_, &layer_->matrix());
         coupled_ = layer_->version();
@@ -247,6 +261,8 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
             term->assemble(chunk, q.data(), controls, extrapolated_stress, matrix_);
     });
     for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
+    low_rank_.clear();
+    for (const BorderTerm* term : borders_) term->add_low_rank(controls, low_rank_);
     add_remainders(q, controls);
 }
 
@@ -257,17 +273,26 @@ SystemMatrix* Model::contact_matrix() {
 void Model::multiply(const VectorXd& x, VectorXd& out) const {
     matrix_.multiply(x.data(), out.data());
     if (coupled_ > 0) layer_->matrix().add_product(x.data(), out.data());
+    low_rank_.add_product(x, out);
 }
 
 VectorXd Model::diagonal() const {
     VectorXd sum = VectorXd::Zero(size());
     matrix_.add_diagonal(sum);
     if (coupled_ > 0) layer_->matrix().add_diagonal(sum);
+    low_rank_.add_diagonal(sum);
     return sum;
 }
 
 void Model::reduce_matrix(LargeVector<double>& values) {
     reduction_.matrix(matrix_, contact_matrix(), values);
+}
+
+void Model::reduce_matrix(Factor& factor) {
+    reduce_matrix(factor.values());
+    if (!borders_.empty())
+        static_cast<LowRankFactor&>(factor).set_low_rank(low_rank_.reduced(reduction_, size()),
+                                                         low_rank_.stiffness());
 }
 
 void Model::share_out_columns() {
@@ -295,6 +320,10 @@ double Model::largest_share(const VectorXd& q, const VectorXd& p) const {
     double share = 1.0;
     for (const Term* term : refusing_) share = std::min(share, term->largest_share(q.data(), p.data()));
     return share;
+}
+
+bool Model::touches() const {
+    return body_contact_ && !body_contact_->touching().empty();
 }
 
 std::string Model::refusal(const VectorXd& q) const {
@@ -340,19 +369,6 @@ void Model::set_turns(const Turns& turns) {
     if (!fits) throw InvalidInput("the start remembers a motion of another scene: start from its positions");
     for (std::size_t k = 0; k < terms_.size(); ++k)
         terms_[k]->set_turns(turns.empty() ? std::vector<double>(terms_[k]->turns().size(), 0.0) : turns[k]);
-}
-
-StrainSet Model::no_strains() const {
-    StrainSet strains;
-    for (const ElasticTerm* term : elastic_)
-        strains.of_terms.emplace_back(term->elements(), term->strains_per_element());
-    return strains;
-}
-
-Index Model::n_strains() const {
-    Index count = 0;
-    for (const ElasticTerm* term : elastic_) count += term->strains_per_element() * term->elements();
-    return count;
 }
 
 std::size_t Model::bytes() const {

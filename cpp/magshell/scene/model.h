@@ -12,18 +12,22 @@
 
 #include "magshell/assembly/contact_layer.h"
 #include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/low_rank.h"
 #include "magshell/assembly/reduction.h"
 #include "magshell/body/membrane_faces.h"
 #include "magshell/linalg/factor.h"
 #include "magshell/scene/bodies.h"
 #include "magshell/scene/varying.h"
-#include "magshell/term/elastic_term.h"
 #include "magshell/term/field_sources.h"
 #include "magshell/term/force_term.h"
+#include "magshell/term/viscous_terms.h"
 
 namespace magshell {
 
 class BodyContactTerm;
+class BorderTerm;
+class DamperTerm;
+class MuscleTerm;
 
 class Model {
   public:
@@ -53,6 +57,10 @@ class Model {
     void multiply(const VectorXd& x, VectorXd& out) const;
     VectorXd diagonal() const;
     void reduce_matrix(LargeVector<double>& values);
+    /// All of it, for the next factorization.
+    void reduce_matrix(Factor& factor);
+    /// What of the Hessian as assembled last is in low_rank() and not in matrix().
+    const LowRank& low_rank() const { return low_rank_; }
     SystemMatrix* contact_matrix();
     const Residual& residual() const { return residual_; }
     Index size() const { return nodes().n_unknowns(); }
@@ -63,8 +71,8 @@ class Model {
     const VectorXd& metric() const { return metric_; }
     /// The floor under every residual of a state, to be multiplied by the unit of round-off.
     VectorXd cancelling_forces(const VectorXd& q);
-    /// Adds what of it points that touch had at the last evaluated state, with the forces of a time step or without.
-    void add_cancelling_contact_forces(bool in_motion, VectorXd& out) const;
+    /// Adds what of it there is at the last evaluated state, with the forces of a time step or without.
+    void add_cancelling_forces_here(bool in_motion, VectorXd& out) const;
 
     double energy(const VectorXd& q, const Controls& controls) const;
     /// In the order of energies(); terms of one name, of several bodies, follow each other.
@@ -98,9 +106,13 @@ class Model {
     bool has_forces() const { return !forces_.empty(); }
     void begin_step(const VectorXd& q, const Controls& controls);
     bool has_contact() const { return contact_ != nullptr; }
+    /// With obstacles; nullptr: there is none.
+    ContactTerm* contact() const { return contact_; }
     /// Whether bodies keep each other, or themselves, out.
     bool has_body_contact() const { return body_contact_ != nullptr; }
     const BodyContactTerm* body_contact() const { return body_contact_; }
+    /// Whether any pair of them touches at the last evaluated state.
+    bool touches() const;
     /// Why a step from q to `end` cannot be: a point would be on the other side of an obstacle. Else empty.
     std::string blocked(const VectorXd& q, const Controls& controls, const VectorXd& end,
                         const Controls& controls_at_end) const;
@@ -115,15 +127,15 @@ class Model {
     /// they hold.
     void vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda, Gradient& out);
 
-    /// The elastic terms' stresses are C (scale d - shift) from now on, and C d without a shift.
-    void set_history(double scale, const StrainSet* shift);
-    StrainSet strains(const VectorXd& q);
-    /// Zeros.
-    StrainSet no_strains() const;
-    /// At the last evaluated state: J p, and J^T s.
-    StrainSet strain_rates(const VectorXd& p);
-    VectorXd strain_forces(const StrainSet& stresses);
-    StrainSet stresses(const StrainSet& strains) const;
+    /// What a law of viscosity is about: elastic terms; and dampers in joints, which may be none.
+    ViscousTerms& elastic() { return elastic_; }
+    const ViscousTerms& elastic() const { return elastic_; }
+    ViscousTerms& dampers() { return dampers_; }
+    const ViscousTerms& dampers() const { return dampers_; }
+    /// How fast dampers are drawn at q, as nodes move by v; and the way back.
+    StrainSet damper_rates(const VectorXd& q, const VectorXd& v) const;
+    void damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates, VectorXd& by_q,
+                          VectorXd& by_v) const;
     /// Whether some states have no energy, as of solids turned inside out; then, of a step p from q, the largest
     /// share up to which there is one, and what is wrong with a state, in words.
     bool refuses_states() const { return !refusing_.empty(); }
@@ -140,8 +152,16 @@ class Model {
     /// The elastic term of a solid.
     const SolidTerm& solid_term(Index solid) const { return *solid_terms_[solid]; }
 
-    /// How many numbers a set of strains has.
-    Index n_strains() const;
+    const MuscleTerm& muscle_term(Index muscle) const { return *muscle_terms_[muscle]; }
+    Index n_muscles() const { return static_cast<Index>(muscle_terms_.size()); }
+
+    /// What Projective Dynamics has in the place of the Hessian: constant while the values are. Throws InvalidInput where a
+    /// term has none, and says which.
+    NodeMatrix surrogate() const;
+    /// What the obstacles that are touched at the last evaluated state add on the nodes [N/m].
+    VectorXd touching_stiffness() const;
+    /// Counts changes of the values.
+    int values_version() const { return values_version_; }
 
     /// A factorization for the reduced Hessian, analysed once for all of them. `watch` is called now and then
     /// meanwhile, and may throw.
@@ -171,10 +191,13 @@ class Model {
     void add_joints(const SceneInput& input);
     void add_solids(const SceneInput& input);
     void add_couples(const SceneInput& input);
+    void add_volumes(const SceneInput& input);
     void add_contacts(const SceneInput& input);
     void add_body_contacts(const SceneInput& input);
     void share_out_columns();
+    void add_muscles(const SceneInput& input);
     void add_remainders(const VectorXd& q, const Controls& controls);
+    bool feels_skews(std::size_t from) const;  // of remainder_, from that one on
     void hand_out_values();
     template <class Function>
     VectorXd rate_by_varying(const Controls& at, const Controls& rate, const Function& function);
@@ -191,11 +214,13 @@ class Model {
     FieldSources sources_;
     std::vector<std::unique_ptr<Term>> terms_;
     std::vector<std::vector<const Term*>> of_body_;  // those assembled by its chunks
-    std::vector<ElasticTerm*> elastic_;
+    ViscousTerms elastic_, dampers_;
+    const DamperTerm* damper_term_ = nullptr;
     std::vector<const SolidTerm*> solid_terms_;
+    std::vector<const MuscleTerm*> muscle_terms_;
     std::vector<const Term*> refusing_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
-    const ContactTerm* contact_ = nullptr;
+    ContactTerm* contact_ = nullptr;
     bool follows_ = false, unsymmetric_ = false;
     BodyContactTerm* body_contact_ = nullptr;
     std::unique_ptr<ContactLayer> layer_;  // nullptr: no bodies touch each other
@@ -207,15 +232,16 @@ class Model {
     VectorXd standing_;      // the values, before any varied
     Kinematics kinematics_;  // where the forces were evaluated last
     Remainder remainder_;
+    LowRank low_rank_;
+    std::vector<BorderTerm*> borders_;  // those that it is of
     std::unique_ptr<Factor> analysed_;
     std::shared_ptr<Factor> spare_;
-    int analyses_ = 0;
+    int analyses_ = 0, values_version_ = 0;
     double length_scale_ = 0.0;
     Residual residual_;
     VectorXd metric_;
     VectorXd cancelling_forces_;  // of the elastic terms, without history
     double beyond_ = 0.0;         // [m] by how much coordinates were larger than at rest then
-    double history_scale_ = 1.0;
     double extent_, rest_reach_;  // [m]
     std::mutex in_use_;
 };

@@ -5,6 +5,7 @@
 #include "magshell/core/errors.h"
 #include "magshell/scene/model.h"
 #include "magshell/term/body_contact_term.h"
+#include "magshell/term/border_term.h"
 
 namespace magshell {
 
@@ -13,22 +14,33 @@ void Model::add_remainders(const VectorXd& q, const Controls& controls) {
     unsymmetric_ = false;
     if (!follows_) return;
     for (const std::unique_ptr<Term>& term : terms_) term->add_remainder(q.data(), controls, remainder_);
-    unsymmetric_ =
-        std::any_of(remainder_.skews().begin(), remainder_.skews().end(), [&](const Remainder::Skew& each) {
-            return reduction_.feels_skew(each.nodes[0], each.nodes[1], each.axis);
-        });
+    unsymmetric_ = feels_skews(0);
+}
+
+bool Model::feels_skews(std::size_t from) const {
+    return std::any_of(remainder_.skews().begin() + static_cast<std::ptrdiff_t>(from),
+                       remainder_.skews().end(), [&](const Remainder::Skew& each) {
+                           return reduction_.feels_skew(each.nodes[0], each.nodes[1], each.axis);
+                       });
 }
 
 void Model::require_symmetric() const {
-    if (unsymmetric_)
+    if (!unsymmetric_) return;
+    if (std::none_of(terms_.begin(), terms_.end(),
+                     [](const auto& term) { return term->name() == "pressure"; }))
         throw InvalidInput(
-            "the pressure has no potential here, so the stiffness is not symmetric: its faces end at a "
-            "border that is "
-            "free, or neighbouring faces have different pressures. Equilibria, motions and their gradients "
-            "can be "
-            "computed, vibrations, buckling loads and followed paths cannot: close the surface, hold its "
-            "border, or "
-            "give one pressure to all of it");
+            "the torque of a Ball has no potential, so the stiffness is not symmetric. Equilibria, motions "
+            "and "
+            "their gradients can be computed, vibrations, buckling loads and followed paths cannot: take the "
+            "torques of Revolute joints instead");
+    throw InvalidInput(
+        "the pressure has no potential here, so the stiffness is not symmetric: its faces end at a "
+        "border that is "
+        "free, or neighbouring faces have different pressures. Equilibria, motions and their gradients "
+        "can be "
+        "computed, vibrations, buckling loads and followed paths cannot: close the surface, hold its "
+        "border, or "
+        "give one pressure to all of it");
 }
 
 void Model::begin_step(const VectorXd& q, const Controls& controls) {
@@ -54,7 +66,8 @@ void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const S
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
 }
 
-void Model::add_cancelling_contact_forces(bool in_motion, VectorXd& out) const {
+void Model::add_cancelling_forces_here(bool in_motion, VectorXd& out) const {
+    for (const BorderTerm* term : borders_) term->add_cancelling_here(out);
     if (contact_) contact_->add_cancelling_normal_forces(out);
     if (body_contact_) body_contact_->add_cancelling_normal_forces(out);
     if (!in_motion) return;
@@ -66,9 +79,10 @@ void Model::hold_forces(bool held) {
 }
 
 void Model::assemble_forces(const Controls& controls, bool cautious) {
+    const std::size_t before = remainder_.skews().size();
     for (const std::unique_ptr<ForceTerm>& force : forces_)
         force->assemble(kinematics_, controls, cautious, matrix_, remainder_);
-    unsymmetric_ |= remainder_.of_motion();
+    unsymmetric_ = unsymmetric_ || remainder_.of_motion() || feels_skews(before);
 }
 
 KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda, Gradient& out) const {

@@ -39,7 +39,7 @@ VectorXd Model::gradient_rate(const VectorXd& q, const Controls& at, const Contr
                Residual gradient;
                gradient.reset(size());
                for (const std::unique_ptr<Term>& term : terms_)
-                   if (term->body() < 0 || term->driven()) term->evaluate(q.data(), there, gradient);
+                   if (term->varies()) term->evaluate(q.data(), there, gradient);
                return gradient.gradient;
            });
 }

@@ -5,10 +5,12 @@
 #include "magshell/scene/model.h"
 #include "magshell/strain/fold_angle.h"
 #include "magshell/term/bending_six_term.h"
+#include "magshell/term/ball_torque_term.h"
 #include "magshell/term/bending_term.h"
 #include "magshell/term/body_contact_term.h"
 #include "magshell/term/body_friction_term.h"
 #include "magshell/term/couple_term.h"
+#include "magshell/term/damper_term.h"
 #include "magshell/term/friction_term.h"
 #include "magshell/term/joint_term.h"
 #include "magshell/term/load_term.h"
@@ -17,6 +19,7 @@
 #include "magshell/term/membrane_six_term.h"
 #include "magshell/term/membrane_term.h"
 #include "magshell/term/moment_term.h"
+#include "magshell/term/muscle_term.h"
 #include "magshell/term/pressure_term.h"
 #include "magshell/term/water_term.h"
 
@@ -55,18 +58,19 @@ void Model::add_terms(const SceneInput& input) {
         std::unique_ptr<MembraneTerm> term = std::make_unique<MembraneTerm>(
             *bodies_.sheets()[body], body, *membrane_faces_[body],
             membrane_loops_[body] ? *membrane_loops_[body] : *loops_[body], nodes(), registry_);
-        elastic_.push_back(term.get());
+        elastic_.add(term.get());
         terms_.push_back(std::move(term));
     }
     for (Index body = 0; body < count; ++body) {
         std::unique_ptr<BendingTerm> term = std::make_unique<BendingTerm>(
             *bodies_.sheets()[body], body, schedule_.of(body), nodes(), matrix_, registry_);
-        elastic_.push_back(term.get());
+        elastic_.add(term.get());
         terms_.push_back(std::move(term));
     }
     for (const SixNodeSheet* sheet : bodies_.six_node_sheets()) add_six_node_sheet(*sheet);
     add_magnetic_terms(input);
     add_solids(input);
+    add_muscles(input);
     for (const FaceEnergyInput& given : input.face_energies) {
         const auto& [surface, body] = bodies_.faces()[given.body];
         terms_.push_back(given.energy->term(given.owner, body, *surface, *loops_[given.body], registry_));
@@ -75,6 +79,7 @@ void Model::add_terms(const SceneInput& input) {
         terms_.push_back(std::make_unique<PressureTerm>(input.pressures, nodes(), matrix_, registry_));
         follows_ = true;
     }
+    add_volumes(input);
     add_moments(input);
     add_joints(input);
     if (input.gravity)
@@ -93,7 +98,7 @@ void Model::add_six_node_sheet(const SixNodeSheet& sheet) {
     const std::vector<const Body*>& all = bodies_.all();
     const Index body = static_cast<Index>(std::find(all.begin(), all.end(), &sheet) - all.begin());
     const auto add = [&](auto term) {
-        elastic_.push_back(term.get());
+        elastic_.add(term.get());
         terms_.push_back(std::move(term));
     };
     const ChunkLoop& chunks = schedule_.of(body);
@@ -118,6 +123,15 @@ void Model::add_magnetic_terms(const SceneInput& input) {
     }
 }
 
+void Model::add_volumes(const SceneInput& input) {
+    const auto add = [&](std::unique_ptr<BorderTerm> term) {
+        borders_.push_back(term.get());
+        terms_.push_back(std::move(term));
+    };
+    if (!input.volumes.empty()) add(std::make_unique<VolumeTerm>(input.volumes, nodes(), matrix_, registry_));
+    if (!input.tendons.empty()) add(std::make_unique<TendonTerm>(input.tendons, nodes(), matrix_, registry_));
+}
+
 void Model::add_moments(const SceneInput& input) {
     std::vector<MomentTerm::Magnet> magnets;
     for (std::size_t k = 0; k < input.rigid.size(); ++k)
@@ -131,19 +145,33 @@ void Model::add_moments(const SceneInput& input) {
 void Model::add_joints(const SceneInput& input) {
     const auto corners = [&](Index part) { return part < 0 ? nullptr : bodies_.rigid_nodes()[part].data(); };
     std::vector<JointTerm::Input> joints;
+    std::vector<DamperTerm::Input> damped;
+    std::vector<BallTorqueTerm::Input> twisted;
     for (const SkeletonInput& skeleton : input.skeletons)
         for (std::size_t k = 0; k < skeleton.links.size(); ++k) {
+            if (skeleton.owners[k].empty()) continue;
             const Joint& joint = skeleton.joints[k];
-            if (!skeleton.owners[k].empty())
-                joints.push_back({skeleton.owners[k], joint,
-                                  corners(joint.parent < 0 ? -1 : skeleton.links[joint.parent]),
-                                  corners(skeleton.links[k])});
+            const Index *parent = corners(joint.parent < 0 ? -1 : skeleton.links[joint.parent]),
+                        *child = corners(skeleton.links[k]);
+            joints.push_back({skeleton.owners[k], joint, parent, child});
+            if (joint.damped) damped.push_back({skeleton.owners[k], joint, parent, child});
+            if (joint.twisted) twisted.push_back({skeleton.owners[k], parent, child});
         }
     for (const ClosureInput& closure : input.closures)
         joints.push_back({closure.owner, Joint{JointKind::ball, -1, closure.place, Vec3::Zero()},
                           corners(closure.parent), corners(closure.child), true});
     if (!joints.empty())
         terms_.push_back(std::make_unique<JointTerm>(joints, nodes().rest, matrix_, registry_));
+    if (!damped.empty()) {
+        std::unique_ptr<DamperTerm> term =
+            std::make_unique<DamperTerm>(damped, nodes().rest, matrix_, registry_);
+        damper_term_ = term.get();
+        dampers_.add(term.get());
+        terms_.push_back(std::move(term));
+    }
+    if (twisted.empty()) return;
+    terms_.push_back(std::make_unique<BallTorqueTerm>(twisted, nodes().rest, registry_));
+    follows_ = true;
 }
 
 void Model::add_solids(const SceneInput& input) {
@@ -152,9 +180,19 @@ void Model::add_solids(const SceneInput& input) {
         std::unique_ptr<SolidTerm> term =
             make_solid_term(input.solids[k].response, *bodies_.solids()[k], body, schedule_.of(body), matrix_,
                             nodes(), registry_);
-        elastic_.push_back(term.get());
+        elastic_.add(term.get());
         solid_terms_.push_back(term.get());
         terms_.push_back(std::move(term));
+    }
+}
+
+void Model::add_muscles(const SceneInput& input) {
+    for (std::size_t k = 0; k < input.muscles.size(); ++k) {
+        const auto& [fibres, body] = bodies_.fibres()[k];
+        Muscle muscle = make_muscle(input.muscles[k], *fibres, body, schedule_.of(body), matrix_, registry_);
+        muscle_terms_.push_back(muscle.term.get());
+        terms_.push_back(std::move(muscle.term));
+        if (muscle.force) forces_.push_back(std::move(muscle.force));
     }
 }
 

@@ -15,8 +15,11 @@
 #include "magshell/term/body_contact_input.h"
 #include "magshell/term/contact_term.h"
 #include "magshell/term/face_energy.h"
+#include "magshell/term/muscle_fibres.h"
 #include "magshell/term/pressure_term.h"
 #include "magshell/term/solid_term.h"
+#include "magshell/term/tendon_term.h"
+#include "magshell/term/volume_term.h"
 
 namespace magshell {
 
@@ -71,7 +74,7 @@ struct FaceEnergyInput {
 /// middles of its edges.
 struct RigidInput {
     std::string owner;
-    Rows3 points;                 // (10, 3) at rest; the scene's vertices after all others
+    Rows3 points;                 // (10, 3) at rest, then its surface's: the tens of all parts come first
     std::vector<Index> vertices;  // the scene's
     bool magnetic = false;
 
@@ -100,6 +103,7 @@ struct SceneInput {
     std::vector<SixNodeSheetInput> six_node_sheets;
     std::vector<SolidInput> solids;  // numbered on after the sheets
     std::vector<SkinInput> skins;
+    std::vector<MuscleInput> muscles;
     std::vector<RigidInput> rigid;
     std::vector<SkeletonInput> skeletons;
     std::vector<ClosureInput> closures;
@@ -109,6 +113,8 @@ struct SceneInput {
     std::vector<EdgeCoupleInput> couples;
     std::vector<FaceEnergyInput> face_energies;
     std::vector<PressureInput> pressures;
+    std::vector<VolumeInput> volumes;
+    std::vector<TendonInput> tendons;
     bool gravity = false, loads = false;
     std::vector<std::shared_ptr<const AppliedField>> field_sources;
     std::vector<ContactInput> contacts;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "magshell/core/errors.h"
+#include "magshell/solve/energy_balance.h"
 #include "magshell/solve/rotations.h"
 #include "magshell/term/body_contact_term.h"
 
@@ -15,17 +16,16 @@ constexpr double smallest_part = 1.0 / 64.0;  // of a step
 
 // At the beginning of a step or of a part of one, and at its stages.
 std::vector<Controls> controls_of(const MotionInput& input, const Tableau& tableau, Index step,
-                                  std::pair<double, double> substep) {
-    std::vector<Controls> controls = {input.controls_at(step, substep.first)};
+                                  const Substep& substep) {
+    std::vector<Controls> controls = {input.controls_at(step, substep.begin)};
     for (int i = 0; i < tableau.stages; ++i)
-        controls.push_back(
-            input.controls_at(step, substep.first + tableau.time(i) * (substep.second - substep.first)));
+        controls.push_back(input.controls_at(step, substep.begin + tableau.time(i) * substep.share()));
     return controls;
 }
 
 std::size_t bytes_of(const MotionState& state) {
     return sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() + state.rates.w.size()) +
-           state.e.bytes() + state.rates.d.bytes() + state.rates.e.bytes();
+           state.e.bytes() + state.rates.elastic.d.bytes() + state.rates.elastic.e.bytes();
 }
 
 std::size_t bytes_of(const SubstepRecord& substep) {
@@ -42,14 +42,14 @@ MotionState beginning(Model& model, const MotionInput& input) {
     model.take(input.controls_at(0, 0.0));
     if (!input.rotations_given)
         start.q += RotationsAtRest(model, start.q, input.controls_at(0, 0.0)).correction();
-    if (input.viscosity.maxwell() && start.e.empty()) start.e = model.strains(start.q);
+    if (input.viscosity.maxwell() && start.e.empty()) start.e = model.elastic().strains(start.q);
     return start;
 }
 
 // The last state; its energies are not known yet.
 void record_state(const Model& model, const MotionInput& input, MotionResult& result) {
     const MotionState& state = result.last;
-    result.recorded.push_back({state.q, state.v, state.turns, {}, {}});
+    result.recorded.push_back({state.q, state.v, state.turns, {}, {}, state.driving, state.held});
     result.kinetic_energy.push_back(0.5 * state.v.dot(input.inertia.mass.cwiseProduct(state.v)));
     result.energies.emplace_back(model.term_names().size(), std::numeric_limits<double>::quiet_NaN());
 }
@@ -61,7 +61,8 @@ class Run {
           model_(newton.model()),
           input_(input),
           result_(result),
-          stepper_(newton, input.tableau, input.inertia, input.viscosity) {
+          stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
+          balance_(model_, input.inertia) {
         result_.start = result_.last = beginning(newton.model(), input);
         result_.begun = true;
         if (keep.gradients) plan(keep);
@@ -88,7 +89,7 @@ class Run {
     void plan(const KeepOptions& keep) {
         const bool explicit_first = input_.tableau.begins_explicitly;
         const std::size_t vector = sizeof(double) * model_.size();
-        const std::size_t strains = sizeof(double) * model_.n_strains();
+        const std::size_t strains = sizeof(double) * model_.elastic().size();
         std::size_t state = (explicit_first ? 4 : 2) * vector;
         if (input_.viscosity.maxwell()) state += strains;
         if (explicit_first && input_.viscosity.any()) state += (input_.viscosity.maxwell() ? 2 : 1) * strains;
@@ -134,26 +135,37 @@ class Run {
         const bool keep = result_.keep == Keep::stages || result_.keep == Keep::factors ||
                           (result_.keep == Keep::checkpoints && last);
         std::vector<SubstepRecord> records;
-        Substeps done, ahead = begins_gently(state) ? gentle_beginning() : Substeps{{0.0, 1.0}};
+        Substeps done, ahead = begins_gently(state) ? gentle_beginning() : Substeps{Substep{}};
         while (!ahead.empty()) {
-            const std::pair<double, double> substep = ahead.back();
+            const Substep substep = ahead.back();
             ahead.pop_back();
             SubstepRecord record;
-            const std::vector<Controls> controls =
-                controls_of(input_, stepper_.tableau_from(state), step, substep);
-            const double share = substep.second - substep.first;
-            if (stepper_.step(state, share * input_.time_step, controls, keep ? &record : nullptr,
-                              result_.keep == Keep::factors, result_.reason)) {
+            const Tableau& tableau = stepper_.tableau_from(state, substep.dissipative);
+            const std::vector<Controls> controls = controls_of(input_, tableau, step, substep);
+            const double dt = substep.share() * input_.time_step;
+            const bool recorded = keep || balance_.watches(), shortest = substep.share() <= smallest_part;
+            const bool taken =
+                stepper_.step(state, dt, substep.dissipative, controls, recorded ? &record : nullptr,
+                              result_.keep == Keep::factors, result_.reason);
+            const bool calm = substep.dissipative || input_.tableau.stages == 1;  // nothing is more so
+            const bool gains = taken && balance_.watches() && !(calm && shortest) &&
+                               balance_.gains(stepper_.algebra(dt, tableau), record, state, controls);
+            if (taken && !gains) {
                 done.push_back(substep);
                 if (keep) records.push_back(std::move(record));
                 continue;
             }
-            if (share <= smallest_part) return false;
-            const double middle = 0.5 * (substep.first + substep.second);
-            ahead.push_back({middle, substep.second});
-            ahead.push_back({substep.first, middle});
+            if (gains) state = std::move(record.begin);
+            if (gains && !calm) {
+                ahead.push_back({substep.begin, substep.end, true});
+                continue;
+            }
+            if (shortest) return false;
+            const double middle = 0.5 * (substep.begin + substep.end);
+            ahead.push_back({middle, substep.end, substep.dissipative});
+            ahead.push_back({substep.begin, middle, substep.dissipative});
         }
-        if (done.size() > 1) result_.halved[step] = done;
+        if (done.size() > 1 || done.front().dissipative) result_.halved[step] = done;
         if (keep) {
             for (const SubstepRecord& substep : records) result_.bytes += bytes_of(substep);
             result_.steps.push_back(std::move(records));
@@ -178,6 +190,7 @@ class Run {
     const MotionInput& input_;
     MotionResult& result_;
     Stepper stepper_;
+    EnergyBalance balance_;
     Index next_checkpoint_ = -1, slots_left_ = 0;
 };
 
@@ -205,16 +218,17 @@ Controls MotionInput::controls_at(Index step, double share) const {
 
 Substeps substeps_of(const std::map<Index, Substeps>& halved, Index step) {
     const auto found = halved.find(step);
-    return found == halved.end() ? Substeps{{0.0, 1.0}} : found->second;
+    return found == halved.end() ? Substeps{Substep{}} : found->second;
 }
 
 void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Substeps& substeps,
                  MotionState& state, std::vector<SubstepRecord>* kept) {
-    for (const std::pair<double, double>& substep : substeps) {
+    for (const Substep& substep : substeps) {
         SubstepRecord record;
         std::string reason;
-        const std::vector<Controls> controls = controls_of(input, stepper.tableau_from(state), step, substep);
-        if (!stepper.step(state, (substep.second - substep.first) * input.time_step, controls,
+        const std::vector<Controls> controls =
+            controls_of(input, stepper.tableau_from(state, substep.dissipative), step, substep);
+        if (!stepper.step(state, substep.share() * input.time_step, substep.dissipative, controls,
                           kept ? &record : nullptr, false, reason))
             throw InvalidInput("a step that was taken before cannot be repeated: " + reason);
         if (kept) kept->push_back(std::move(record));

@@ -1,4 +1,5 @@
-// A motion: steps of equal length, halved where one fails, and what is kept of them for the way back.
+// A motion: steps of equal length, halved where one fails, and what is kept of them for the way back. Where bodies touch
+// and a step gains energy that nobody put in, implicit Euler takes it instead, in halves where even that does.
 #pragma once
 
 #include <map>
@@ -21,7 +22,8 @@ struct MotionInput {
     std::vector<Controls> controls;
     Varying varying;  // values whose numbers stand in them, after the others
     NewtonOptions newton;
-    Index record_every = 1;  // steps between the states handed out, from the start on
+    ProjectiveOptions projective;  // where it solves the stages
+    Index record_every = 1;        // steps between the states handed out, from the start on
 
     /// At a share of a step.
     Controls controls_at(Index step, double share) const;
@@ -38,8 +40,14 @@ struct KeepOptions {
     Keep wanted = Keep::nothing;  // nothing: stages, or checkpoints where the budget does not hold them
 };
 
-/// A step in substeps, each from a share of the step to another.
-using Substeps = std::vector<std::pair<double, double>>;
+/// A part of a step, from a share of it to another; dissipative: by implicit Euler, whatever the method is.
+struct Substep {
+    double begin = 0.0, end = 1.0;
+    bool dissipative = false;
+
+    double share() const { return end - begin; }
+};
+using Substeps = std::vector<Substep>;
 
 struct MotionResult {
     Outcome outcome = Outcome::failed;
@@ -50,7 +58,7 @@ struct MotionResult {
     std::vector<MotionState> recorded;          // every record_every steps, the start first
     std::vector<double> kinetic_energy;         // [J], of those
     std::vector<std::vector<double>> energies;  // [J], of those, term by term; NaN if interrupted meanwhile
-    std::map<Index, Substeps> halved;           // the steps that were taken in substeps
+    std::map<Index, Substeps> halved;  // the steps that were taken in substeps, or in a dissipative one
     Keep keep = Keep::nothing;
     std::vector<std::vector<SubstepRecord>> steps;  // where stages are kept
     std::map<Index, MotionState> checkpoints;       // by the step that begins there

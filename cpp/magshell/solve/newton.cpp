@@ -1,13 +1,10 @@
 #include "magshell/solve/newton.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "magshell/core/errors.h"
-#include "magshell/solve/unsymmetric.h"
 
 namespace magshell {
 namespace {
@@ -47,10 +44,6 @@ double deserved(double residual, double tolerance) {
 // square of the step before: negligible after a small move.
 constexpr double negligible_move = 1e-7, small_move = 1e-4;
 
-// Of solves for gradients with a factorization from nearby: a soft sheet's solution has up to four digits less than its residual.
-constexpr double nearby_gradient_tolerance = 1e-14;
-constexpr int nearby_gradient_vectors = 30;
-
 // Friction keeps its normal forces while it lives, also where an interruption ends that.
 class HeldForces {
   public:
@@ -61,18 +54,6 @@ class HeldForces {
 
   private:
     Model& model_;
-};
-
-// Adds the time it lives to a sum.
-class Stopwatch {
-  public:
-    explicit Stopwatch(double& sum) : sum_(sum) {}
-    ~Stopwatch() { sum_ += std::chrono::duration<double>(Clock::now() - began_).count(); }
-
-  private:
-    using Clock = std::chrono::steady_clock;
-    double& sum_;
-    Clock::time_point began_ = Clock::now();
 };
 
 }  // namespace
@@ -100,31 +81,12 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
     VectorXd cancelling = model_.cancelling_forces(q);
     // In the inertia of a short step, positions cancel.
     if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q).cwiseAbs();
-    model_.add_cancelling_contact_forces(anchor.motion != nullptr, cancelling);
+    model_.add_cancelling_forces_here(anchor.motion != nullptr, cancelling);
     if (!with_floor) cancelling.setZero();
     return std::max(
         relative(free.head(nodes), magnitude.head(nodes), cancelling.head(nodes), options_.tolerance),
         relative(free.tail(rotations), magnitude.tail(rotations), cancelling.tail(rotations),
                  options_.tolerance));
-}
-
-FactorReport Newton::factorize_assembled(const VectorXd& q, const Anchor& anchor) {
-    if (!factor_ || factor_->pattern() != model_.reduction().pattern())
-        factor_ = model_.new_factor([this] { watch(watched_); });
-    LargeVector<double>& values = factor_->values();
-    model_.reduce_matrix(values);
-    if (anchor.weights) model_.reduction().add_weights(*anchor.weights, values);
-    if (model_.reduction().carries()) model_.reduction().add_curvature(gradient(q, anchor), values);
-    ++factorizations_;
-    const Stopwatch running(linear_time_);
-    FactorReport report;
-    try {
-        report = factor_->factorize();
-    } catch (const InvalidInput&) {
-        report.reason = "the forces are not finite: a face has no area, or lies where a field has no value";
-    }
-    if (!report.succeeded) ++failed_factorizations_;
-    return report;
 }
 
 void Newton::evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
@@ -139,76 +101,10 @@ void Newton::assemble(const VectorXd& q, const Controls& controls, bool extrapol
     unsymmetric_ = model_.unsymmetric();
 }
 
-FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor) {
-    evaluate(q, controls, anchor);
-    assemble(q, controls, false, anchor);
-    return factorize_assembled(q, anchor);
-}
-
-FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
-                               const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves, bool cautious) {
-    assemble(q, controls, extrapolated_stress, anchor, cautious);
-    for (Eigen::Index k = 0; k < moves.cols(); ++k) {
-        if (moves.col(k).isZero(0.0)) continue;
-        const VectorXd move = moves.col(k);
-        VectorXd pull(move.size());
-        model_.multiply(move, pull);
-        model_.remainder().add_product(move, false, pull);
-        moves.col(k) = pull;
-    }
-    return factorize_assembled(q, anchor);
-}
-
-GmresReport Newton::solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
-                                 const Factor& nearby, VectorXd& rhs) {
-    assemble(q, controls, false, anchor);
-    const Stopwatch running(linear_time_);
-    const Reduction& reduction = model_.reduction();
-    VectorXd stiffness = model_.diagonal(), whole(model_.size());
-    if (anchor.weights) stiffness += *anchor.weights;
-    // Forces of different kinds count alike, whatever their units.
-    const VectorXd scale = reduction.weights(stiffness).unaryExpr(
-        [](double each) { return each != 0.0 ? 1.0 / std::sqrt(std::abs(each)) : 1.0; });
-    const VectorXd forces = reduction.carries() ? gradient(q, anchor) : VectorXd();
-    const auto assembled = [&](const VectorXd& x) {
-        const VectorXd full = reduction.expand(x);
-        model_.multiply(full, whole);
-        if (anchor.weights) whole += anchor.weights->cwiseProduct(full);
-        if (unsymmetric_) model_.remainder().add_product(full, true, whole);
-        VectorXd image = reduction.vector(whole);
-        reduction.add_curvature_product(forces, x, image);
-        return VectorXd(scale.cwiseProduct(image));
-    };
-    const auto precondition = [&](VectorXd& x) {
-        x = x.cwiseQuotient(scale);
-        nearby.solve(x);
-    };
-    VectorXd reduced = scale.cwiseProduct(reduction.vector(rhs));
-    const GmresReport report =
-        gmres(assembled, precondition, reduced, {nearby_gradient_tolerance, nearby_gradient_vectors});
-    if (report.converged) rhs = reduction.expand(reduced);
-    return report;
-}
-
-VectorXd Newton::solve_with_factor(const VectorXd& rhs, double tolerance) const {
-    const Stopwatch running(linear_time_);
-    VectorXd reduced = model_.reduction().vector(rhs);
-    if (unsymmetric_)
-        solve_unsymmetric(model_, *factor_, false, {tolerance, to_round_off.max_iterations}, reduced);
-    else
-        factor_->solve(reduced);
-    return model_.reduction().expand(reduced);
-}
-
-VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
-    if (!unsymmetric_) return solve_with_factor(rhs);
-    const Stopwatch running(linear_time_);
-    VectorXd reduced = model_.reduction().vector(rhs);
-    const GmresReport report = solve_unsymmetric(model_, *factor_, true, to_round_off, reduced);
-    if (!report.converged)
-        throw InvalidInput("a linear solve with friction, water or pressure stopped at a residual of " +
-                           std::to_string(report.residual));
-    return model_.reduction().expand(reduced);
+VectorXd Newton::left_of(const VectorXd& move, double share, const VectorXd& q,
+                         const Controls& controls) const {
+    if (!model_.reduction().drives()) return (1.0 - share) * move;
+    return model_.reduction().prescribed_increment(q, controls);  // along curves
 }
 
 bool Newton::still_holds(const VectorXd& q, const Controls& controls) {
@@ -227,12 +123,13 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
     const VectorXd from = q;
     const Model::Turns turns = model_.turns();
     NewtonReport report = iterate(q, controls, anchor, max_iterations, options_.mixed);
-    if (report.converged) return report;
+    if (report.converged || !report.touched) return report;
     const int iterations = report.iterations;
     q = from;
     model_.set_turns(turns);
     report = solve_searching(q, controls, anchor, searched * max_iterations);
     report.iterations += iterations;
+    if (!report.converged) tell_contact(report);
     return report;
 }
 
@@ -328,6 +225,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
     if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
     evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
+        report.touched |= model_.touches();
         report.residual = relative_residual(q, anchor);
         watch(report.residual);
         if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent())
@@ -347,7 +245,10 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         const double contraction = report.residual / last_residual;
         last_residual = report.residual;
         if (report.iterations == 0 || !factor_serves(contraction, report.residual, last_step)) {
-            const bool cautious = contraction > contracting;
+            // Before the first step a liquid's pressure is that of a volume that it is not to have.
+            const bool begins =
+                mixed && !extrapolated && model_.n_muscles() == 0 && !model_.has_body_contact();
+            const bool cautious = begins || contraction > contracting;
             report.factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
             if (!report.factor.succeeded) return fail(report.factor.reason);
             const Index negative_pivots = report.factor.negative_pivots;
@@ -355,17 +256,31 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             report.lost = model_.bodies().solids().empty() &&
                           negative_pivots > first_negative_pivots + most_new_negative_pivots;
             if (mixed && report.lost) return fail("the iteration lost its way");
-            moved = last_step <= small_move * model_.length_scale() ? 0.0
-                                                                    : std::numeric_limits<double>::infinity();
+            // Of a matrix that leaves out what is negative, no pivot tells whether a state is stable.
+            const bool exact = !cautious || (model_.n_muscles() == 0 && !model_.has_body_contact() &&
+                                             model_.low_rank().empty());
+            moved = exact && last_step <= small_move * model_.length_scale()
+                        ? 0.0
+                        : std::numeric_limits<double>::infinity();
         }
         // Loads at rest leave a remainder of few nodes, which takes few vectors: no digit is given away.
         const VectorXd force = -gradient(q, anchor) - pull.col(0);
         VectorXd step =
             move + (anchor.motion ? solve_with_factor(force, deserved(report.residual, options_.tolerance))
                                   : solve_with_factor(force));
-        const double share = advance(q, step, shortest_share, report);
+        const VectorXd from = model_.has_body_contact() && in_place ? q : VectorXd();
+        double share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
-        move *= 1.0 - share;
+        if (from.size() > 0) {
+            const double less = part_into_contact(from, step, share, force.dot(step));
+            if (less < 1.0) {
+                share *= less;
+                step *= less;
+                q = from;
+                model_.reduction().advance(q, step);
+            }
+        }
+        move = left_of(move, share, q, controls);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())

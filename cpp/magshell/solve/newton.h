@@ -32,6 +32,8 @@ struct NewtonReport {
     double residual = 0.0;
     FactorReport factor;    // of the last matrix factorized
     bool in_place = false;  // whether that may stand for the solution's own, nothing having moved since
+    bool touched = false;   // whether bodies touched, or were in each other's way, at any of its iterations
+    std::string blocked;    // what was in the way of the last step of which little could be taken, in words
     bool lost = false;      // far from any solution: a step half as long will hardly do
     std::string reason;     // why not converged
 };
@@ -76,6 +78,8 @@ class Newton {
     void evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor);
     /// Evaluates, assembles with the state's own stresses and factorizes.
     FactorReport factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor = {});
+    /// That of the energy at the last evaluated state, with the pull of the anchor.
+    VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
     /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes,
     /// is replaced by the forces K moves that it causes.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
@@ -90,6 +94,14 @@ class Newton {
     VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
     /// K^T p = rhs likewise, to round-off. Throws InvalidInput where forces make K too unsymmetric for that.
     VectorXd solve_transposed(const VectorXd& rhs) const;
+
+    /// As far along a step as there are states; the share of it, negative where that leads nowhere, and the report
+    /// says why.
+    double advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
+    /// From the end of a step, last evaluated, back towards `from` by secants where the energy has risen again there,
+    /// which fell at `slope` [J] at the beginning; the share of the step that is left.
+    double search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
+                  const VectorXd& step, double slope);
 
     /// The residual at the last evaluated state, relative to the forces that cancel in it and to their
     /// round-off, if that is to count.
@@ -108,6 +120,7 @@ class Newton {
     std::shared_ptr<Factor> release_factor();
     double linear_time() const { return linear_time_; }  // [s] in factorizations and solves
     void count_iteration() { ++iterations_; }
+    void count_factorizations(int more) { factorizations_ += more; }
     void watch(double residual) const {
         watched_ = residual;
         if (watch_) watch_(residual);
@@ -116,13 +129,13 @@ class Newton {
   private:
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                          bool mixed);
-    /// As far along a step as there are states; the share of it, negative where that leads nowhere, and the report
-    /// says why.
-    double advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
-    /// From the end of a step, last evaluated, back towards `from` by secants where the energy has risen again there,
-    /// which fell at `slope` [J] at the beginning; the share of the step that is left.
-    double search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
-                  const VectorXd& step, double slope);
+    /// What is left of a motion that supports and motors prescribe after a share of it.
+    VectorXd left_of(const VectorXd& move, double share, const VectorXd& q, const Controls& controls) const;
+    /// Of a step, which is a share of a whole one, the part up to which bodies that touch do not push back by more than it
+    /// expects. It has the energy fall at `slope` [J] at its beginning, the last evaluated state.
+    double part_into_contact(const VectorXd& q, const VectorXd& step, double share, double slope) const;
+    /// The reason of a report, and what touched.
+    void tell_contact(NewtonReport& report) const;
     /// Shortened steps with held normal forces, from the last evaluated state until the residual is small
     /// enough or so many are done; false where none can be taken, and the report says why.
     bool descend(VectorXd& q, const Controls& controls, const Anchor& anchor, double enough, int most_steps,
@@ -132,7 +145,6 @@ class Newton {
     /// Whether steps with the last factorization will do, which are as good as free.
     bool factor_serves(double contraction, double residual, double last_step) const;
     FactorReport factorize_assembled(const VectorXd& q, const Anchor& anchor);
-    VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
 
     Model& model_;
     NewtonOptions options_;

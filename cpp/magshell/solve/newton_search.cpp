@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "magshell/solve/newton.h"
+#include "magshell/term/body_contact_term.h"
 
 namespace magshell {
 namespace {
@@ -12,6 +13,8 @@ namespace {
 constexpr double contracting = 0.5;
 // A shorter share of a step leads nowhere.
 constexpr double shortest_share = 1e-9;
+// Of a step, that leaves little of it: it is to be told what was in its way.
+constexpr double little = 0.1;
 
 }  // namespace
 
@@ -21,9 +24,61 @@ double Newton::advance(VectorXd& q, VectorXd& step, double shortest, NewtonRepor
         report.reason = model_.stuck(q, step);
         return -1.0;
     }
+    if (model_.has_body_contact()) {
+        report.touched |= share < 1.0;
+        report.blocked = share < little ? model_.stuck(q, step) : std::string();
+    }
     if (share < 1.0) step *= share;
     model_.reduction().advance(q, step);
     return share;
+}
+
+// The energy is expected to fall ever slower along the step, and at the end of the whole one no more. What bodies that
+// touch add to that, they tell alone: at the step's end and, where that is too much, by secants between too far and not
+// far enough.
+double Newton::part_into_contact(const VectorXd& q, const VectorXd& step, double share, double slope) const {
+    constexpr double rising = 0.5, falling = 0.5;  // of the slope at the beginning
+    constexpr int most_trials = 6;
+    if (!(slope > 0.0)) return 1.0;
+    const BodyContactTerm& contact = *model_.body_contact();
+    const auto pushed_back = [&](double part) {
+        VectorXd there = q;
+        model_.reduction().advance(there, part * step);
+        return contact.slope(there.data(), step.data());
+    };
+    const double at_end = pushed_back(1.0);
+    if (at_end <= rising * slope) return 1.0;
+    const double at_begin = pushed_back(0.0), stiffness = contact.curvature(step.data());
+    const auto slope_of = [&](double part, double push) {
+        return (share * part - 1.0) * slope + push - at_begin - part * stiffness;
+    };
+    double near = 0.0, far = 1.0, at_near = -slope, at_far = slope_of(1.0, at_end);
+    if (at_far <= rising * slope) return 1.0;
+    for (int trial = 0; trial < most_trials; ++trial) {
+        // The contact's push rises ever faster: a secant falls short. Illinois' rule halves the end that stays.
+        const double part = std::clamp(near + (far - near) * at_near / (at_near - at_far),
+                                       near + 0.1 * (far - near), far - 0.1 * (far - near));
+        const double there = slope_of(part, pushed_back(part));
+        if (there > rising * slope) {
+            far = part;
+            at_far = there;
+            at_near *= trial > 0 ? 0.5 : 1.0;
+        } else if (there < -falling * slope) {
+            near = part;
+            at_near = there;
+            at_far *= 0.5;
+        } else {
+            return part;
+        }
+    }
+    return near > 0.0 ? near : far;
+}
+
+void Newton::tell_contact(NewtonReport& report) const {
+    if (!report.blocked.empty())
+        report.reason += "; " + report.blocked;
+    else if (const std::string hardest = model_.body_contact()->hardest(); !hardest.empty())
+        report.reason += "; bodies touch: " + hardest;
 }
 
 double Newton::search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
@@ -84,7 +139,7 @@ NewtonReport Newton::solve_searching(VectorXd& q, const Controls& controls, cons
         was_cautious = cautious;
         share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
-        move *= 1.0 - share;
+        move = left_of(move, share, q, controls);
         evaluate(q, controls, anchor);
         if (in_place) share *= search(q, controls, anchor, from, step, share * slope);
     }

@@ -23,7 +23,7 @@ class Relaxation {
         const VectorXd move = model_.reduction().prescribed_increment(q_, controls);
         if (model_.has_body_contact() && model_.largest_share(q_, move) < 1.0)
             report_.reason = model_.stuck(q_, move);
-        q_ += move;
+        model_.reduction().advance(q_, move);
         energy_ = model_.energy(q_, controls);
     }
 

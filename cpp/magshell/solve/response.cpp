@@ -21,6 +21,7 @@ VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, cons
         VectorXd pull(q.size());
         model.multiply(change, pull);
         model.remainder().add_product(change, false, pull);
+        reduction.add_driven_forces(model.residual().gradient, change, pull);
         force += pull;
     }
     VectorXd reduced = -reduction.vector(force);

@@ -33,39 +33,92 @@ VectorXd StepAlgebra::target(const VectorXd& x_hat, const VectorXd& v_hat) const
     return x_hat + velocity_share_.cwiseProduct(v_hat);
 }
 
-Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity)
-    : newton_(newton), tableau_(tableau), inertia_(std::move(inertia)), viscosity_(viscosity) {}
+Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity,
+                 const ProjectiveOptions& projective)
+    : newton_(newton), tableau_(tableau), inertia_(std::move(inertia)), viscosity_(viscosity) {
+    if (projective.on) projective_ = std::make_unique<ProjectiveSolver>(newton, projective);
+}
 
-const Tableau& Stepper::tableau_from(const MotionState& state) const {
+NewtonReport Stepper::solve(VectorXd& q, const Controls& controls, const Anchor& anchor) {
+    Model& model = newton_.model();
+    if (projective_) {
+        const double scale = viscosity_.any() ? viscosity_.scale(anchor.motion->time) : 1.0;
+        return projective_->solve(q, controls, anchor, scale);
+    }
+    const VectorXd predicted = q;
+    const Model::Turns turns = model.turns();
+    NewtonReport report = newton_.solve(q, controls, anchor);
+    if (!report.converged && !model.has_body_contact() && (model.has_contact() || newton_.options().mixed)) {
+        q = predicted;
+        model.set_turns(turns);
+        report = model.has_contact() ? newton_.solve_damped(q, controls, anchor)
+                                     : newton_.solve_plain(q, controls, anchor);
+    }
+    return report;
+}
+
+const Tableau& Stepper::tableau_from(const MotionState& state, bool dissipative) const {
+    if (dissipative) return dissipative_;
     return tableau_.begins_explicitly && state.rates.empty() ? starter_ : tableau_;
 }
 
 const StepAlgebra& Stepper::algebra(double dt, const Tableau& tableau) {
-    if (!algebra_ || algebra_->dt() != dt ||
+    if (!algebra_ || algebra_->dt() != dt || algebra_->tableau().stages != tableau.stages ||
         algebra_->tableau().begins_explicitly != tableau.begins_explicitly)
         algebra_ = std::make_unique<StepAlgebra>(tableau, inertia_, dt);
     return *algebra_;
 }
 
-std::vector<StageRates> first_rates(const Tableau& tableau, const MotionState& state) {
+// What dampers feel follows from the motion: no state has to remember it.
+std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, const MotionState& state) {
     if (!tableau.begins_explicitly) return {};
-    return {state.rates};
+    std::vector<StageRates> rates = {state.rates};
+    rates.front().joints.d = model.damper_rates(state.q, state.v);
+    return rates;
 }
 
-bool Stepper::step(MotionState& state, double dt, std::span<const Controls> controls, SubstepRecord* kept,
-                   bool with_factors, std::string& reason) {
-    const StepAlgebra& step = algebra(dt, tableau_from(state));
+// Along a prescribed path the acceleration of a stage is of first order only; that through three ends of steps is of
+// second. In a first step there are but two.
+VectorXd Stepper::driving(const MotionState& begin, double dt, const VectorXd& q, const Anchor& anchor,
+                          const StageRates& last) const {
+    VectorXd force = newton_.gradient(q, anchor);
+    if (begin.dt_before > 0.0) {
+        const double r = dt / begin.dt_before;
+        const VectorXd w = ((1.0 + 2.0 * r) / (1.0 + r) * last.v - (1.0 + r) * begin.v +
+                            r * r / (1.0 + r) * begin.v_before) /
+                           dt;
+        force += inertia_.mass.cwiseProduct(w - last.w);
+    }
+    return newton_.model().reduction().driving(force);
+}
+
+StepRates::StepRates(const Model& model, const StepAlgebra& step, const SubstepRecord& substep)
+    : x_hat(substep.stages.size()),
+      v_hat(substep.stages.size()),
+      all(first_rates(model, step.tableau(), substep.begin)) {
+    for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
+        step.start_of_stage(i, substep.begin, all, x_hat[i], v_hat[i]);
+        step.finish_stage(substep.stages[i].q, x_hat[i], v_hat[i], model.n_coordinates(), all.emplace_back());
+    }
+}
+
+bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<const Controls> controls,
+                   SubstepRecord* kept, bool with_factors, std::string& reason) {
+    const StepAlgebra& step = algebra(dt, tableau_from(state, dissipative));
     const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
     const Index coordinates = model.n_coordinates();
     model.set_turns(state.turns);
     model.begin_step(state.q, controls.front());
     const ElasticAfterwards elastic_afterwards(model);
-    const StrainSet at_begin = viscosity_.any() ? model.strains(state.q) : StrainSet();
-    std::vector<StageRates> rates = first_rates(tableau, state);
+    const bool damped = !model.dampers().empty();
+    const StrainSet at_begin = viscosity_.any() ? model.elastic().strains(state.q) : StrainSet(),
+                    joints_at_begin = model.dampers().strains(state.q);
+    std::vector<StageRates> rates = first_rates(model, tableau, state);
     std::vector<StageState> stages;
     VectorXd q = state.q, x_hat, v_hat;
     StrainSet e;
+    VectorXd driving, held;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
         model.take(controls[i + 1]);
@@ -78,40 +131,48 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
             ahead.tail(q.size() - coordinates).setZero();
             const VectorXd others = q.tail(q.size() - coordinates);
             q = state.q;
-            // Short of what is in the way, if anything is.
-            if (model.has_body_contact()) ahead *= model.share_of_step(q, ahead);
+            // Well short of what is in the way, if anything is: very near it, a barrier is too steep to begin at.
+            if (model.has_body_contact()) {
+                const double share = model.share_of_step(q, ahead);
+                if (share < 1.0) ahead *= 0.25 * share;
+            }
             model.reduction().advance(q, ahead);
             q.tail(others.size()) = others;
         }
-        ViscousStage viscous;
+        const double T = step.stage_time();
+        ViscousStage viscous, joints;
         if (viscosity_.any()) {
-            viscous = ViscousStage(viscosity_, step.stage_time(), dt, tableau.a[i], rates, at_begin, state.e);
-            model.set_history(viscosity_.scale(step.stage_time()), &viscous.shift);
+            viscous =
+                ViscousStage(viscosity_, T, dt, tableau.a[i], rates, &StageRates::elastic, at_begin, state.e);
+            model.elastic().set_history(viscosity_.scale(T), &viscous.shift);
+        }
+        if (damped) {
+            joints = ViscousStage(damper_law, T, dt, tableau.a[i], rates, &StageRates::joints,
+                                  joints_at_begin, {});
+            model.dampers().set_history(damper_law.scale(T), &joints.shift);
         }
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
         const Anchor anchor{&step.weights(), &target, &motion};
-        const VectorXd predicted = q;
-        const Model::Turns turns = model.turns();
-        NewtonReport report = newton_.solve(q, controls[i + 1], anchor);
-        if (!report.converged && !model.has_body_contact() &&
-            (model.has_contact() || newton_.options().mixed)) {
-            q = predicted;
-            model.set_turns(turns);
-            report = model.has_contact() ? newton_.solve_damped(q, controls[i + 1], anchor)
-                                         : newton_.solve_plain(q, controls[i + 1], anchor);
-        }
+        const NewtonReport report = solve(q, controls[i + 1], anchor);
         if (!report.converged) {
             reason = model.not_finite(q, controls[i + 1]);
             if (reason.empty()) reason = report.reason;
             model.set_turns(state.turns);
             return false;
         }
+        // The stage's whole residual, evaluated at q last: it vanishes but for what supports hold.
+        if (i + 1 == tableau.stages && model.reduction().holds())
+            held =
+                model.reduction().held(model.residual().gradient + step.weights().cwiseProduct(q - target));
         StageRates& now = rates.emplace_back();
         step.finish_stage(q, x_hat, v_hat, coordinates, now);
+        if (i + 1 == tableau.stages && model.reduction().drives())
+            driving = this->driving(state, dt, q, anchor, now);
         if (viscosity_.any()) {
-            viscous.finish(viscosity_, step.stage_time(), model.strains(q), now);
+            viscous.finish(viscosity_, T, model.elastic().strains(q), now.elastic);
             e = std::move(viscous.e);
         }
+        if (damped) joints.finish(damper_law, T, model.dampers().strains(q), now.joints);
         if (kept) {
             const bool factorized = with_factors && report.iterations > 0;
             stages.push_back({q, model.turns(), factorized ? newton_.release_factor() : nullptr});
@@ -122,7 +183,12 @@ bool Stepper::step(MotionState& state, double dt, std::span<const Controls> cont
         model.set_turns(state.turns);
         return false;
     }
-    MotionState end{std::move(q), rates.back().v, model.turns(), std::move(e), {}};
+    MotionState end{std::move(q), rates.back().v,     model.turns(),  std::move(e),
+                    {},           std::move(driving), std::move(held)};
+    if (model.reduction().drives()) {
+        end.v_before = state.v;
+        end.dt_before = dt;
+    }
     if (tableau_.begins_explicitly) end.rates = std::move(rates.back());
     std::swap(state, end);
     if (kept) *kept = {std::move(end), std::move(stages)};

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "magshell/solve/newton.h"
+#include "magshell/solve/projective.h"
 #include "magshell/solve/tableau.h"
 #include "magshell/solve/viscosity.h"
 
@@ -20,6 +21,10 @@ struct MotionState {
     Model::Turns turns;
     StrainSet e;       // of the Maxwell branch; empty without one
     StageRates rates;  // at the end of the step that led here, for a method that begins with them; else empty
+    VectorXd driving;  // what motors do there [N, N m]; empty where none is, and before the first step
+    VectorXd held;  // [N] what supports pulled with at the end of that step, as Reduction::held; else empty
+    VectorXd v_before;       // where motors are: at the beginning of the step that led here
+    double dt_before = 0.0;  // [s] of that step; 0: there was none
 };
 
 /// Of all unknowns: masses [kg] and viscous damping [N s/m], zero for those that are no vertex.
@@ -66,27 +71,43 @@ class StepAlgebra {
 
 class Stepper {
   public:
-    Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity);
+    Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity,
+            const ProjectiveOptions& projective);
 
-    /// Takes the state over a step with these controls at its beginning and at its stages. On failure the
-    /// state stays, and the reason tells why. `kept`, if given, gets the step; with_factors: Newton's last
+    /// Takes the state over a step with these controls at its beginning and at its stages, as tableau_from() says. On
+    /// failure the state stays, and the reason tells why. `kept`, if given, gets the step; with_factors: Newton's last
     /// factorizations too.
-    bool step(MotionState& state, double dt, std::span<const Controls> controls, SubstepRecord* kept,
-              bool with_factors, std::string& reason);
+    bool step(MotionState& state, double dt, bool dissipative, std::span<const Controls> controls,
+              SubstepRecord* kept, bool with_factors, std::string& reason);
 
-    /// The method of a step from this state: SDIRK2 where there are no rates to begin with.
-    const Tableau& tableau_from(const MotionState& state) const;
+    /// The method of a step from this state: SDIRK2 where there are no rates to begin with; dissipative: implicit Euler.
+    const Tableau& tableau_from(const MotionState& state, bool dissipative) const;
     const StepAlgebra& algebra(double dt, const Tableau& tableau);
 
   private:
+    /// What motors do at the end of a step, once its last stage is solved and `last` holds its rates.
+    VectorXd driving(const MotionState& begin, double dt, const VectorXd& q, const Anchor& anchor,
+                     const StageRates& last) const;
+    /// A stage, by other means where the first fail.
+    NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor);
+
     Newton& newton_;
-    Tableau tableau_, starter_ = sdirk2();
+    std::unique_ptr<ProjectiveSolver> projective_;  // nullptr: Newton's steps
+    Tableau tableau_, starter_ = sdirk2(), dissipative_ = implicit_euler();
     Inertia inertia_;
     Viscosity viscosity_;
     std::unique_ptr<StepAlgebra> algebra_;  // of the last step
 };
 
 /// The rates that a step begins with: those of the state, if the method takes them.
-std::vector<StageRates> first_rates(const Tableau& tableau, const MotionState& state);
+std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, const MotionState& state);
+
+/// The rates of a step that was taken, from its states: those it began with, and those of its stages.
+struct StepRates {
+    std::vector<VectorXd> x_hat, v_hat;
+    std::vector<StageRates> all;
+
+    StepRates(const Model& model, const StepAlgebra& step, const SubstepRecord& substep);
+};
 
 }  // namespace magshell

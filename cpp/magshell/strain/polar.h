@@ -20,9 +20,12 @@ struct Polar {
         Pack3 b[3] = {{f.at[0], f.at[3], f.at[6]}, {f.at[1], f.at[4], f.at[7]}, {f.at[2], f.at[5], f.at[8]}};
         const Pack one(1.0), zero(0.0);
         Pack3 v[3] = {{one, zero, zero}, {zero, one, zero}, {zero, zero, one}};
-        for (int sweep = 0; sweep < sweeps; ++sweep)
+        for (int sweep = 0; sweep < sweeps; ++sweep) {
+            bool turned = false;
             for (const auto& [i, j] : {std::pair{0, 1}, std::pair{0, 2}, std::pair{1, 2}})
-                turn(b[i], b[j], v[i], v[j]);
+                turned |= turn(b[i], b[j], v[i], v[j]);
+            if (!turned) break;
+        }
         Pack squared[3] = {squared_norm(b[0]), squared_norm(b[1]), squared_norm(b[2])};
         for (const auto& [i, j] : {std::pair{0, 2}, std::pair{1, 2}, std::pair{0, 1}})
             larger_first(squared[i], squared[j], b[i], b[j], v[i], v[j]);
@@ -38,13 +41,25 @@ struct Polar {
   private:
     static constexpr int sweeps = 6;
 
-    static void turn(Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
-        const Pack gamma = Pack(2.0) * dot(a, b), delta = squared_norm(b) - squared_norm(a);
+    // Whether any lane was turned. One that is orthogonal stays as it is, whatever its neighbours do.
+    static bool turn(Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
+        const Pack of_a = squared_norm(a), of_b = squared_norm(b), gamma = Pack(2.0) * dot(a, b);
+        const Pack negligible = gamma * gamma - Pack(1e-30) * of_a * of_b;
+        if (none_positive(negligible)) return false;
+        const Pack delta = of_b - of_a;
         const Pack root = sqrt(delta * delta + gamma * gamma) + Pack(1e-300);
-        const Pack tangent = where_negative(delta, Pack(-1.0) * gamma, gamma) / (abs(delta) + root);
+        const Pack wanted = where_negative(delta, Pack(-1.0) * gamma, gamma) / (abs(delta) + root);
+        const Pack tangent = where_negative(negligible, Pack(0.0), wanted);
         const Pack c = Pack(1.0) / sqrt(Pack(1.0) + tangent * tangent), s = c * tangent;
         rotate(c, s, a, b);
         rotate(c, s, va, vb);
+        return true;
+    }
+
+    static bool none_positive(const Pack& a) {
+        bool none = true;
+        for (int lane = 0; lane < Pack::width; ++lane) none &= !(a[lane] > 0.0);
+        return none;
     }
 
     static void rotate(const Pack& c, const Pack& s, Pack3& a, Pack3& b) {
@@ -64,14 +79,17 @@ struct Polar {
     }
 
     void directions(const Pack3 b[3]) {
+        const Pack length = sqrt(squared_norm(b[0]));
+        u[0] = (Pack(1.0) / length) * b[0];
+        const Pack3 across = b[1] - dot(u[0], b[1]) * u[0];
+        const Pack width = sqrt(squared_norm(across));
+        u[1] = (Pack(1.0) / width) * across;
+        u[2] = cross(u[0], u[1]);
         for (int lane = 0; lane < Pack::width; ++lane) {
-            Vec3 first(b[0].x[lane], b[0].y[lane], b[0].z[lane]),
-                second(b[1].x[lane], b[1].y[lane], b[1].z[lane]);
-            const double length = first.norm();
-            first = length > 0.0 ? Vec3(first / length) : Vec3(Vec3::UnitX());
-            second -= first.dot(second) * first;
-            const double across = second.norm();
-            second = across > 1e-15 * length && across > 0.0 ? Vec3(second / across) : first.unitOrthogonal();
+            if (length[lane] > 0.0 && width[lane] > 1e-15 * length[lane]) continue;  // a line, or a point
+            Vec3 first(b[0].x[lane], b[0].y[lane], b[0].z[lane]), second;
+            first = length[lane] > 0.0 ? Vec3(first / first.norm()) : Vec3(Vec3::UnitX());
+            second = first.unitOrthogonal();
             const Vec3 all[3] = {first, second, first.cross(second)};
             for (int k = 0; k < 3; ++k) {
                 u[k].x.set(lane, all[k].x());

@@ -51,38 +51,80 @@ bool BodyContactTerm::set_values(const Values& values) {
         distances.push_back(law.reach + law.thickness);
     }
     candidates_.set_distances(distances);
+    found_at_.resize(0);
     return false;  // none of its forces cancel in add_cancelling_forces
 }
 
-std::vector<BodyContactTerm::Touch> BodyContactTerm::touches(const double* q) const {
+BodyContactTerm::Touches BodyContactTerm::found(const double* q) const {
+    VectorXd at = candidates_.places(q);
+    if (found_at_.size() > 0 && at == found_at_) return found_;
     const std::vector<NearPair>& near = candidates_.near(q);
     const Index count = static_cast<Index>(near.size());
-    std::vector<std::vector<Touch>> found((count + block_length - 1) / block_length);
-    parallel_for(static_cast<int>(found.size()), [&](int block) {
+    std::vector<std::vector<Touch>> parts((count + block_length - 1) / block_length);
+    parallel_for(static_cast<int>(parts.size()), [&](int block) {
         const Index first = block * block_length, last = std::min(count, first + block_length);
         for (Index k = first; k < last; ++k) {
+            if (!candidates_.may_touch(k)) continue;
             const PairPlaces x = places_of(near[k].pair, q);
-            const PairEnergy at(near[k].pair, x, laws_[near[k].contact]);
-            if (!at.acts()) continue;
+            const PairEnergy pair(near[k].pair, x, laws_[near[k].contact]);
+            if (!pair.acts()) continue;
             double far = 0.0;
-            for (int i = 0; i < at.count(); ++i) far = std::max(far, x[i].lpNorm<Eigen::Infinity>());
-            found[block].push_back({near[k], at, far});
+            for (int i = 0; i < pair.count(); ++i) far = std::max(far, x[i].lpNorm<Eigen::Infinity>());
+            parts[block].push_back({near[k], pair, far});
         }
     });
+    std::size_t size = 0;
+    for (const std::vector<Touch>& part : parts) size += part.size();
     std::vector<Touch> all;
-    for (const std::vector<Touch>& part : found) all.insert(all.end(), part.begin(), part.end());
-    return all;
+    all.reserve(size);
+    for (const std::vector<Touch>& part : parts) all.insert(all.end(), part.begin(), part.end());
+    found_ = std::make_shared<const std::vector<Touch>>(std::move(all));
+    found_at_ = std::move(at);
+    return found_;
+}
+
+double BodyContactTerm::slope(const double* q, const double* p) const {
+    double sum = 0.0;
+    for (const Touch& touch : *found(q)) {
+        const PairVectors gradient = touch.at.gradient();
+        for (int k = 0; k < touch.at.count(); ++k)
+            sum += gradient[k].dot(Eigen::Map<const Vec3>(p + 3 * touch.near.pair.nodes[k]));
+    }
+    return sum;
+}
+
+double BodyContactTerm::curvature(const double* p) const {
+    double sum = 0.0;
+    for (const Touch& touch : touching()) {
+        const PairVectors gradient = touch.at.gradient(), stiffness = touch.at.normal_force_by_place();
+        double slope = 0.0, pushed = 0.0;
+        for (int k = 0; k < touch.at.count(); ++k) {
+            const Eigen::Map<const Vec3> moved(p + 3 * touch.near.pair.nodes[k]);
+            slope += gradient[k].dot(moved);
+            pushed += stiffness[k].dot(moved);
+        }
+        const double force = touch.at.normal_force();
+        if (force != 0.0) sum += pushed * slope / force;
+    }
+    return sum;
+}
+
+std::string BodyContactTerm::hardest() const {
+    const Touch* most = nullptr;
+    for (const Touch& touch : touching())
+        if (!most || touch.at.normal_force() > most->at.normal_force()) most = &touch;
+    return most ? candidates_.names(most->near) + " push each other hardest" : std::string();
 }
 
 double BodyContactTerm::energy(const double* q, const Controls&) const {
     double total = 0.0;
-    for (const Touch& touch : touches(q)) total += touch.at.energy();
+    for (const Touch& touch : *found(q)) total += touch.at.energy();
     return total;
 }
 
 void BodyContactTerm::evaluate(const double* q, const Controls&, Residual& out) {
-    touching_ = touches(q);
-    for (const Touch& touch : touching_) {
+    touching_ = found(q);
+    for (const Touch& touch : *touching_) {
         const PairVectors gradient = touch.at.gradient();
         for (int k = 0; k < touch.at.count(); ++k)
             for (int axis = 0; axis < 3; ++axis)
@@ -97,7 +139,7 @@ void BodyContactTerm::keep_coupled(const std::vector<Touch>& touches) {
 
 void BodyContactTerm::prepare_assembly(const double* q, const Controls&) {
     const bool coupled =
-        std::all_of(touching_.begin(), touching_.end(),
+        std::all_of(touching().begin(), touching().end(),
                     [&](const Touch& touch) { return layer_.couples(touch.near.pair.nodes); }) &&
         std::all_of(kept_.begin(), kept_.end(),
                     [&](const ContactLayer::Group& group) { return layer_.couples(group); });
@@ -110,7 +152,7 @@ void BodyContactTerm::prepare_assembly(const double* q, const Controls&) {
 }
 
 void BodyContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix&) const {
-    for (const Touch& touch : touching_) {
+    for (const Touch& touch : touching()) {
         PairBlocks blocks;
         touch.at.hessian(cautious_, blocks);
         layer_.add(touch.near.pair.nodes,
@@ -119,7 +161,7 @@ void BodyContactTerm::finish_assembly(const double*, const Controls&, SystemMatr
 }
 
 void BodyContactTerm::vjp(const double*, const Controls&, const double* lambda, Gradient& out) {
-    for (const Touch& touch : touching_)
+    for (const Touch& touch : touching())
         add_vjp(touch, touch.at.vjp(places_of(touch.near.pair, lambda)), {}, out.values);
 }
 
@@ -136,7 +178,7 @@ void BodyContactTerm::add_vjp(const Touch& touch, const PairEnergy::ByLaw& by, c
 }
 
 void BodyContactTerm::add_cancelling_normal_forces(VectorXd& out) const {
-    for (const Touch& touch : touching_) {
+    for (const Touch& touch : touching()) {
         const PairVectors stiffness = touch.at.normal_force_by_place();
         for (int k = 0; k < touch.at.count(); ++k)
             out.segment<3>(3 * touch.near.pair.nodes[k]).array() += stiffness[k].norm() * touch.far;
@@ -200,7 +242,7 @@ std::string BodyContactTerm::refusal(const double* q) const {
 }
 
 std::size_t BodyContactTerm::bytes() const {
-    return candidates_.bytes() + layer_.bytes() + touching_.capacity() * sizeof(Touch);
+    return candidates_.bytes() + layer_.bytes() + touching().capacity() * sizeof(Touch);
 }
 
 }  // namespace magshell

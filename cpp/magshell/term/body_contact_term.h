@@ -6,6 +6,7 @@
 // Where a pair has no gap there is no energy: the term refuses such states, and steps that lead through them.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -31,14 +32,21 @@ class BodyContactTerm final : public Term {
                     const std::vector<BodyContactInput>& contacts, ContactLayer& layer, Registry& registry);
 
     /// The pairs that touch at q, always in the same order; and those at the last evaluated state.
-    std::vector<Touch> touches(const double* q) const;
-    const std::vector<Touch>& touching() const { return touching_; }
+    std::vector<Touch> touches(const double* q) const { return *found(q); }
+    const std::vector<Touch>& touching() const { return *touching_; }
+    /// Whether any pair touches at q.
+    bool acts(const double* q) const { return !found(q)->empty(); }
+    /// How the energy at q changes along p [J], and how fast that changes, but for what turns, at the last evaluated state.
+    double slope(const double* q, const double* p) const;
+    double curvature(const double* p) const;
+    /// The faces that push each other hardest at the last evaluated state, in words; empty: none touch.
+    std::string hardest() const;
     const FrictionLaw& friction(const Touch& touch) const { return friction_[touch.near.contact]; }
 
     /// Which faces are in the way of a step p from q, in words.
     std::string blocking(const double* q, const double* p) const;
     /// Whether what is negative of the Hessians of pairs is left out from now on.
-    void be_cautious(bool cautious) { cautious_ = cautious; }
+    void be_cautious(bool cautious) override { cautious_ = cautious; }
     /// Adds the magnitude of forces that cancel inside those between pairs at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
     /// Adds the gradient by the numbers of a pair's contact.
@@ -48,11 +56,13 @@ class BodyContactTerm final : public Term {
     /// From now on as if no state had been looked at: a solve has the same bits whatever came before it.
     void forget() const {
         candidates_.forget();
+        found_at_.resize(0);
         layer_.couple({});
     }
     /// The layer couples these as well, whether they still touch or not, until others take their place.
     void keep_coupled(const std::vector<Touch>& touches);
 
+    bool add_surrogate(NodeMatrix&) const override { return false; }
     std::string_view name() const override { return "body contact"; }
     bool set_values(const Values& values) override;
     bool refuses_states() const override { return true; }
@@ -71,6 +81,10 @@ class BodyContactTerm final : public Term {
         Slot stiffness, reach, distance, smoothing, kinetic, fixed, sticking_speed;
     };
 
+    using Touches = std::shared_ptr<const std::vector<Touch>>;
+
+    /// Those that touch at q; asked again at the same place, the same.
+    Touches found(const double* q) const;
     /// Calls found(pair, share) where a pair lets a step go less far than all before it; nullptr: its length does.
     template <class Found>
     void each_limit(const double* q, const double* p, const Found& found) const;
@@ -81,7 +95,9 @@ class BodyContactTerm final : public Term {
     std::vector<double> least_;  // of each contact, what no distance goes below [m]
     mutable ContactCandidates candidates_;
     ContactLayer& layer_;
-    std::vector<Touch> touching_;
+    mutable VectorXd found_at_;  // where those that were found last are; empty: nowhere
+    mutable Touches found_;
+    Touches touching_ = std::make_shared<const std::vector<Touch>>();
     std::vector<ContactLayer::Group> kept_;
     bool cautious_ = false;
 };

@@ -56,18 +56,35 @@ void ContactCandidates::set_distances(const std::vector<double>& distances) {
 }
 
 const std::vector<NearPair>& ContactCandidates::near(const double* q) {
+    constexpr double with_round_off = 2.0 * (1.0 + 1e-9);
     const Index count = static_cast<Index>(touching_nodes_.size());
-    const auto at = [&](Index k) { return Eigen::Map<const Vec3>(q + 3 * touching_nodes_[k]); };
     if (looked_at_.size() > 0) {
         double moved = 0.0;
         for (Index k = 0; k < count; ++k)
-            moved = std::max(moved, (at(k) - looked_at_.segment<3>(3 * k)).squaredNorm());
-        if (4.0 * moved <= margin_ * margin_) return near_;
+            moved = std::max(
+                moved, (Eigen::Map<const Vec3>(q + 3 * touching_nodes_[k]) - looked_at_.segment<3>(3 * k))
+                           .squaredNorm());
+        if (4.0 * moved <= margin_ * margin_) {
+            come_nearer_ = with_round_off * std::sqrt(moved) + round_off_;
+            return near_;
+        }
     }
-    looked_at_.resize(3 * count);
-    for (Index k = 0; k < count; ++k) looked_at_.segment<3>(3 * k) = at(k);
+    looked_at_ = places(q);
     near_ = phase_.near(q, distances_);
+    slack_.resize(near_.size());
+    for (std::size_t k = 0; k < near_.size(); ++k)
+        slack_[k] = pair_distance(near_[k].pair.kind, places_of(near_[k].pair, q)) -
+                    (distances_[near_[k].contact] - margin_);
+    const double far = looked_at_.size() > 0 ? looked_at_.lpNorm<Eigen::Infinity>() : 0.0;
+    come_nearer_ = round_off_ = 1e-12 * (far + margin_);
     return near_;
+}
+
+VectorXd ContactCandidates::places(const double* q) const {
+    VectorXd all(3 * touching_nodes_.size());
+    for (std::size_t k = 0; k < touching_nodes_.size(); ++k)
+        all.segment<3>(3 * k) = Eigen::Map<const Vec3>(q + 3 * touching_nodes_[k]);
+    return all;
 }
 
 double ContactCandidates::longest_move(const double* p) const {
@@ -95,7 +112,8 @@ std::string ContactCandidates::names(const NearPair& pair) const {
 }
 
 std::size_t ContactCandidates::bytes() const {
-    return phase_.bytes() + near_.capacity() * sizeof(NearPair) + looked_at_.size() * sizeof(double);
+    return phase_.bytes() + near_.capacity() * (sizeof(NearPair) + sizeof(double)) +
+           looked_at_.size() * sizeof(double);
 }
 
 }  // namespace magshell

@@ -22,9 +22,12 @@ class ContactCandidates {
     /// Of each contact, the distance within which pairs touch [m].
     void set_distances(const std::vector<double>& distances);
 
-    /// Those that touch at q, and others.
+    /// Those that touch at q, and others; and whether one of them, by its number, may be among those that touch.
     const std::vector<NearPair>& near(const double* q);
+    bool may_touch(std::size_t k) const { return slack_[k] <= come_nearer_; }
     void forget() { looked_at_.resize(0); }
+    /// Where all that can touch is.
+    VectorXd places(const double* q) const;
     /// Points and triangles, and edges, that may come nearer than that, one a contact, on straight ways from q to
     /// q + share p.
     std::vector<NearPair> on_the_way(const double* q, const double* p, double share,
@@ -54,7 +57,10 @@ class ContactCandidates {
     std::vector<double> distances_;  // with the margin
     std::vector<Index> touching_nodes_;
     std::vector<NearPair> near_;
-    VectorXd looked_at_;  // where those nodes were; empty: nowhere
+    VectorXd looked_at_;         // where those nodes were; empty: nowhere
+    std::vector<double> slack_;  // by how much a pair was farther apart then than where it touches [m]
+    double round_off_ = 0.0;     // of distances [m]
+    double come_nearer_ = 0.0;   // by how much any pair may have come nearer since [m]
 };
 
 }  // namespace magshell

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
 
 namespace magshell {
@@ -207,8 +208,28 @@ double ContactTerm::energy(const double* q, const Controls& controls) const {
     return total;
 }
 
+std::vector<ContactTerm::Keeping> ContactTerm::keepings() const {
+    std::vector<Keeping> all;
+    for (std::size_t c = 0; c < contacts_.size(); ++c)
+        for (const Index obstacle : contacts_[c].obstacles)
+            for (const ContactPoint& p : contacts_[c].points) {
+                if (p.nodes[1] >= 0)
+                    throw InvalidInput("Coulomb's law node by node is for vertices: take face_samples=0");
+                all.push_back({p.nodes[0], obstacle, laws_[c].offset, laws_[c].friction});
+            }
+    return all;
+}
+
+void ContactTerm::add_touching_stiffness(VectorXd& of_nodes) const {
+    for (const Touch& touch : touching_) {
+        const ContactPoint& p = point(touch);
+        for (int k = 0; k < 3; ++k)  // of a w w^T, the sums of its rows
+            if (p.nodes[k] >= 0) of_nodes[p.nodes[k]] += p.weights[k] * touch.stiffness;
+    }
+}
+
 void ContactTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
-    touching_ = touches(q, controls);
+    touching_ = aside_ ? std::vector<Touch>() : touches(q, controls);
     for (const Touch& touch : touching_) spread(touch, -touch.force * touch.at.normal, out);
 }
 

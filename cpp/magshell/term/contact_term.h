@@ -46,6 +46,17 @@ class ContactTerm final : public Term {
                 const std::vector<std::shared_ptr<const Obstacle>>& obstacles, Registry& registry);
 
     bool set_values(const Values& values) override;
+    void add_touching_stiffness(VectorXd& of_nodes) const override;
+
+    /// A vertex that an obstacle keeps at a distance.
+    struct Keeping {
+        Index node, obstacle;
+        double offset, friction;
+    };
+    /// All of them. Throws InvalidInput where points on faces touch as well.
+    std::vector<Keeping> keepings() const;
+    /// From now on, until told otherwise, nothing touches: somebody else sees to that.
+    void stand_aside(bool aside) { aside_ = aside; }
 
     /// The points that touch at q, in the order of contacts, obstacles and points.
     std::vector<Touch> touches(const double* q, const Controls& controls) const;
@@ -107,6 +118,7 @@ class ContactTerm final : public Term {
     std::vector<PlacedObstacle> obstacles_;
     std::vector<ObstacleSlots> obstacle_slots_;
     std::vector<Touch> touching_;
+    bool aside_ = false;
 };
 
 }  // namespace magshell

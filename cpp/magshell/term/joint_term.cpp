@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
-#include <numbers>
 
 namespace magshell {
 namespace {
@@ -11,12 +9,6 @@ namespace {
 using Corners = CornerForm::Corners;
 
 constexpr double small_angle = 1e-4;
-
-Vec3 across(const Vec3& axis) {
-    Index smallest;
-    axis.cwiseAbs().minCoeff(&smallest);
-    return axis.cross(Vec3::Unit(smallest)).normalized();
-}
 
 const JointLaw::Names& names_of(JointKind kind) {
     if (kind == JointKind::prismatic) return JointLaw::of_slides;
@@ -43,22 +35,8 @@ JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& 
             each.slots.push_back(registry.values.add(input.owner, "stiffness", "N/m", 1, 1));
             continue;
         }
-        const auto add = [&](CornerForm& form, const Vec3& of_parent, const Vec3& of_child, double factor) {
-            form.add(links.vector(false, of_parent), links.vector(true, of_child), factor);
-        };
-        if (joint.kind == JointKind::revolute) {
-            const Vec3 u = across(joint.axis), v = joint.axis.cross(u);
-            add(each.cosine, u, u, 1.0);
-            add(each.cosine, v, v, 1.0);
-            add(each.sine, v, u, 1.0);
-            add(each.sine, u, v, -1.0);
-        } else if (joint.kind == JointKind::prismatic)
-            each.cosine.add(links.vector(false, joint.axis), apart);
-        else
-            for (int c = 0; c < 3; ++c) add(each.cosine, Vec3::Unit(c), Vec3::Unit(c), 1.0);
-        each.at_rest =
-            (joint.kind == JointKind::revolute ? each.sine : each.cosine).gradient(links.rest()).cwiseAbs() *
-            (joint.kind == JointKind::revolute ? 0.5 : 1.0);
+        each.form = JointForm(joint, links);
+        each.at_rest = each.form.at(links.rest()).first.cwiseAbs();
         each.reach =
             joint.kind == JointKind::prismatic ? links.reach() : 1.0 + links.reach() / links.length();
         for (const char* name : names_of(joint.kind))
@@ -90,43 +68,29 @@ Vec3 JointTerm::gap(const Each& joint, const Corners& at) const {
 
 double JointTerm::coordinate(std::size_t k, const Corners& at) const {
     const Each& each = each_[k];
-    const double value = each.cosine.value(at);
-    if (each.kind == JointKind::prismatic) return value;
-    if (each.kind == JointKind::ball)
-        return 2.0 * std::asin(std::sqrt(std::clamp(0.25 * (3.0 - value), 0.0, 1.0)));
-    const double angle = std::atan2(each.sine.value(at), value);
-    return last_turn_[k] + std::remainder(angle - last_turn_[k], 2.0 * std::numbers::pi);
+    const double value = each.form.value(at, last_turn_[k]);
+    if (each.kind != JointKind::ball) return value;
+    return 2.0 * std::asin(std::sqrt(std::clamp(0.25 * (3.0 - value), 0.0, 1.0)));
 }
 
 JointTerm::State JointTerm::state(std::size_t k, const double* q) const {
     const Each& each = each_[k];
-    State s;
-    s.at = each.links.positions(q);
-    s.coordinate = coordinate(k, s.at);
+    const Corners at = each.links.positions(q);
+    State s{each.form.at(at), coordinate(k, at), 0.0, 0.0, 1.0};
     const JointEnergy law = law_at(each, s.coordinate);
     s.by_first = law.force;
     s.by_second = law.stiffness;
-    s.share = 1.0;
-    s.first = each.cosine.gradient(s.at);
-    if (each.kind == JointKind::revolute) {
-        const std::complex<double> inverse =
-            1.0 / std::complex<double>(each.cosine.value(s.at), each.sine.value(s.at));
-        const Corners by_sine = each.sine.gradient(s.at), by_cosine = s.first;
-        s.first = inverse.real() * by_sine + inverse.imag() * by_cosine;
-        s.other = inverse.real() * by_cosine - inverse.imag() * by_sine;
-    } else if (each.kind == JointKind::ball) {  // cos s = (form - 1)/2
-        const double sine = std::sin(s.coordinate);
-        if (s.coordinate < small_angle) {  // only the spring acts here
-            s.share = -0.5;
-            s.by_first = -0.5 * each.law.spring_stiffness;
-            s.by_second = each.law.spring_stiffness / 12.0;
-        } else {
-            s.share = -0.5 / sine;
-            s.by_first = s.share * law.force;
-            s.by_second =
-                (law.stiffness * sine - law.force * std::cos(s.coordinate)) / (4.0 * sine * sine * sine);
-        }
+    if (each.kind != JointKind::ball) return s;
+    if (s.coordinate < small_angle) {  // cos s = (form - 1)/2; only the spring acts here
+        s.share = -0.5;
+        s.by_first = -0.5 * each.law.spring_stiffness;
+        s.by_second = each.law.spring_stiffness / 12.0;
+        return s;
     }
+    const double sine = std::sin(s.coordinate);
+    s.share = -0.5 / sine;
+    s.by_first = s.share * law.force;
+    s.by_second = (law.stiffness * sine - law.force * std::cos(s.coordinate)) / (4.0 * sine * sine * sine);
     return s;
 }
 
@@ -149,8 +113,8 @@ void JointTerm::evaluate(const double* q, const Controls&, Residual& out) {
             continue;
         }
         const State now = state(k, q);
-        if (each.kind == JointKind::revolute) last_turn_[k] = now.coordinate;
-        each.links.scatter(now.by_first * now.first, out);
+        if (each.kind == JointKind::revolute && std::isfinite(now.coordinate)) last_turn_[k] = now.coordinate;
+        each.links.scatter(now.by_first * now.form.first, out);
     }
 }
 
@@ -164,14 +128,8 @@ void JointTerm::finish_assembly(const double* q, const Controls&, SystemMatrix& 
             continue;
         }
         const State now = state(k, q);
-        if (each.kind != JointKind::revolute) {
-            each.links.add(now.by_first * each.cosine.pairs, now.first, now.by_second, now.first, 0.0, out);
-            continue;
-        }
-        const std::complex<double> inverse =
-            1.0 / std::complex<double>(each.cosine.value(now.at), each.sine.value(now.at));
-        each.links.add(now.by_first * (inverse.real() * each.sine.pairs + inverse.imag() * each.cosine.pairs),
-                       now.first, now.by_second, now.other, -now.by_first, out);
+        each.links.add(now.by_first * now.form.pairs, now.form.first, now.by_second, now.form.other,
+                       now.by_first * now.form.cross, out);
     }
 }
 
@@ -196,7 +154,7 @@ void JointTerm::vjp(const double* q, const Controls&, const double* lambda, Grad
             continue;
         }
         const State now = state(k, q);
-        const double along = now.share * now.first.cwiseProduct(rate).sum();
+        const double along = now.share * now.form.first.cwiseProduct(rate).sum();
         if (each.kind == JointKind::ball && now.coordinate < small_angle) {
             out.values[each.slots[0].first] += along;  // force over sine is 1
             continue;

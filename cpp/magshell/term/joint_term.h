@@ -1,18 +1,15 @@
 // What acts in the joints of skeletons: springs, torques, servos, limits; and closures of loops.
 //
-// The coordinate of a joint is read off the corners of its two links (corner_form.h):
-//   revolute   s = arg(C + i S),  C = u_p . u_c + v_p . v_c,  S = v_p . u_c - u_p . v_c      u, v across the axis
-//   prismatic  s = a_p . (o_c - o_p)
-//   ball       s = angle of the rotation, 1 + 2 cos s = sum e_p . e_c
+// The coordinate of a joint is read off the corners of its two links, as joint_form.h says; of a ball joint it is the angle
+// of the rotation.
 // A closure pulls a point of one link to a point of another: k/2 |o_c - o_p|^2.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "magshell/body/joint.h"
 #include "magshell/energy/joint_law.h"
-#include "magshell/term/corner_form.h"
+#include "magshell/term/joint_form.h"
 #include "magshell/term/term.h"
 
 namespace magshell {
@@ -47,7 +44,7 @@ class JointTerm final : public Term {
         JointKind kind;
         bool closure;
         LinkPair links;
-        CornerForm cosine, sine;      // of a revolute; of the others the first is their form
+        JointForm form;               // of a ball joint, not its angle yet
         CornerSum gap;                // of a closure
         CornerForm::Corners at_rest;  // |d(coordinate)/dx|
         double reach;  // what rounds at rest: a length, in lengths of a link where the coordinate is an angle
@@ -55,11 +52,11 @@ class JointTerm final : public Term {
         JointLaw law;
         double stiffness = 0.0;  // of a closure
     };
-    /// What of a joint a state tells: E' and E'' by what `first` is the gradient of, its coordinate or its form.
+    /// What of a joint a state tells: E' and E'' by its form.
     struct State {
-        CornerForm::Corners at, first, other;  // other: of a revolute, the gradient of log |C + i S|
+        JointForm::Local form;
         double coordinate, by_first, by_second;
-        double share;  // d(coordinate)/d(form) where first is that of a form
+        double share;  // d(coordinate)/d(form)
     };
 
     double coordinate(std::size_t k, const CornerForm::Corners& at) const;

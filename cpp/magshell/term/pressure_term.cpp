@@ -4,21 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "magshell/assembly/skew_blocks.h"
+
 namespace magshell {
 namespace {
 
 // Of the magnitudes that cancel between neighbours: what is left below is round-off.
 constexpr double cancelled = 1e-13, round_off = 8.0 * std::numeric_limits<double>::epsilon();
-
-// [axis]x in the first lane of a block whose diagonal is zero.
-void set_skew(Pack33& block, const Vec3& axis) {
-    block.at[1].set(0, -axis.z());
-    block.at[2].set(0, axis.y());
-    block.at[3].set(0, axis.z());
-    block.at[5].set(0, -axis.x());
-    block.at[6].set(0, -axis.y());
-    block.at[7].set(0, axis.x());
-}
 
 // Of all parts of a face together.
 template <class Kernel>

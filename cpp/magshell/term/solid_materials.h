@@ -10,6 +10,6 @@ using MakeSolidTerm = std::unique_ptr<SolidTerm>(const SolidResponse&, const Sol
                                                  Registry&);
 
 MakeSolidTerm make_neo_hookean_term, make_isochoric_term, make_stable_neo_hookean_term,
-    make_strain_quadratic_term, make_corotated_term, make_guccione_term;
+    make_strain_quadratic_term, make_corotated_term, make_guccione_term, make_projective_term;
 
 }  // namespace magshell

@@ -11,8 +11,9 @@ std::unique_ptr<SolidTerm> make_solid_term(const SolidResponse& response, const 
     if (response.mean_volume && !solid.quadratic())
         throw InvalidInput(
             "the mean volume of an element is for quadratic tetrahedra: linear ones have one point");
-    for (MakeSolidTerm* make : {make_neo_hookean_term, make_isochoric_term, make_stable_neo_hookean_term,
-                                make_strain_quadratic_term, make_corotated_term, make_guccione_term})
+    for (MakeSolidTerm* make :
+         {make_neo_hookean_term, make_isochoric_term, make_stable_neo_hookean_term,
+          make_strain_quadratic_term, make_corotated_term, make_guccione_term, make_projective_term})
         if (std::unique_ptr<SolidTerm> term = make(response, solid, body, chunks, matrix, nodes, registry))
             return term;
     throw InvalidInput("no solid material is called " + response.material);

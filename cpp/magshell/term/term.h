@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "magshell/assembly/node_matrix.h"
 #include "magshell/assembly/remainder.h"
 #include "magshell/assembly/residual.h"
 #include "magshell/assembly/schedule.h"
@@ -40,12 +41,17 @@ class Term {
 
     /// Whether the controls drive it. Every term that they do is linear in them; poses move in time steps only.
     virtual bool driven() const { return true; }
+    /// Whether values that may vary within a solve act in it.
+    virtual bool varies() const { return body() < 0 || driven(); }
 
     /// The energy [J] at q; changes nothing.
     virtual double energy(const double* q, const Controls& controls) const = 0;
 
     /// Adds the gradient at q and keeps what assemble and extrapolate need of this state.
     virtual void evaluate(const double* q, const Controls& controls, Residual& out) = 0;
+
+    /// From now on, what keeps an iteration from overshooting instead of a Hessian that is not positive, or not.
+    virtual void be_cautious(bool /*cautious*/) {}
 
     /// What the Hessian at the last evaluated state needs beforehand.
     virtual void prepare_assembly(const double* /*q*/, const Controls&) {}
@@ -76,6 +82,12 @@ class Term {
     /// puts them back.
     virtual std::vector<double> turns() const { return {}; }
     virtual void set_turns(const std::vector<double>&) {}
+
+    /// What Projective Dynamics puts in the place of its Hessian: a matrix of the nodes, the same along x, y and z, about as
+    /// stiff as the term in any state. Adds it; false where there is none, and Projective Dynamics cannot do the term.
+    virtual bool add_surrogate(NodeMatrix& /*out*/) const { return true; }
+    /// Of what touches at the last evaluated state: stiffness [N/m] on the nodes.
+    virtual void add_touching_stiffness(VectorXd& /*of_nodes*/) const {}
 
     virtual std::size_t bytes() const = 0;
 };

@@ -74,6 +74,34 @@ class Tetrahedra : public SolidTerm {
         });
     }
 
+    /// w sum_p V_p g_k . g_l,  w what a material says, or the modulus of its waves at rest, 2 mu + lam.
+    bool add_surrogate(NodeMatrix& out) const override {
+        for (Index pack = 0; pack < loop_.packs(); ++pack) {
+            const RestModuli moduli = Material::rest_moduli(constants_[pack].at);
+            Pack weight = Pack(2.0) * moduli.mu + moduli.lambda;
+            if constexpr (requires { Material::surrogate(constants_[pack].at); })
+                weight = Material::surrogate(constants_[pack].at);
+            Pack sum[N][N];
+            for (int p = 0; p < points; ++p) {
+                Pack3 g[N];
+                Element::gradients(rest_[pack].gradients[p], p, g);
+                for (int k = 0; k < N; ++k)
+                    for (int l = 0; l <= k; ++l) {
+                        const Pack share = weight * rest_[pack].volume[p] * dot(g[k], g[l]);
+                        sum[k][l] = p == 0 ? share : sum[k][l] + share;
+                    }
+            }
+            for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+                const std::array<Index, N>& nodes = element_nodes_[loop_.element(pack, lane)];
+                for (int k = 0; k < N; ++k) {
+                    out.add_diagonal(nodes[k], sum[k][k][lane]);
+                    for (int l = 0; l < k; ++l) out.add_pair(nodes[k], nodes[l], sum[k][l][lane]);
+                }
+            }
+        }
+        return true;
+    }
+
     bool refuses_states() const override { return Material::refuses_inversion; }
 
     double largest_share(const double* q, const double* step) const override {

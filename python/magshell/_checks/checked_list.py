@@ -8,7 +8,10 @@ from collections.abc import Iterable
 def checked_list(name: str, items, kinds: tuple[type, ...], wanted: str | None = None) -> tuple:
     """Of one object or several; raises ValueError where one is of none of the kinds."""
     wanted = wanted or ", ".join(kind.__name__ for kind in kinds) + " objects"
-    listed = [items] if isinstance(items, (*kinds, type)) or not isinstance(items, Iterable) else list(items)
+    several = (
+        isinstance(items, Iterable) and getattr(items, "ndim", 1) > 0
+    )  # an array of numpy's may be a number
+    listed = list(items) if several and not isinstance(items, (*kinds, type)) else [items]
     for item in listed:
         if not isinstance(item, kinds):
             what = f"the class {item.__name__}: call it" if isinstance(item, type) else type(item).__name__

@@ -77,3 +77,12 @@ def dtype_like(*inputs):
     """Of results: that of the first tensor among the inputs that has one for real numbers, or float64."""
     real = (given.dtype for given in inputs if is_tensor(given) and given.is_floating_point())
     return next(real, sys.modules["torch"].float64)
+
+
+def stacked(parts: list, axis: int = 0):
+    """Arrays as one along a new axis, or tensors in their graphs; of none, no numbers."""
+    if parts and is_tensor(parts[0]):
+        import torch
+
+        return torch.stack(parts, axis)
+    return np.stack(parts, axis) if parts else np.zeros(0)

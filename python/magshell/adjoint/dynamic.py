@@ -6,6 +6,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import NoGradient
+from ..methods.projective_dynamics import ProjectiveDynamics
 from ..scene.values import Gradient
 from .static import by_leaf
 
@@ -23,6 +24,10 @@ class MotionAdjoint:
             raise NoGradient(
                 f"no gradient here: the motion stopped after {found.steps_done} of {asked.steps} steps ({found.reason})"
             )
+        if isinstance(asked.integrator, ProjectiveDynamics):
+            why = asked.integrator.without_gradient(inputs.scene)
+            if why:
+                raise NoGradient(f"no gradient here: {why}")
         with inputs.in_core():
             found_by = _core.pull_back_motion(inputs.scene._model, asked.core, found, *by_outputs)
         gradient = Gradient(inputs.scene, found_by.pop("values"), found_by.pop("controls"), found_by)

@@ -50,9 +50,14 @@ PARTS = {
         "dynamics", "dynamics", "integrators: error, time, energy; gradients and memory of motions"
     ),
     "scaling": Part("scaling", "scaling", "time and memory from 2,000 to 500,000 faces, one and two threads"),
+    "experiments": Part(
+        "experiments",
+        "experiments",
+        "searches with and without gradients, each simulation counted; their memory",
+    ),
     "paper": Part("paper", "paper", "the examples beside Table 1 of Chen et al. 2022"),
 }
-EXTRAS = {"torch": "torch", "matplotlib": "plot"}  # library: the extra that brings it
+EXTRAS = {"torch": "torch", "gymnasium": "gym", "matplotlib": "plot"}  # library: the extra that brings it
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -150,12 +155,12 @@ def _figure(arguments: list[str]) -> int:
 
 def _overview() -> str:
     lines = ["usage: python -m magshell.bench PART [options]", "", "parts:"]
-    lines += [f"  {name:<10} {part.summary}" for name, part in PARTS.items()]
-    lines += ["", "  all FOLDER            every part, its numbers and its figure"]
+    lines += [f"  {name:<11} {part.summary}" for name, part in PARTS.items()]
+    lines += ["", "  all FOLDER             every part, its numbers and its figure"]
     lines += [
-        "  check                 all parts, quickly: targets that are missed, and what changed since the last release"
+        "  check                  all parts, quickly: targets that are missed, and what changed since the last release"
     ]
-    lines += ["  figure JSON PNG       draws what an earlier run wrote with --json"]
+    lines += ["  figure JSON PNG        draws what an earlier run wrote with --json"]
     return "\n".join([*lines, "", "python -m magshell.bench PART --help lists a part's options"])
 
 

@@ -15,7 +15,7 @@ from magshell.scene.values import Values
 from .contact_kernels import contacts
 from .ratios import note
 from .report import add_rounds, chosen, print_table
-from .solid_kernels import solids
+from .solid_kernels import muscles, solids
 from .timing import Timing, clocked, measure, peak_memory
 
 FACES, QUICK_FACES = (8192, 131072), (128, 512)
@@ -79,12 +79,14 @@ def run(options: argparse.Namespace) -> dict:
         rows,
     )
     of_solids = solids(options.quick, options.rounds)
+    of_muscles = muscles(options.quick, options.rounds)
     of_contacts = contacts(options.quick, options.rounds)
     gain = two_threads(SHEETS[0], sizes[0], options.rounds)
     _print_targets(costs[SHEETS[0].name], gain)
     return {
         "sheets": {name: [each._asdict() for each in of_sheet] for name, of_sheet in costs.items()},
         "solids": of_solids,
+        "muscles": of_muscles,
         "contacts": of_contacts,
         "two threads": gain,
     }

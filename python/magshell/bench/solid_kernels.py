@@ -38,10 +38,47 @@ def solids(quick: bool, rounds: int) -> list[dict]:
     return found
 
 
-def cost(element: str, volume: str, cells: tuple[int, int, int], rounds: int) -> dict:
+FORMS: dict[str, dict] = {
+    "target stretch": {"stiffness": 1e5, "activation": 0.1},
+    "active stress": {"peak_stress": 3e4, "activation": 0.5},
+    "Hill": {
+        "peak_stress": 3e4,
+        "activation": 0.5,
+        "force_length": [(0.5, 0.2), (0.75, 0.7), (1.0, 1.0), (1.25, 0.7), (1.5, 0.2)],
+    },
+}
+
+
+def muscles(quick: bool, rounds: int) -> list[dict]:
+    """Prints what a muscle in all of a solid adds to its gradient and Hessian, over what those of the solid alone cost."""
+    found = []
+    for element in ("linear", "quadratic"):
+        cells = QUICK_CELLS[0] if quick else CELLS[0]
+        for form, law in FORMS.items():
+            alone, pulled = (cost(element, "ln J", cells, rounds, each) for each in (None, law))
+            more = (pulled["hessian"] - alone["hessian"]) / alone["tetrahedra"]
+            share = more * alone["tetrahedra"] / alone["hessian"]
+            found.append({"element": element, "form": form, "added": more, "share": share})
+    rows = [
+        [f"{each['element']}, {each['form']}", f"{1e6 * each['added']:.3f}", f"{each['share']:.2f}"]
+        for each in found
+    ]
+    headings = ["muscle", "added", "of the solid's own"]
+    print_table(
+        f"A muscle, microseconds a tetrahedron, best of {rounds} (at most 1 of the solid's own)",
+        headings,
+        rows,
+    )
+    return found
+
+
+def cost(
+    element: str, volume: str, cells: tuple[int, int, int], rounds: int, muscle: dict | None = None
+) -> dict:
     material = ms.NeoHookean(volume, young_modulus=1e5, poisson_ratio=0.45 if volume == "isochoric" else 0.3)
     solid = ms.Solid(ms.meshes.box((4.0, 1.0, 1.0), cells=cells), material=material, element=element)
-    scene = ms.Scene(solid, supports=[ms.Pin(solid.mesh.vertices_at(x=0.0))])
+    actuators = [] if muscle is None else [ms.Muscle(solid, (1.0, 0.2, 0.1), **muscle)]
+    scene = ms.Scene(solid, supports=[ms.Pin(solid.mesh.vertices_at(x=0.0))], actuators=actuators)
     model, controls = scene._model, scene._control_layout.zeros()
     state = model.rest_state()
     state += 1e-3 / cells[0] * np.random.default_rng(0).standard_normal(state.size)

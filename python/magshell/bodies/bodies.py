@@ -58,10 +58,12 @@ class Bodies:
     """Raises ValueError where one is no Shell, Solid, Rigid or Skeleton, or is there twice, or where a tie cannot be.
 
     shells: all Shells and Solids. rigid: the Rigid parts, links among them, whose points come after all vertices.
+    touching: those of the rigid parts whose shapes touch: vertices of theirs come after the points of all.
     original: (n_v of all,), the first of the vertices that each is welded to, or itself.
     """
 
-    def __init__(self, bodies, ties=()):
+    def __init__(self, bodies, ties=(), touching=()):
+        self.touching: tuple[Rigid, ...] = tuple(touching)
         listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton))
         self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
         self.listed: tuple = tuple(listed)
@@ -233,8 +235,27 @@ class Bodies:
 
     @property
     def n_points(self) -> int:
-        """Vertices, and points of rigid parts."""
-        return self.mesh.n_vertices + 10 * len(self.rigid)
+        """Vertices, of which those that are welded count once, and points of rigid parts: what comes first in a state."""
+        return self.n_vertices + 10 * len(self.rigid) + self.n_on_surfaces
+
+    @property
+    def n_rows(self) -> int:
+        """Vertices of all bodies, those of shapes that touch, and points of rigid parts, as a caller counts them."""
+        return len(self.original) + 10 * len(self.rigid) + self.n_on_surfaces
+
+    @property
+    def n_on_surfaces(self) -> int:
+        """Vertices of shapes that touch."""
+        return sum(part.shape.n_vertices for part in self.touching)
+
+    def first_on_surface(self, part: Rigid) -> int:
+        """Where the vertices of its shape begin, among all points as a caller counts them."""
+        before = 0
+        for each in self.rigid:
+            if each is part:
+                break
+            before += each.shape.n_vertices if any(each is other for other in self.touching) else 0
+        return len(self.original) + 10 * len(self.rigid) + before
 
     def of(self, item) -> Span:
         """What a support, a load or a contact is about. Raises ValueError where it does not say so, and has to."""

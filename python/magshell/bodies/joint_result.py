@@ -6,6 +6,7 @@ import numpy as np
 
 from .joints import Joint
 from .rigid_result import RigidResult, _cross
+from .skeleton_input import motors
 
 
 class JointResult:
@@ -50,10 +51,14 @@ class JointResult:
 
     @property
     def rate(self):
-        """(n,) rad/s of a Revolute, m/s of a Prismatic: how fast its coordinate changes, in a motion."""
+        """(n,) rad/s of a Revolute, m/s of a Prismatic: how fast its coordinate changes, in a motion. Of a Ball (n, 3)
+        rad/s, how its child turns to its parent, axes of the world."""
         kind = self.joint._kind
-        if kind not in ("revolute", "prismatic"):
+        if kind not in ("revolute", "prismatic", "ball"):
             raise ValueError(f"a {type(self.joint).__name__} has no rate")
+        if kind == "ball":
+            turning = self._child.angular_velocity
+            return turning if self._parent is None else turning - self._parent.angular_velocity
         axis, spin = _like(self.joint.axis, self._child.center), 0.0
         velocity = self._velocity_of(self._child) - self._velocity_of(self._parent)
         if self._parent is not None:
@@ -63,6 +68,23 @@ class JointResult:
         slid = self.place - self._place_of(self._parent)
         turned = 0.0 if self._parent is None else (_cross(spin, axis) * slid).sum(-1)
         return (axis * velocity).sum(-1) + turned
+
+    @property
+    def motor_torque(self) -> np.ndarray:
+        """(...) N m, with which the motor of a Revolute turns its child about the axis, against its parent. In a motion NaN
+        in the state that it starts from. It has no gradient."""
+        return self._motor("revolute", "motor_angle")
+
+    @property
+    def motor_force(self) -> np.ndarray:
+        """(...) N, likewise of a Prismatic, along the axis."""
+        return self._motor("prismatic", "motor_displacement")
+
+    def _motor(self, kind: str, value: str) -> np.ndarray:
+        if self.joint._kind != kind or not self.joint.driven:
+            raise ValueError(f"only a {kind.capitalize()} with a {value} has a motor")
+        number = [id(each) for each in motors(self._result.scene._bodies.skeletons)].index(id(self.joint))
+        return self._result._driving[..., number]
 
     @property
     def place(self):

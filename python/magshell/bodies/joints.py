@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,7 +21,7 @@ class Joint(Owner):
     """
 
     _kind: ClassVar[str] = ""
-    _defaults: ClassVar[dict[str, float]] = {}  # by name: where it does not act
+    _defaults: ClassVar[dict[str, Any]] = {}  # by name: where it does not act
 
     def __init__(self, child: Rigid, parent: Rigid | None, origin, axis=None, rate=None, **law):
         for name, link in (("child", child), ("parent", parent)):
@@ -42,7 +42,7 @@ class Joint(Owner):
         for name, value in self._given.items():
             self._given[name] = self._checked(name, value)
         self._check_together()
-        self.rate = None if rate is None else float(quantity("rate", f"{self._unit('')}/s", rate, ()))
+        self.rate = None if rate is None else self._checked_rate(rate)
         # What it was made without, a solve cannot give it.
         self._replaceable = (*self._given, *(() if rate is None else ("rate",)))
         self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
@@ -55,16 +55,21 @@ class Joint(Owner):
             return None
         raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
 
-    def _checked(self, name: str, value) -> float:
+    def _checked_rate(self, value) -> float | np.ndarray:
+        return float(quantity("rate", f"{self._unit('')}/s", value, ()))
+
+    def _checked(self, name: str, value) -> float | np.ndarray:
         unit = self._unit(name)
         if name in ("servo_stiffness", "torque_limit", "force_limit", "limit_stiffness", "limit_smoothing"):
             return positive(name, unit, value)
-        if name == "spring_stiffness":
+        if name in ("spring_stiffness", "damping"):
             return not_negative(name, unit, value)
         return float(quantity(name, unit, value, ()))
 
     def _unit(self, name: str) -> str:
         slides = self._kind == "prismatic"
+        if name == "damping":
+            return "N s/m" if slides else "N m s/rad"
         if name in ("spring_stiffness", "servo_stiffness", "limit_stiffness"):
             return "N/m" if slides else "N m/rad"
         if name in ("torque", "torque_limit", "force", "force_limit"):
@@ -80,6 +85,12 @@ class Joint(Owner):
             )
         if len(limited) == 2 and not given["lower_limit"] < given["upper_limit"]:
             raise ValueError(f"lower_limit of a {kind} must be below its upper_limit")
+        if self.driven:
+            (motor,) = (name for name in given if name.startswith("motor_"))
+            if idle := [name for name in _UNDER_MOTOR if name in given]:
+                raise ValueError(
+                    f"{motor} of a {kind} prescribes where it is: {', '.join(idle)} would do nothing"
+                )
         target = [name for name in self._defaults if name.startswith("target_")]
         if target and (target[0] in given) != ("servo_stiffness" in given):
             raise ValueError(
@@ -87,9 +98,18 @@ class Joint(Owner):
             )
 
     @property
+    def driven(self) -> bool:
+        """Whether a motor prescribes its coordinate."""
+        return any(name.startswith("motor_") for name in self._given)
+
+    @property
     def acts(self) -> bool:
         """Whether anything but the constraint itself is in it."""
         return bool(self._given)
+
+    def has(self, name: str) -> bool:
+        """Whether it was made with this."""
+        return name in self._given
 
     def replaced(self, **values) -> Joint:
         """The same joint with other numbers of what acts in it."""
@@ -111,20 +131,35 @@ class Joint(Owner):
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
         found = {name: gradient.value(label, name)[0] for name in self._given}
         if self.rate is not None:
-            rows, found["rate"] = gradient.others.get("own_velocities"), np.zeros(())
+            rows = gradient.others.get("own_velocities")
+            found["rate"] = np.zeros(np.shape(self.rate))
             for place in values.moved_by(self) if rows is not None else ():
-                found["rate"] = found["rate"] + (rows[place.points] * self.directions(place.rest)).sum()
+                found["rate"] = found["rate"] + self._rate_gradient(place.rest, rows[place.points])
         return found
 
-    def directions(self, points: np.ndarray) -> np.ndarray:
-        """How points (n, 3) m of what it carries at rest move as its coordinate does: (n, 3), m/rad or 1."""
+    def velocities(self, points: np.ndarray) -> np.ndarray:
+        """Of points (n, 3) m of what it carries at rest, as it starts: (n, 3) m/s."""
+        return self.rate * self._directions(points)
+
+    def _rate_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
+        return (by_velocities * self._directions(points)).sum()
+
+    def _directions(self, points: np.ndarray) -> np.ndarray:
+        """How points move as its coordinate does: (n, 3), m/rad or 1."""
         if self._kind == "prismatic":
             return np.broadcast_to(self.axis, points.shape)
         return np.cross(self.axis, points - self.origin)
 
     def __repr__(self) -> str:
-        law = "".join(f", {name} {value:g}" for name, value in self._given.items())
+        law = "".join(f", {name} {_told(value)}" for name, value in self._given.items())
         return f"{type(self).__name__}({'to the world' if self.parent is None else 'between two links'}{law})"
+
+
+_UNDER_MOTOR = ("torque", "force", "servo_stiffness", "lower_limit", "upper_limit")
+
+
+def _told(value) -> str:
+    return f"{value:g}" if np.ndim(value) == 0 else f"({', '.join(f'{each:g}' for each in value)})"
 
 
 class Fixed(Joint):
@@ -144,11 +179,15 @@ class Revolute(Joint):
 
     origin, axis: (3,) m, and a direction, both in the world at rest and riding on the parent.
     spring_stiffness, rest_angle: N m/rad, rad: a spring.
+    damping: N m s/rad, a torque against the rate of the angle, in motions.
     torque: N m, on the child about the axis, and on the parent against it.
     target_angle, servo_stiffness, torque_limit: rad, N m/rad, N m: a servo that pulls towards the target, with a torque
         that stays below the limit (none by default).
     lower_limit, upper_limit, limit_stiffness, limit_smoothing: rad, rad, N m/rad, rad: beyond a limit the torque grows by
         a parabola of the length of the smoothing, then at this stiffness.
+    motor_angle: rad, prescribes the angle: a motor, reached by the shorter way round; `result[hinge].motor_torque` says
+        what it takes, in motions to second order, to first in loops that a Closure closes. In place of a torque, a
+        servo and limits. How fast it is to start with, `rate` says.
     rate: rad/s, at the start of a motion from rest positions, in a tree without vertices.
 
     All but the rate and the places may change in ms.simulate, one value a step or at the ends of steps.
@@ -167,7 +206,9 @@ class Revolute(Joint):
     _defaults: ClassVar[dict[str, float]] = {
         "spring_stiffness": 0.0,
         "rest_angle": 0.0,
+        "damping": 0.0,
         "torque": 0.0,
+        "motor_angle": 0.0,
         "target_angle": 0.0,
         "servo_stiffness": 0.0,
         "torque_limit": _FAR,
@@ -188,7 +229,9 @@ class Revolute(Joint):
         axis,
         spring_stiffness=None,
         rest_angle=None,
+        damping=None,
         torque=None,
+        motor_angle=None,
         target_angle=None,
         servo_stiffness=None,
         torque_limit=None,
@@ -205,8 +248,9 @@ class Revolute(Joint):
 class Prismatic(Joint):
     """Slides a link along an axis. Its displacement [m] is zero at rest.
 
-    As Revolute, with lengths for angles and forces [N] for torques: spring_stiffness N/m, rest_displacement m, force N,
-    target_displacement m, servo_stiffness N/m, force_limit N, lower_limit, upper_limit m, limit_stiffness N/m,
+    As Revolute, with lengths for angles and forces [N] for torques: spring_stiffness N/m, rest_displacement m, damping
+    N s/m, force N, motor_displacement m (`result[slide].motor_force`), target_displacement m, servo_stiffness N/m,
+    force_limit N, lower_limit, upper_limit m, limit_stiffness N/m,
     limit_smoothing m, rate m/s.
     """
 
@@ -214,7 +258,9 @@ class Prismatic(Joint):
     _defaults: ClassVar[dict[str, float]] = {
         "spring_stiffness": 0.0,
         "rest_displacement": 0.0,
+        "damping": 0.0,
         "force": 0.0,
+        "motor_displacement": 0.0,
         "target_displacement": 0.0,
         "servo_stiffness": 0.0,
         "force_limit": _FAR,
@@ -235,7 +281,9 @@ class Prismatic(Joint):
         axis,
         spring_stiffness=None,
         rest_displacement=None,
+        damping=None,
         force=None,
+        motor_displacement=None,
         target_displacement=None,
         servo_stiffness=None,
         force_limit=None,
@@ -253,17 +301,24 @@ class Ball(Joint):
     """Turns a link about a point, any way.
 
     spring_stiffness: N m/rad, pulls the rotation, as one angle, back to none.
+    damping: N m s/rad, a torque against the rate at which the link turns to its parent, in motions.
+    torque: (3,) N m, a moment on the child, and against it on the parent, its axes those of the world: it keeps its
+        direction as they turn. It has no potential, as a following pressure has none.
     upper_limit, limit_stiffness, limit_smoothing: rad, N m/rad, rad: of that angle, below pi.
+    rate: (3,) rad/s, how the child turns to its parent at the start of a motion, as in Revolute; axes of the world.
     """
 
     _kind = "ball"
-    _defaults: ClassVar[dict[str, float]] = {
+    _defaults: ClassVar[dict[str, Any]] = {
         "spring_stiffness": 0.0,
+        "damping": 0.0,
+        "torque": np.zeros(3),
         "upper_limit": _FAR,
         "limit_stiffness": 0.0,
         "limit_smoothing": 1.0,
     }
-    _replaceable = _in_time = tuple(_defaults)
+    _in_time = tuple(_defaults)
+    _replaceable = (*_in_time, "rate")
 
     def __init__(
         self,
@@ -272,14 +327,31 @@ class Ball(Joint):
         *,
         origin,
         spring_stiffness=None,
+        damping=None,
+        torque=None,
         upper_limit=None,
         limit_stiffness=None,
         limit_smoothing=None,
+        rate=None,
     ):
         law = {name: value for name, value in locals().items() if name in self._defaults}
-        super().__init__(child, parent, origin, **law)
+        super().__init__(child, parent, origin, rate=rate, **law)
         if upper_limit is not None and not 1e-3 <= float(upper_limit) < np.pi:
             raise ValueError(f"upper_limit [rad] of a Ball must be from 1e-3 to pi, got {upper_limit:g}")
+
+    def _checked(self, name: str, value) -> float | np.ndarray:
+        if name == "torque":
+            return np.array(quantity(name, "N m", value, (3,)))
+        return super()._checked(name, value)
+
+    def _checked_rate(self, value) -> np.ndarray:
+        return np.array(quantity("rate", "rad/s", value, (3,)))
+
+    def velocities(self, points: np.ndarray) -> np.ndarray:
+        return np.cross(self.rate, points - self.origin)
+
+    def _rate_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
+        return np.cross(points - self.origin, by_velocities).sum(axis=0)
 
 
 class Closure(Joint):

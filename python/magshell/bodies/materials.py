@@ -31,6 +31,9 @@ class SolidMaterial:
         unit, wanted, holds = self._ranges[name]
         array = real_numbers(f"{name} [{unit}]", value)
         array = quantity(name, unit, array, array.shape)
+        row = self._row_shapes().get(name, ())
+        if row and array.shape[-1:] != row:
+            raise ValueError(f"{name} [{unit}] must have shape {row} or (n_t, {row[0]}), got {array.shape}")
         bad = ~holds(array)
         if bad.any():
             index = np.argmax(bad)
@@ -175,6 +178,25 @@ class Corotated(_Isotropic):
 
     young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
     """
+
+
+class Projective(_Isotropic):
+    """What Projective Dynamics is for: mu |F - R|^2 + lam/2 |F - P|^2, R the nearest rotation, P the nearest matrix with
+    determinant 1 (Bouaziz et al. 2014; with the weights 2 mu and lam of [Qiao21]). Elements turned inside out come back.
+    Volume counts at every point of an element, so that it has no mean_volume.
+
+    young_modulus: Pa, positive. poisson_ratio: in [0, 1/2). Each a number, or (n_t,). They give mu and lam as everywhere;
+        but for small strains e this energy is mu |e|^2 + lam/6 (tr e)^2: it resists changes of volume with a third of lam.
+    """
+
+    _ranges: ClassVar = {
+        "young_modulus": _YOUNG["young_modulus"],
+        "poisson_ratio": ("1", "in [0, 1/2): lam is a weight here", lambda nu: (nu >= 0) & (nu < 0.5)),
+    }
+
+    @property
+    def nearly_incompressible(self) -> bool:
+        return False
 
 
 class Guccione(SolidMaterial):

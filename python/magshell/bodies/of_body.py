@@ -5,6 +5,8 @@ from __future__ import annotations
 from .body_result import BodyResult
 from .joint_result import JointResult
 from .joints import Joint
+from .muscle import Muscle
+from .muscle_result import MuscleResult
 from .rigid import Rigid
 from .rigid_result import RigidResult
 from .shell import Shell
@@ -13,11 +15,15 @@ from .solid_result import SolidResult
 
 
 def result_of(
-    result, body: Shell | Solid | Rigid | Joint
-) -> BodyResult | SolidResult | RigidResult | JointResult:
-    """`result[body]`, or `result[joint]`. Raises ValueError where the scene has no such body."""
+    result, body: Shell | Solid | Rigid | Joint | Muscle
+) -> BodyResult | SolidResult | RigidResult | JointResult | MuscleResult:
+    """`result[body]`, `result[joint]` or `result[actuator]`. Raises ValueError where the scene has no such one."""
+    if hasattr(body, "_result_in"):  # an actuator
+        return body._result_in(result)
     if isinstance(body, Joint):
         return JointResult(result, body)
+    if isinstance(body, Muscle):
+        return MuscleResult(result, body)
     if isinstance(body, Rigid):
         return RigidResult(result, body)
     return SolidResult(result, body) if isinstance(body, Solid) else BodyResult(result, body)

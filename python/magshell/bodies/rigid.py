@@ -7,6 +7,10 @@ import numpy as np
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
 from .._checks.selections import selection
+from ..mesh.triangle_mesh import TriangleMesh
+from ..meshes.stuffed import from_distance
+from ..shapes import Shape
+from .filled_shape import filled
 from .shell import Shell
 from .solid import Solid
 
@@ -26,6 +30,9 @@ class Rigid(Owner):
     velocity, angular_velocity: (3,) m/s of the center, (3,) rad/s in the world's axes: of a free body, where a motion
         starts at rest positions. Vertices have theirs from the `velocities` of ms.simulate.
     body: the Shell or Solid whose vertices they are, in a scene of several.
+    shape: a TriangleMesh where it is at rest, or one of ms.shapes, of which the surface of some 2000 tetrahedra is taken:
+        what an ms.Contact of the part with bodies touches with, and pictures show. `Rigid.of` makes mass, inertia and
+        center from one.
 
     Supports hold none of its vertices. `result[part]` has its center and rotation, and how fast it moves. ms.simulate
     takes it by TRBDF2, the first step in seven parts, or by ImplicitEuler; viscous damping acts on vertices only. Faces
@@ -54,11 +61,13 @@ class Rigid(Owner):
         velocity=None,
         angular_velocity=None,
         body: Shell | Solid | None = None,
+        shape: TriangleMesh | Shape | None = None,
     ):
         if body is not None and not isinstance(body, Shell | Solid):
             raise ValueError(f"body must be a Shell or a Solid of the scene, got {body!r:.60}")
         if vertices is None and body is not None:
             raise ValueError("a Rigid of a body needs its vertices: Rigid(vertices=..., body=...)")
+        self.shape = _checked_shape(shape)
         self.vertices = None if vertices is None else selection("Rigid vertices", vertices)
         self.body = body
         self.mass = None if mass is None else float(quantity("mass", "kg", mass, ()))
@@ -104,8 +113,24 @@ class Rigid(Owner):
                 raise ValueError(f"the Rigid was made without {name}: give it one in the scene, zero will do")
         return self._again({**own, **values})
 
+    @classmethod
+    def of(cls, shape: TriangleMesh | Shape, mass_density: float, **others) -> Rigid:
+        """The one that fills a closed surface, faces outwards: mass [kg], inertia and center by its density [kg/m3].
+        others: of its arguments.
+
+        Raises ValueError where the surface is open, or turned inside out.
+
+        >>> import magshell as ms
+        >>> ms.Rigid.of(ms.meshes.box((0.02, 0.02, 0.02), cells=(1, 1, 1)).surface, 1e3)
+        Rigid(free, mass 0.008 kg)
+        """
+        surface = _checked_shape(shape)
+        if surface is None:
+            raise ValueError("shape must be a TriangleMesh or one of ms.shapes, got None")
+        return cls(shape=surface, **filled(surface, mass_density), **others)
+
     def _again(self, values: dict) -> Rigid:
-        return Rigid(self.vertices, body=self.body, **values)
+        return type(self)(self.vertices, body=self.body, shape=self.shape, **values)
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         if self.magnetic_moment is not None:
@@ -145,6 +170,17 @@ class Rigid(Owner):
             else f", magnetic_moment {tuple(self.magnetic_moment.tolist())} A m2"
         )
         return f"Rigid({what}{mass}{magnet})"
+
+
+_SHAPE_TETRAHEDRA = 2000
+
+
+def _checked_shape(shape) -> TriangleMesh | None:
+    if isinstance(shape, Shape):
+        return from_distance(shape, n_tetrahedra=_SHAPE_TETRAHEDRA).surface
+    if shape is not None and not isinstance(shape, TriangleMesh):
+        raise ValueError(f"shape must be a TriangleMesh or one of ms.shapes, got {shape!r:.60}")
+    return shape
 
 
 def _checked_inertia(given) -> np.ndarray:

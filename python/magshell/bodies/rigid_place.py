@@ -34,6 +34,7 @@ class Place(NamedTuple):
     center: np.ndarray
     axes: np.ndarray
     length: float
+    surface: np.ndarray  # (m, 3) m at rest, of its shape where that touches; after the tens of all parts
 
     def center_of(self, part: Rigid) -> np.ndarray:
         """(3,) m, of its own mass, at rest."""
@@ -80,7 +81,8 @@ class Place(NamedTuple):
 
     def as_input(self, owner: str, magnetic: bool) -> dict:
         """As the core takes it."""
-        return {"owner": owner, "points": self.rest, "vertices": self.vertices.tolist(), "magnetic": magnetic}
+        points = np.concatenate([self.rest, self.surface])
+        return {"owner": owner, "points": points, "vertices": self.vertices.tolist(), "magnetic": magnetic}
 
 
 def places(bodies) -> list[Place]:
@@ -98,7 +100,9 @@ def places(bodies) -> list[Place]:
                 )
             of_part[vertex] = k
         skeleton = bodies.skeleton_of(part)
-        found.append(_place(part, skeleton, bodies.mesh.rest_positions[vertices], vertices, n_v + 10 * k))
+        place = _place(part, skeleton, bodies.mesh.rest_positions[vertices], vertices, n_v + 10 * k)
+        touches = any(each is part for each in bodies.touching)
+        found.append(place._replace(surface=part.shape.rest_positions) if touches else place)
     return found
 
 
@@ -142,7 +146,7 @@ def _place(
             "a Link of a point mass needs a joint away from its center: nothing tells how it turns"
         )
     points = center + length * _POINTS @ axes.T
-    return Place(vertices, slice(first, first + 10), points, center, axes, length)
+    return Place(vertices, slice(first, first + 10), points, center, axes, length, np.zeros((0, 3)))
 
 
 def check_rigid(scene, given: np.ndarray, settled: np.ndarray, name: str, size: float) -> None:
@@ -160,7 +164,8 @@ _BENT = 1e-3
 
 
 def own_velocities(inputs, start, goes_on: bool) -> np.ndarray:
-    """(10 a part, 3) m/s: how the points of free rigid parts start. goes_on: start is a motion, which knows it.
+    """(n, 3) m/s: how the points of free rigid parts start, ten of each; those of surfaces follow them, and are zero here.
+    goes_on: start is a motion, which knows it.
 
     Raises ValueError where a start does not fit their velocities.
     """
@@ -181,10 +186,10 @@ def own_velocities(inputs, start, goes_on: bool) -> np.ndarray:
             continue
         if from_rest:
             for place, k in zip(values.moved_by(joint), scene._bodies.moved_by(own), strict=True):
-                rows[k] += joint.rate * joint.directions(place.rest)
+                rows[k] += joint.velocities(place.rest)
         elif not goes_on or joint is not own:
             raise _not_from(start, "rate of a joint")
-    return rows.reshape(-1, 3)
+    return np.concatenate([rows.reshape(-1, 3), np.zeros((scene._bodies.n_on_surfaces, 3))])
 
 
 def _not_from(start, what: str) -> ValueError:

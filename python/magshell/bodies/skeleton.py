@@ -39,11 +39,41 @@ class Skeleton:
         for name, items in (("links", self.links), ("joints", self.joints)):
             if len({id(item) for item in items}) < len(items):
                 raise ValueError(f"{name} must differ, but one is there twice")
+        self.named: dict[str, Rigid | Joint] = {}  # of a file
         self._leading: dict[int, Joint] = {}
         for k, joint in enumerate(self.joints):
             self._check(k, joint)
         self._order = self._in_order()
         self._check_velocities()
+
+    @classmethod
+    def from_urdf(
+        cls, path, *, fixed_base: bool = True, limits: bool = True, limit_stiffness=None, limit_smoothing=None
+    ) -> Skeleton:
+        """Reads a URDF file, with the extra `urdf`: links with masses and inertias, at rest where all joints are at zero;
+        revolute, continuous, prismatic and fixed joints with axes, limits and damping; links on a floating joint are free.
+        `skeleton.named["elbow"]` is the link or joint of that name.
+
+        fixed_base: the root is held in the world; else it is free.
+        limit_stiffness, limit_smoothing: of all joints that have limits, in their units (see Revolute, Prismatic);
+            limits=False leaves limits out. Limits of effort and velocity are those of actuators, and not read, nor are
+            shapes: pictures show rods.
+
+        Raises ValueError on what cannot be: mimic joints, dry friction, planar joints, loops, broken files; ImportError
+        without the extra.
+        """
+        from .urdf import read_urdf
+
+        links, joints, named = read_urdf(
+            path,
+            fixed_base=fixed_base,
+            limits=limits,
+            limit_stiffness=limit_stiffness,
+            limit_smoothing=limit_smoothing,
+        )
+        skeleton = cls(links, joints)
+        skeleton.named = named
+        return skeleton
 
     def _check(self, k: int, joint: Joint) -> None:
         for role in ("child", "parent"):

@@ -40,6 +40,20 @@ def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -
 
 def _joint(joint: Joint | None, place: dict[int, int]) -> dict:
     if joint is None:
-        return {"kind": "free", "parent": -1, "origin": np.zeros(3), "axis": np.zeros(3)}
-    parent = -1 if joint.parent is None else place[id(joint.parent)]
-    return {"kind": joint._kind, "parent": parent, "origin": joint.origin, "axis": joint.axis}
+        still = dict.fromkeys(("driven", "damped", "twisted"), False)
+        return {"kind": "free", "parent": -1, "origin": np.zeros(3), "axis": np.zeros(3), **still}
+    return {
+        "kind": joint._kind,
+        "parent": -1 if joint.parent is None else place[id(joint.parent)],
+        "origin": joint.origin,
+        "axis": joint.axis,
+        "driven": joint.driven,
+        "damped": joint.has("damping"),
+        "twisted": joint._kind == "ball" and joint.has("torque"),
+    }
+
+
+def motors(skeletons) -> list[Joint]:
+    """In the core's order."""
+    leading = [skeleton.joint_to(link) for skeleton in skeletons for link in skeleton.in_order]
+    return [joint for joint in leading if joint is not None and joint.driven]

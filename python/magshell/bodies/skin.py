@@ -16,6 +16,8 @@ class Skin(Owner):
     """A magnetized layer on the surface of a Solid, without stiffness, and without mass unless one is given, as in [Chen22]
     6.4.
 
+    Without a field it may stand where it has a mass density and no magnetization.
+
     A layer with a modulus of its own is a Shell: `ms.Shell(solid.mesh.surface, ...)` with `ms.Tie(solid, shell)`.
 
     thickness: m, positive, a number or (k,), one a face.
@@ -102,7 +104,11 @@ class Skin(Owner):
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
         """With what its values do to the masses of the vertices."""
-        found = {name: gradient.value(label, name) for name in ("thickness", "remanent_magnetization")}
+        found = {
+            "thickness": np.zeros(len(self.faces)),
+            "remanent_magnetization": np.zeros((len(self.faces), 3)),
+        }
+        found |= {name: gradient.value(label, name) for name in found if gradient.has(label, name)}
         by_masses = None if self.mass_density is None else values.by_masses(gradient)
         if by_masses is not None:
             vertices = values.part_of_skin(self).vertices

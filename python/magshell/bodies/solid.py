@@ -10,7 +10,7 @@ from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
 from ..mesh.tet_integrals import shape_integrals, shape_products
 from ..mesh.tet_mesh import TetMesh
-from .materials import SolidMaterial
+from .materials import Projective, SolidMaterial
 from .mean_volume import warn_of_mean_volume
 from .shell import magnetization_of
 from .skin import Skin
@@ -70,6 +70,10 @@ class Solid(Owner):
             raise ValueError(f"mean_volume must be True, False or None, got {mean_volume!r}")
         if mean_volume and element == "linear":
             raise ValueError("mean_volume is for quadratic elements: linear ones have one point each")
+        if mean_volume and isinstance(material, Projective):
+            raise ValueError(
+                "mean_volume is not for Projective: no part of its energy depends on the volume alone"
+            )
         self.mesh = mesh.second_order() if element == "quadratic" else mesh.first_order()
         self.element = element
         for name in material.names:

@@ -6,6 +6,7 @@ import numpy as np
 
 from .._checks.tensors import detached
 from .body_result import BodyResult
+from .muscle_result import muscles_of
 from .solid_states import SolidStates, states_at
 
 # Tetrahedra that are looked at unasked, when a result is printed: some 30 ms.
@@ -30,7 +31,8 @@ class SolidResult(BodyResult):
         """
         positions = np.asarray(detached(self._result.positions), dtype=np.float64)
         at = positions if positions.ndim == 2 else positions[index]
-        return states_at(self._result._values_at(index), self.body, at)
+        found = states_at(self._result._values_at(index), self.body, at)
+        return found._replace(muscles=muscles_of(self._result, self.body, index))
 
     def stresses(self, index: int = -1) -> SolidStates:
         """As `strains`, which has both: `green_strains`, `cauchy_stresses`, `von_mises_stresses` and `mean` are those of

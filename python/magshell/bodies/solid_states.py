@@ -15,12 +15,14 @@ class SolidStates(NamedTuple):
     """At the points of integration of each tetrahedron: one of linear ones, p = 4 of quadratic ones.
 
     deformation_gradients: F, (n_t, p, 3, 3). cauchy_stresses: P F^T / J, (n_t, p, 3, 3), Pa, elastic.
-    volumes: at rest, (n_t, p), m3.
+    volumes: at rest, (n_t, p), m3. muscles: {"activation", "fibre_stretch", "fibre_tension" [Pa]}: (n_t,) each, of all
+    muscles in it, NaN where there are none; None in a solid without.
     """
 
     deformation_gradients: np.ndarray
     cauchy_stresses: np.ndarray
     volumes: np.ndarray
+    muscles: dict[str, np.ndarray] | None = None
 
     @property
     def volume_ratios(self) -> np.ndarray:

@@ -9,6 +9,8 @@
 
 [Chen22] bounds every component of the field by 0.05 T: the box of `ms.optim.MMA` or `LBFGS` on per-step values, or on
 the control points of a spline, holds it exactly.
+
+Where contact makes gradients of long motions useless, `ms.control.in_windows` searches the first steps first.
 """
 
 from .curves import Arc, Chain, Curve, Polyline
@@ -24,12 +26,16 @@ from .motions import (
 from .penalties import dmp, field_cap, field_excess, field_rate, field_strength
 from .signals import fit_fourier, fourier, harmonics, held, rotating, step_times
 from .splines import fit_spline, spline
+from .waves import pulse, wave
+from .windows import Window, Windows, in_windows
 
 __all__ = [
     "Arc",
     "Chain",
     "Curve",
     "Polyline",
+    "Window",
+    "Windows",
     "curve_distance",
     "dmp",
     "field_cap",
@@ -42,12 +48,15 @@ __all__ = [
     "frames_at",
     "harmonics",
     "held",
+    "in_windows",
     "key_frames",
     "path_following",
+    "pulse",
     "rotating",
     "spline",
     "step_times",
     "successive_targets",
     "track",
     "track_fitting",
+    "wave",
 ]

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._checks.tensors import detached
+from ..bodies.muscle import Muscle
 from ..obstacles import Obstacle
 from ..scene.courses import Course
+from ..scene.values import Values
+from ..surroundings.actuator import Actuator
 from ..surroundings.supports import Support
 from .obstacle_paths import ObstaclePath
 from .supports_in_time import check_supports
@@ -24,10 +28,13 @@ class InTime:
         self._places: dict[tuple[int, str], list[slice]] = {}
         self.entries: list[int] = []
         self.poses: dict[int, np.ndarray] = {}
+        self.of_actuators: dict[tuple[Actuator, str], np.ndarray] = {}
         for course in courses:
             course.check(asked.steps)
         of_values = [each for each in courses if not isinstance(each.owner, Obstacle)]
         knots = [asked.at_knots(each.name, each.unit, each.value, each.row) for each in of_values]
+        for course, at_knots in zip(of_values, knots, strict=True):
+            course.owner.check_in_time(course.name, at_knots)
         check_supports(
             asked, [(c, k) for c, k in zip(of_values, knots, strict=True) if isinstance(c.owner, Support)]
         )
@@ -36,9 +43,23 @@ class InTime:
             numbers = np.reshape(
                 asked.inputs.take(course.name, at_knots, _Values(self, course)), (asked.knots, -1)
             )
+            if isinstance(course.owner, Actuator):
+                self.of_actuators[course.owner, course.name] = numbers.reshape(-1, *course.row)
+                self._check_actuator(course)
             rows += [numbers] * self._add(course, numbers.shape[1])
+        self.activations: dict[Muscle, np.ndarray] = {
+            course.owner: np.asarray(detached(at_knots), dtype=np.float64)
+            for course, at_knots in zip(of_values, knots, strict=True)
+            if isinstance(course.owner, Muscle)
+        }
         self.rows = np.concatenate(rows, axis=1)
         self._add_obstacles([each for each in courses if isinstance(each.owner, Obstacle)])
+
+    def values(self, values: Values, knot: int) -> Values:
+        """Those of the motion with the activations at one of its knots."""
+        return values.with_objects(
+            {muscle: muscle.replaced(activation=rows[knot]) for muscle, rows in self.activations.items()}
+        )
 
     def _add(self, course: Course, width: int) -> int:
         """Finds the places of a value in the core; how many there are."""
@@ -58,6 +79,12 @@ class InTime:
             places.append(slice(end, end + width))
             end += width
         return len(labels)
+
+    def _check_actuator(self, course: Course) -> None:
+        """Raises ValueError where the actuator cannot have one of its numbers."""
+        at_knots = self.of_actuators[course.owner, course.name]
+        for extreme in (at_knots.min(axis=0), at_knots.max(axis=0)):
+            course.owner.replaced(**{course.name: extreme})
 
     def _add_obstacles(self, courses: list[Course]) -> None:
         values, obstacles = self._asked.inputs.values, self._asked.inputs.scene.obstacles

@@ -90,16 +90,29 @@ class MotionInputs:
                 "controls": self._all_controls(),
                 "varying": self._in_time.entries,
                 "newton": solver._newton_options(),
+                "projective": getattr(integrator, "_projective", None),
                 "record_every": self.record_every,
             },
         )
 
     def recorded(self, name: str, count: int) -> np.ndarray:
         """A control at the first `count` recorded states, (count, *row): at the start, then at the ends of steps."""
-        knots = self._knots[name]
+        return self._knots[name][self._recorded_knots(count)]
+
+    def varied(self, count: int) -> dict[tuple, np.ndarray]:
+        """Likewise {(actuator, name): its values} of what varies."""
+        at = self._recorded_knots(count)
+        return {key: rows[at] for key, rows in self._in_time.of_actuators.items()}
+
+    def _recorded_knots(self, count: int) -> np.ndarray:
         a_step = len(self.integrator._times) + 1
         ends = a_step * self.record_every * np.arange(1, count) - 1
-        return knots[np.concatenate([[0], ends])]
+        return np.concatenate([[0], ends])
+
+    @property
+    def activations(self) -> InTime | None:
+        """What is in time of muscles, if anything is."""
+        return self._in_time if self._in_time.activations else None
 
     def _all_controls(self) -> np.ndarray:
         """(knots, m), in the core's layout."""

@@ -80,14 +80,15 @@ def simulate(
         there, they lie on straight lines between (rotation vectors too), also at the stages within a step. Of field sources
         one a step may be given, which lets them jump. The surface of an obstacle moves, for friction, with the slopes of
         parabolas through three neighbouring ends, on straight lines between those: of second order, as its places are.
-    integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(). A method of higher
-        order makes an impact bounce, and each of its steps there is much work, unless the steps resolve it.
+    integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(), ProjectiveDynamics().
+        A method of higher order makes an impact bounce, and each of its steps there is much work, unless the steps resolve
+        it.
     record_every: steps between the states that come back, the start first.
     memory_budget: bytes that may be kept for gradients: all states if they fit; else checkpoints, between which the
         steps are taken again on the way back, some of them several times.
     keep: "stages" or "checkpoints", whatever the budget says; "factors": all states with their factorizations, which
         pays where several gradients are taken of one motion.
-    solver: of a step; MixedNewton() by default, of which the load steps are not used.
+    solver: of a step; MixedNewton() by default, of which the load steps are not used. ProjectiveDynamics needs none.
     progress: show a bar once the motion has taken two seconds.
 
     A step that does not converge is taken in halves, down to 1/64 of it. Raises NotConverged and Interrupted with the
@@ -116,7 +117,10 @@ def simulate(
         what = (
             f"the class {integrator.__name__}: call it" if isinstance(integrator, type) else repr(integrator)
         )
-        raise ValueError(f"integrator must be ms.TRBDF2(), ImplicitEuler(), SDIRK2() or SDIRK3(), got {what}")
+        raise ValueError(
+            "integrator must be ms.TRBDF2(), ImplicitEuler(), SDIRK2(), SDIRK3() or ProjectiveDynamics(), "
+            f"got {what}"
+        )
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
     if not isinstance(scene, Scene):
@@ -223,7 +227,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         largest_bending_strain=strain.bending,
         steps=asked.steps,
         steps_done=found.steps_done,
-        halved={step: len(parts) for step, parts in found.halved.items()},
+        halved={step: len(parts) for step, parts in found.halved.items() if len(parts) > 1},
+        calmed=tuple(step for step, parts in found.halved.items() if any(calm for _, _, calm in parts)),
         end=MotionState(
             ended.time,
             found.last_state,
@@ -243,9 +248,12 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         wall_time=wall_time,
         linear_time=found.linear_time,
         _field_factors=asked.recorded("field_factor", recorded),
+        _load_factors=asked.recorded("load_factor", recorded),
+        _varied=asked.varied(recorded),
         _thickness=thickness,
         _values=values,
         _directions=found.directions(model),
+        _held_forces=found.held_forces(model),
         _placed=[
             (
                 values.current(contact),
@@ -257,6 +265,9 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         ],
         _own_points=points[:, n_v:] if rigid else None,
         _own_velocities=velocities[:, n_v:] if rigid else None,
+        _driving=found.driving(),
+        _activations=asked.activations,
+        _record_every=asked.record_every,
     )
 
 

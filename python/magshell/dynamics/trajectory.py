@@ -23,10 +23,14 @@ from ..bodies.strains import StrainHistory, Strains, strains_of
 from ..mesh.crossings import told
 from ..methods.clock import Clock, clock_of
 from ..methods.integrators import Integrator
+from ..scene.body_kinks import near_body_kinks
+from ..scene.reactions import Reaction, reaction_in
 from ..scene.scene import Scene
 from ..scene.touching import Touching, touching_in
 from ..surroundings.body_contact import BodyContact
+from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import near_kinks
+from ..surroundings.supports import Clamp, Pin, SymmetryPlane
 
 
 @dataclass(frozen=True)
@@ -101,7 +105,8 @@ class Trajectory:
     largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
         leaves the model, of which ms.LargeStrainWarning warns.
     steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
-    taken}. end: the last state, from which another simulation goes on. bytes: kept for gradients.
+    taken}. calmed: the steps, or steps with parts, that implicit Euler took instead of the integrator, because bodies
+    touched and the step would have gained energy that nothing put in. end: the last state, from which another simulation goes on. bytes: kept for gradients.
     """
 
     scene: Scene
@@ -119,6 +124,7 @@ class Trajectory:
     steps: int
     steps_done: int
     halved: dict[int, int]
+    calmed: tuple[int, ...]
     end: MotionState
     iterations: int
     factorizations: int
@@ -127,14 +133,20 @@ class Trajectory:
     wall_time: float
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
+    _load_factors: np.ndarray = field(repr=False)
+    _varied: dict = field(repr=False)  # {(actuator, name): (n, ...)}, of the recorded states
     _thickness: np.ndarray = field(repr=False)
     _values: Any = field(repr=False)
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
+    _held_forces: np.ndarray = field(repr=False)  # (n, m, 3) N, of the constraints' held nodes
     _placed: list = field(
         repr=False, default_factory=list
     )  # the first arguments of near_kinks, of each contact
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
+    _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
+    _activations: Any = field(repr=False, default=None)  # what changed of the values
+    _record_every: int = field(repr=False, default=1)
 
     def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
         """What it says of one body of the scene."""
@@ -149,7 +161,17 @@ class Trajectory:
         return self.positions - self.positions.new_tensor(np.array(rest))
 
     def _values_at(self, index: int):
-        return self._values
+        """With the values in time that muscles had then."""
+        return (
+            self._values
+            if self._activations is None
+            else self._activations.values(self._values, self._knot(index))
+        )
+
+    def _knot(self, index: int) -> int:
+        """Where a recorded state is among the times at which controls are given."""
+        step = range(len(self))[index] * self._record_every
+        return 0 if step == 0 else (len(self.integrator._times) + 1) * step - 1
 
     @property
     def _obstacles(self) -> tuple:
@@ -163,11 +185,13 @@ class Trajectory:
 
     @property
     def kinks(self) -> dict[int, np.ndarray]:
-        """{recorded state: vertices} that touch an obstacle where the motion is not differentiable, or within the
-        smoothing of there: by the sharp edge of a box or a mesh, in the middle of a body.
+        """{recorded state: vertices} that touch where the motion is not differentiable, or within the smoothing of there: an
+        obstacle by the sharp edge of a box or a mesh, or in the middle of a body; of bodies in contact, the point or edge
+        whose closest point goes over a fold of the other surface by more than 0.3 rad, or over its border.
 
         A small change may bring such a point to another side. A gradient is that of the side on which it is. Looked up
-        when asked for, in the recorded states only.
+        when asked for, in the recorded states only. What opens and closes, sticks and slips is none: the laws of contact
+        and friction are smooth there, and `touching` tells what does.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
@@ -181,9 +205,15 @@ class Trajectory:
         found = {}
         for k, time in enumerate(self.times):
             near = [near_kinks(*each, positions[k], time) for each in self._placed]
+            near += [self._near_body_kinks(contact, k) for contact in self.scene._body_contacts]
             if near and (every := np.unique(np.concatenate(near))).size:
                 found[k] = every
         return found
+
+    def _near_body_kinks(self, contact: BodyContact, index: int) -> np.ndarray:
+        smoothing = self._values.current(contact).smoothing
+        positions = self.scene._model.points(self._state_at(index))
+        return near_body_kinks(self.scene, self.touching(contact, index), smoothing, positions)
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face in a recorded state, by default the last."""
@@ -195,12 +225,25 @@ class Trajectory:
         model = self.scene._model
         state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
         before = 3 * self.scene._bodies.n_points
+        if self._own_points is not None:  # free parts are where no vertex tells
+            own = np.asarray(detached(self._own_points)[index], dtype=np.float64)
+            state[:before] = model.full_vector(np.concatenate([positions, own]))[:before]
         state[before : before + self._directions.shape[1]] = self._directions[index]
         return state
 
-    def touching(self, contact: BodyContact, index: int = -1) -> Touching:
-        """The pairs of a contact of bodies that touch in a recorded state, by default the last, and their forces."""
-        return touching_in(self.scene, self._values, contact, self._state_at(index))
+    def touching(self, contact: BodyContact | Contact, index: int = -1) -> Touching:
+        """The pairs of a contact that touch in a recorded state, by default the last, and their forces."""
+        own = () if self._own_velocities is None else (self._own_velocities,)
+        velocities = np.concatenate(
+            [np.asarray(detached(each)[index], dtype=np.float64) for each in (self.velocities, *own)]
+        )
+        state, time = self._state_at(index), float(self.times[index])
+        return touching_in(self.scene, self._values, contact, state, velocities, time)
+
+    def reaction(self, support: Pin | Clamp | SymmetryPlane, index: int = -1) -> Reaction:
+        """With what forces a support of the scene held it in a recorded state, by default the last, inertia and damping
+        included: those at the end of the time step that led there, NaN at the start."""
+        return reaction_in(self.scene, support, self._state_at(index), self._held_forces[index])
 
     def self_intersections(self, index: int = -1) -> np.ndarray:
         """The faces that pass through each other in a recorded state, as in TriangleMesh.self_intersections, (k, 2)."""
@@ -212,6 +255,7 @@ class Trajectory:
     def __repr__(self) -> str:
         stopped = "" if self.steps_done == self.steps else f" of {self.steps}"
         halved = f", {len(self.halved)} of them in parts" if self.halved else ""
+        halved += f", {len(self.calmed)} by implicit Euler" if self.calmed else ""
         strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
         crossings = told(self.scene.mesh, detached(self.positions))
         a_step = 1e3 * self.wall_time / max(self.steps_done, 1)

@@ -17,6 +17,7 @@ from .mode_shapes import mode_shapes
 from .rest import RestStiffness
 
 _LARGEST_CHANGE = 1e100  # over the stiffness itself: its square still is a number
+_ROUND_OFF = 1e-14  # of a length: what moves no more does not move
 _PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured, over the mean edge length
 _LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
 
@@ -69,6 +70,9 @@ def linear_buckling(
     modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
         the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
+    Bodies in contact are refused: a contact bears in one direction only, so that a mode and its opposite have different
+    factors, and none of them is linear; ms.follow passes where contacts open and close.
+
     Raises ValueError on bad input, in a scene with contact of bodies, where the supports leave the sheet a motion without
     stiffness, where the controls do nothing, and where the sheet does not buckle under them (a column that is pulled);
     Interrupted.
@@ -94,7 +98,8 @@ def linear_buckling(
     )
     if scene._body_contacts:
         raise ValueError(
-            "the scene has contact of bodies, which opens and closes as it buckles: ms.follow follows it, or leave it out"
+            "the scene has contact of bodies, which holds in one direction only, so that no linear mode buckles: ms.follow "
+            "follows it as it opens and closes, or leave it out"
         )
     began = time.perf_counter()
     model = scene._model
@@ -103,11 +108,9 @@ def linear_buckling(
     with inputs.in_core():
         stiffness = RestStiffness(scene)
         response = stiffness.response(inputs)
-        displacement = float(np.abs(model.positions(response)).max())
+        displacement = float(np.abs(model.points(response)).max())
         change = _stiffness_change(scene, stiffness, response, displacement, inputs)
-    factors, vectors = _lowest(
-        stiffness, change, modes, _LARGEST_DISPLACEMENT * scene._bodies.size, displacement
-    )
+    factors, vectors = _lowest(stiffness, change, modes, _LARGEST_DISPLACEMENT * _size(scene), displacement)
     shapes, edge_rotations = mode_shapes(model, vectors)
     return Buckling(
         scene=scene,
@@ -119,12 +122,22 @@ def linear_buckling(
     )
 
 
+def _size(scene: Scene) -> float:
+    """m, of its bodies; of its links, where there is nothing else."""
+    if scene._bodies.size > 0.0:
+        return scene._bodies.size
+    return float(np.ptp(scene._model.points(scene._model.rest_state()), axis=0).max())
+
+
 def _stiffness_change(
     scene: Scene, stiffness: RestStiffness, response: np.ndarray, displacement: float, inputs: Inputs
 ) -> np.ndarray:
     """The values of dK, in the pattern of K, for the controls as they are."""
     # Where nothing moves before buckling, K is linear in the controls and any step is exact.
-    step = _PRE_LOAD * float(scene.mesh.edge_lengths.mean()) / displacement if displacement > 0.0 else 1.0
+    edges = scene.mesh.edge_lengths
+    length = float(edges.mean()) if len(edges) else _size(scene)
+    moves = displacement > _ROUND_OFF * length
+    step = _PRE_LOAD * length / displacement if moves else 1.0
 
     def values(t: float) -> np.ndarray:
         return scene._model.hessian(stiffness.rest + t * response, t * inputs.controls)[3]

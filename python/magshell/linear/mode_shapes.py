@@ -15,6 +15,12 @@ def mode_shapes(model, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _normalized(model, vector: np.ndarray) -> np.ndarray:
+    """By the vertices; by the links of a skeleton where no vertex moves."""
     shape = model.expand(vector)
-    displacements = model.positions(shape)
+    vertices, links = model.positions(shape), model.points(shape)
+    moved = np.abs(vertices).max(initial=0.0) > _STILL * np.abs(links).max(initial=0.0)
+    displacements = vertices if moved else links
     return shape / displacements.ravel()[np.argmax(np.abs(displacements))]
+
+
+_STILL = 1e-9

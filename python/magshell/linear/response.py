@@ -38,7 +38,7 @@ class LinearResponse:
         return self.displacements + self.displacements.new_tensor(np.array(rest))
 
     def __repr__(self) -> str:
-        moved = float(np.linalg.norm(np.asarray(self.displacements), axis=1).max())
+        moved = float(np.linalg.norm(np.asarray(self.displacements), axis=1).max(initial=0.0))
         return f"LinearResponse: largest displacement {moved:.4g} m, {self.wall_time:.3g} s"
 
 

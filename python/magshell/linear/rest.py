@@ -13,10 +13,17 @@ from ..scene.scene import Scene
 class RestStiffness:
     """The Hessian K at the rest shape without controls, factorized once. Works on the free unknowns, (n,).
 
-    Raises ValueError where K is not positive definite: the scene is not held, or not stable at rest.
+    Raises ValueError where K is not positive definite: the scene is not held, or not stable at rest; and where actuators
+    have a stiffness of their own, which is no part of K.
     """
 
     def __init__(self, scene: Scene):
+        springs = [each for each in scene.actuators if getattr(each, "is_spring", False)]
+        if springs:
+            raise ValueError(
+                f"linear theory takes the stiffness at rest without what acts there, and {springs[0]!r} is a spring that "
+                "acts: ms.equilibrium, ms.follow and ms.vibration_modes have it"
+            )
         self._model = scene._model
         self.rest = self._model.rest_state()
         *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())

@@ -123,6 +123,7 @@ def vibration_modes(
             stiffness = model.hessian(model.rest_state(), scene._control_layout.zeros())
         else:
             stiffness = model.hessian(equilibrium._state, equilibrium._controls)
+        beside = model.low_rank()
         inertia = None
         if scene.rigid_parts:
             masses = model.free_weights(inputs.values.masses)  # as the parts are turned there
@@ -130,7 +131,7 @@ def vibration_modes(
     slow = min(map(_slow_square, inputs.values.sheets), default=1.0)
     if consistent is not None:
         inertia = in_places(consistent, *stiffness[1:3])
-    pencil = _Pencil(stiffness, model.free_points, masses, slow, inertia, consistent)
+    pencil = _Pencil(stiffness, beside, model.free_points, masses, slow, inertia, consistent)
     squares, vectors = pencil.lowest(int(count))
     modes, edge_rotations = mode_shapes(model, vectors)
     return VibrationModes(
@@ -147,7 +148,8 @@ def vibration_modes(
 class _Pencil:
     """K and M, and a factorization of K - shift M with the shift below every square of a frequency.
 
-    stiffness: (n, column starts, rows, values), the lower triangle of K. points: (n, 3), where the unknowns are.
+    stiffness: (n, column starts, rows, values), the lower triangle of K. beside: columns (n, k) and their stiffnesses, what
+    K has beside that. points: (n, 3), where the unknowns are.
     masses: (n,), the diagonal of M, zero for edge rotations. inertia: all of M, in the places of K, if that is more.
     consistent: M (n, n), where it has no root at hand.
     slow_square: 1/s2, about as large as the lowest of a sheet that is held.
@@ -156,6 +158,7 @@ class _Pencil:
     def __init__(
         self,
         stiffness: tuple,
+        beside: tuple,
         points: np.ndarray,
         masses: np.ndarray,
         slow_square: float,
@@ -163,6 +166,7 @@ class _Pencil:
         consistent=None,
     ):
         *pattern, self._values = stiffness
+        self._beside = beside
         self._diagonal = pattern[1][:-1]
         self._masses = masses
         self._moving = np.flatnonzero(masses)
@@ -254,7 +258,7 @@ class _Pencil:
         else:
             values -= shift * self._inertia
         self.factorizations += 1
-        report = self._factor.factorize(values)
+        report = self._factor.factorize(values, *self._beside)
         if not report.succeeded:
             raise NotConverged(f"the vibration modes: {report.reason}")
         return report

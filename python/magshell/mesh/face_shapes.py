@@ -37,14 +37,14 @@ def shares(mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _integrals(positions: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """(k, 6), m2: of the shape functions over a triangle of the parameters, on sides (k, 6, 3)."""
-    points, weights = _rule(corners)
-    shapes, slopes = _shapes(points)
+    points, weights = rule(corners)
+    values, slopes = shapes(points)
     along = np.einsum("pan,kni->apki", slopes, positions)
     densities = np.linalg.norm(np.cross(along[0], along[1]), axis=2)
-    return np.einsum("p,pk,pn->kn", weights, densities, shapes)
+    return np.einsum("p,pk,pn->kn", weights, densities, values)
 
 
-def _rule(corners: np.ndarray, order: int = 4) -> tuple[np.ndarray, np.ndarray]:
+def rule(corners: np.ndarray, order: int = 4) -> tuple[np.ndarray, np.ndarray]:
     """Points (p, 2) and weights (p,): Gauss's rule for the square, drawn together into a triangle (3, 2)."""
     at, lengths = np.polynomial.legendre.leggauss(order)
     u, v = (each.ravel() for each in np.meshgrid((at + 1) / 2, (at + 1) / 2))
@@ -54,7 +54,7 @@ def _rule(corners: np.ndarray, order: int = 4) -> tuple[np.ndarray, np.ndarray]:
     return corners[0] + u[:, None] * first + (v * (1 - u))[:, None] * second, weights * area2
 
 
-def _shapes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def shapes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of six nodes at points (p, 2): (p, 6), and their slopes (p, 2, 6)."""
     s, t = points.T
     corner = np.stack([1 - s - t, s, t], axis=1)

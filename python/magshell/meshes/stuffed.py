@@ -12,6 +12,7 @@ from ..mesh.tet_mesh import TetMesh
 from ..mesh.tet_topology import FACES, face_table, outer_faces, touching_edges, touching_vertices
 from ..shapes import Shape
 from ._bcc_lattice import lattice_inside
+from ._lost import warn_of_loss
 from ._stuffing import Cuts, stuffed
 from ._tet_cells import check_order, check_size, turned
 
@@ -44,6 +45,9 @@ def from_distance(
     Parts named by `Shape.named` become parts of the mesh, 1, 2, ... in their order, by which is nearest to a tetrahedron's
     barycenter; 0 is what none has named. The same arguments give the same mesh.
 
+    An ms.MeshQualityWarning says where more than 15 % of the shape's volume was lost or joined, where there are more or
+    fewer parts than the shape has, and where the number of tetrahedra asked for is missed by more than 20 %.
+
     Raises:
         ValueError: also for a shape that reaches beyond its bounds, and where nothing is found inside.
 
@@ -57,10 +61,12 @@ def from_distance(
     low, high = _bounds(shape, bounds)
     order = check_order(order)
     if spacing is not None:
-        points, tetrahedra = _solid(distance, low, high, positive("spacing", "m", spacing))
+        spacing = positive("spacing", "m", spacing)
+        points, tetrahedra = _solid(distance, low, high, spacing)
     else:
-        points, tetrahedra = _solid_of(distance, low, high, count("n_tetrahedra", n_tetrahedra))
+        points, tetrahedra, spacing = _solid_of(distance, low, high, count("n_tetrahedra", n_tetrahedra))
     mesh = TetMesh(points, tetrahedra)
+    warn_of_loss(mesh, distance, low, high, spacing, n_tetrahedra)
     if isinstance(shape, Shape):
         _, number, names = shape.nearest(mesh.tetrahedron_barycenters)
         mesh = (
@@ -85,8 +91,8 @@ def _bounds(shape, bounds) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
-def _solid_of(distance: Distance, low, high, wanted: int) -> tuple[np.ndarray, np.ndarray]:
-    """The solid whose number of tetrahedra comes closest to the wanted one, of a few spacings."""
+def _solid_of(distance: Distance, low, high, wanted: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """The solid whose number of tetrahedra comes closest to the wanted one, of a few spacings, and that."""
     extent = high - low
     across = np.maximum(np.ceil(extent * (_SAMPLES / extent.prod()) ** (1 / 3)), 8).astype(int)
     at = np.stack(np.meshgrid(*[(np.arange(n) + 0.5) / n for n in across], indexing="ij"), axis=-1).reshape(
@@ -101,7 +107,7 @@ def _solid_of(distance: Distance, low, high, wanted: int) -> tuple[np.ndarray, n
         found = _solid(distance, low, high, spacing)
         miss = abs(np.log(len(found[1]) / wanted))
         if miss < smallest_miss:
-            best, smallest_miss = found, miss
+            best, smallest_miss = (*found, spacing), miss
         if smallest_miss <= _CLOSE:
             break
         spacing *= (len(found[1]) / wanted) ** (1 / 3)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .projective_dynamics import ProjectiveDynamics
+
 
 @dataclass(frozen=True)
 class ImplicitEuler:
@@ -54,4 +56,4 @@ class SDIRK3:
     _times = (0.43586652150845899942, 0.5 * (1.0 + 0.43586652150845899942), 1.0)
 
 
-Integrator = ImplicitEuler | TRBDF2 | SDIRK2 | SDIRK3
+Integrator = ImplicitEuler | TRBDF2 | SDIRK2 | SDIRK3 | ProjectiveDynamics

@@ -46,6 +46,7 @@ def pose(motion: Callable | None, time: float) -> tuple[np.ndarray, np.ndarray]:
 
 def rates(motion: Callable | None, time: float) -> tuple[np.ndarray, np.ndarray]:
     """Velocity (3,) m/s and spin omega (3,) rad/s in world axes, with dR/dt = [omega] R, at a time [s]."""
+    time = float(quantity("time", "s", time, ()))
     if motion is None:
         return np.zeros(3), np.zeros(3)
     weights = FORWARD if 0 <= time < 2 * STEP else CENTRAL

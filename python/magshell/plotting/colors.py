@@ -25,8 +25,10 @@ OUTLINE = "#3a4048"
 REST = "#9aa3ad"
 MAGNETIZATION = "#23272e"
 FIELD = "#1b7f5c"
+CONTACT = "#b3202c"
 OBSTACLE = "#b59a76"
 BONE = "#f0e6d2"
+TENDON = "#8c1c3c"
 NO_VALUE = "#d9dbde"
 # Sheets that lie over each other in one picture, when no scalar colours them.
 SERIES = ("#7fa8d1", "#e8b36a", "#8fbf9f", "#d58b8b", "#b3a2d0", "#9fa8b2")
@@ -181,6 +183,41 @@ def _von_mises(states: list[State], _: LengthUnit) -> Scalar:
     return Scalar(f"von Mises stress [{unit}]", values, limits, inside=inside, of_tetrahedra=True)
 
 
+def _of_muscles(name: str):
+    """Of tetrahedra with fibres: activation from 0, or even on both sides of it; stretch even about 1; tension in Pa."""
+
+    def rows(found: SolidStates) -> np.ndarray:
+        return np.full(len(found.volumes), np.nan) if found.muscles is None else found.muscles[name]
+
+    def scalar(states: list[State], _: LengthUnit) -> Scalar:
+        values, inside = _of_elements(states, name, rows, SolidStates)
+        low, high = _range(values)
+        label, limits, scale = name.replace("_", " "), (0.0, max(high, 1e-300)), "sequential"
+        if name == "fibre_stretch":
+            bound = max(high - 1.0, 1.0 - low)
+            limits, scale = (1.0 - bound, 1.0 + bound), "diverging"
+        elif low < 0:
+            bound = max(high, -low)
+            limits, scale = (-bound, bound), "diverging"
+        if name == "fibre_tension":
+            factor, unit = prefixed(limits[1], "Pa")
+            values, inside = ([each / factor for each in some] for some in (values, inside))
+            label, limits = f"{label} [{unit}]", (limits[0] / factor, limits[1] / factor)
+        return Scalar(label, values, limits, scale, inside, True)
+
+    return scalar
+
+
+def _contact_pressure(states: list[State], _: LengthUnit) -> Scalar:
+    found = [state.contact_pressures for state in states]
+    if any(each is None for each in found):
+        raise ValueError("color='contact_pressure' is of a result of a scene with contacts: there is none")
+    largest = max(float(each.max(initial=0.0)) for each in found)
+    factor, unit = prefixed(largest, "Pa") if largest > 0.0 else (1.0, "Pa")
+    values = [each / factor for each in found]
+    return Scalar(f"contact pressure [{unit}]", values, (0.0, _range(values)[1]), inside=values)
+
+
 def _resultant(name: str, text: str, unit: str, of_faces: str):
     """Of sheets: the principal value of larger magnitude, even on both sides of 0."""
 
@@ -228,8 +265,10 @@ NAMED = {
     "magnetization": _magnetization,
     "displacement": _displacement,
     "magnetic_energy": _magnetic_energy,
+    "contact_pressure": _contact_pressure,
     "volume_ratio": _volume_ratio,
     "von_mises_stress": _von_mises,
+    **{name: _of_muscles(name) for name in ("activation", "fibre_stretch", "fibre_tension")},
     "membrane_force": _resultant(
         "membrane_force", "principal membrane force", "N/m", "principal_membrane_forces"
     ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.arrays import index_array
+from .._checks.scalars import flag
 from ..mesh.crossings import AFFORDABLE_FACES
 from ..states.state import State, states_of
 from ..states.units import length_unit
@@ -37,6 +38,7 @@ def plot(
     show_field: bool = True,
     rest: bool = False,
     mesh_lines: bool = False,
+    contacts: bool = False,
     titles=None,
     overlay: bool = False,
     fade: bool = False,
@@ -54,15 +56,18 @@ def plot(
     obstacles: what is around the sheet, one one sees through; by default what the contacts of a scene are about.
     states: numbers of those to draw, of a path or a motion; by default all, or nine evenly spread ones.
     color: "magnetization" (the component of M_r along the axis that all of it shares, else its angle or
-        magnitude), "displacement", "magnetic_energy" (a rest volume), of a
-        result "von_mises_stress" (the mean of the tetrahedron behind a face; of a sheet the larger of both surfaces'),
-        of its solids "volume_ratio" (J), of its sheets "membrane_force" or "bending_moment" (the larger principal one),
+        magnitude), "displacement", "magnetic_energy" (a rest volume), of a result "contact_pressure" (of all contacts, on
+        both sides of a sheet) and "von_mises_stress" (the mean of the tetrahedron behind a face; of a sheet the larger of
+        both surfaces'), of its solids "volume_ratio" (J), of its sheets "membrane_force" or "bending_moment" (the larger
+        principal one),
+        with muscles "activation", "fibre_stretch" or "fibre_tension",
         an array with a number a face or a vertex, a list of such arrays, one a state, or None for plain sheets.
         "auto": magnetization if it varies, else displacement.
     color_label, color_range: the text, with the unit, and the ends of the colour bar.
     arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
     show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it.
     rest: the rest shape as a faint outline. mesh_lines: the edges of the mesh.
+    contacts: the forces of all contacts, friction included, as arrows from the vertices on which they act, over everything.
     titles: one a state; that a sheet passes through itself is added, where there are at most 20,000 faces to look at.
     overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light shows a motion.
     columns: of panels, by default what fits best.
@@ -103,7 +108,9 @@ def plot(
     plane = checked_cut(cut, whole, seen)
     sections = () if plane is None else tuple(section(state, plane) for state in whole)
     groups = [drawn] if overlay or fade else [[state] for state in drawn]
-    options = Options(count, show_field, rest, mesh_lines, fade, plane, sections)
+    if flag("contacts", contacts) and not any(state.loads for state in drawn):
+        raise ValueError("contacts are drawn of a result of a scene with contacts: there is none")
+    options = Options(count, show_field, rest, mesh_lines, fade, plane, sections, contacts)
     drawing = draw(groups, titles, scalar, seen, unit, options)
     return paint(drawing, width, columns, painter)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -68,6 +69,23 @@ def magnetization_glyphs(state: State, count: int, unit_vector: float) -> Glyphs
     flat = float(np.linalg.norm(tangential)) / max(float(np.linalg.norm(vectors)), 1e-300)
     starts = (x0 + x1 + x2) / 3.0 - 0.5 * tangential + 0.02 * (vectors - tangential)
     return Glyphs(starts, vectors, RADIUS * spacing, 0.5 * flat * spacing)
+
+
+class ContactForces(NamedTuple):
+    """Places (k, 3) m and forces (k, 3) N on the vertices there."""
+
+    places: np.ndarray
+    forces: np.ndarray
+
+
+def contact_forces(state: State) -> ContactForces:
+    """Of one state: none where it has no contacts, and none that is negligible beside its largest."""
+    if state.loads is None:
+        return ContactForces(np.zeros((0, 3)), np.zeros((0, 3)))
+    forces = state.loads().forces
+    sizes = np.linalg.norm(forces, axis=1)
+    shown = sizes > NEGLIGIBLE * sizes.max(initial=0.0)
+    return ContactForces(state.positions[shown], forces[shown])
 
 
 def halo(states: list[State], size: float) -> np.ndarray:

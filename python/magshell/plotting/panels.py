@@ -23,7 +23,8 @@ SOLID_CREASE = np.cos(
 )  # of closed surfaces, where coarse triangles turn by more on what is round
 LINE = 0.0022  # width, in sizes of the drawing
 LONGEST_FIELD = 0.2  # arrow of a uniform field, in sizes of the drawing
-FLESH = 0.45  # the opacity of what has bones inside
+LONGEST_CONTACT = 0.12  # arrow of a contact force, likewise
+FLESH = 0.45  # the opacity of what has bones or tendons inside
 PALEST = 0.8  # the way to white of the first of many states that fade
 
 
@@ -83,6 +84,7 @@ class Options:
     fade: bool = False  # of the states in one panel, the earlier ones are paler
     cut: Cut | None = None
     sections: tuple[Section, ...] = ()  # one a state, where there is a cut
+    contacts: bool = False  # their forces as arrows
 
 
 def draw(
@@ -123,6 +125,8 @@ def draw(
                 chosen = magnetization_solids(state, strongest, options.arrows, options.cut)
                 panel.solids += _pale(chosen, paleness)
         legend.append(magnetization_key(strongest))
+    if options.contacts:
+        legend += _contacts(panels, groups, size, options)
     if options.field:
         _uniform_fields(panels, groups, view, size, options)
         legend += _sources(panels, groups, size)
@@ -173,7 +177,9 @@ def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, opti
     step = float(mesh.edge_lengths.mean())
     skin = sheet(state.positions, mesh.faces, shades)
     bones = [sheet(*each, rgb(colors.BONE)) for each in state.bones]
-    solids = [*bones, replace(skin, opacity=FLESH) if bones else skin]
+    inside = [*bones, *(sheet(*each, rgb(colors.TENDON)) for each in state.tendons)]
+    shapes = [sheet(*each, rgb(colors.BONE)) for each in state.shapes]
+    solids = [*inside, *shapes, replace(skin, opacity=FLESH) if inside else skin]
     if options.mesh_lines:
         edges = mesh.edges[_seen(state, np.arange(mesh.n_edges), eye)]
         solids.append(ribbons(state.positions[edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))
@@ -288,6 +294,27 @@ def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> lis
         if chosen is not None:
             panel.solids.append(arrows(chosen.starts, chosen.vectors, chosen.radius, colors.FIELD))
     return [sources_key(strong)] if strong else []
+
+
+def _contacts(panels: list[Panel], groups: list[list[State]], size: float, options: Options):
+    """Adds the forces of contacts, and returns what the legend says of them: nothing where nothing touches."""
+    of_groups = [[glyphs.contact_forces(state) for state in group] for group in groups]
+    strongest = max(
+        (
+            float(np.linalg.norm(each.forces, axis=1).max(initial=0.0))
+            for group in of_groups
+            for each in group
+        ),
+        default=0.0,
+    )
+    if strongest == 0.0:
+        return []
+    for panel, group, found in zip(panels, groups, of_groups, strict=True):
+        for each, paleness in zip(found, _paleness(len(group), options), strict=True):
+            vectors = LONGEST_CONTACT * size / strongest * each.forces
+            drawn = arrows(each.places, vectors, 0.003 * size, colors.CONTACT, 0.5 * size)
+            panel.solids += _pale([drawn], paleness)
+    return [(f"contact force, up to {with_unit(strongest, 'N')}", colors.CONTACT)]
 
 
 def magnetization_key(strongest: float) -> tuple[str, str]:

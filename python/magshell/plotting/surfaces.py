@@ -21,8 +21,20 @@ def on_surfaces(states: list[State]) -> list[State]:
             found.append(state)
             continue
         surface, vertices = drawn.setdefault(id(mesh), (mesh.surface, mesh.surface_vertices))
-        found.append(replace(state, mesh=surface, positions=state.positions[vertices], elements=None))
+        found.append(
+            replace(
+                state,
+                mesh=surface,
+                positions=state.positions[vertices],
+                elements=None,
+                loads=_on_vertices(state.loads, vertices),
+            )
+        )
     return found
+
+
+def _on_vertices(loads, vertices: np.ndarray):
+    return None if loads is None else lambda: loads().of(vertices)
 
 
 def scalar_on_surfaces(scalar: Scalar | None, states: list[State]) -> Scalar | None:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..bodies.muscle import Muscle
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
+from ..surroundings.cavity import Cavity
+from ..surroundings.cells import Cells
 from ..surroundings.face_energies import FaceEnergy
 from ..surroundings.pressure import Pressure
+from ..surroundings.tendon import Tendon
 
 
 def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
@@ -23,6 +27,15 @@ def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
     }
 
 
+def muscle_inputs(scene) -> list[dict]:
+    solids = scene._bodies.solids
+    return [
+        muscle._core_input(label, next(k for k, solid in enumerate(solids) if solid is muscle.body))
+        for muscle, label in scene._labels
+        if isinstance(muscle, Muscle)
+    ]
+
+
 def face_inputs(scene) -> dict[str, list[dict]]:
     """Energies of faces, and pressures."""
     bodies = scene._bodies
@@ -36,6 +49,20 @@ def face_inputs(scene) -> dict[str, list[dict]]:
             load._core_input(label, bodies) for load, label in scene._labels if isinstance(load, Pressure)
         ],
     }
+
+
+def actuator_inputs(scene) -> dict[str, list[dict]]:
+    """Volumes and tendons."""
+    bodies = scene._bodies
+    volumes = [
+        each._core_input(label, bodies) for each, label in scene._labels if isinstance(each, Cavity | Cells)
+    ]
+    tendons = [
+        each._core_input(label, bodies, scene._rigid)
+        for each, label in scene._labels
+        if isinstance(each, Tendon)
+    ]
+    return {"volumes": volumes, "tendons": tendons}
 
 
 def _sheets(scene, directed_edges: np.ndarray) -> list[dict]:
@@ -70,6 +97,9 @@ def _solids(scene) -> list[dict]:
 
 
 def _skins(scene) -> list[dict]:
+    """Those that feel a field; what they weigh their solids know."""
+    if not scene.fields:
+        return []
     bodies = scene._bodies
     skinned = [
         (body, span)

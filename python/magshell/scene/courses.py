@@ -10,10 +10,12 @@ import numpy as np
 from .._checks.quantity import shape_of
 from .._machine.keywords import nearest_first
 from ..bodies.joints import Joint
+from ..bodies.muscle import Muscle
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
+from ..surroundings.actuator import Actuator
 
-_JUMPING = (AppliedField, Joint)  # their values may change at once, others move
+_JUMPING = (AppliedField, Joint, Muscle, Actuator)  # their values may change at once, others move
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Course:
         if shape == self.row:
             return
         allowed = {"(steps + 1, ...)": (steps + 1, *self.row)}
-        if isinstance(self.owner, _JUMPING):
+        if changes_at_once(self.owner):
             allowed["(steps, ...)"] = (steps, *self.row)
         if shape not in allowed.values():
             wanted = " or ".join(f"{name} = {each}" for name, each in allowed.items())
@@ -50,7 +52,7 @@ class Course:
 
 
 def _unit(owner, name: str) -> str:
-    return owner._unit(name) if isinstance(owner, Joint) else _UNITS[name]
+    return owner._unit(name) if isinstance(owner, Joint | Actuator) else _UNITS[name]
 
 
 _UNITS = {
@@ -61,6 +63,7 @@ _UNITS = {
     "rotation": "rad",
     "displacement": "m",
     "pressure": "Pa",
+    "activation": "1",
 }
 
 
@@ -70,7 +73,7 @@ def over_time(scene, replaced: dict[object, dict]) -> tuple[dict[object, dict], 
     courses: list[Course] = []
     for owner, named in replaced.items():
         for name, value in named.items():
-            row = _row(owner, name)
+            row = row_in_time(owner, name)
             if row is not None and (callable(value) or len(shape_of(name, value)) == len(row) + 1):
                 courses.append(Course(owner, name, _unit(owner, name), value, row))
                 continue
@@ -81,7 +84,7 @@ def over_time(scene, replaced: dict[object, dict]) -> tuple[dict[object, dict], 
             raise ValueError(
                 f"{owner!r} moves by its motion: give its center and rotation over time, or a motion, not both"
             )
-        if isinstance(owner, _JUMPING):
+        if changes_at_once(owner):
             continue
         constant = still.pop(owner, {})  # of its place: the same all the time
         courses += [Course(owner, name, _UNITS[name], value, (3,)) for name, value in constant.items()]
@@ -103,9 +106,14 @@ def refuse_functions(owner, name: str, value, in_time: bool) -> None:
     raise ValueError(f"{name} of {kind} cannot change during a motion ({what}): give numbers")
 
 
-def _row(owner, name: str) -> tuple[int, ...] | None:
+def row_in_time(owner, name: str) -> tuple[int, ...] | None:
     """The shape of a value that may change during a motion, at one time."""
     return np.shape(getattr(owner, name, np.zeros(3))) if name in names_in_time(owner) else None
+
+
+def changes_at_once(owner) -> bool:
+    """Whether values of an object may jump during a motion; others move."""
+    return isinstance(owner, _JUMPING)
 
 
 def names_in_time(owner) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from .._checks.quantity import quantity
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
 from ..bodies.joints import Joint
+from ..bodies.muscle import Muscle
 from ..bodies.rigid import Rigid
 from ..bodies.rigid_place import places
 from ..bodies.shell import Shell
@@ -24,16 +25,23 @@ from ..bodies.solid import Solid
 from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
+from ..surroundings.actuator import Actuator
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.constraints import free_rigid_motions, gather
 from ..surroundings.contact import Contact
-from ..surroundings.contact_inputs import body_contact_inputs, contact_inputs, obstacles_of, split_contacts
+from ..surroundings.contact_inputs import (
+    body_contact_inputs,
+    contact_inputs,
+    obstacles_of,
+    shapes_that_touch,
+    split_contacts,
+)
 from ..surroundings.face_energies import FaceEnergy
 from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..surroundings.pressure import Pressure
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane, continuations
 from ..surroundings.water import Water
-from .core_inputs import body_inputs, face_inputs
+from .core_inputs import actuator_inputs, body_inputs, face_inputs, muscle_inputs
 from .layout import Layout
 from .values import Values
 
@@ -51,6 +59,7 @@ class Scene:
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.
+    actuators: Muscle, Cavity, Cells and Tendon objects.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     gravity: (3,), m/s2; needs the mass density of all bodies.
     contacts: Contact objects, each with the obstacles or the bodies that it is about, and SelfContact objects. Bodies pass
@@ -85,18 +94,20 @@ class Scene:
         ties=(),
         supports=(),
         loads=(),
+        actuators=(),
         field=None,
         gravity=None,
         contacts=(),
         water: Water | None = None,
         allow_rigid_motions: bool = False,
     ):
-        self._bodies = Bodies(bodies, ties)
-        self.supports = checked_list("supports", supports, _SUPPORTS)
-        self.loads = checked_list("loads", loads, _LOADS)
-        self.fields = () if field is None else checked_list("field", field, (AppliedField,))
         self.contacts = checked_list("contacts", contacts, (Contact, BodyContact))
         self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
+        self._bodies = Bodies(bodies, ties, shapes_that_touch(self._body_contacts))
+        self.supports = checked_list("supports", supports, _SUPPORTS)
+        self.loads = checked_list("loads", loads, _LOADS)
+        self.actuators = _checked_actuators(self._bodies, actuators)
+        self.fields = () if field is None else checked_list("field", field, (AppliedField,))
         self.obstacles = obstacles_of(self._obstacle_contacts)
         if water is not None and not isinstance(water, Water):
             raise ValueError(f"water must be a Water, got {type(water).__name__}")
@@ -121,6 +132,7 @@ class Scene:
             "ties": self.ties,
             "supports": self.supports,
             "loads": self.loads,
+            "actuators": self.actuators,
             "field": self.fields,
             "gravity": self.gravity,
             "contacts": self.contacts,
@@ -178,6 +190,8 @@ class Scene:
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
             **face_inputs(self),
+            muscles=muscle_inputs(self),
+            **actuator_inputs(self),
             loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
             contacts=contact_inputs(self._obstacle_contacts, bodies),
@@ -215,6 +229,7 @@ class Scene:
             ("joint", self.joints),
             ("support", self.supports),
             ("load", self.loads),
+            ("actuator", self.actuators),
             ("field", self._sources),
             ("contact", self._obstacle_contacts),
             ("body contact", self._body_contacts),
@@ -279,6 +294,7 @@ class Scene:
             *self.joints,
             *self.supports,
             *self.loads,
+            *self.actuators,
             *self.fields,
             *self.contacts,
             *self.obstacles,
@@ -313,6 +329,7 @@ class Scene:
         lines += [f"  joined by {joint!r}" for joint in self.joints]
         lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
         lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
+        lines += [f"  driven by {each!r}{self._whose(each)}" for each in self.actuators]
         lines += [f"  in {field!r}" for field in self.fields]
         lines += [f"  kept out by {contact!r}{self._whose(contact)}" for contact in self.contacts]
         if self.water is not None:
@@ -329,6 +346,18 @@ class Scene:
         return f" (body {self._bodies.number(item.body)})"
 
 
+def _checked_actuators(bodies: Bodies, given) -> tuple[Muscle | Actuator, ...]:
+    """Raises ValueError where one is of no solid of the scene, or is there twice."""
+    kinds = "Muscle, Cavity, Cells and Tendon objects"
+    actuators = checked_list("actuators", given, (Muscle, Actuator), kinds)
+    for k, each in enumerate(actuators):
+        if isinstance(each, Muscle) and not any(each.body is solid for solid in bodies.solids):
+            raise ValueError(f"actuator {k} is a Muscle of a solid that is not in the scene: {each.body!r}")
+        if any(each is other for other in actuators[:k]):
+            raise ValueError(f"actuators must differ, but actuator {k} is there twice")
+    return actuators
+
+
 def _refuse_support(parts, held: np.ndarray) -> None:
     """Raises ValueError where a support holds a vertex of a rigid part."""
     for k, place in enumerate(parts):
@@ -341,12 +370,17 @@ def _refuse_support(parts, held: np.ndarray) -> None:
 
 
 def _refuse_idle_magnetization(scene: Scene) -> None:
-    """A skin does nothing but feel a field."""
+    """A skin does nothing but feel a field, and weigh if it has a mass density."""
     if scene.fields:
         return
     for k, body in enumerate(scene.bodies):
-        if isinstance(body, Solid) and (body.skin is not None or body.remanent_magnetization is not None):
-            what = "a skin" if body.skin is not None else "a remanent_magnetization"
+        if not isinstance(body, Solid):
+            continue
+        idle = body.skin is not None and (
+            body.skin.mass_density is None or body.skin.remanent_magnetization is not None
+        )
+        if idle or body.remanent_magnetization is not None:
+            what = "a skin" if idle else "a remanent_magnetization"
             raise ValueError(f"body {k} has {what}, but the scene has no field: Scene(..., field=...)")
 
 

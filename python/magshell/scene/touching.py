@@ -8,23 +8,41 @@ import numpy as np
 
 from .. import _core
 from ..surroundings.body_contact import BodyContact
+from ..surroundings.contact import Contact
+from .touching_obstacles import pairs_with_obstacles
 
 
 @dataclass(frozen=True)
 class Touching:
-    """What of a contact of bodies touches in one state.
+    """What of a contact touches in one state.
 
-    pairs: (k, 4), the scene's vertices: of a vertex and a face, or of two edges; of three or two, with -1 behind, those of a
-        vertex with an edge or another vertex, which take back what several faces would count twice.
-    distances: (k,) m, between the parts of each pair. normal_forces: (k,) N, with which they push each other apart;
-        negative where they take something back.
-    forces: (n_v, 3) N, on every vertex of the scene, with which they push each other apart; friction is not among them.
+    pairs: (k, 4), the scene's vertices. Of bodies: of a vertex and a face, or of two edges; of three or two, with -1
+        behind, those of a vertex with an edge or another vertex, which take back what several faces would count twice. Of
+        obstacles: those of a point of the body, one or three.
+    distances: (k,) m, between the parts of each pair. normals: (k, 3), from its second part, or the obstacle, to the first.
+    normal_forces: (k,) N, with which they push each other apart; negative where they take something back.
+    friction_forces: (k, 3) N, on the first part; the second has the opposite. sliding_velocities: (k, 3) m/s, of the first
+        part along the second. Both are zero in what is at rest. Of lagged friction, that which normal forces of this state
+        would make, not those of the beginning of the step.
+    coefficient: the largest that friction may be, of the normal force; zero without friction. sticking_speed: m/s.
+    forces: (n_v, 3) N, on every vertex of the scene, with which they push each other apart; and what turns edges that are
+        nearly parallel, as their pairs fade there, which comes to nothing on each edge. friction: (n_v, 3) N, likewise
+        what rubs. pushed: (n_v,) N, what vertices have of the normal forces, without regard to direction.
     """
 
     pairs: np.ndarray
     distances: np.ndarray
+    normals: np.ndarray
     normal_forces: np.ndarray
+    friction_forces: np.ndarray
+    sliding_velocities: np.ndarray
+    coefficient: float
+    sticking_speed: float
     forces: np.ndarray
+    friction: np.ndarray
+    pushed: np.ndarray
+    _pushes: np.ndarray  # (n_v, 3) N, of the normal forces alone, without what turns nearly parallel edges
+    _direction: np.ndarray  # (k,), 1 where the first part is of the contact's first body or at an obstacle
 
     @property
     def normal_force(self) -> float:
@@ -32,24 +50,92 @@ class Touching:
         return float(self.normal_forces.sum())
 
     @property
+    def friction_force(self) -> np.ndarray:
+        """(3,) N, of all pairs together: on the first body of the contact, or on what touches an obstacle. What a body does
+        to itself comes to nothing that has a meaning."""
+        return self._direction @ self.friction_forces
+
+    @property
     def smallest_distance(self) -> float:
         """m; infinite where nothing touches."""
         return float(self.distances.min(initial=np.inf))
 
+    @property
+    def sliding_speeds(self) -> np.ndarray:
+        """(k,) m/s."""
+        return np.linalg.norm(self.sliding_velocities, axis=1)
+
+    @property
+    def friction_ratios(self) -> np.ndarray:
+        """(k,), of each pair's friction to Coulomb's bound, `coefficient` times its normal force: below 1 it sticks. Zero
+        without friction."""
+        bound = self.coefficient * np.abs(self.normal_forces)
+        sizes = np.linalg.norm(self.friction_forces, axis=1)
+        return np.divide(sizes, bound, out=np.zeros(len(sizes)), where=bound > 0.0)
+
+    @property
+    def slips(self) -> np.ndarray:
+        """(k,), whether a pair with friction slides at its sticking speed or faster; without friction everything does."""
+        return self.sliding_speeds >= (self.sticking_speed if self.coefficient > 0.0 else 0.0)
+
     def __repr__(self) -> str:
         near = f", {self.smallest_distance:.4g} m apart at least" if len(self.pairs) else ""
-        return f"Touching: {len(self.pairs)} pairs{near}, {self.normal_force:.4g} N"
+        rubs = ""
+        if self.coefficient > 0.0 and len(self.pairs):
+            rubs = f", {np.count_nonzero(self.slips)} of them slip"
+        return f"Touching: {len(self.pairs)} pairs{near}, {self.normal_force:.4g} N{rubs}"
 
 
-def touching_in(scene, values, contact: BodyContact, state: np.ndarray) -> Touching:
-    """values: of the solve that found the state. Raises ValueError where the contact is none of the scene's bodies."""
+def touching_in(
+    scene,
+    values,
+    contact: BodyContact | Contact,
+    state: np.ndarray,
+    velocities: np.ndarray | None = None,
+    time: float | None = None,
+) -> Touching:
+    """values: of the solve that found the state. velocities: (n_v, 3) m/s, or with those of the points of rigid parts, and
+    time, s, of a motion. Raises ValueError where the contact is none of the scene's."""
+    velocities = np.zeros((scene.mesh.n_vertices, 3)) if velocities is None else velocities
+    if isinstance(contact, Contact) and any(each is contact for each in scene._obstacle_contacts):
+        found = pairs_with_obstacles(scene, values, contact, scene._model.positions(state), velocities, time)
+        *_, coefficient, sticking_speed = values.current(contact).law(*values.touching(contact))
+        return _gathered(scene, found, coefficient, sticking_speed)
     numbers = [k for k, each in enumerate(scene._body_contacts) if each is contact]
     if not numbers:
-        raise ValueError(f"contact must be one of bodies, of scene.contacts, got {contact!r:.80}")
+        raise ValueError(f"contact must be one of scene.contacts, got {contact!r:.80}")
     with values.in_core():
-        of, pairs, distances, normal_forces, on_nodes = _core.touching_pairs(scene._model, state)
-    mine = of == numbers[0]
-    forces = np.zeros((scene.mesh.n_vertices, 3))
-    there = pairs[mine] >= 0
-    np.add.at(forces, pairs[mine][there], on_nodes[mine][there])
-    return Touching(pairs[mine], distances[mine], normal_forces[mine], forces)
+        found = _core.touching_pairs(scene._model, state, scene._model.full_vector(velocities))
+    mine = found.pop("contacts") == numbers[0]
+    now = values.current(contact)
+    coefficient = now.static_friction_coefficient or now.friction_coefficient or 0.0
+    return _gathered(
+        scene, {name: each[mine] for name, each in found.items()}, coefficient, now.sticking_speed
+    )
+
+
+def _gathered(scene, found: dict, coefficient: float, sticking_speed: float) -> Touching:
+    pairs, weights = found["pairs"], found["weights"]
+    there = pairs >= 0
+
+    def on_vertices(rows: np.ndarray) -> np.ndarray:
+        """rows: (k, 4) or (k, 4, 3)."""
+        sums = np.zeros((scene._bodies.n_rows, *rows.shape[2:]))
+        np.add.at(sums, pairs[there], rows[there])
+        return sums[: scene.mesh.n_vertices]
+
+    return Touching(
+        pairs,
+        found["distances"],
+        found["normals"],
+        found["normal_forces"],
+        found["friction_forces"],
+        found["sliding_velocities"],
+        float(coefficient),
+        float(sticking_speed),
+        on_vertices(found["forces"]),
+        on_vertices(weights[:, :, None] * found["friction_forces"][:, None, :]),
+        on_vertices(np.abs(weights) * found["normal_forces"][:, None]),
+        on_vertices((weights * found["normal_forces"][:, None])[:, :, None] * found["normals"][:, None, :]),
+        np.where(found["swapped"], -1.0, 1.0),
+    )

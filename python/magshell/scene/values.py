@@ -51,8 +51,8 @@ class Values:
         if "vertex_loads" in own:
             numbers["loads", "forces"] = own["vertex_loads"]
         if ("loads", "forces") in numbers:
-            own_points = [np.zeros((10, 3)) for _ in self.rigid]
-            numbers["loads", "forces"] = joined([numbers["loads", "forces"], *own_points])
+            own_points = np.zeros((10 * len(self.rigid) + scene._bodies.n_on_surfaces, 3))
+            numbers["loads", "forces"] = joined([numbers["loads", "forces"], own_points])
         if magnetization is not None:
             for label, rows in of_carriers(scene, magnetization):
                 numbers[label, "remanent_magnetization"] = rows
@@ -139,7 +139,8 @@ class Values:
         return joined([*(body.weighed_masses for body in self.sheets), *self._masses_of_rigid()])
 
     def _masses_of_rigid(self) -> list[np.ndarray]:
-        return [place.masses(part) for place, part in zip(self.scene._rigid, self.rigid, strict=True)]
+        masses = [place.masses(part) for place, part in zip(self.scene._rigid, self.rigid, strict=True)]
+        return [*masses, np.zeros(self.scene._bodies.n_on_surfaces)]
 
     def rigid_place(self, part):
         """Where one of `rigid` is."""
@@ -178,6 +179,17 @@ class Values:
     def current(self, item):
         """An object of the scene as it is in this solve."""
         return self._now.get(item, item)
+
+    def with_objects(self, now: dict) -> Values:
+        """These with other objects, {object of the scene: as it is}, whose numbers are their own alone."""
+        other = copy(self)
+        other._now = {**self._now, **now}
+        numbers: dict[tuple[str, str], np.ndarray] = {}
+        for owner, label in self.scene._labels:
+            if owner in now:
+                now[owner].add_numbers(label, other, numbers)
+        other.numbers = self.scene._value_layout.packed(numbers, self.numbers)
+        return other
 
     def move(self, obstacle, path) -> None:
         """Has an obstacle, whose own place is the origin in `numbers`, follow a path."""

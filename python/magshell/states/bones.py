@@ -48,17 +48,44 @@ def _rod(a: np.ndarray, b: np.ndarray, radius: float):
 
 def bones_of(result) -> list[list[tuple[np.ndarray, np.ndarray]]]:
     """Of every state of a result (one, or k of them), the surfaces of its links, where they are."""
+    return _where(
+        result,
+        [
+            (link, *surface_of(skeleton, link, result[link]._place.center))
+            for skeleton in result.scene._bodies.skeletons
+            for link in skeleton.links
+        ],
+    )
+
+
+def shapes_of(result) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+    """Likewise of the free parts that have a shape."""
+    return _where(result, _shapes(result.scene))
+
+
+def shapes_at_rest(scene) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of a scene."""
+    return [(points, faces) for _, points, faces in _shapes(scene)]
+
+
+def _shapes(scene) -> list:
+    """(part, vertices at rest (n, 3) m, faces (m, 3)) of the rigid parts, no links, that have a shape."""
+    bodies = scene._bodies
+    parts = [part for part in bodies.rigid if part.shape is not None and bodies.skeleton_of(part) is None]
+    return [(part, part.shape.rest_positions, part.shape.faces) for part in parts]
+
+
+def _where(result, surfaces) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+    """surfaces: (part, vertices at rest (n, 3) m, faces (m, 3)) of each."""
     found: list[list[tuple[np.ndarray, np.ndarray]]] = []
-    for skeleton in result.scene._bodies.skeletons:
-        for link in skeleton.links:
-            of = result[link]
-            points, faces = surface_of(skeleton, link, of._place.center)
-            turns, centers = np.asarray(detached(of.rotation)), np.asarray(detached(of.center))
-            around = points - of._place.center
-            moved = np.einsum("kij,nj->kni", turns.reshape(-1, 3, 3), around) + centers.reshape(-1, 1, 3)
-            found = found or [[] for _ in moved]
-            for state, positions in zip(found, moved, strict=True):
-                state.append((positions, faces))
+    for part, points, faces in surfaces:
+        of = result[part]
+        turns, centers = np.asarray(detached(of.rotation)), np.asarray(detached(of.center))
+        around = points - of._place.center
+        moved = np.einsum("kij,nj->kni", turns.reshape(-1, 3, 3), around) + centers.reshape(-1, 1, 3)
+        found = found or [[] for _ in moved]
+        for state, positions in zip(found, moved, strict=True):
+            state.append((positions, faces))
     return found
 
 

@@ -22,4 +22,5 @@ def element_fields(found: ShellStresses | SolidStates) -> dict[str, np.ndarray]:
         "volume_ratio": found.mean(found.volume_ratios),
         "green_strain": found.mean(found.green_strains).reshape(-1, 9),
         "cauchy_stress": found.mean(found.cauchy_stresses).reshape(-1, 9),
+        **(found.muscles or {}),
     }

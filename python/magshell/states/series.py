@@ -49,13 +49,15 @@ def write_series(
         or (n, n_t, k), which are added; rows are those of one body after another, faces those of solids' surfaces too.
 
     Tetrahedra are written as such, with sheets beside them as triangles. Of a result they have their means of
-    `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`; sheets have `membrane_force` [N/m]
+    `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`, and where muscles are `activation`,
+    `fibre_stretch` and `fibre_tension` [Pa]; sheets have `membrane_force` [N/m]
     and `bending_moment` [N] as they pull now, and the larger `von_mises_stress` [Pa] of their surfaces. Matrices are
     by rows; what an element does not have is NaN.
 
-    Points have `displacement` [m], `velocity` [m/s] and, in a field, `flux_density` [T]; faces of a magnetized sheet
-    have `magnetization` [A/m], F_0 M_r, as it turns with them. Returns the path of the PVD. progress: show a bar once it
-    has taken two seconds.
+    Points have `displacement` [m], `velocity` [m/s], in a field `flux_density` [T], and of a result of a scene with contacts
+    `contact_pressure` [Pa]: what pushes them, on both sides of a sheet, over a third of their faces' area. Faces of a
+    magnetized sheet have `magnetization` [A/m], F_0 M_r, as it turns with them. Returns the path of the PVD. progress: show
+    a bar once it has taken two seconds.
 
     Replaces an earlier series of this name. The PVD is there at the end, and lists whole files only: after an error,
     a full disk or Ctrl-C those that are done.
@@ -102,6 +104,8 @@ def write_series(
         for k, state in enumerate(tqdm(states, desc="write_series", delay=2.0, disable=not progress)):
             on_vertices = {"displacement": state.displacements}
             on_vertices |= {name: values[k] for name, values in more["vertex"].items()}
+            if (pressures := state.contact_pressures) is not None:
+                on_vertices = {"contact_pressure": pressures, **on_vertices}
             if in_field:
                 on_vertices["flux_density"] = state.flux_density_at(state.positions)
             on_faces, on_tetrahedra = (

@@ -24,7 +24,9 @@ from ..obstacles import Obstacle
 from ..scene.scene import Scene
 from ..statics.equilibria import Equilibria
 from ..statics.path import Path
-from .bones import bones_at_rest, bones_of, joined, mesh_of
+from .bones import bones_at_rest, bones_of, joined, mesh_of, shapes_at_rest, shapes_of
+from .contact_loads import ContactLoads, contact_loads
+from .tendons import tendons_at_rest, tendons_of
 from .units import clock
 
 
@@ -36,8 +38,10 @@ class State:
     flux_density: (3,), T, the uniform field, or None without one.
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
     title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
-    bones: surfaces of links inside, vertices (n, 3) m and faces (m, 3) each.
+    bones, tendons: surfaces of links and of tendons inside, vertices (n, 3) m and faces (m, 3) each. shapes: of free rigid
+        parts, likewise.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
+    loads: () -> ContactLoads of a result of a scene with contacts, or None without any.
     """
 
     mesh: TriangleMesh | TetMesh | JoinedMesh
@@ -52,6 +56,14 @@ class State:
         None
     )
     bones: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    tendons: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    loads: Callable[[], ContactLoads] | None = None
+    shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+
+    @property
+    def contact_pressures(self) -> np.ndarray | None:
+        """(n_v,) Pa, or None without contacts."""
+        return None if self.loads is None else self.loads().pressures(self.positions, self.mesh.faces)
 
     @property
     def magnetization(self) -> np.ndarray:
@@ -112,11 +124,12 @@ def states_of(
     if isinstance(what, Shell | Solid):
         return _states(what.mesh, _magnetized(given, [what]))
     if isinstance(what, Scene):
-        bones = bones_at_rest(what)
-        if bones and not what.bodies:
-            return _states(mesh_of(bones), _with_own(given, what), what.fields)
+        bones, shapes = bones_at_rest(what), shapes_at_rest(what)
+        if (bones or shapes) and not what.bodies:
+            return _states(mesh_of([*bones, *shapes]), _with_own(given, what), what.fields)
         states = _states(what.mesh, _with_own(given, what), what.fields)
-        return [replace(state, bones=tuple(bones)) for state in states]
+        tendons = tuple(tendons_at_rest(what))
+        return [replace(state, bones=tuple(bones), shapes=tuple(shapes), tendons=tendons) for state in states]
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
     if is_result and not isinstance(what, Equilibria):
         own = _held_by(what)
@@ -126,7 +139,8 @@ def states_of(
         if not what.scene.bodies and positions is None:
             mesh, merged["positions"] = _skeletons_alone(what)
         states = _states(mesh, merged, what.scene.fields, own["strengths"], own["titles"])
-        states = _with_elements(what, _with_bones(what, states, positions), positions)
+        states = _with_tendons(what, _with_bones(what, states, positions), positions)
+        states = _with_elements(what, states, positions)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
@@ -142,23 +156,36 @@ def states_of(
 
 
 def _with_bones(result, states: list[State], positions) -> list[State]:
-    """With the skeletons inside its bodies, where the states are those that it has itself."""
-    if positions is not None or not result.scene._bodies.skeletons or not result.scene.bodies:
+    """With the skeletons inside its bodies and the shapes of free parts, where the states are those that it has itself."""
+    if positions is not None or not result.scene.bodies:
         return states
-    bones = bones_of(result)
-    return [replace(state, bones=tuple(each)) for state, each in zip(states, bones, strict=True)]
+    none = [[] for _ in states]
+    pairs = zip(states, bones_of(result) or none, shapes_of(result) or none, strict=True)
+    return [replace(state, bones=tuple(bones), shapes=tuple(shapes)) for state, bones, shapes in pairs]
+
+
+def _with_tendons(result, states: list[State], positions) -> list[State]:
+    """With the tendons in its bodies, where the states are those that it has itself."""
+    tendons = [] if positions is not None else tendons_of(result)
+    if not tendons:
+        return states
+    return [replace(state, tendons=tuple(each)) for state, each in zip(states, tendons, strict=True)]
 
 
 def _skeletons_alone(result) -> tuple[TriangleMesh, np.ndarray]:
     """Of a result without flesh: its bones as a sheet, and where they are, (k, n, 3) m."""
-    if not result.scene._bodies.skeletons:
+    bones, shapes = bones_of(result), shapes_of(result)
+    if not bones and not shapes:
         raise ValueError("cannot draw a scene of free rigid parts: they have no shape")
-    frames = [joined(each)[0] for each in bones_of(result)]
-    return mesh_of(bones_at_rest(result.scene)), np.stack(frames)
+    count = len(bones or shapes)
+    pairs = zip(bones or [[]] * count, shapes or [[]] * count, strict=True)
+    frames = [joined([*each, *others])[0] for each, others in pairs]
+    at_rest = [*bones_at_rest(result.scene), *shapes_at_rest(result.scene)]
+    return mesh_of(at_rest), np.stack(frames)
 
 
 def _with_elements(result, states: list[State], positions) -> list[State]:
-    """With what the elements of its bodies go through, where the states are those that it has itself."""
+    """With what the elements of its bodies go through, and contacts do, where the states are those that it has itself."""
     if positions is not None or not hasattr(result, "_values_at"):
         return states
     bodies = result.scene._bodies
@@ -169,7 +196,10 @@ def _with_elements(result, states: list[State], positions) -> list[State]:
             for body, span in zip(bodies.shells, bodies.spans, strict=True)
         ]
 
-    return [replace(state, elements=elements_of(k)) for k, state in enumerate(states)]
+    def loads_of(k: int):
+        return (lambda: contact_loads(result, k)) if result.scene.contacts else None
+
+    return [replace(state, elements=elements_of(k), loads=loads_of(k)) for k, state in enumerate(states)]
 
 
 def timed(states: list[State], times) -> list[State]:

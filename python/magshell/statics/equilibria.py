@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from .._checks.tensors import is_tensor
+from .._checks.tensors import stacked
 from ..bodies.bodies import BODIES
 from ..bodies.of_body import result_of
 from ..bodies.strains import Strains
@@ -24,8 +24,8 @@ class Equilibria(Sequence):
         for case in self._cases:
             if not isinstance(case, Equilibrium):
                 raise ValueError(f"cases must hold Equilibrium objects, got {type(case).__name__}")
-        self.positions = _stacked([case.positions for case in self._cases])
-        self.edge_rotations = _stacked([case.edge_rotations for case in self._cases])
+        self.positions = stacked([case.positions for case in self._cases])
+        self.edge_rotations = stacked([case.edge_rotations for case in self._cases])
 
     @property
     def scene(self):
@@ -33,7 +33,7 @@ class Equilibria(Sequence):
 
     @property
     def displacements(self):
-        return _stacked([case.displacements for case in self._cases])
+        return stacked([case.displacements for case in self._cases])
 
     @property
     def stable(self) -> bool:
@@ -67,6 +67,14 @@ class Equilibria(Sequence):
     def _values_at(self, index: int):
         return self._cases[index]._values
 
+    @property
+    def _load_factors(self) -> np.ndarray:
+        return np.array([case._load_factors for case in self._cases])
+
+    @property
+    def _varied(self) -> dict:
+        return {}
+
     def _state_at(self, index: int) -> np.ndarray:
         return self._cases[index]._state
 
@@ -75,18 +83,10 @@ class Equilibria(Sequence):
 
     def __getitem__(self, index):
         """A case, some of them, or what all say of one body of the scene."""
-        if isinstance(index, BODIES):
+        if isinstance(index, BODIES) or hasattr(index, "_result_in"):
             return result_of(self, index)
         chosen = self._cases[index]
         return Equilibria(chosen) if isinstance(index, slice) else chosen
 
     def __repr__(self) -> str:
         return "\n".join([f"Equilibria: {len(self)} load cases", *(repr(case) for case in self._cases)])
-
-
-def _stacked(parts: list):
-    if parts and is_tensor(parts[0]):
-        import torch
-
-        return torch.stack(parts)
-    return np.stack(parts) if parts else np.zeros(0)

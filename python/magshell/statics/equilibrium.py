@@ -17,9 +17,12 @@ from ..bodies.solid import Solid
 from ..bodies.solid_result import SolidResult, told_strains
 from ..bodies.strains import Largest, Strains, strains_of
 from ..mesh.crossings import told
+from ..scene.reactions import Reaction, reaction_in
 from ..scene.scene import Scene
 from ..scene.touching import Touching, touching_in
 from ..surroundings.body_contact import BodyContact
+from ..surroundings.contact import Contact
+from ..surroundings.supports import Clamp, Pin, SymmetryPlane
 
 
 @dataclass(frozen=True, repr=False)
@@ -84,8 +87,23 @@ class Equilibrium:
     def _values_at(self, index: int):
         return self._values
 
+    @property
+    def _load_factors(self) -> np.ndarray:
+        """Of its one state, ()."""
+        return self.scene._control_layout.of(self._controls, "scene", "load_factor")[0]
+
+    @property
+    def _varied(self) -> dict:
+        return {}
+
     def _state_at(self, index: int) -> np.ndarray:
         return self._state
+
+    @property
+    def _driving(self) -> np.ndarray:
+        """Of the motors of joints, in the core's order, N m or N."""
+        with self._values.in_core():
+            return self.scene._model.driving(self._state, self._controls, self._turns)
 
     @property
     def _obstacles(self) -> tuple:
@@ -110,9 +128,24 @@ class Equilibrium:
         """
         return strains_of(self.scene, self._state, self._values.whole.thickness)
 
-    def touching(self, contact: BodyContact) -> Touching:
-        """The pairs of a contact of bodies that touch, and their forces."""
+    def touching(self, contact: BodyContact | Contact) -> Touching:
+        """The pairs of a contact that touch, and their forces."""
         return touching_in(self.scene, self._values, contact, self._state)
+
+    def reaction(self, support: Pin | Clamp | SymmetryPlane) -> Reaction:
+        """With what forces a support of the scene holds it.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+        >>> clamp = ms.Clamp(mesh.edges_at(x=0.0))
+        >>> rest = ms.equilibrium(ms.Scene(sheet, supports=[clamp], gravity=(0, 0, -9.81)))
+        >>> round(float(rest.reaction(clamp).force[2]), 5)  # the weight of 2 g
+        0.01962
+        """
+        with self._values.in_core():
+            held = self.scene._model.held_forces(self._state, self._turns, self._controls)
+        return reaction_in(self.scene, support, self._state, held.reshape(-1, 3))
 
     def self_intersections(self) -> np.ndarray:
         """The faces that pass through each other, as in TriangleMesh.self_intersections, (k, 2)."""

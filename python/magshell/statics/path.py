@@ -123,6 +123,14 @@ class Path:
     def _state_at(self, index: int) -> np.ndarray:
         return self._points[index].state
 
+    @property
+    def _load_factors(self) -> np.ndarray:
+        return self._control("load_factor")[:, 0]
+
+    @property
+    def _varied(self) -> dict:
+        return {}
+
     def _values_at(self, index: int):
         return self._moving.values(self.parameters[index])
 
@@ -193,8 +201,9 @@ def follow(
     unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
     parameter passes 1 or `lowest_parameter`, or where until(parameter, positions) says so. Controls as in ms.equilibrium.
 
-    values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, those
-        move along the path, on straight lines from the start's to these; everything else has to be the same.
+    values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, or with
+        other activations of muscles, those move along the path, on straight lines from the start's to these; everything
+        else has to be the same.
 
     first_step: of the parameter. largest_step: root mean square displacement between points, over the mesh's size.
     locate_critical: find limit points and bifurcations between points whose numbers of unstable directions differ.
@@ -305,7 +314,7 @@ def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> 
         scene=scene,
         parameters=np.array([point.parameter for point in points]),
         positions=np.array([model.positions(point.state) for point in points]).reshape(
-            -1, scene.mesh.n_vertices, 3
+            len(points), scene.mesh.n_vertices, 3
         ),
         unstable_directions=np.array([point.unstable_directions for point in points], dtype=int),
         critical=tuple(_critical(model, point) for point in found.critical),

@@ -30,6 +30,7 @@ class Constraints:
     held_nodes: np.ndarray  # (m, 5): node, how many directions, of each the move or -1
     held_frames: np.ndarray  # (m, 3, 3): columns, the held directions first
     moves: tuple[RigidMove, ...]
+    direction_owners: tuple  # (n_d,), the support that holds each direction, or None
 
 
 def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints:
@@ -37,8 +38,8 @@ def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints
     moves: list[RigidMove] = []
     mesh, places = bodies.mesh, [(s, bodies.of(s)) for s in supports]
     nodes, frames = _held_vertices(bodies, [h for s, span in places for h in held_by(s, span, bodies)], moves)
-    pairs, directions, direction_moves = _directed_edges(
-        [d for s, span in places for d in _directed(s, span)], moves
+    pairs, directions, direction_moves, owners = _directed_edges(
+        [(s, d) for s, span in places for d in _directed(s, span)], moves
     )
     directions = np.concatenate([directions, free_directions])
     direction_moves += [-1] * len(free_directions)
@@ -51,6 +52,7 @@ def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints
         np.array(nodes, dtype=np.int32).reshape(-1, 5),
         np.array(frames).reshape(-1, 3, 3),
         tuple(moves),
+        (*owners, *[None] * len(free_directions)),
     )
 
 
@@ -69,6 +71,23 @@ def held_by(support, span: Span, bodies: Bodies) -> list[Held]:
         held._replace(vertices=bodies.original[held.vertices + span.first_vertex])
         for held in support.held(span.mesh)
     ]
+
+
+def held_directions(bodies: Bodies, supports) -> list[tuple[object, int, np.ndarray]]:
+    """(support, vertex of the scene, (m, 3) orthonormal) of all that they hold; what an earlier support holds of a vertex is
+    left out of the later ones'."""
+    found = []
+    taken: dict[int, np.ndarray] = {}
+    for support in supports:
+        for held in held_by(support, bodies.of(support), bodies):
+            for vertex, along in zip(held.vertices.tolist(), held.directions, strict=True):
+                before = taken.get(vertex, np.zeros((0, 3)))
+                rest = along - along @ before.T @ before
+                _, values, rows = np.linalg.svd(rest)
+                own = rows[: int(np.sum(values > 1e-9))]
+                taken[vertex] = np.concatenate([before, own])
+                found.append((support, vertex, own))
+    return found
 
 
 def _directed(support, span: Span) -> list[DirectedEdges]:
@@ -178,10 +197,10 @@ def _mover(axis: np.ndarray, moving: list[Hold]) -> RigidMove | None:
     return next((hold.move for hold in moving if (np.abs(hold.along @ axis) == 1.0).any()), None)
 
 
-def _directed_edges(directed: list[DirectedEdges], moves: list[RigidMove]):
-    pairs, directions, direction_moves = [], [], []
+def _directed_edges(directed: list[tuple[object, DirectedEdges]], moves: list[RigidMove]):
+    pairs, directions, direction_moves, owners = [], [], [], []
     seen: set[int] = set()
-    for group in directed:
+    for support, group in directed:
         move = -1
         if group.move is not None:
             move = len(moves)
@@ -196,7 +215,8 @@ def _directed_edges(directed: list[DirectedEdges], moves: list[RigidMove]):
             pairs.append((edge, len(directions) + which))
         directions.extend(group.directions[first])
         direction_moves.extend([move] * len(first))
-    return pairs, np.array(directions).reshape(-1, 3), direction_moves
+        owners.extend([support] * len(first))
+    return pairs, np.array(directions).reshape(-1, 3), direction_moves, owners
 
 
 def _prevented(bodies, constraints: Constraints, in_part: np.ndarray, center: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ from ..bodies.shell import Shell
 from ..mesh.triangle_mesh import TriangleMesh
 from ..obstacles import Obstacle
 from .body_contact import BodyContact
+from .widths import width_of
 
 _FACE_POINTS = {  # barycentric coordinates of the points on a face
     0: np.zeros((0, 3)),
@@ -148,7 +149,7 @@ class Contact(Owner):
 
     def law(self, *sheets: Shell) -> tuple[float, ...]:
         """The numbers of `_replaceable` for the sheets that touch: N/m, m, m, 1, m/s."""
-        extent = max(np.linalg.norm(np.ptp(sheet.mesh.rest_positions, axis=0)) for sheet in sheets)
+        extent = max(width_of(sheet.mesh) for sheet in sheets)
         thick = [sheet.thickness for sheet in sheets if isinstance(sheet, Shell)]
         smoothing = _SMOOTHING * float(np.mean(joined(thick))) if thick else _SMOOTHING_OF_SOLIDS * extent
         return (

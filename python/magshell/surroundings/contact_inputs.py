@@ -7,7 +7,7 @@ import numpy as np
 from .._checks.selections import indices
 from ..bodies.rigid import Rigid
 from ..bodies.solid import Solid
-from .body_contact import BodyContact, mesh_of
+from .body_contact import BodyContact, side_of, touches_with_shape
 
 
 def obstacles_of(contacts) -> tuple:
@@ -48,16 +48,25 @@ def _check_each_pair_once(contacts) -> None:
             )
 
 
+def shapes_that_touch(contacts) -> tuple[Rigid, ...]:
+    """Rigid parts that contacts are about with their shapes, each once."""
+    sides = [side for contact in contacts for side in contact.sides if touches_with_shape(side)]
+    return tuple({id(side): side for side in sides}.values())
+
+
 def _surface(side, bodies) -> dict:
-    """The faces of a body, or those between the vertices of a rigid part: (k, 3), the scene's vertices."""
-    body = mesh_of(side)
+    """The faces of a body, of a rigid part's shape, or those between its vertices: (k, 3), the scene's vertices."""
+    body = side_of(side)
     try:
-        number = bodies.number(body)
         rigid = bodies.rigid_number(side) if isinstance(side, Rigid) else -1
+        number = -1 if touches_with_shape(side) else bodies.number(body)
     except ValueError:
         raise ValueError(f"a Contact is about a body that is not in the scene: {side!r}") from None
-    span = bodies.spans[number]
     faces, chosen = body.mesh.faces, np.arange(body.mesh.n_faces)
+    if number < 0:
+        rows = (faces + bodies.first_on_surface(side)).astype(np.int32)
+        return {"name": f"rigid part {rigid}", "faces": rows, "numbers": chosen.astype(np.int32)}
+    span = bodies.spans[number]
     if rigid >= 0:
         own = indices("Rigid vertices", side.vertices, body.mesh.n_vertices)
         chosen = np.flatnonzero(np.isin(faces, own).all(axis=1))

@@ -1,0 +1,31 @@
+// Fibres in some of a solid's elements, with chunks of their own: what is assembled by them comes on top of the solid.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "magshell/body/solid.h"
+
+namespace magshell {
+
+class Fibres final : public Body {
+  public:
+    /// `elements`: of the solid, in the caller's numbers, each once. The solid has to outlive it.
+    Fibres(const Solid& solid, const std::vector<Index>& elements);
+    Fibres(const Fibres&) = delete;
+    Fibres& operator=(const Fibres&) = delete;
+
+    Index n_elements() const override { return static_cast<Index>(of_solid.size()); }
+    std::span<const Index> nodes_of(Index element) const override {
+        return solid.nodes_of(of_solid[element]);
+    }
+    Vec3 rest(Index element, int k) const { return solid.rest(of_solid[element], k); }
+
+    const Solid& solid;
+    Renumbering elements;                            // the caller's list of them <-> ours
+    std::vector<Index> of_solid;                     // of each, its number there, ascending
+    std::vector<std::array<Index, 4>> linear_nodes;  // as those of the solid
+    std::vector<std::array<Index, 10>> quadratic_nodes;
+};
+
+}  // namespace magshell

@@ -1,0 +1,93 @@
+// A muscle's fibres at a point of integration of an element of N nodes.
+//
+//   E_p = V_p w psi(l, a),   l = |F m|,  F m = sum alpha_k x_k = y,  alpha_k = g_k . m                       [J]
+//
+//   target stretch   psi = (l - r)^2/2, r = 1 - a                                         Du et al. 2021 (DiffPD)
+//   active stress    psi = a l^2/2, P = w a (F m) m^T                                     Lee et al. 2018, [Qiao21]
+//   Hill             psi = a int f_L dl + int f_P dl, and in motion the force a f_L (f_V - 1) beside it
+//
+// with T = psi' the tension over w, n = y/l and T/l where l > 0:
+//
+//   dE/dx_k = V_p w alpha_k T n,     d2E/dx_k dx_l = V_p w alpha_k alpha_l (T/l (I - n n^T) + T' n n^T)
+//
+// One element a lane. Nothing of it knows det F: flat and inverted elements are like others. Where l = 0, n is zero, the
+// mean over all directions, and T/l is taken as T'.
+#pragma once
+
+#include "magshell/core/pack_functions.h"
+#include "magshell/core/vector3.h"
+#include "magshell/energy/fibre_curve.h"
+#include "magshell/strain/carried_vector.h"
+#include "magshell/strain/deformation.h"
+
+namespace magshell {
+
+enum class FibreForm { target_stretch, active_stress, hill };
+
+/// What fibres do, of unit strength.
+struct FibreLaw {
+    FibreForm form = FibreForm::active_stress;
+    FibreCurve force_length, passive;  // f_L(l), f_P(l)
+    FibreCurve force_velocity;         // f_V(u), u the rate of l over its largest; empty: 1
+
+    struct Response {
+        Pack energy, tension, slope;  // psi, T, T'
+        Pack by_activation;           // dT/da
+    };
+
+    Response at(const Pack& length, const Pack& activation) const {
+        if (form == FibreForm::target_stretch) {
+            const Pack off = length - Pack(1.0) + activation;
+            return {Pack(0.5) * off * off, off, Pack(1.0), Pack(1.0)};
+        }
+        if (form == FibreForm::active_stress)
+            return {Pack(0.5) * activation * length * length, activation * length, activation, length};
+        Response all;
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const FibreCurve::Sample active = force_length.at(length[lane]);
+            const FibreCurve::Sample rest =
+                passive.empty() ? FibreCurve::Sample{0.0, 0.0, 0.0} : passive.at(length[lane]);
+            const double a = activation[lane];
+            all.energy.set(lane, a * active.integral + rest.integral);
+            all.tension.set(lane, a * active.value + rest.value);
+            all.slope.set(lane, a * active.slope + rest.slope);
+            all.by_activation.set(lane, active.value);
+        }
+        return all;
+    }
+
+    /// f_V - 1 and its slope.
+    FibreCurve::Sample beside_isometric(double rate) const {
+        FibreCurve::Sample sample = force_velocity.at(rate);
+        sample.value -= 1.0;
+        return sample;
+    }
+};
+
+/// Where a fibre lies now.
+struct FibrePlace {
+    Pack3 y, n;
+    Pack length, inverse;  // l, and 1/l, zero where l is
+
+    explicit FibrePlace(const Pack3& carried) : y(carried), length(sqrt(squared_norm(carried))) {
+        for (int lane = 0; lane < Pack::width; ++lane)
+            inverse.set(lane, length[lane] > 0.0 ? 1.0 / length[lane] : 0.0);
+        n = inverse * y;
+    }
+
+    /// T/l, or T' where l is zero.
+    Pack over_length(const FibreLaw::Response& law) const {
+        return law.tension * inverse + (Pack(1.0) - length * inverse) * law.slope;
+    }
+
+    /// along n n^T + across (I - n n^T)
+    Pack33 stiffness(const Pack& along, const Pack& across) const {
+        Pack33 m = outer((along - across) * n, n);
+        add_to_diagonal(m, across);
+        return m;
+    }
+    /// What is left of v across the fibre.
+    Pack3 across(const Pack3& v) const { return v - dot(n, v) * n; }
+};
+
+}  // namespace magshell

@@ -1,0 +1,160 @@
+// The energy of Projective Dynamics: distances to rotations and to matrices that keep the volume. One point a lane.
+//
+//   W = mu |F - R|^2 + lam/2 |F - P|^2                                            [J/m3]  [Qiao21] (3)
+//   T = 2 mu (F - R) + lam (F - P) = (2 mu + lam) F - sum_i t_i u_i v_i^T,   t_i = 2 mu + lam d_i         [Pa]
+//
+// F = sum s_i u_i v_i^T; R the nearest rotation, P = sum d_i u_i v_i^T the nearest matrix with determinant 1. t_i are the
+// stresses that mixed Newton keeps. For small strains lam counts a third, as F - P is then tr(E)/3 I. In the frames of u and v, with n_i = 1/d_i and b_i = 1 + k n_i^2 (k: the multiplier),
+//
+//   dd_i/ds_i = (b_j n_l^2 + b_l n_j^2)/D,  dd_i/ds_j = - b_l n_i n_j/D,   D = sum of b_i b_j n_l^2
+//   (t_i - t_j)/(s_i - s_j) = lam/(1 + k d_l),   (t_i + t_j)/(s_i + s_j) = as it stands
+//
+// Where s_i + s_j = 0, R and P jump, and P also where two small stretches are equal in an element far too large. There, and
+// only there, derivatives are cut off, which keeps the Hessian finite.
+#pragma once
+
+#include "magshell/energy/invariant_solid.h"
+#include "magshell/strain/polar.h"
+#include "magshell/strain/unit_determinant.h"
+
+namespace magshell {
+
+struct Projective : LameSolid {
+    static constexpr int stresses = 3;
+    static constexpr bool refuses_inversion = false;
+    static constexpr bool keeps_measures = false;
+
+    static RestModuli rest_moduli(const Pack c[]) { return {Pack(1.0 / 3.0) * c[0], c[1]}; }
+    static void rest_moduli_vjp(const Pack[], const RestModuli& by, Pack out[]) {
+        out[0] += Pack(1.0 / 3.0) * by.lambda;
+        out[1] += by.mu;
+    }
+    /// No Hessian is larger: distances to a set grow no faster than to a point of it.
+    static Pack surrogate(const Pack c[]) { return Pack(2.0) * c[1] + c[0]; }
+
+    Pack33 f;
+    Polar polar;
+    UnitDeterminant nearest;
+
+    explicit Projective(const Pack33& gradient) : f(gradient), polar(f), nearest(polar.stretch) {}
+
+    /// No part of it follows a measure of volume.
+    static Volumetric volumetric(const Pack[], const Pack&) { return {Pack(0.0), Pack(0.0), Pack(0.0)}; }
+    Pack volume_measure() const { return Pack(1.0); }
+    Pack volume_rate(const Pack33&) const { return Pack(0.0); }
+    static void pressure_by_constants(const Pack[], const Pack&, Pack by[]) { by[0] = by[1] = Pack(0.0); }
+
+    Pack energy(const Pack c[]) const {
+        Pack shear(0.0), volume(0.0);
+        for (int i = 0; i < 3; ++i) {
+            const Pack from_rotation = polar.stretch[i] - Pack(1.0);
+            const Pack from_volume = polar.stretch[i] - nearest.d[i];
+            shear += from_rotation * from_rotation;
+            volume += from_volume * from_volume;
+        }
+        return c[1] * shear + Pack(0.5) * c[0] * volume;
+    }
+
+    void stress(const Pack c[], const Pack&, Pack t[]) const {
+        for (int i = 0; i < 3; ++i) t[i] = Pack(2.0) * c[1] + c[0] * nearest.d[i];
+    }
+
+    void stress_rate(const Pack c[], const Pack33& along, const Pack&, Pack t[]) const {
+        Pack rate[3];
+        for (int i = 0; i < 3; ++i)
+            rate[i] = dot(polar.u[i], multiply(along, multiply(transpose(polar.rotation), polar.u[i])));
+        for (int i = 0; i < 3; ++i) {
+            Pack sum(0.0);
+            for (int j = 0; j < 3; ++j) sum += by_stretch(i, j) * rate[j];
+            t[i] = c[0] * sum;
+        }
+    }
+
+    // sum_i t_i u_i v_i^T = (sum_i t_i u_i u_i^T) R
+    Pack33 piola(const Pack c[], const Pack t[]) const {
+        return (Pack(2.0) * c[1] + c[0]) * f - multiply(along_directions(t), polar.rotation);
+    }
+
+    void work_by_constants(const Pack[], const Pack33& d, Pack work[]) const {
+        work[0] = double_dot(f - multiply(along_directions(nearest.d), polar.rotation), d);
+        work[1] = Pack(2.0) * double_dot(f - polar.rotation, d);
+    }
+
+    template <int N>
+    class Tangent {
+      public:
+        Tangent(const Projective& at, const Pack c[], const Pack t[], const Pack&, const Pack& volume,
+                const Pack3* gradients) {
+            const Pack* s = at.polar.stretch;
+            const Pack all = Pack(2.0) * c[1] + c[0];
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j)
+                    stretch_[3 * i + j] = volume * ((i == j ? all : Pack(0.0)) - c[0] * at.by_stretch(i, j));
+            const Pack least = Pack(1e-10) * s[0] + Pack(1e-100);
+            for (int l = 0; l < 3; ++l) {
+                const int i = (l + 1) % 3, j = (l + 2) % 3;
+                const Pack shear =
+                    all - c[0] / max(Pack(1.0) + at.nearest.multiplier * at.nearest.d[l], Pack(1e-10));
+                const Pack turn = all - (t[i] + t[j]) / max(s[i] + s[j], least);
+                same_[l] = Pack(0.5) * volume * (shear + turn);
+                other_[l] = Pack(0.5) * volume * (shear - turn);
+            }
+            for (int i = 0; i < 3; ++i) u_[i] = at.polar.u[i];
+            for (int k = 0; k < N; ++k) {
+                const Pack3 turned = multiply(at.polar.rotation, gradients[k]);  // v_i . g = u_i . R g
+                for (int i = 0; i < 3; ++i) g_[k][i] = dot(u_[i], turned);
+            }
+        }
+
+        // In the frames: dF_ij = x_i g_j for a node that moves along x.
+        Pack33 block(int k, int l) const {
+            const Pack *a = g_[k], *b = g_[l];
+            Pack33 h;
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) {
+                    const int rest = 3 - i - j;
+                    h.at[3 * i + j] = stretch_[3 * i + j] * a[i] * b[j];
+                    if (i != j)
+                        h.at[3 * i + j] += other_[rest] * a[j] * b[i];
+                    else
+                        h.at[3 * i + j] += same_[(i + 1) % 3] * a[(i + 2) % 3] * b[(i + 2) % 3] +
+                                           same_[(i + 2) % 3] * a[(i + 1) % 3] * b[(i + 1) % 3];
+                }
+            Pack33 turned = outer(u_[0], Pack3{h.at[0], h.at[1], h.at[2]});
+            turned += outer(u_[1], Pack3{h.at[3], h.at[4], h.at[5]});
+            turned += outer(u_[2], Pack3{h.at[6], h.at[7], h.at[8]});
+            const Pack33 directions{
+                {u_[0].x, u_[0].y, u_[0].z, u_[1].x, u_[1].y, u_[1].z, u_[2].x, u_[2].y, u_[2].z}};
+            return multiply(turned, directions);
+        }
+
+      private:
+        Pack stretch_[9], same_[3], other_[3];
+        Pack3 u_[3];
+        Pack g_[N][3];
+    };
+
+  private:
+    Pack33 along_directions(const Pack t[]) const {
+        Pack33 sum = outer(t[0] * polar.u[0], polar.u[0]);
+        for (int i = 1; i < 3; ++i) sum += outer(t[i] * polar.u[i], polar.u[i]);
+        return sum;
+    }
+
+    /// dd_i/ds_j
+    Pack by_stretch(int i, int j) const {
+        Pack n[3], b[3];
+        for (int l = 0; l < 3; ++l) {
+            n[l] = Pack(1.0) / nearest.d[l];
+            b[l] = Pack(1.0) + nearest.multiplier * n[l] * n[l];
+        }
+        Pack determinant(0.0);
+        for (int l = 0; l < 3; ++l) determinant += b[(l + 1) % 3] * b[(l + 2) % 3] * n[l] * n[l];
+        determinant = max(determinant, Pack(1e-10) * n[2] * n[2]);
+        if (i != j) return -(b[3 - i - j] * n[i] * n[j]) / determinant;
+        const int p = (i + 1) % 3, q = (i + 2) % 3;
+        return (b[p] * n[q] * n[q] + b[q] * n[p] * n[p]) / determinant;
+    }
+};
+
+}  // namespace magshell

@@ -1,0 +1,82 @@
+// What a volume V costs, V_0 at rest, by two numbers of its own:
+//
+//   pressure    E = - p V                                                      p [Pa]
+//   gas         E = - p_g V_0 ln(V / V_0) + p_o (V - V_0)                      at constant temperature, n R T = p_g V_0;
+//                                                                              p_g [Pa] at the volume at rest, p_o outside
+//   liquid      E = K/2 (V - V_t)^2 / V_0                                      V_t [m3], K [Pa] bulk modulus
+//   cell        E = V_0 K/2 (V / V_0 - a)^2                                    a, K [Pa]                         [Qiao21] 5
+//
+// - dE/dV is the pressure inside, over that outside.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace magshell {
+
+enum class VolumeLaw { pressure, gas, liquid, cell };
+
+/// The names and units of its numbers; nullptr: it has only one.
+struct VolumeNames {
+    std::array<const char*, 2> names, units;
+};
+
+inline VolumeNames names_of(VolumeLaw law) {
+    switch (law) {
+        case VolumeLaw::pressure:
+            return {{"pressure", nullptr}, {"Pa", nullptr}};
+        case VolumeLaw::gas:
+            return {{"filling_pressure", "outside_pressure"}, {"Pa", "Pa"}};
+        case VolumeLaw::liquid:
+            return {{"volume", "bulk_modulus"}, {"m3", "Pa"}};
+        case VolumeLaw::cell:
+            break;
+    }
+    return {{"volume_ratio", "stiffness"}, {"1", "Pa"}};
+}
+
+/// Energy, dE/dV, d2E/dV2, and dE/dV by its numbers; `magnitude`: of what cancels in dE/dV.
+struct VolumeEnergy {
+    double energy, slope, curvature = 0.0, magnitude = 0.0;
+    std::array<double, 2> slope_by{};
+
+    VolumeEnergy(VolumeLaw law, const std::array<double, 2>& numbers, double rest, double volume) {
+        const auto [a, b] = numbers;
+        const double ratio = volume / rest;
+        switch (law) {
+            case VolumeLaw::pressure:
+                energy = -a * volume;
+                slope = -a;
+                slope_by = {-1.0, 0.0};
+                return;
+            case VolumeLaw::gas:
+                // Without gas there is nothing that would resist, not even at no volume.
+                energy = b * (volume - rest);
+                if (a != 0.0)
+                    energy -=
+                        ratio > 0.0 ? a * rest * std::log(ratio) : -std::numeric_limits<double>::infinity();
+                slope = b - a / ratio;
+                curvature = a / (ratio * volume);
+                magnitude = b + a / ratio;
+                slope_by = {-1.0 / ratio, 1.0};
+                return;
+            case VolumeLaw::liquid:
+                energy = 0.5 * b * (volume - a) * (volume - a) / rest;
+                slope = b * (volume - a) / rest;
+                curvature = b / rest;
+                magnitude = b * (std::abs(volume) + std::abs(a)) / rest;
+                slope_by = {-b / rest, (volume - a) / rest};
+                return;
+            case VolumeLaw::cell:
+                energy = 0.5 * rest * b * (ratio - a) * (ratio - a);
+                slope = b * (ratio - a);
+                curvature = b / rest;
+                magnitude = b * (std::abs(ratio) + std::abs(a));
+                slope_by = {-b, ratio - a};
+                return;
+        }
+    }
+};
+
+}  // namespace magshell

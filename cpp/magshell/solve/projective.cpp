@@ -1,0 +1,179 @@
+#include "magshell/solve/projective.h"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "magshell/solve/anderson.h"
+#include "magshell/solve/coulomb_contact.h"
+#include "magshell/solve/secants.h"
+
+namespace magshell {
+namespace {
+
+// A shorter share of a step than that leads nowhere.
+constexpr double shortest_share = 1e-9;
+// How far a node may be from where Coulomb's law has it, of the extent of the scene.
+constexpr double law_tolerance = 1e-10;
+
+// Points that begin or cease to touch make another matrix, which is looked for now and then.
+constexpr int rounds_between_looks = 5;
+
+// The penalty of obstacles is off while it lives.
+class StandingAside {
+  public:
+    explicit StandingAside(ContactTerm& contact) : contact_(contact) { contact_.stand_aside(true); }
+    StandingAside(const StandingAside&) = delete;
+    StandingAside& operator=(const StandingAside&) = delete;
+    ~StandingAside() { contact_.stand_aside(false); }
+
+  private:
+    ContactTerm& contact_;
+};
+
+}  // namespace
+
+ProjectiveSolver::ProjectiveSolver(Newton& newton, const ProjectiveOptions& options)
+    : newton_(newton), model_(newton.model()), options_(options), matrix_(newton.model()) {}
+
+VectorXd ProjectiveSolver::reduced_gradient(const VectorXd& q, const Anchor& anchor) const {
+    return model_.reduction().vector(newton_.gradient(q, anchor));
+}
+
+bool ProjectiveSolver::touches_otherwise(const Anchor& anchor, VectorXd& before) const {
+    if (!model_.has_contact()) return false;
+    constexpr double much = 0.5;  // of the diagonal without it
+    VectorXd now = model_.touching_stiffness();
+    bool changed = false;
+    for (Index node = 0; node < now.size() && !changed; ++node)
+        changed = std::abs(now[node] - before[node]) >
+                  much * ((*anchor.weights)[3 * node] + matrix_.stiffness(node) + before[node]);
+    if (changed) before = std::move(now);
+    return changed;
+}
+
+void ProjectiveSolver::prepare(const Anchor& anchor, double scale) {
+    const int factorized = matrix_.factorizations();
+    matrix_.set(scale, *anchor.weights, model_.touching_stiffness());
+    newton_.count_factorizations(matrix_.factorizations() - factorized);
+    matrix_.linearize();
+}
+
+NewtonReport ProjectiveSolver::solve(VectorXd& q, const Controls& controls, const Anchor& anchor,
+                                     double scale) {
+    if (!options_.coulomb || !model_.has_contact()) return solve_rounds(q, controls, anchor, scale);
+    const StandingAside aside(*model_.contact());
+    return solve_touching(q, controls, anchor, scale);
+}
+
+NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& controls, const Anchor& anchor,
+                                            double scale) {
+    NewtonReport report;
+    const auto fail = [&](std::string reason) {
+        report.reason = std::move(reason);
+        return report;
+    };
+    if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
+    const Reduction& reduction = model_.reduction();
+    VectorXd move = reduction.prescribed_increment(q, controls);
+    newton_.evaluate(q, controls, anchor);
+    prepare(anchor, scale);
+    Secants secants(options_.history);
+    VectorXd touched = model_.touching_stiffness();
+    VectorXd gradient = reduced_gradient(q, anchor);
+    for (;; ++report.iterations, newton_.count_iteration()) {
+        const bool last = report.iterations == options_.iterations;
+        const bool in_place = move.isZero(0.0);
+        report.residual = newton_.relative_residual(q, anchor);
+        newton_.watch(report.residual);
+        if (!std::isfinite(report.residual)) return fail("the iteration diverged");
+        if (in_place && options_.tolerance > 0.0 && report.residual <= options_.tolerance &&
+            (report.iterations > 0 || newton_.relative_residual(q, anchor, false) <= options_.tolerance))
+            report.converged = true;
+        if (last && in_place && options_.tolerance == 0.0) report.converged = true;
+        if (report.converged) return report;
+        if (last)
+            return fail("no convergence in " + std::to_string(report.iterations) +
+                        " iterations of Projective Dynamics: the residual is " +
+                        std::to_string(report.residual));
+        if (report.iterations % rounds_between_looks == rounds_between_looks - 1 &&
+            touches_otherwise(anchor, touched)) {
+            prepare(anchor, scale);
+            secants.clear();
+        }
+        VectorXd direction = -gradient;
+        if (!in_place) direction -= reduction.vector(matrix_.times(move));
+        secants.solve(direction, [&](VectorXd& rhs) { matrix_.solve(rhs); });
+        double slope = -gradient.dot(direction);
+        if (in_place && !(slope > 0.0) && !secants.empty()) {
+            secants.clear();
+            direction = -gradient;
+            matrix_.solve(direction);
+            slope = -gradient.dot(direction);
+        }
+        const VectorXd from = q;
+        VectorXd step = move + reduction.expand(direction);
+        double share = newton_.advance(q, step, shortest_share, report);
+        if (share < 0.0) return report;
+        move *= 1.0 - share;
+        newton_.evaluate(q, controls, anchor);
+        if (in_place) share *= newton_.search(q, controls, anchor, from, step, share * slope);
+        VectorXd now = reduced_gradient(q, anchor);
+        if (in_place) secants.add(share * direction, now - gradient);
+        gradient = std::move(now);
+    }
+}
+
+// The forces of contact shift the anchor's target, so that what is left over is a residual as any other.
+NewtonReport ProjectiveSolver::solve_touching(VectorXd& q, const Controls& controls, const Anchor& anchor,
+                                              double scale) {
+    NewtonReport report;
+    const auto fail = [&](std::string reason) {
+        report.reason = std::move(reason);
+        return report;
+    };
+    const Reduction& reduction = model_.reduction();
+    const VectorXd first_move = reduction.prescribed_increment(q, controls);
+    reduction.advance(q, first_move);
+    if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
+    newton_.evaluate(q, controls, anchor);
+    prepare(anchor, scale);
+    CoulombContact contact(model_, matrix_, controls, *anchor.motion->x_hat, anchor.motion->time);
+    VectorXd target = *anchor.target;
+    const Anchor pushed{anchor.weights, &target, anchor.motion};
+    Anderson anderson(options_.history);
+    const auto last_round = [&](const NewtonReport& now) {
+        return now.iterations + 1 == options_.iterations;
+    };
+    for (;; ++report.iterations, newton_.count_iteration()) {
+        report.residual = newton_.relative_residual(q, pushed);
+        newton_.watch(report.residual);
+        if (!std::isfinite(report.residual)) return fail("the iteration diverged");
+        const bool last = report.iterations == options_.iterations;
+        const double off = contact.look(q);
+        report.converged = options_.tolerance > 0.0 ? report.residual <= options_.tolerance &&
+                                                          off <= law_tolerance * model_.extent()
+                                                    : last;
+        if (report.converged) return report;
+        if (last)
+            return fail("no convergence in " + std::to_string(report.iterations) +
+                        " iterations of Projective Dynamics with Coulomb's law: the residual is " +
+                        std::to_string(report.residual));
+        VectorXd direction = -reduced_gradient(q, pushed);
+        matrix_.solve(direction);
+        VectorXd move = reduction.expand(direction);
+        contact.settle(q, move);
+        VectorXd end = q;
+        const double share = newton_.advance(end, move, shortest_share, report);
+        if (share < 0.0) return report;
+        VectorXd ahead =
+            share < 1.0 || last_round(report) ? VectorXd(end - q) : VectorXd(anderson.next(end, move) - q);
+        if (newton_.advance(q, ahead, shortest_share, report) < 0.0) return report;
+        target = *anchor.target;
+        for (Index k = 0; k < model_.n_coordinates(); ++k)
+            if (contact.forces()[k] != 0.0) target[k] += contact.forces()[k] / (*anchor.weights)[k];
+        newton_.evaluate(q, controls, anchor);
+    }
+}
+
+}  // namespace magshell

@@ -1,0 +1,83 @@
+// The matrix with determinant 1 that is nearest to F = U diag(s) V^T: U diag(d) V^T with d the nearest to s whose product is
+// 1. Where s is sorted and only its last may be negative, all d are positive, and with a multiplier k
+//
+//   d_i - k/d_i = s_i,   d_i = (s_i + r_i)/2,   r_i = sqrt(s_i^2 + 4 k),   d_1 d_2 d_3 = 1
+//
+// k > 0 where F is too small. Where it is large and thin, the product is too large even at the smallest k that has roots,
+// -s_3^2/4: then d_3 = (s_3 - r_3)/2. One point a lane; what a lane gets does not depend on its neighbours.
+#pragma once
+
+#include <cmath>
+
+#include "magshell/core/pack_functions.h"
+
+namespace magshell {
+
+struct UnitDeterminant {
+    Pack d[3], multiplier;
+
+    /// s: sorted by size, the last one of either sign.
+    explicit UnitDeterminant(const Pack s[3]) : multiplier(0.0) {
+        constexpr int most = 12;
+        Pack root[3];
+        for (int iteration = 0;; ++iteration) {
+            for (int i = 0; i < 3; ++i) {
+                root[i] = sqrt(max(s[i] * s[i] + Pack(4.0) * multiplier, Pack(0.0)));
+                d[i] = Pack(0.5) * (s[i] + root[i]);
+            }
+            const Pack off = d[0] * d[1] * d[2] - Pack(1.0);
+            const Pack open = abs(off) - Pack(settled);
+            if (iteration == most || all_negative(open)) break;
+            Pack slope[3];
+            for (int i = 0; i < 3; ++i) slope[i] = d[i] * root[i];
+            const Pack sum = slope[0] * slope[1] + slope[1] * slope[2] + slope[2] * slope[0];
+            const Pack step = off * root[0] * root[1] * root[2] / sum;
+            multiplier = where_negative(open, multiplier, multiplier - step);
+        }
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const bool found = std::abs(d[0][lane] * d[1][lane] * d[2][lane] - 1.0) < 4.0 * settled &&
+                               d[2][lane] > 0.0 && s[2][lane] * s[2][lane] + 4.0 * multiplier[lane] >= 0.0;
+            if (!found) search(lane, s);
+        }
+    }
+
+  private:
+    static constexpr double settled = 2e-15;
+
+    static bool all_negative(const Pack& a) {
+        bool all = true;
+        for (int lane = 0; lane < Pack::width; ++lane) all &= a[lane] < 0.0;
+        return all;
+    }
+
+    // By bisection: of the multiplier on the branch that has the product 1.
+    void search(int lane, const Pack s[3]) {
+        const double at[3] = {s[0][lane], s[1][lane], s[2][lane]};
+        double k[3];
+        const auto product = [&](double multiplier_, bool upper) {
+            for (int i = 0; i < 3; ++i) {
+                const double root = std::sqrt(std::max(at[i] * at[i] + 4.0 * multiplier_, 0.0));
+                if (i == 2 && (!upper || at[i] < 0.0))  // without cancelling
+                    k[i] = upper ? 2.0 * multiplier_ / (root - at[i]) : -2.0 * multiplier_ / (at[i] + root);
+                else
+                    k[i] = 0.5 * (at[i] + root);
+            }
+            return k[0] * k[1] * k[2];
+        };
+        double low = at[2] > 0.0 ? -0.25 * at[2] * at[2] : 0.0, high = 0.0;
+        const bool upper = product(low, true) <= 1.0;
+        if (upper)
+            for (high = 1.0; product(high, true) < 1.0;) high *= 4.0;
+        for (int halving = 0; halving < 2000; ++halving) {
+            const double middle = 0.5 * (low + high);
+            if (middle == low || middle == high) break;
+            ((product(middle, upper) < 1.0) == upper ? low : high) = middle;
+        }
+        const double found = 0.5 * (low + high);
+        product(found, upper);
+        multiplier.set(lane, found);
+        for (int i = 0; i < 3; ++i) d[i].set(lane, k[i]);
+    }
+};
+
+}  // namespace magshell

@@ -1,0 +1,45 @@
+// Moments in ball joints, with axes that the world holds: m on the child, -m on the parent. Such a moment has no potential.
+//
+//   f_k = m x (x_k - c)/(8 l^2)      on the four corners, as sum rho rho^T = 4 l^2 I
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "magshell/term/term.h"
+
+namespace magshell {
+
+class BallTorqueTerm final : public Term {
+  public:
+    struct Input {
+        std::string owner;
+        const Index* parent;  // four corners, or nullptr: the world
+        const Index* child;
+    };
+
+    BallTorqueTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest, Registry& registry);
+
+    std::string_view name() const override { return "joints"; }
+    bool set_values(const Values& values) override;
+    bool driven() const override { return false; }
+    double energy(const double*, const Controls&) const override { return 0.0; }
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void add_remainder(const double* q, const Controls& controls, Remainder& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::size_t bytes() const override { return sides_.capacity() * sizeof(Side); }
+
+  private:
+    struct Side {  // one link of a joint
+        std::array<Index, 4> corners;
+        double sign, share;  // 1/(8 l^2)
+        Slot slot;
+        Vec3 moment = Vec3::Zero();
+
+        std::array<Vec3, 4> arms(const double* q) const;
+    };
+    std::vector<Side> sides_;
+};
+
+}  // namespace magshell

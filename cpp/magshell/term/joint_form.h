@@ -1,0 +1,53 @@
+// A scalar that tells how two links stand to each other, read off their corners (corner_form.h), with what Newton needs
+// of it:
+//
+//   revolute   s = arg(C + i S),  C = u_p . u_c + v_p . v_c,  S = v_p . u_c - u_p . v_c      u, v across the axis
+//   prismatic  s = a_p . (o_c - o_p)
+//   ball       s = sum e_p . e_c = 1 + 2 cos(angle);  or one product of the rotation, a_p . b_c
+//
+// d2s/dx2 = pairs (x) I + cross (first other^T + other first^T), first = ds/dx; of an angle, other = d(log |C + i S|)/dx.
+#pragma once
+
+#include "magshell/body/joint.h"
+#include "magshell/term/corner_form.h"
+
+namespace magshell {
+
+class JointForm {
+  public:
+    using Corners = CornerForm::Corners;
+    struct Local {
+        double value;
+        Corners first, other = Corners::Zero();
+        Eigen::Matrix<double, 8, 8> pairs;
+        double cross = 0.0;
+
+        /// d2s/dx2 times a motion of the corners.
+        Corners second(const Corners& along) const {
+            Corners product = along * pairs;
+            if (cross != 0.0)
+                product += cross * (other.cwiseProduct(along).sum() * first +
+                                    first.cwiseProduct(along).sum() * other);
+            return product;
+        }
+    };
+
+    JointForm() = default;
+    /// That of a joint.
+    JointForm(const Joint& joint, const LinkPair& links);
+    /// a_p . b_c of two vectors at rest.
+    static JointForm product(const LinkPair& links, const Vec3& of_parent, const Vec3& of_child);
+
+    bool angle() const { return angle_; }
+    /// An angle from -pi to pi.
+    double value(const Corners& at) const;
+    /// The same next to another one, full turns away if need be.
+    double value(const Corners& at, double near) const;
+    Local at(const Corners& at) const;
+
+  private:
+    bool angle_ = false;
+    CornerForm form_, sine_;  // of an angle, its cosine first
+};
+
+}  // namespace magshell

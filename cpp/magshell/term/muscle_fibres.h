@@ -1,0 +1,186 @@
+// What the terms of a muscle share: its fibres in packs, their law, and the numbers that they read.
+//
+// Values: "fibres" (a unit vector an element, at rest), "strength" [Pa] (w, an element) and "activation" (a, one of each
+// segment; those of an element are its segment's). With a force-velocity curve also "shortening_rate" [1/s], at which a
+// shortening fibre pulls no more.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/body/fibres.h"
+#include "magshell/energy/fibre.h"
+#include "magshell/strain/tetrahedron.h"
+
+namespace magshell {
+
+/// A muscle as the caller describes it.
+struct MuscleInput {
+    std::string owner;  // under which its values are registered
+    Index solid = 0;
+    std::vector<Index> elements;  // of the solid
+    std::vector<Index> segments;  // of each of them
+    Index n_segments = 1;
+    FibreLaw law;
+};
+
+/// Puts in place, or adds, the forces alpha_k pull of a point.
+template <int N>
+inline void add_pulls(const CarriedVector<N>& m, const Pack3& pull, bool first, Pack3 g[N]) {
+    for (int k = 0; k < N; ++k) {
+        const Pack3 share = m.alpha[k] * pull;
+        g[k] = first ? share : g[k] + share;
+    }
+}
+
+/// The blocks alpha_k alpha_l M of a point, as a tangent for add_blocks.
+template <int N>
+struct FibreTangent {
+    const CarriedVector<N>& m;
+    Pack33 stiffness;
+
+    Pack33 block(int k, int l) const { return (m.alpha[k] * m.alpha[l]) * stiffness; }
+};
+
+template <class Element>
+class MuscleFibres {
+  public:
+    static constexpr int N = Element::nodes, points = Element::points;
+    using Nodes = std::array<Index, N>;
+
+    struct Pieces {
+        CarriedVector<N> m[points];
+        Pack volume[points];
+        Pack strength, activation;
+    };
+
+    MuscleFibres(const MuscleInput& input, const Fibres& fibres, const ChunkLoop& chunks,
+                 const SystemMatrix& matrix, Registry& registry)
+        : fibres(fibres),
+          law(input.law),
+          loop(nodes(fibres), chunks, matrix),
+          directions(
+              registry.values.add(input.owner, "fibres", "1", fibres.n_elements(), 3, &fibres.elements)),
+          strength(
+              registry.values.add(input.owner, "strength", "Pa", fibres.n_elements(), 1, &fibres.elements)),
+          activation(registry.values.add(input.owner, "activation", "1", input.n_segments, 1)),
+          pieces_(loop.packs()) {
+        for (Index k = 0; k < fibres.n_elements(); ++k)
+            segments_.push_back(input.segments[fibres.elements.user[k]]);
+    }
+
+    bool set_values(const Values& values) {
+        const bool turned = values.changed(directions);
+        const auto each_lane = [&](const auto& body) {
+            for (Index pack = 0; pack < loop.packs(); ++pack)
+                for (int lane = 0; lane < Pack::width; ++lane)
+                    body(pieces_[pack], lane, loop.element(pack, lane));
+        };
+        if (turned)
+            each_lane([&](Pieces& each, int lane, Index t) {
+                const RestElement<Element> rest = rest_of(t);
+                const Vec3 m = values.vector(directions, t);
+                for (int p = 0; p < points; ++p) {
+                    const Eigen::Matrix<double, N, 1> alpha = gradients(rest, p) * m;
+                    each.volume[p].set(lane, rest.volume[p]);
+                    for (int k = 0; k < N; ++k) each.m[p].alpha[k].set(lane, alpha[k]);
+                }
+            });
+        if (values.changed(strength))
+            each_lane([&](Pieces& each, int lane, Index t) {
+                each.strength.set(lane, values.number(strength, t));
+            });
+        if (values.changed(activation))
+            each_lane([&](Pieces& each, int lane, Index t) {
+                each.activation.set(lane, values.number(activation, segments_[t]));
+            });
+        return turned || values.changed(strength, activation);
+    }
+
+    const Pieces& at(Index pack) const { return pieces_[pack]; }
+    Index segment(Index element) const { return segments_[element]; }
+
+    RestElement<Element> rest_of(Index element) const {
+        Vec3 x[N];
+        for (int k = 0; k < N; ++k) x[k] = fibres.rest(element, k);
+        return RestElement<Element>(x);
+    }
+
+    // The g_k of a point, one a row.
+    static Eigen::Matrix<double, N, 3> gradients(const RestElement<Element>& rest, int p) {
+        return Element::shape_derivatives(p) * rest.gradients[p];
+    }
+
+    std::size_t bytes() const { return loop.bytes() + bytes_of(pieces_) + bytes_of(segments_); }
+
+    /// What the terms find of an element by the values: `pulled` is F^T b of every point, as its nodes have it, sum_k g_k
+    /// pulled_k.
+    struct Found {
+        Pack strength{0.0}, activation{0.0};
+        Pack pulled[points][N];
+
+        Found() {
+            for (Pack(&of_point)[N] : pulled) std::fill_n(of_point, N, Pack(0.0));
+        }
+        /// By the F m of a point, where F is that of the nodes x.
+        void add(int p, const Pack3 x[N], const Pack3& by) {
+            for (int k = 0; k < N; ++k) pulled[p][k] += dot(x[k], by);
+        }
+    };
+
+    class Gatherer {
+      public:
+        explicit Gatherer(const MuscleFibres& muscle) : muscle_(muscle) {
+            by_direction_.resize(muscle.fibres.n_elements(), Vec3::Zero());
+            by_strength_.resize(muscle.fibres.n_elements(), 0.0);
+            by_activation_.resize(muscle.fibres.n_elements(), 0.0);
+        }
+
+        void take(Index pack, const Found& found) {
+            for (int lane = 0; lane < muscle_.loop.lanes_in(pack); ++lane) {
+                const Index t = muscle_.loop.element(pack, lane);
+                by_strength_[t] = found.strength[lane];
+                by_activation_[t] = found.activation[lane];
+                const RestElement<Element> rest = muscle_.rest_of(t);
+                for (int p = 0; p < points; ++p) {
+                    const Eigen::Matrix<double, N, 3> g = gradients(rest, p);
+                    for (int k = 0; k < N; ++k)
+                        by_direction_[t] += found.pulled[p][k][lane] * g.row(k).transpose();
+                }
+            }
+        }
+
+        void hand_over(Gradient& out) const {
+            for (Index t = 0; t < muscle_.fibres.n_elements(); ++t) {
+                out.values.segment<3>(muscle_.directions.at(t)) += by_direction_[t];
+                out.values[muscle_.strength.at(t)] += by_strength_[t];
+                out.values[muscle_.activation.at(muscle_.segment(t))] += by_activation_[t];
+            }
+        }
+
+      private:
+        const MuscleFibres& muscle_;
+        std::vector<Vec3> by_direction_;
+        std::vector<double> by_strength_, by_activation_;
+    };
+
+    const Fibres& fibres;
+    const FibreLaw law;
+    const ElementLoop<N> loop;
+    const Slot directions, strength, activation;
+
+  private:
+    static const std::vector<Nodes>& nodes(const Fibres& fibres) {
+        if constexpr (N == 4)
+            return fibres.linear_nodes;
+        else
+            return fibres.quadratic_nodes;
+    }
+
+    std::vector<Pieces> pieces_;
+    std::vector<Index> segments_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,94 @@
+// Volumes inside closed surfaces, of cavities and of cells, and what each of them costs.            energy/volume_form.h,
+//                                                                                                   energy/volume_law.h
+//   g = E'(V) dV/dx,     H = E'(V) d2V/dx2 + E''(V) dV/dx dV/dx^T
+//
+// The last part couples all nodes of a surface: it goes into the matrix where these are coupled there, and is of low rank
+// beside it elsewhere. In mixed steps the pressure is an unknown of its own, condensed: the curvature sees the one to which
+// the linearized step leads, which a stiff liquid needs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "magshell/assembly/lanes.h"
+#include "magshell/body/nodes.h"
+#include "magshell/energy/volume_form.h"
+#include "magshell/energy/volume_law.h"
+#include "magshell/term/border_term.h"
+
+namespace magshell {
+
+/// A closed surface: nodes of its faces, in the caller's vertices, and a weight each: -1 where it runs the other way round.
+struct ClosedSurface {
+    std::vector<Index> triangles, curved;  // three a face, six a face
+    std::vector<double> weights, curved_weights;
+};
+
+/// Volumes under one law, one number or pair of numbers each.
+struct VolumeInput {
+    std::string owner;  // under which these are registered
+    VolumeLaw law = VolumeLaw::pressure;
+    bool stays_open = false;  // whether a state without volume has no energy
+    bool coupled = false;     // whether all nodes of a surface are to be coupled in the matrix
+    std::vector<ClosedSurface> surfaces;
+};
+
+class VolumeTerm final : public BorderTerm {
+  public:
+    VolumeTerm(const std::vector<VolumeInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
+               Registry& registry);
+
+    std::string_view name() const override { return "volume"; }
+    bool set_values(const Values& values) override;
+    bool refuses_states() const override;
+    double largest_share(const double* q, const double* p) const override;
+    std::string refusal(const double* q) const override;
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void add_low_rank(const Controls& controls, LowRank& out) const override;
+    void extrapolate(const double* p) override;
+    void add_cancelling_here(VectorXd& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    template <int N>
+    struct Face {
+        std::array<Index, N> places;  // among the nodes of its surface
+        PairSlots<N> slots;
+        double weight;
+    };
+    struct Volume {
+        std::vector<Index> nodes;
+        std::vector<Face<3>> triangles;
+        std::vector<Face<6>> curved;
+        VolumeLaw law;
+        std::array<Slot, 2> slots;
+        Index row;
+        bool stays_open;
+        double rest = 0.0;  // [m3]
+        std::vector<SystemMatrix::Slot>
+            pairs;  // of all nodes, at lower_index(row - 1, column); empty: low rank
+        std::array<double, 2> numbers{};
+        // At the last evaluated state.
+        double volume = 0.0, slope = 0.0, curvature = 0.0, magnitude = 0.0, extrapolated = 0.0;
+        std::vector<Vec3> slopes;  // dV/dx
+
+        /// Positions from the first node on: wherever the origin is, the volume is the same.
+        std::vector<Vec3> at(const double* q) const;
+        double volume_at(const std::vector<Vec3>& x) const;
+        void add_slopes(const std::vector<Vec3>& x, std::vector<Vec3>& out) const;
+        double along(const double* p) const;
+    };
+
+    void add(const VolumeInput& input, const ClosedSurface& surface, Index row, std::array<Slot, 2> slots,
+             const Nodes& nodes, const SystemMatrix& matrix);
+    void add_outer_product(const Volume& volume, double stiffness, SystemMatrix& out) const;
+
+    Slot factor_;
+    std::vector<Volume> volumes_;
+    double factor_now_ = 0.0;  // at the last evaluated state
+};
+
+}  // namespace magshell

@@ -1,0 +1,1 @@
+"""Searches with and without gradients, on the same simulator and counting the same simulations."""

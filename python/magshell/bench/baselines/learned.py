@@ -1,0 +1,50 @@
+"""Reinforcement learning by stable-baselines3 on the environment of a task: SAC and PPO."""
+
+from __future__ import annotations
+
+from .counted import BudgetSpent, Counted
+
+
+def sac(task, counted: Counted, seed: int) -> None:
+    from stable_baselines3 import SAC
+
+    _learn(
+        lambda one: SAC("MlpPolicy", one, seed=seed, learning_starts=2 * task.actions, device="cpu"),
+        task,
+        counted,
+    )
+
+
+def ppo(task, counted: Counted, seed: int) -> None:
+    from stable_baselines3 import PPO
+
+    steps = 5 * task.actions
+    _learn(
+        lambda one: PPO("MlpPolicy", one, seed=seed, n_steps=steps, batch_size=task.actions, device="cpu"),
+        task,
+        counted,
+    )
+
+
+def _learn(make, task, counted: Counted) -> None:
+    """An episode is a simulation, its mean loss the value."""
+    from gymnasium import Wrapper
+
+    class Episodes(Wrapper):
+        def reset(self, **named):
+            self.lost = 0.0
+            counted.begin()
+            return super().reset(**named)
+
+        def step(self, action):
+            observation, reward, terminated, truncated, info = super().step(action)
+            self.lost -= reward / task.actions
+            if terminated or truncated:
+                counted.counted(self.lost)
+            return observation, reward, terminated, truncated, info
+
+    make(Episodes(task.environment())).learn(total_timesteps=10 * counted.budget * task.actions)
+    raise BudgetSpent
+
+
+LEARNERS = {"SAC": sac, "PPO": ppo}

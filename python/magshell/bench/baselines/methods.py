@@ -1,0 +1,128 @@
+"""The searches. Each is method(task, counted, seed): it minimizes until the budget of `counted` is spent or it ends.
+
+A library that is not installed raises ImportError; it is an extra of the bench, and no part of the package needs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+
+import numpy as np
+
+import magshell as ms
+
+from .counted import BudgetSpent, Counted
+
+_SPREAD = 0.2  # of unknowns in -1 to 1: how far methods without a gradient look around at first
+
+
+def lbfgs(task, counted: Counted, seed: int) -> None:
+    _by_gradient(lambda x: ms.optim.LBFGS([x], lower=-1.0, upper=1.0), task, counted, seed)
+
+
+def mma(task, counted: Counted, seed: int) -> None:
+    _by_gradient(lambda x: ms.optim.MMA([x], lower=-1.0, upper=1.0), task, counted, seed)
+
+
+def adam(task, counted: Counted, seed: int) -> None:
+    import torch
+
+    _by_gradient(lambda x: torch.optim.Adam([x], lr=0.1), task, counted, seed)
+
+
+def _by_gradient(make: Callable, task, counted: Counted, seed: int) -> None:
+    """A motion with its gradient counts as one simulation; the time says what it costs."""
+    import torch
+
+    x = torch.tensor(task.start(seed), requires_grad=True)
+
+    def objective():
+        counted.begin()
+        value = task.differentiable(x.clamp(-1.0, 1.0))
+        counted.counted(float(value.detach()))
+        return value
+
+    def with_gradient():
+        optimizer.zero_grad()
+        value = objective()
+        value.backward()
+        return value
+
+    optimizer = make(x)
+    closure = with_gradient if isinstance(optimizer, torch.optim.Adam) else objective
+    while True:
+        before = len(counted.best)
+        optimizer.step(closure)
+        if len(counted.best) == before:  # it stands still
+            return
+
+
+def cma_es(task, counted: Counted, seed: int) -> None:
+    import cma
+
+    options = {"bounds": [-1, 1], "seed": seed + 1, "verbose": -9, "maxfevals": counted.budget}
+    if task.unknowns > 500:
+        options["CMA_diagonal"] = True  # a full covariance of thousands takes longer than the simulations
+    search = cma.CMAEvolutionStrategy(task.start(seed), _SPREAD, options)
+    while not search.stop():
+        asked = search.ask()
+        search.tell(asked, [counted(each) for each in asked])
+
+
+def nelder_mead(task, counted: Counted, seed: int) -> None:
+    from scipy.optimize import minimize
+
+    start = task.start(seed)
+    away = np.where(start > 0, -_SPREAD, _SPREAD)
+    options = {"maxfev": counted.budget, "adaptive": True}
+    options["initial_simplex"] = np.concatenate([start[None], start + np.diag(away)])
+    minimize(counted, start, method="Nelder-Mead", bounds=[(-1, 1)] * task.unknowns, options=options)
+
+
+def bobyqa(task, counted: Counted, seed: int) -> None:
+    import nlopt
+
+    search = nlopt.opt(nlopt.LN_BOBYQA, task.unknowns)
+    search.set_lower_bounds(-1.0)
+    search.set_upper_bounds(1.0)
+    search.set_initial_step(_SPREAD)
+    search.set_maxeval(counted.budget)
+    search.set_min_objective(lambda x, _: counted(x))
+    search.optimize(np.clip(task.start(seed), -1 + _SPREAD, 1 - _SPREAD))
+
+
+def evolution(task, counted: Counted, seed: int) -> None:
+    """As LEAP's usual pipeline: parents by tournaments of two, Gaussian mutation of their copies, the best is kept."""
+    rng, size = np.random.default_rng(seed), 10
+    people = np.clip(task.start(seed) + _SPREAD * rng.standard_normal((size, task.unknowns)), -1, 1)
+    people[0] = task.start(seed)
+    values = np.array([counted(each) for each in people])
+    while True:
+        pairs = rng.integers(size, size=(size, 2))
+        parents = people[np.where(values[pairs[:, 0]] < values[pairs[:, 1]], pairs[:, 0], pairs[:, 1])]
+        children = np.clip(parents + 0.5 * _SPREAD * rng.standard_normal(parents.shape), -1, 1)
+        found = np.array([counted(each) for each in children])
+        best = int(np.argmin(values))
+        worst = int(np.argmax(found))
+        children[worst], found[worst] = people[best], values[best]
+        people, values = children, found
+
+
+SEARCHES: dict[str, Callable] = {
+    "L-BFGS": lbfgs,
+    "MMA": mma,
+    "Adam": adam,
+    "CMA-ES": cma_es,
+    "evolution (LEAP's)": evolution,
+    "BOBYQA": bobyqa,
+    "Nelder-Mead": nelder_mead,
+}
+
+
+def run(search: Callable, task, budget: int, seed: int) -> dict:
+    """{"best": (k,), "seconds": (k,)} of one run."""
+    counted = Counted(task.objective, budget, task.goal)
+    with suppress(BudgetSpent):
+        search(task, counted, seed)
+    return {"best": counted.best, "seconds": counted.seconds}

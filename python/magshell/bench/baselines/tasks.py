@@ -1,0 +1,102 @@
+"""What is searched for: moduli of the bridges, and the field that lifts a strip."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import magshell as ms
+
+_NOISE = 0.05  # of unknowns in -1 to 1: how far the starts of the seeds are apart
+
+
+class Task:
+    """unknowns: how many, each in -1 to 1. objective(unknowns) -> float; differentiable: the same of a tensor, with a
+    gradient. goal: where a search may end."""
+
+    name: str
+    unknowns: int
+    goal: float | None = None
+    learned = False  # whether it is an environment too
+
+    def start(self, seed: int) -> np.ndarray:
+        """(unknowns,): the same for every method."""
+        around = _NOISE * np.random.default_rng([17, seed]).standard_normal(self.unknowns)
+        return np.clip(self.middle + around, -1, 1)
+
+    @property
+    def middle(self) -> np.ndarray:
+        return np.zeros(self.unknowns)
+
+
+class BridgeTask(Task):
+    """[Qiao21] Figure 3: the miss of the mean node, over the sag that is asked for. Needs examples/."""
+
+    goal = 0.01
+
+    def __init__(self, name: str):
+        from _bridges import shape, task
+
+        self.name = name
+        self._task = task.Task(getattr(shape, name)())
+        self._low, self._high = self._task.bounds
+        self.unknowns = len(self._low)
+
+    @property
+    def middle(self) -> np.ndarray:
+        return 2 * (self._task.start - self._low) / (self._high - self._low) - 1
+
+    def objective(self, unknowns) -> float:
+        return float(self._task.loss(self._moduli(unknowns))) ** 0.5
+
+    def differentiable(self, unknowns):
+        return self._task.loss(self._moduli(unknowns)) ** 0.5
+
+    def _moduli(self, unknowns):
+        low, high = self._low, self._high
+        if not isinstance(unknowns, np.ndarray):
+            low, high = map(unknowns.new_tensor, (low, high))
+        return low + 0.5 * (unknowns + 1) * (high - low)
+
+
+class StripTask(Task):
+    """The registered magnetic strip without its disturbance: 50 actions of three numbers. The mean miss of the tip, over
+    the strip's length. An episode counts as one simulation."""
+
+    name, learned = "strip", True
+
+    def __init__(self):
+        self._environment = self.environment()
+        self.actions = self._environment.actions_per_episode
+        self.unknowns = 3 * self.actions
+
+    @staticmethod
+    def environment():
+        from magshell.envs.robots import magnetic_strip
+
+        return magnetic_strip(disturbed=False)
+
+    def objective(self, unknowns) -> float:
+        self._environment.reset(seed=0)
+        rewards = [self._environment.step(action)[1] for action in unknowns.reshape(self.actions, 3)]
+        return -sum(rewards) / self.actions
+
+    def differentiable(self, unknowns):
+        from magshell.envs.robots import STRIP_LENGTH, STRIP_TARGET
+
+        one = self._environment
+        [actuator] = one.actuators
+        low, high = (unknowns.new_tensor(each.copy()) for each in (actuator.lower, actuator.upper))
+        field = low + 0.5 * (unknowns.reshape(self.actions, 3) + 1) * (high - low)
+        each = one.steps_per_action
+        motion = ms.simulate(
+            one.scene,
+            steps=each * self.actions,
+            time_step=one.time_step,
+            applied_flux_density=field.repeat_interleave(each, dim=0),
+            integrator=ms.ImplicitEuler(),
+            stiffness_damping=2e-3,
+            progress=False,
+        )
+        tip = np.array(one.scene.mesh.vertices_at(x=STRIP_LENGTH))
+        heights = motion.positions[each::each, tip, 2].mean(1)
+        return (heights - STRIP_TARGET).abs().mean() / STRIP_LENGTH

@@ -1,0 +1,244 @@
+"""Muscles: fibres in a solid that pull as they are activated."""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+
+from .._checks.owner import Owner
+from .._checks.quantity import quantity, real_numbers, shape_of
+from .._checks.scalars import positive
+from .._checks.tensors import detached
+from .fibre_tables import checked_force_velocity, checked_table, core_curve
+from .fibres import checked_directions, checked_weights, fibres_of
+from .solid import Solid
+
+_TABLES = ("force_length", "passive", "force_velocity")
+
+
+class Muscle(Owner):
+    """Fibres in a solid's tetrahedra that pull along themselves: one of the actuators of a scene.
+
+    body: the Solid that they are in. With F the deformation and m the unit vector along a fibre at rest, its stretch is
+        l = |F m|; the tension is a nominal one, of the rest area.
+    fibres: ms.fibres_along(...), Fibres; or their direction at rest, (3,), one a tetrahedron, (n_t, 3), or a function of
+        places (n_t, 3) m that returns such. Their length does not matter, but must not be zero: the gradient by directions
+        is that of the normalized vector. elements: the tetrahedra that have fibres, by default all (with Fibres, theirs).
+    activation: a, 1: what a solve changes, in ms.simulate also in time, as (steps + 1, ...), (steps, ...) or a function.
+        One number, or one of each segment.
+    segments: how many equal pieces of the fibres have an activation of their own, where the fibres know their coordinates;
+        or (k,), the segment of each of their tetrahedra, which may be one a tetrahedron. `places` is where they are.
+    weights: (k,), of the tetrahedra with fibres, factors of the tension; by default those of Fibres.
+
+    What the fibres do is told by one of two:
+
+    stiffness: Pa. A *target stretch*: tension stiffness (l - 1 + a), so that fibres alone would shorten by a, or lengthen
+        where it is negative; a from -1 to 1. At a = 0 it is passive stiffness.
+    peak_stress: Pa. An *active stress*: tension peak_stress a l, without a rest length; a from 0 to 1.
+        force_length makes it a muscle of *Hill's* type: tension peak_stress (a f_L(l) f_V(l'/shortening_rate) + f_P(l)),
+        with tables of two columns, the first in equal steps: force_length of l, passive of l (by default none), and
+        force_velocity, by default 1, of the rate of l over shortening_rate [1/s]: negative as it shortens, usually -1
+        to 1, with a row (0, 1). Between rows run twice differentiable curves; beyond a table its last value holds. The part
+        that depends on the rate acts in ms.simulate only; it makes the matrix of a step unsymmetric.
+
+    Fibres that are crushed, l near 0, pull in no direction at l = 0; where they push, as with a negative activation, they
+    can buckle like rods.
+
+    A block with fibres along x that pull with half of its modulus shortens:
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.box((1, 1, 1), cells=(1, 1, 1))
+    >>> block = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.45))
+    >>> muscle = ms.Muscle(block, (1, 0, 0), peak_stress=5e4)
+    >>> sides = [ms.SymmetryPlane(normal) for normal in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+    >>> scene = ms.Scene(block, supports=sides, actuators=[muscle])
+    >>> rest = ms.equilibrium(scene, values={muscle: {"activation": 1.0}})
+    >>> round(float(rest[muscle].stretches.mean()), 4)
+    0.7331
+    """
+
+    _replaceable = ("activation", "fibres", "weights", "stiffness", "peak_stress", "shortening_rate")
+    _in_time = ("activation",)
+
+    def __init__(
+        self,
+        body: Solid,
+        fibres,
+        *,
+        activation=0.0,
+        stiffness=None,
+        peak_stress=None,
+        force_length=None,
+        passive=None,
+        force_velocity=None,
+        shortening_rate=None,
+        segments=None,
+        weights=None,
+        elements=None,
+    ):
+        if not isinstance(body, Solid):
+            raise ValueError(f"body of a Muscle must be a Solid, got {body!r:.60}")
+        self.body = body
+        found = fibres_of(fibres, body.mesh, elements)
+        count = body.mesh.n_tetrahedra
+        self.elements = np.flatnonzero(found.elements) if found.elements.dtype == bool else found.elements
+        if len(self.elements) == 0 or self.elements.max() >= count:
+            raise ValueError(f"elements must be in [0, {count}), got {self.elements.max()}")
+        self.coordinates, self.length = found.coordinates, found.length
+        self.fibres = found.directions
+        self.weights = found.weights if weights is None else checked_weights(weights, len(self.elements))
+        if (stiffness is None) == (peak_stress is None):
+            raise ValueError("a Muscle needs stiffness [Pa] or peak_stress [Pa], one of them")
+        self.stiffness = None if stiffness is None else positive("stiffness", "Pa", stiffness)
+        self.peak_stress = None if peak_stress is None else positive("peak_stress", "Pa", peak_stress)
+        self.force_length = None if force_length is None else checked_table("force_length", force_length)
+        self.passive = None if passive is None else checked_table("passive", passive)
+        self.force_velocity = None if force_velocity is None else checked_force_velocity(force_velocity)
+        self.shortening_rate = (
+            None if shortening_rate is None else positive("shortening_rate", "1/s", shortening_rate)
+        )
+        self._check_together()
+        self.segments, self.n_segments = self._segments(segments)
+        own = () if self.segments is None else (self.n_segments,)
+        self.activation = np.broadcast_to(self._activation(activation, own), own)
+        self._replaceable = tuple(name for name in type(self)._replaceable if getattr(self, name) is not None)
+
+    def _check_together(self) -> None:
+        hill = [name for name in _TABLES if getattr(self, name) is not None]
+        if hill and self.stiffness is not None:
+            raise ValueError(f"{hill[0]} is of a Muscle with a peak_stress [Pa], not with a stiffness")
+        if hill and self.force_length is None:
+            raise ValueError(f"a Muscle with {hill[0]} needs a force_length")
+        if (self.force_velocity is None) != (self.shortening_rate is None):
+            raise ValueError("force_velocity and shortening_rate [1/s] of a Muscle belong together")
+
+    def _segments(self, given) -> tuple[np.ndarray | None, int]:
+        if given is None:
+            return None, 1
+        shape = shape_of("segments", given)
+        whole = np.issubdtype(np.asarray(given).dtype, np.integer) and not isinstance(given, bool)
+        if shape not in ((), (len(self.elements),)) or not whole or np.min(given) < (0 if shape else 1):
+            raise ValueError(
+                f"segments must be how many there are, or the segment of each of the {len(self.elements)} tetrahedra with "
+                f"fibres, got {given!r:.60}"
+            )
+        if shape:
+            return np.array(given, dtype=np.int64), int(np.max(given)) + 1
+        if self.coordinates is None:
+            raise ValueError(
+                "segments can only be counted where fibres know their coordinates, as ms.fibres_along makes them"
+            )
+        start = min(float(self.coordinates.min()), 0.0) if self.length else 0.0
+        share = (self.coordinates - start) / self.length
+        return np.clip((share * int(given)).astype(np.int64), 0, int(given) - 1), int(given)
+
+    @property
+    def places(self) -> np.ndarray:
+        """(segments,) m: where the middle of each is along the fibres; of segments by tetrahedra, the mean of theirs."""
+        if self.coordinates is None:
+            raise ValueError("fibres know no coordinates: ms.fibres_along makes some that do")
+        if self.segments is None:
+            return np.array([0.5 * self.length])
+        counts = np.maximum(np.bincount(self.segments, minlength=self.n_segments), 1)
+        means = np.bincount(self.segments, self.coordinates, self.n_segments) / counts
+        even = (np.arange(self.n_segments) + 0.5) * self.length / self.n_segments
+        return np.where(np.bincount(self.segments, minlength=self.n_segments) > 0, means, even)
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Of the activation."""
+        return (0.0 if self.stiffness is None else -1.0), 1.0
+
+    def check_in_time(self, name: str, rows) -> None:
+        """Raises ValueError where activations over time leave their range."""
+        if name == "activation":
+            self._in_range(np.asarray(detached(rows)))
+
+    def _activation(self, given, row: tuple[int, ...]) -> np.ndarray:
+        array = real_numbers("activation", given)
+        if array.shape not in ((), row):
+            wanted = f"a number or have shape (segments,) = {row}" if row else "a number"
+            raise ValueError(f"activation must be {wanted}, got shape {array.shape}")
+        array = quantity("activation", "1", array, array.shape)
+        self._in_range(array)
+        return array
+
+    def _in_range(self, array: np.ndarray) -> None:
+        low, high = self.range
+        if (wrong := (array < low) | (array > high)).any():
+            raise ValueError(
+                f"activation of a Muscle with a {'peak_stress' if self.stiffness is None else 'stiffness'} must be from "
+                f"{low:g} to {high:g}, got {array[wrong].flat[0]:g}"
+            )
+
+    def replaced(self, **values) -> Muscle:
+        """The same muscle with other numbers."""
+        other, count = copy(self), len(self.elements)
+        for name, value in values.items():
+            if name not in self._replaceable:
+                raise ValueError(f"the Muscle was made without {name}")
+            if name == "activation":
+                checked = np.broadcast_to(
+                    self._activation(value, self.activation.shape), self.activation.shape
+                )
+            elif name == "fibres":
+                shape = shape_of("fibres", value)
+                row = shape if shape == (3,) else (count, 3)
+                checked = np.broadcast_to(checked_directions("fibres", value, row), (count, 3))
+            elif name == "weights":
+                checked = checked_weights(value, count)
+            else:
+                checked = positive(name, "1/s" if name == "shortening_rate" else "Pa", value)
+            setattr(other, name, checked)
+        return other
+
+    @property
+    def strength(self) -> float:
+        """The stiffness or the peak stress, Pa."""
+        return self.peak_stress if self.stiffness is None else self.stiffness
+
+    @property
+    def _form(self) -> str:
+        if self.stiffness is not None:
+            return "target stretch"
+        return "active stress" if self.force_length is None else "hill"
+
+    def _core_input(self, owner: str, solid: int) -> dict:
+        segments = np.zeros(len(self.elements), dtype=np.int64) if self.segments is None else self.segments
+        return {
+            "owner": owner,
+            "solid": solid,
+            "elements": self.elements.tolist(),
+            "segments": segments.tolist(),
+            "n_segments": self.n_segments,
+            "form": self._form,
+            **{name: core_curve(getattr(self, name)) for name in _TABLES},
+        }
+
+    def add_numbers(self, label: str, values, numbers: dict) -> None:
+        numbers[label, "fibres"] = self.fibres / np.linalg.norm(self.fibres, axis=1, keepdims=True)
+        numbers[label, "strength"] = self.strength * self.weights
+        numbers[label, "activation"] = np.atleast_1d(self.activation)
+        if self.shortening_rate is not None:
+            numbers[label, "shortening_rate"] = self.shortening_rate
+
+    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+        by_strength, by_fibres = gradient.value(label, "strength"), gradient.value(label, "fibres")
+        lengths = np.linalg.norm(self.fibres, axis=1, keepdims=True)
+        along = self.fibres / lengths
+        found = {
+            "activation": gradient.value(label, "activation").reshape(self.activation.shape),
+            "fibres": (by_fibres - np.sum(by_fibres * along, axis=1, keepdims=True) * along) / lengths,
+            "weights": self.strength * by_strength,
+            "peak_stress" if self.stiffness is None else "stiffness": by_strength @ self.weights,
+        }
+        if self.shortening_rate is not None:
+            found["shortening_rate"] = gradient.value(label, "shortening_rate")[0]
+        return found
+
+    def __repr__(self) -> str:
+        what = "peak_stress" if self.stiffness is None else "stiffness"
+        pieces = "" if self.segments is None else f", {self.n_segments} segments"
+        tables = "".join(f", {name}" for name in _TABLES if getattr(self, name) is not None)
+        return f"Muscle(in {len(self.elements)} tetrahedra{pieces}, {what} {self.strength:g} Pa{tables})"

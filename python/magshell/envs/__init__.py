@@ -1,0 +1,39 @@
+"""Scenes as environments of gymnasium, for reinforcement learning and any other method that only tries actions.
+
+    hinge = ms.Revolute(arm, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
+    environment = ms.envs.Environment(
+        scene,
+        actuators=[ms.envs.Actuator(hinge, "torque", lower=-1.0, upper=1.0)],
+        observation=lambda now: [now[hinge].angle, now[hinge].rate],
+        reward=lambda now: -abs(now[hinge].angle - 0.5),
+        time_step=1e-2,
+        steps_per_action=2,
+        actions_per_episode=50,
+    )
+
+Robots that come along are registered once their module is loaded, which gymnasium does for names before a colon:
+`gymnasium.make("magshell.envs.robots:magshell/MagneticStrip-v0")`, and `gymnasium.make_vec` for many in processes.
+
+gymnasium (the extra `gym`) is imported when `Environment` or `robots` is first asked for.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from .actuator import Actuator
+from .snapshot import Snapshot
+
+__all__ = ["Actuator", "Environment", "Snapshot", "robots"]
+
+
+def __getattr__(name: str):
+    if name == "Environment":
+        return import_module(".environment", __name__).Environment
+    if name == "robots":
+        return import_module(".robots", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,100 @@
+"""What an action of an environment sets: a value of one of the scene's objects, between bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.quantity import quantity
+from .._machine.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
+from ..scene.courses import changes_at_once, names_in_time, row_in_time
+
+
+class Actuator:
+    """A value that actions set. All its numbers are entries of the action, which run from -1 at `lower` to 1 at `upper`.
+
+    owner: the scene, for applied_flux_density [T] and the factors of ms.simulate; or one of its objects, for what may
+        change during a motion there: the torque of a joint, the displacement of a clamp, the moments of Dipoles, ...
+    lower, upper: bounds in the value's own unit, numbers or of its shape.
+
+    Fields and what acts in joints stay at the action's value while it lasts; what moves (supports, obstacles, sources)
+    goes there in a straight line from where the action before had it, at first from where the scene has it.
+
+    >>> import magshell as ms
+    >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    >>> hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
+    >>> ms.envs.Actuator(hinge, "torque", lower=-2.0, upper=2.0)
+    Actuator(torque of Revolute, 1 number from -2 to 2)
+    """
+
+    def __init__(self, owner, name: str, *, lower, upper):
+        self.owner, self.name = owner, name
+        self._of_scene = hasattr(owner, "bodies") and hasattr(owner, "supports")
+        if self._of_scene:
+            known = CONTROLS
+            self.shape: tuple[int, ...] = (3,) if name == FLUX_DENSITY else ()
+        else:
+            known = names_in_time(owner)
+            self.shape = row_in_time(owner, name) or ()
+        if name not in known:
+            has = f"it has {nearest_first(name, known)}" if known else "it has none"
+            raise ValueError(
+                f"{type(owner).__name__} has no value {name!r} that may change during a motion: {has}"
+            )
+        self.lower, self.upper = (
+            np.broadcast_to(quantity(each, "", value, np.shape(value)), self.shape)
+            if np.shape(value) in ((), self.shape)
+            else self._refuse(each, value)
+            for each, value in (("lower", lower), ("upper", upper))
+        )
+        if not self._of_scene and self._of_owner is None:
+            raise ValueError(f"the {type(owner).__name__} was made without {name}: give it one, zero will do")
+        if not (self.lower < self.upper).all():
+            raise ValueError(f"lower of an Actuator must be below upper, got {lower} and {upper}")
+
+    def _refuse(self, which: str, value):
+        raise ValueError(
+            f"{which} of {self.name} must be a number or have shape {self.shape}, got {np.shape(value)}"
+        )
+
+    @property
+    def size(self) -> int:
+        """How many entries of the action it takes."""
+        return int(np.prod(self.shape))
+
+    @property
+    def at_start(self) -> np.ndarray:
+        """Its value in the scene, before any action: of a field, none; of factors, one."""
+        if self._of_scene:
+            return np.zeros(3) if self.name == FLUX_DENSITY else np.array(1.0)
+        return np.array(self._of_owner, dtype=np.float64).reshape(self.shape)
+
+    @property
+    def _of_owner(self):
+        """As its owner has it, or None."""
+        return getattr(getattr(self.owner, "_move", self.owner), self.name, None)
+
+    def check_in(self, scene) -> None:
+        """Raises ValueError unless its owner is the scene or among its objects."""
+        if not any(self.owner is each for each in (scene, *scene.objects)):
+            raise ValueError(f"{self!r} is about something that is neither the scene nor one of its objects")
+        if self._of_scene and self.name not in controls_of(self.owner, scene):
+            raise ValueError(f"the scene has no {self.name}")
+
+    def value(self, action: np.ndarray) -> np.ndarray:
+        """Of its own entries of an action, (size,) in -1 to 1."""
+        share = 0.5 * (action.reshape(self.shape) + 1.0)
+        return self.lower + share * (self.upper - self.lower)
+
+    def course(self, before: np.ndarray, now: np.ndarray, steps: int) -> np.ndarray:
+        """As ms.simulate takes it: (steps, ...) where it changes at once, else (steps + 1, ...) on a straight line."""
+        if self._of_scene or changes_at_once(self.owner):
+            return np.broadcast_to(now, (steps, *self.shape))
+        shares = np.linspace(0.0, 1.0, steps + 1).reshape(-1, *(1 for _ in self.shape))
+        return (1.0 - shares) * before + shares * now
+
+    def __repr__(self) -> str:
+        numbers = "1 number" if self.size == 1 else f"{self.size} numbers"
+        return (
+            f"Actuator({self.name} of {type(self.owner).__name__}, {numbers} "
+            f"from {self.lower.min():g} to {self.upper.max():g})"
+        )

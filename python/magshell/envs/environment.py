@@ -1,0 +1,238 @@
+"""A scene as an environment of gymnasium."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+
+import numpy as np
+
+from .._checks.arrays import count, named_values
+from .._checks.checked_list import checked_list
+from .._checks.quantity import quantity, real_numbers
+from .._checks.scalars import positive
+from .._machine.keywords import FLUX_DENSITY, nearest_first
+from ..dynamics.simulate import simulate as simulate_motion
+from ..errors import NotConverged
+from ..plotting.limits import checked_width
+from ..scene.scene import Scene
+from .actuator import Actuator
+from .frames import Camera
+from .library import require_gymnasium
+from .snapshot import Snapshot
+
+gymnasium = require_gymnasium("envs.Environment")
+
+_OWN = ("steps", "time_step", "start", "velocities", "values", "record_every", "progress")  # of ms.simulate
+_ROUNDING = 1e-6  # beyond the bounds, of actions that were single precision on their way
+
+
+class Environment(gymnasium.Env):
+    """A scene that actions drive, step by step, as gymnasium has it.
+
+    actuators: what an action sets, Actuator objects. The action holds their numbers one after another, each from -1 to 1.
+    observation: function of a Snapshot, the state after an action: finite numbers, always as many, in any one shape.
+    reward: function of a Snapshot: a number. `snapshot.before` is the state that the action began in.
+    time_step, steps_per_action: s, and how many of them an action lasts. actions_per_episode: after which it is truncated.
+    start: function of numpy's Generator, which the seed of `reset` sets: the disturbance that an episode begins with, as
+        {"start": ..., "velocities": ...} of ms.simulate, either or both. By default it begins at rest.
+        `reset(options=...)` takes the same names, which come first.
+    finished: function of a Snapshot: whether the episode ends there.
+    failure_reward: where a step of the motion fails, the episode ends with this reward, at the last good state, and
+        info["failure"] says why. None: ms.NotConverged comes through.
+    simulate: {name: value}, further arguments of ms.simulate: integrator, damping, solver, ...
+    render_mode: "rgb_array" or None; render_width: pixels; view: as in ms.plot.
+
+    The scene is built once; actions go on with the motion from its last state with the same bits as one long motion. The
+    same seed and actions give the same bits. To run many in processes, hand gymnasium.vector.AsyncVectorEnv functions
+    that make them; scenes can be pickled.
+
+    Raises ValueError on bad input: an observation that is not finite or changes its shape, an action of another shape.
+
+    >>> import magshell as ms
+    >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    >>> hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
+    >>> pendulum = ms.envs.Environment(
+    ...     ms.Scene(ms.Skeleton([bob], [hinge]), gravity=(0, 0, -9.81)),
+    ...     actuators=[ms.envs.Actuator(hinge, "torque", lower=-2.0, upper=2.0)],
+    ...     observation=lambda now: [now[hinge].angle, now[hinge].rate],
+    ...     reward=lambda now: -abs(float(now[hinge].angle) - 0.2),
+    ...     time_step=1e-2,
+    ...     steps_per_action=5,
+    ...     actions_per_episode=20,
+    ... )
+    >>> observation, _ = pendulum.reset(seed=0)
+    >>> _, reward, terminated, truncated, info = pendulum.step([1.0])
+    >>> observation.tolist(), reward < 0, terminated, truncated, round(info["time"], 6)
+    ([0.0, 0.0], True, False, False, 0.05)
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        actuators,
+        observation: Callable[[Snapshot], object],
+        reward: Callable[[Snapshot], float],
+        time_step: float,
+        actions_per_episode: int,
+        steps_per_action: int = 1,
+        start: Callable[[np.random.Generator], dict] | None = None,
+        finished: Callable[[Snapshot], bool] | None = None,
+        failure_reward: float | None = None,
+        simulate: dict | None = None,
+        render_mode: str | None = None,
+        render_width: int = 480,
+        view=None,
+    ):
+        if not isinstance(scene, Scene):
+            raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+        self.scene, self.actuators = scene, checked_list("actuators", actuators, (Actuator,))
+        if not self.actuators:
+            raise ValueError("actuators must hold at least one ms.envs.Actuator")
+        for k, each in enumerate(self.actuators):
+            each.check_in(scene)
+            if any(each.owner is other.owner and each.name == other.name for other in self.actuators[:k]):
+                raise ValueError(f"two actuators set one value: {each!r}")
+        functions = {"observation": observation, "reward": reward, "start": start, "finished": finished}
+        for name, function in functions.items():
+            if not callable(function) and (function is not None or name in ("observation", "reward")):
+                raise ValueError(f"{name} must be a function, got {function!r:.60}")
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f'render_mode must be None or "rgb_array", got {render_mode!r}')
+        self._observe, self._reward, self._start, self._finished = observation, reward, start, finished
+        self._failure_reward = (
+            None if failure_reward is None else float(quantity("failure_reward", "", failure_reward, ()))
+        )
+        self.time_step = positive("time_step", "s", time_step)
+        self.steps_per_action = count("steps_per_action", steps_per_action)
+        self.actions_per_episode = count("actions_per_episode", actions_per_episode)
+        self._options = dict(named_values("simulate", simulate))
+        known = [
+            name for name in inspect.signature(simulate_motion).parameters if name not in (*_OWN, "scene")
+        ]
+        for name in self._options:
+            if name not in known:
+                why = (
+                    "which the environment sets itself"
+                    if name in _OWN
+                    else f"but {nearest_first(name, known)}"
+                )
+                raise ValueError(f"simulate must not hold {name!r}, {why}")
+        self.render_mode, self._width, self._view = render_mode, checked_width(render_width), view
+        self.metadata = {
+            "render_modes": ["rgb_array"],
+            "render_fps": max(1, round(1.0 / (self.time_step * self.steps_per_action))),
+        }
+        size = sum(each.size for each in self.actuators)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float64)
+        self._shape: tuple[int, ...] | None = None
+        self._camera: Camera | None = None
+        self._now: Snapshot | None = None
+        self._begin({})
+        self._shape = self._observed(self._now).shape
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, self._shape, np.float64)
+        self._now = None
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
+        """Begins an episode: (observation, info)."""
+        super().reset(seed=seed)
+        begun = {} if self._start is None else self._start(self.np_random)
+        self._begin({**named_values("what `start` returns", begun), **named_values("options", options)})
+        return self._observed(self._now), {"time": 0.0}
+
+    def step(self, action) -> tuple[np.ndarray, float, bool, bool, dict]:
+        """One action: (observation, reward, terminated, truncated, info)."""
+        if self._now is None:
+            raise RuntimeError("reset must be called before the first step of an episode")
+        values = self._values(action)
+        before = Snapshot(self._now.motion, self._now.index, self._now.action)
+        try:
+            motion = self._moved(self._from, self.steps_per_action, self._setting, values)
+        except NotConverged as error:
+            if self._failure_reward is None:
+                raise
+            self._now, observation = None, self._observed(before)
+            info = {"time": before.time, "failure": str(error)}
+            return observation, self._failure_reward, True, False, info
+        self._from, self._setting = {"start": motion.end}, values
+        self._now = now = Snapshot(
+            motion, len(motion) - 1, np.concatenate([v.ravel() for v in values]), before
+        )
+        self._taken += 1
+        reward = self._rewarded(now)
+        terminated = bool(self._finished(now)) if self._finished is not None else False
+        info = {"time": now.time, "iterations": motion.iterations}
+        return self._observed(now), reward, terminated, self._taken >= self.actions_per_episode, info
+
+    def render(self) -> np.ndarray | None:
+        """(height, width, 3) uint8, of the state as it is; None without a render_mode."""
+        if self.render_mode is None:
+            return None
+        if self._now is None:
+            raise RuntimeError("reset must be called before there is anything to render")
+        if self._camera is None:
+            fields = [each.upper for each in self.actuators if each.name == FLUX_DENSITY]
+            self._camera = Camera(self._now, self._width, self._view, fields[0] if fields else None)
+        return self._camera.frame(self._now)
+
+    def close(self) -> None:
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+
+    def _begin(self, where: dict) -> None:
+        """The state that an episode begins in: the first of a motion of one step, which is not gone on with."""
+        for name in where:
+            if name not in ("start", "velocities"):
+                raise ValueError(f'an episode begins with "start" and "velocities", got {name!r}')
+        self._from, self._taken = where, 0
+        self._setting = [each.at_start for each in self.actuators]
+        motion = self._moved(where, 1, self._setting, self._setting)
+        self._now = Snapshot(motion, 0, np.concatenate([value.ravel() for value in self._setting]))
+
+    def _moved(self, where: dict, steps: int, before: list, now: list):
+        values: dict = {}
+        for actuator, old, new in zip(self.actuators, before, now, strict=True):
+            values.setdefault(actuator.owner, {})[actuator.name] = actuator.course(old, new, steps)
+        if self.scene.has_uniform_field and FLUX_DENSITY not in self._options:
+            values.setdefault(self.scene, {}).setdefault(FLUX_DENSITY, np.zeros(3))
+        return simulate_motion(
+            self.scene,
+            steps=steps,
+            time_step=self.time_step,
+            values=values,
+            record_every=steps,
+            progress=False,
+            **where,
+            **self._options,
+        )
+
+    def _values(self, action) -> list[np.ndarray]:
+        """Of each actuator, its value. Raises ValueError on an action of another shape or beyond its bounds."""
+        array = real_numbers("action", action).astype(np.float64)
+        if array.shape != self.action_space.shape:
+            raise ValueError(f"action must have shape {self.action_space.shape}, got {array.shape}")
+        if not (np.abs(array) <= 1.0 + _ROUNDING).all():
+            worst = array[np.argmax(~(np.abs(array) <= 1.0 + _ROUNDING))]
+            raise ValueError(f"action must lie between -1 and 1, got {worst:g}")
+        ends = np.cumsum([each.size for each in self.actuators])[:-1]
+        parts = np.split(np.clip(array, -1.0, 1.0), ends)
+        return [each.value(part) for each, part in zip(self.actuators, parts, strict=True)]
+
+    def _observed(self, now: Snapshot) -> np.ndarray:
+        array = np.array(real_numbers("observation", self._observe(now)), dtype=np.float64)
+        if not np.isfinite(array).all():
+            raise ValueError(
+                f"observation must be finite, but {np.count_nonzero(~np.isfinite(array))} of {array.size} numbers are not, "
+                f"at {now.time:.6g} s"
+            )
+        if self._shape is not None and array.shape != self._shape:
+            raise ValueError(f"observation must have shape {self._shape} in every state, got {array.shape}")
+        return array
+
+    def _rewarded(self, now: Snapshot) -> float:
+        array = real_numbers("reward", self._reward(now))
+        if array.size != 1 or not np.isfinite(array).all():
+            raise ValueError(f"reward must be one finite number, got {array!r:.80}")
+        return float(array.reshape(()))

@@ -1,0 +1,57 @@
+"""Frames of an episode: one view and one window, whatever moves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..plotting import backend as backends
+from ..plotting.frames import Reel, Scenery
+from ..plotting.limits import checked_width
+from ..plotting.panels import Options, size_of
+from ..plotting.surfaces import on_surfaces
+from ..plotting.view import view_of
+from ..states.state import State, states_of
+from ..states.units import length_unit
+from .snapshot import Snapshot
+
+_AROUND = 0.5  # of the rest shape's size: how much room is around it in the window
+
+
+class Camera:
+    """Paints snapshots. Made with the first; a context of the plotting library is open until `close`."""
+
+    def __init__(self, first: Snapshot, width: int, view, strongest=None):
+        """strongest: (3,) T, the uniform field that its arrow is scaled by."""
+        state = _state(first)
+        size = size_of([state])
+        room = [
+            replace(
+                state,
+                positions=state.positions + sign * _AROUND * size * axis,
+                flux_density=strongest,
+                bones=(),
+            )
+            for axis in np.eye(3)
+            for sign in (-1, 1)
+        ]
+        options = Options(60, True, False, False)
+        self._scenery = Scenery([state, *room], None, view_of([state], view), length_unit(size), options)
+        drawing = self._scenery.drawing(state, None, state.title)
+        self._reel = Reel(drawing, checked_width(width), backends.choose(None))
+        self._reel.__enter__()
+
+    def frame(self, snapshot: Snapshot) -> np.ndarray:
+        """(height, width, 3) uint8."""
+        state = _state(snapshot)
+        return self._reel.image(self._scenery.drawing(state, None, state.title))
+
+    def close(self) -> None:
+        self._reel.__exit__(None, None, None)
+
+
+def _state(snapshot: Snapshot) -> State:
+    [state] = states_of(snapshot)
+    [surface] = on_surfaces([replace(state, time=snapshot.time, title=f"{snapshot.time:.3f} s")])
+    return surface

@@ -1,0 +1,95 @@
+"""Robots that come along, registered with gymnasium under magshell/NAME-v0."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import meshes
+from ..bodies.joints import Revolute
+from ..bodies.link import Link
+from ..bodies.materials import NeoHookean
+from ..bodies.shell import Shell
+from ..bodies.skeleton import Skeleton
+from ..bodies.solid import Solid
+from ..fields.field import UniformField
+from ..methods.integrators import ImplicitEuler
+from ..scene.scene import Scene
+from ..surroundings.supports import Clamp, Pin
+from .actuator import Actuator
+from .environment import Environment
+from .library import require_gymnasium
+
+__all__ = ["magnetic_strip", "soft_arm"]
+
+
+STRIP_LENGTH, STRIP_TARGET = 0.05, 0.01  # m
+
+
+def magnetic_strip(
+    target: float = STRIP_TARGET, render_mode: str | None = None, disturbed: bool = True
+) -> Environment:
+    """A magnetized strip, 5 cm long and clamped at one end; a field of up to 4 mT upwards and 1 mT along and across is
+    to lift its tip to a height, m. An action lasts 20 ms, an episode 1 s. Observed: heights and speeds of the tip and of
+    the middle, over its length. disturbed: whether it starts with a small velocity.
+    """
+    mesh = meshes.rectangle(STRIP_LENGTH, 0.01, cells=(8, 2))
+    sheet = Shell(
+        mesh, thickness=1e-3, young_modulus=3e6, mass_density=1e3, remanent_magnetization=(4e4, 0.0, 0.0)
+    )
+    scene = Scene(sheet, supports=[Clamp(mesh.edges_at(x=0.0))], field=UniformField(), gravity=(0, 0, -9.81))
+    tip, middle = mesh.vertices_at(x=STRIP_LENGTH), mesh.vertices_at(x=STRIP_LENGTH / 2)
+
+    def seen(now):
+        heights = (now.positions[tip, 2].mean(), now.positions[middle, 2].mean())
+        speeds = (now.velocities[tip, 2].mean(), now.velocities[middle, 2].mean())
+        return np.array([*heights, *speeds]) / STRIP_LENGTH
+
+    return Environment(
+        scene,
+        actuators=[
+            Actuator(scene, "applied_flux_density", lower=(-1e-3, -1e-3, -4e-3), upper=(1e-3, 1e-3, 4e-3))
+        ],
+        observation=seen,
+        reward=lambda now: -abs(now.positions[tip, 2].mean() - target) / STRIP_LENGTH,
+        start=(lambda generator: {"velocities": generator.normal(scale=0.01, size=3)}) if disturbed else None,
+        time_step=1e-2,
+        steps_per_action=2,
+        actions_per_episode=50,
+        simulate={"integrator": ImplicitEuler(), "stiffness_damping": 2e-3},
+        render_mode=render_mode,
+    )
+
+
+def soft_arm(target: float = 0.6, render_mode: str | None = None) -> Environment:
+    """A soft bar, 40 cm long and held at one end, with two bones and the hinge between them inside; a torque up to 10 N m is
+    to bend it to an angle, rad. An action lasts 20 ms, an episode 1 s. Observed: angle and rate of the hinge.
+    """
+    mesh = meshes.box((0.4, 0.06, 0.06), cells=(8, 4, 4))
+    flesh = Solid(
+        mesh, material=NeoHookean(young_modulus=5e5, poisson_ratio=0.4), mass_density=500.0, element="linear"
+    )
+    x, y, z = flesh.mesh.rest_positions.T
+    inside = (np.abs(y - 0.03) < 0.02) & (np.abs(z - 0.03) < 0.02)
+    upper = Link(np.flatnonzero(inside & (x > 0.02) & (x < 0.17)), body=flesh)
+    lower = Link(np.flatnonzero(inside & (x > 0.22)), body=flesh)
+    hinge = Revolute(lower, upper, origin=(0.2, 0.03, 0.03), axis=(0.0, 1.0, 0.0), torque=0.0)
+    held = Pin(np.flatnonzero(x < 1e-9))
+    scene = Scene([flesh, Skeleton([upper, lower], [hinge])], supports=[held], gravity=(0, 0, -9.81))
+    return Environment(
+        scene,
+        actuators=[Actuator(hinge, "torque", lower=-10.0, upper=10.0)],
+        observation=lambda now: [float(now[hinge].angle), float(now[hinge].rate)],
+        reward=lambda now: -abs(float(now[hinge].angle) - target),
+        start=lambda generator: {"velocities": generator.normal(scale=0.01, size=3)},
+        time_step=1e-2,
+        steps_per_action=2,
+        actions_per_episode=50,
+        simulate={"integrator": ImplicitEuler(), "stiffness_damping": 2e-3},
+        render_mode=render_mode,
+    )
+
+
+REGISTERED = {"magshell/MagneticStrip-v0": magnetic_strip, "magshell/SoftArm-v0": soft_arm}
+
+for _id, _make in REGISTERED.items():
+    require_gymnasium("envs.robots").register(id=_id, entry_point=f"{__name__}:{_make.__name__}")

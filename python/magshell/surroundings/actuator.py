@@ -1,0 +1,64 @@
+"""What a scene's `actuators` have in common."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from .._checks.owner import Owner
+from .._checks.quantity import quantity, real_numbers
+
+
+class Actuator(Owner):
+    """Works in bodies by numbers that a controller sets: pressures, volumes, tensions. All of them may change during a
+    motion, at once or gradually, and the load factor scales what it does.
+
+    bodies: those that it works in. is_spring: whether it has a stiffness of its own, which linear theory leaves out.
+    """
+
+    for_all = False
+    is_spring = True
+    bodies: tuple = ()
+    _units: ClassVar[dict[str, str]] = {}
+
+    def _unit(self, name: str) -> str:
+        return self._units[name]
+
+    @property
+    def body(self):
+        """The one body, or None where there are several."""
+        return self.bodies[0] if len(self.bodies) == 1 else None
+
+    def _keep_shapes(self, changed: Actuator) -> Actuator:
+        for name in self._replaceable:
+            before, after = getattr(self, name), getattr(changed, name)
+            if before.shape != after.shape:
+                raise ValueError(f"{name} must keep its shape {before.shape}, got {after.shape}")
+        return changed
+
+
+def number(name: str, unit: str, value, least: float | None = None, above: bool = False) -> np.ndarray:
+    """A finite number as an array (), at least `least`, or above it. Raises ValueError."""
+    array = quantity(name, unit, value, ())
+    _check_range(name, unit, array, least, above)
+    return array
+
+
+def numbers(name: str, unit: str, value, count: int, what: str, least: float, above: bool) -> np.ndarray:
+    """Finite numbers, one a cell (count,), given so or as one of all. Raises ValueError."""
+    array = real_numbers(f"{name} [{unit}]", value)
+    if array.shape not in ((), (count,)):
+        raise ValueError(f"{name} [{unit}] must be a number or one a {what}, ({count},), got {array.shape}")
+    array = quantity(name, unit, np.broadcast_to(array, (count,)), (count,))
+    _check_range(name, unit, array, least, above)
+    return array
+
+
+def _check_range(name: str, unit: str, array: np.ndarray, least: float | None, above: bool) -> None:
+    if least is None:
+        return
+    smallest = float(array.min(initial=np.inf))
+    if smallest < least or (above and smallest == least):
+        wanted = f"above {least:g}" if above else f"at least {least:g}"
+        raise ValueError(f"{name} [{unit}] must be {wanted}, got {smallest:g}")

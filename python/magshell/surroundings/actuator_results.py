@@ -1,0 +1,117 @@
+"""What a result says of one actuator of its scene: of tensors in their graph, tensors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._checks.tensors import stacked
+from .closed_surface import of_tetrahedra
+
+
+class ActuatorResult:
+    """One actuator of a result."""
+
+    def __init__(self, result, actuator):
+        if not any(actuator is each for each in result.scene.actuators):
+            raise ValueError(
+                f"an actuator of the scene is one of scene.actuators, got {actuator!r} that is not in it"
+            )
+        self._result, self.actuator = result, actuator
+
+    def _by_law(self, law, states):
+        """law(the actuator as it was, what it is about), of all states, times the load factors that they were under."""
+        factors = self._result._load_factors
+        if np.ndim(factors) == 0:
+            return float(factors) * law(self._at(0), states)
+        return stacked([float(factor) * law(self._at(k), states[k]) for k, factor in enumerate(factors)])
+
+    def _at(self, k: int):
+        """The actuator as it was in a state."""
+        varied = {
+            name: rows[k] for (owner, name), rows in self._result._varied.items() if owner is self.actuator
+        }
+        now = self._result._values_at(k).current(self.actuator)
+        return now.replaced(**varied) if varied else now
+
+    def __repr__(self) -> str:
+        return f"{type(self._result).__name__} of {self.actuator!r}"
+
+
+class CavityResult(ActuatorResult):
+    """A Cavity of a result."""
+
+    @property
+    def volume(self):
+        """(...) m3."""
+        return self._surface.volume(self._result.positions)
+
+    @property
+    def pressure(self):
+        """(...) Pa, over that outside, as it acts: times the load factor."""
+        rest = float(self._surface.volume(self._result.scene.mesh.rest_positions))
+        return self._by_law(lambda cavity, volume: cavity.pressure_at(volume, rest), self.volume)
+
+    @property
+    def _surface(self):
+        return self.actuator.surface(self._result.scene._bodies)
+
+
+class CellsResult(ActuatorResult):
+    """Cells of a result."""
+
+    @property
+    def volume_ratios(self):
+        """(..., k): J, the volume of each cell over that at rest."""
+        span = self._result.scene._bodies.of(self.actuator)
+        positions = self._result.positions[..., span.vertices, :]
+        mesh = self.actuator.body.mesh
+        volumes = []
+        for group in self.actuator.groups:
+            surface = of_tetrahedra(mesh.tetrahedra[group])
+            volumes.append(surface.volume(positions) / float(surface.volume(mesh.rest_positions)))
+        return stacked(volumes, axis=-1)
+
+    @property
+    def pressures(self):
+        """(..., k) Pa: K (a - J), times the load factor."""
+        return self._by_law(lambda cells, ratios: cells.pressure_at(ratios), self.volume_ratios)
+
+
+class TendonResult(ActuatorResult):
+    """A Tendon of a result."""
+
+    @property
+    def positions(self):
+        """(..., k, 3) m, of its points."""
+        scene = self._result.scene
+        own = np.zeros((0, 3)) if not scene.rigid_parts else self._result._own_points
+        vertices = self._result.positions
+        n_vertices, points = len(scene._bodies.original), []
+        for at, weights in self.actuator.riding(scene._bodies, scene._rigid):
+            of_points = at[0] >= n_vertices
+            rows = own[..., at - n_vertices, :] if of_points else vertices[..., at, :]
+            points.append((rows * _like(weights[:, None], rows)).sum(-2))
+        return stacked(points, axis=-2)
+
+    @property
+    def lengths(self):
+        """(..., segments) m."""
+        points = self.positions
+        return ((points[..., 1:, :] - points[..., :-1, :]) ** 2).sum(-1) ** 0.5
+
+    @property
+    def length(self):
+        """(...) m."""
+        return self.lengths.sum(-1)
+
+    @property
+    def tension(self):
+        """(...) N; of a tendon that does not slide, one a segment, (..., segments). Times the load factor."""
+        return self._by_law(
+            lambda tendon, length: tendon.tension_at(length),
+            self.length if self.actuator.sliding else self.lengths,
+        )
+
+
+def _like(array: np.ndarray, other):
+    return array if isinstance(other, np.ndarray) else other.new_tensor(array)

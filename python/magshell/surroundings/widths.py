@@ -1,0 +1,14 @@
+"""How wide a body is, however it is turned."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def width_of(mesh) -> float:
+    """m, of a mesh at rest: twice the way from the middle of its surface to the vertex that is farthest from it. Of a
+    rectangle and a box that is the diagonal."""
+    corners = mesh.rest_positions[mesh.faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    middle = areas @ corners.mean(axis=1) / areas.sum()
+    return 2.0 * float(np.linalg.norm(mesh.rest_positions - middle, axis=1).max())

@@ -1,0 +1,78 @@
+"""Cavities: blown far beyond their largest pressure, empty, filled in one call, crushed."""
+
+from __future__ import annotations
+
+import numpy as np
+from answers import at_rest, both, holds, near, refused
+from registry import case
+
+import magshell as ms
+
+
+def hollow_ball(cells=2, element="quadratic") -> ms.Solid:
+    ball = ms.meshes.ball(1.0, cells=cells)
+    inner = np.linalg.norm(ball.rest_positions[ball.tetrahedra], axis=2).min(axis=1) < 0.5 - 1e-6
+    kept, numbered = np.unique(ball.tetrahedra[~inner], return_inverse=True)
+    mesh = ms.TetMesh(ball.rest_positions[kept], numbered.reshape(-1, 4))
+    material = ms.NeoHookean("isochoric", young_modulus=3.0, poisson_ratio=0.49)
+    return ms.Solid(mesh, material=material, element=element)
+
+
+def scene_of(body: ms.Solid, *actuators) -> ms.Scene:
+    on = [np.flatnonzero(np.abs(body.mesh.rest_positions[:, k]) < 1e-9) for k in range(3)]
+    pins = [ms.Pin(vertices, components="xyz"[k]) for k, vertices in enumerate(on)]
+    return ms.Scene(body, supports=pins, actuators=actuators)
+
+
+@case("a ball filled to {:g} times its hollow's volume in one call, by water", over=(3.0, 30.0, 100.0))
+def filled(times):
+    body = hollow_ball()
+    rest = ms.Cavity(body, pressure=0.0).rest_volume(scene_of(body))
+    water = ms.Cavity(body, volume=times * rest, bulk_modulus=1e4)
+    found = ms.equilibrium(scene_of(body, water))
+    return both(at_rest(found), near("volume", float(found[water].volume), times * rest, rel=1e-3))
+
+
+@case("a gas at {:g} times the pressure outside, from rest in one call", over=(0.0, 1e-6, 0.5, 30.0))
+def gas(times):
+    body = hollow_ball()
+    inside = ms.Cavity(body, filling_pressure=0.3 * times, outside_pressure=0.3)
+    found = ms.equilibrium(scene_of(body, inside))
+    volume, pressure = float(found[inside].volume), float(found[inside].pressure)
+    rest = inside.rest_volume(found.scene)
+    return both(
+        at_rest(found),
+        near("p V + p_o V", (pressure + 0.3) * volume, 0.3 * times * rest, rel=1e-9)
+        if times
+        else near("pressure", pressure, -0.3, rel=1e-12),
+    )
+
+
+@case("a vacuum in a box of a sheet far too weak for it")
+def crushed():
+    box = ms.meshes.box((0.03, 0.03, 0.03), cells=(2, 2, 1))
+    mesh = ms.TriangleMesh(box.rest_positions, box.faces)
+    sheet = ms.Shell(mesh, thickness=2e-4, young_modulus=1e4)
+    vacuum = ms.Cavity(sheet, filling_pressure=0.0)
+    scene = ms.Scene(sheet, supports=[ms.Pin(mesh.vertices_at(z=0.0))], actuators=[vacuum])
+
+    def solve():
+        return ms.equilibrium(scene)
+
+    return refused(solve, "", ms.NotConverged)
+
+
+@case("sixty bordered groups of cells that want {:g} times their volume, in one call", over=(0.3, 3.0))
+def grown(times):
+    mesh = ms.meshes.box((0.3, 0.1, 0.1), cells=(15, 4, 4))
+    material = ms.NeoHookean(young_modulus=1e4, poisson_ratio=0.3)
+    body = ms.Solid(mesh, material=material, element="linear")
+    at = mesh.tetrahedron_barycenters
+    number = (at[:, 0] / 0.02).astype(int) * 4 + 2 * (at[:, 1] > 0.05) + (at[:, 2] > 0.05)
+    cells = ms.Cells(body, number, stiffness=1e5, volume_ratio=times)
+    found = ms.equilibrium(ms.Scene(body, supports=[ms.Pin(mesh.vertices_at(x=0.0))], actuators=[cells]))
+    ratios = found[cells].volume_ratios
+    return both(
+        at_rest(found),
+        holds("most reach it", abs(np.median(ratios) / times - 1) < 0.25, f"{np.median(ratios):.3g}"),
+    )

@@ -1,0 +1,242 @@
+"""Cavities in scenes: laws, results, inertia, collapse. Derivatives: test_actuator_kernels.py, test_every_gradient.py."""
+
+import numpy as np
+import pytest
+import torch
+from actuated import SOFT, box_sheet, gauge_pressure_of, held, hollow_block
+
+import magshell as ms
+from magshell import shapes
+
+LAWS = {
+    "pressure": {"pressure": 4e3},
+    "suction": {"pressure": -2e3},
+    "gas": {"filling_pressure": 1.3e5},
+    "less gas": {"filling_pressure": 0.9e5},
+    "liquid": {"volume": 1.2e-6, "bulk_modulus": 1e6},
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("element", ["linear", "quadratic"])
+def test_results_say_volume_and_pressure_by_the_law(law, element):
+    body = hollow_block(element)
+    cavity = ms.Cavity(body, **LAWS[law])
+    scene = held(body, actuators=[cavity])
+    rest = cavity.rest_volume(scene)
+    assert rest == pytest.approx(1e-6, rel=1e-12)
+    found = ms.equilibrium(scene)
+    inside = found[cavity]
+    assert found.stable and found.load_steps == 1
+    assert float(inside.pressure) == pytest.approx(gauge_pressure_of(cavity, inside.volume, rest), rel=1e-12)
+    assert (inside.volume > rest) == (float(inside.pressure) > 0)
+    # The same pressure prescribed leads to the same place.
+    again = ms.Cavity(body, pressure=float(inside.pressure))
+    same = ms.equilibrium(held(body, actuators=[again]))
+    assert np.abs(same.positions - found.positions).max() < 1e-9 * 0.03
+
+
+def test_water_keeps_its_volume_and_takes_few_iterations():
+    """With a bulk modulus 22,000 times the solid's modulus: a constraint in all but name."""
+    body = hollow_block("quadratic")
+    water = ms.Cavity(body, volume=1.5e-6)
+    found = ms.equilibrium(held(body, actuators=[water]))
+    assert float(found[water].volume) == pytest.approx(1.5e-6, rel=1e-4)
+    assert found.load_steps == 1 and found.iterations <= 12
+    softer = ms.Cavity(body, volume=1.5e-6, bulk_modulus=2.2e7)
+    near = ms.equilibrium(held(body, actuators=[softer]))
+    assert near.iterations <= found.iterations + 2  # stiffness costs nothing
+
+
+def test_several_cavities_share_a_wall():
+    """A block with two hollows, of which one is under pressure and the other full of liquid."""
+    box = ms.meshes.box((0.05, 0.03, 0.03), cells=(5, 3, 3))
+    at = box.tetrahedron_barycenters
+    hollow = (np.abs(at[:, 1:] - 0.015).max(axis=1) < 0.005) & (
+        (np.abs(at[:, 0] - 0.015) < 0.005) | (np.abs(at[:, 0] - 0.035) < 0.005)
+    )
+    kept, numbered = np.unique(box.tetrahedra[~hollow], return_inverse=True)
+    mesh = ms.TetMesh(box.rest_positions[kept], numbered.reshape(-1, 4))
+    body = ms.Solid(mesh, material=ms.NeoHookean(**SOFT), element="linear")
+    with pytest.raises(ValueError, match=r"2 hollows: say which of its faces"):
+        held(body, actuators=[ms.Cavity(body, pressure=1.0)])
+    x = mesh.rest_positions[mesh.faces].mean(axis=1)
+    inside = np.abs(x[:, 1:] - 0.015).max(axis=1) < 0.0051
+    left, right = (np.flatnonzero(inside & (np.abs(x[:, 0] - c) < 0.0051)) for c in (0.015, 0.035))
+    blown, filled = ms.Cavity(body, left, pressure=1e4), ms.Cavity(body, right, volume=1e-6)
+    found = ms.equilibrium(held(body, actuators=[blown, filled]))
+    assert float(found[filled].volume) == pytest.approx(1e-6, rel=1e-4)
+    # The wall between them is pushed over, and all around is pulled along: the liquid holds both back.
+    assert abs(float(found[filled].pressure)) > 10.0 and float(found[blown].volume) > 1.001e-6
+    alone = ms.equilibrium(held(body, actuators=[blown]))
+    assert float(found[blown].volume) != pytest.approx(float(alone[blown].volume), rel=1e-5)
+
+
+def hollow_ball(cells=2) -> ms.Solid:
+    """Radii 0.5 and 1, nearly incompressible; its center held by planes of symmetry."""
+    ball = ms.meshes.ball(1.0, cells=cells)
+    inner = np.linalg.norm(ball.rest_positions[ball.tetrahedra], axis=2).min(axis=1) < 0.49
+    kept, numbered = np.unique(ball.tetrahedra[~inner], return_inverse=True)
+    mesh = ms.TetMesh(ball.rest_positions[kept], numbered.reshape(-1, 4))
+    round_one = mesh.second_order(surface=shapes.difference(shapes.ball(1.0), shapes.ball(0.5)))
+    return ms.Solid(round_one, material=ms.NeoHookean("isochoric", young_modulus=3.0, poisson_ratio=0.4999))
+
+
+def ball_scene(body, *actuators) -> ms.Scene:
+    on = [np.flatnonzero(np.abs(body.mesh.rest_positions[:, k]) < 1e-9) for k in range(3)]
+    pins = [ms.Pin(vertices, components="xyz"[k]) for k, vertices in enumerate(on)]
+    return ms.Scene(body, supports=pins, actuators=actuators)
+
+
+def pressure_of_thick_ball(volume_ratio):
+    """Neo-Hookean with mu = 1, incompressible: p = [2/l + 1/(2 l^4)] between the inner and the outer stretch."""
+    inner = np.cbrt(volume_ratio)
+    outer = np.cbrt(1.0 + (inner**3 - 1.0) / 8.0)
+
+    def part(stretch):
+        return 2.0 / stretch + 0.5 / stretch**4
+
+    return part(outer) - part(inner)
+
+
+def test_a_balloon_blown_to_a_hundred_times_its_volume_passes_its_largest_pressure():
+    """By its volume all is stable; under that pressure it would be unstable beyond the largest. One layer of elements."""
+    body = hollow_ball()
+    rest = ms.Cavity(body, pressure=0.0).rest_volume(ball_scene(body))
+    liquid = ms.Cavity(body, volume=rest, bulk_modulus=1e3)
+    scene = ball_scene(body, liquid)
+    path = ms.follow(
+        scene,
+        start=ms.equilibrium(scene),
+        values={liquid: {"volume": 100.0 * rest}},
+        largest_step=0.6,
+        progress=False,
+    )
+    inside = path[liquid]
+    assert inside.volume[-1] == pytest.approx(100.0 * rest, rel=1e-3)
+    assert (path.unstable_directions == 0).all() and not path.critical
+    # The polyhedron is a ball's but for its size.
+    expected = pressure_of_thick_ball(inside.volume / rest)
+    assert np.abs(inside.pressure - expected).max() < 0.06 * expected.max()
+    top = np.argmax(inside.pressure)
+    assert 0 < top < len(path) - 1 and inside.pressure[-1] < 0.8 * inside.pressure[top]
+
+
+def test_a_path_by_pressure_turns_round_at_the_largest():
+    body = hollow_ball()
+    air = ms.Cavity(body, pressure=2.0)
+    scene = ball_scene(body, air)
+    rest = air.rest_volume(scene)
+    path = ms.follow(
+        scene,
+        largest_step=0.1,
+        progress=False,
+        until=lambda _, x: np.abs(x).max() > 2.0,
+    )
+    limits = [each for each in path.critical if each.kind == "limit"]
+    assert len(limits) == 1 and path.unstable_directions[-1] == 1
+    largest = pressure_of_thick_ball(np.linspace(1, 100, 10_000)).max()
+    assert 2.0 * limits[0].parameter == pytest.approx(largest, rel=0.06)
+    inside = path[air]
+    assert inside.pressure == pytest.approx(2.0 * path.parameters) and inside.volume[-1] > 5.0 * rest
+    # At one of the unstable states the liquid has no negative direction, under the same forces.
+    unstable = path.equilibrium(-1)
+    liquid = ms.Cavity(
+        body, volume=float(inside.volume[-1]) + 1e-3 * float(inside.pressure[-1]) * rest, bulk_modulus=1e3
+    )
+    same = ms.equilibrium(ball_scene(body, liquid), start=unstable.positions)
+    assert not unstable.stable and same.stable
+    assert np.abs(same.positions - unstable.positions).max() < 1e-6
+
+
+def test_a_path_by_the_amount_of_gas():
+    body = hollow_ball()
+    gas = ms.Cavity(body, filling_pressure=1.0, outside_pressure=1.0)
+    scene = ball_scene(body, gas)
+    rest = gas.rest_volume(scene)
+    path = ms.follow(
+        scene,
+        start=ms.equilibrium(scene),
+        values={gas: {"filling_pressure": 60.0}},
+        largest_step=0.2,
+        progress=False,
+    )
+    inside, amount = path[gas], 1.0 + 59.0 * path.parameters
+    assert np.allclose((inside.pressure + 1.0) * inside.volume, amount * rest, rtol=1e-9)
+    assert inside.volume[-1] > 20.0 * rest
+
+
+@pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()], ids=repr)
+def test_gas_in_motion(integrator):
+    """Let go from a smaller volume it swings about its rest; the pressure of every state is by its own volume."""
+    body = box_sheet(size=0.03, thickness=1e-3)
+    gas = ms.Cavity(body, filling_pressure=101325.0)
+    scene = held(body, actuators=[gas])
+    amount = np.linspace(1.0, 1.02, 11) * 101325.0
+    move = ms.simulate(
+        scene,
+        steps=10,
+        time_step=2e-4,
+        integrator=integrator,
+        values={gas: {"filling_pressure": amount}},
+        progress=False,
+    )
+    inside = move[gas]
+    assert inside.volume.shape == inside.pressure.shape == (11,)
+    expected = amount * gas.rest_volume(scene) / inside.volume - 101325.0
+    assert np.allclose(inside.pressure, expected, rtol=1e-12, atol=1e-9)
+    assert inside.volume[-1] > inside.volume[0] * 1.001
+
+
+def test_a_motion_with_gas_conserves_energy():
+    body = box_sheet(size=0.03, thickness=1e-3)
+    gas = ms.Cavity(body, filling_pressure=1.2e5)
+    scene = held(body, actuators=[gas])
+    move = ms.simulate(scene, steps=100, time_step=5e-5, progress=False)
+    assert abs(move.energy[-1] - move.energy[0]) < 0.05 * move.kinetic_energy.max()
+    assert move.kinetic_energy.max() > 0
+
+
+def test_volumes_are_differentiable():
+    body = hollow_block()
+    gas = ms.Cavity(body, filling_pressure=1.3e5)
+    scene = held(body, actuators=[gas])
+    amount = torch.tensor(1.3e5, requires_grad=True, dtype=torch.float64)
+
+    def volume(value):
+        found = ms.equilibrium(
+            scene, values={gas: {"filling_pressure": value}}, solver=ms.MixedNewton(tolerance=1e-13)
+        )
+        return found[gas].volume
+
+    volume(amount).backward()
+    above, below = (float(volume(1.3e5 + way * 100.0)) for way in (1, -1))
+    assert float(amount.grad) == pytest.approx((above - below) / 200.0, rel=1e-5)
+
+
+def test_vibrations_feel_the_gas_in_them():
+    """A box full of liquid is stiffer in the mode that changes its volume, and none is softer."""
+    body = box_sheet(size=0.03, thickness=1e-3, cells=(4, 4, 1))
+    empty = ms.vibration_modes(held(body), count=4)
+    gas = ms.Cavity(body, filling_pressure=101325.0)
+    scene = held(body, actuators=[gas])
+    modes = ms.vibration_modes(scene, ms.equilibrium(scene), count=4)
+    assert modes.unstable == 0
+    assert (modes.squares >= empty.squares * (1 - 1e-9)).all()
+    assert modes.squares[0] > 1.2 * empty.squares[0]
+
+
+def test_vacuum_is_crushed_to_a_stable_rest_or_refused():
+    body = hollow_block("quadratic")
+    vacuum = ms.Cavity(body, filling_pressure=0.0, outside_pressure=2e3)
+    found = ms.equilibrium(held(body, actuators=[vacuum]))
+    assert found.stable and np.isfinite(found.positions).all()
+    assert float(found[vacuum].pressure) == -2e3 and float(found[vacuum].volume) < 1e-6
+
+
+def test_a_collapse_is_an_error_that_says_so():
+    sheet = box_sheet(size=0.03, thickness=2e-4, modulus=1e4)
+    vacuum = ms.Cavity(sheet, filling_pressure=0.0)
+    with pytest.raises(ms.NotConverged) as caught:
+        ms.equilibrium(held(sheet, actuators=[vacuum]))
+    assert np.isfinite(caught.value.last_good.positions).all()
