@@ -22,11 +22,11 @@ def test_a_flap_hangs_by_its_lever_and_so_does_the_gradient():
     origin = torch.tensor([0.05, 0.0, 0.0], dtype=torch.float64, requires_grad=True)
     rest = ms.equilibrium(scene, values={hinge: {"origin": origin}}, solver=ms.MixedNewton(tolerance=1e-12))
     lever = ARM - 0.05
-    angle = float(rest[hinge].angle)
+    angle = rest[hinge].angle.item()
     assert angle * SPRING == pytest.approx(WEIGHT * lever * np.cos(angle), rel=1e-9)
     rest[hinge].angle.backward()
     slope = -WEIGHT * np.cos(angle) / (SPRING + WEIGHT * lever * np.sin(angle))
-    # Moved along z, it turns about another height: by symmetry of the weight this does at the angle what the arm's slope does.
+    # A hinge that is higher by z has the rod at -z beside its arm, whose lever is z sin(angle).
     upright = WEIGHT * np.sin(angle) / (SPRING + WEIGHT * lever * np.sin(angle))
     assert origin.grad[0].item() == pytest.approx(slope, rel=1e-7)
     assert abs(origin.grad[1].item()) < 1e-12
@@ -57,20 +57,29 @@ def _arm_in_flesh():
     x = mesh.rest_positions[:, 0]
     x = x - x.min()
     first, second = (
-        ms.Link(np.flatnonzero(np.abs(x - at) < 1e-6), body=solid, mass=1e-3, inertia=1e-7) for at in (0.02, 0.04)
+        ms.Link(np.flatnonzero(np.abs(x - at) < 1e-6), body=solid, mass=1e-3, inertia=1e-7)
+        for at in (0.02, 0.04)
     )
     corner = mesh.rest_positions.min(axis=0)
-    hinge = ms.Revolute(first, origin=corner + (0.012, 0.005, 0.006), axis=(0.1, 1, 0), spring_stiffness=1e-4)
-    ball = ms.Ball(second, first, origin=corner + (0.03, 0.004, 0.005), spring_stiffness=1e-4, damping=1e-6)
+    hinge = ms.Revolute(
+        first, origin=np.add(corner, (0.012, 0.005, 0.006)), axis=(0.1, 1, 0), spring_stiffness=1e-4
+    )
+    ball = ms.Ball(
+        second, first, origin=np.add(corner, (0.03, 0.004, 0.005)), spring_stiffness=1e-4, damping=1e-6
+    )
     pinned = ms.Pin(np.flatnonzero(x < 1e-6))
-    scene = ms.Scene([solid, ms.Skeleton([first, second], [hinge, ball])], supports=[pinned], gravity=(0, 1, -9.81))
+    scene = ms.Scene(
+        [solid, ms.Skeleton([first, second], [hinge, ball])], supports=[pinned], gravity=(0, 1, -9.81)
+    )
     return scene, hinge, ball
 
 
 def test_gradient_in_flesh_over_200_steps():
     scene, hinge, ball = _arm_in_flesh()
     way = np.random.default_rng(5).standard_normal((2, 3))
-    weights = torch.tensor(np.random.default_rng(6).standard_normal(scene.bodies[0].mesh.rest_positions.shape))
+    weights = torch.tensor(
+        np.random.default_rng(6).standard_normal(scene.bodies[0].mesh.rest_positions.shape)
+    )
 
     def end(shift, tensors=False):
         given = {

@@ -210,7 +210,8 @@ class MotionInputs:
         inputs.scene._bodies.check_welded("velocities", "m/s", rows)
         velocity = model.full_vector(np.concatenate([rows, own]))
         if inputs.scene.rigid_parts:
-            velocity = model.settled_velocity(origin.state, velocity)
+            with inputs.in_core():
+                velocity = model.settled_velocity(origin.state, velocity)
             fastest = np.abs(rows).max(initial=0.0)
             check_rigid(inputs.scene, rows, model.positions(velocity), "velocities [m/s]", fastest)
         return MotionState(
@@ -247,7 +248,8 @@ class MotionInputs:
         inputs.scene._bodies.check_welded("start", "m", positions)
         check_faces(inputs.scene, positions)
         self._outside = positions
-        state = model.state(positions, np.zeros(mesh.n_edges))
+        with inputs.in_core():
+            state = model.state(positions, np.zeros(mesh.n_edges))
         check_rigid(inputs.scene, positions, model.positions(state), "start [m]", mesh.size)
         return MotionState(0.0, state, still, rotations_known=False)
 
