@@ -1,4 +1,4 @@
-"""How the cost of skeletons grows with their links, and what one adds to a solid: tables of `python -m magshell.bench scaling`."""
+"""How costs of skeletons grow with their links, and what one adds to a solid: tables of `python -m magshell.bench scaling`."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def tree(links: int, children: int) -> ms.Scene:
     length, made, joints = 0.05, [], []
     for k in range(links):
         parent = (k - 1) // children if k else -1
-        start = np.zeros(3) if k == 0 else np.array(made[parent].center) + [length / 2, 0, 0]
-        start = start + [0, 0.3 * length * (k % children), 0]
-        made.append(ms.Link(mass=0.01, inertia=1e-5, center=start + [length / 2, 0, 0]))
+        start = np.zeros(3) if k == 0 else np.add(made[parent].center, (length / 2, 0, 0))
+        start = np.add(start, (0, 0.3 * length * (k % children), 0))
+        made.append(ms.Link(mass=0.01, inertia=1e-5, center=np.add(start, (length / 2, 0, 0))))
         axis = np.roll([0.0, 1.0, 0.2], k % 2)
         before = None if k == 0 else made[parent]
         joints.append(ms.Revolute(made[k], before, origin=start, axis=axis, spring_stiffness=1.0))

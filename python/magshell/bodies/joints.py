@@ -47,7 +47,7 @@ class Joint(Owner):
         self._replaceable = (
             *self._given,
             *(() if rate is None else ("rate",)),
-            *(("origin",) if self._pivots else ()),
+            *(("origin",) if self.has_place else ()),
         )
         self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
 
@@ -124,7 +124,7 @@ class Joint(Owner):
         return self._again({**own, **values})
 
     @property
-    def _pivots(self) -> bool:
+    def has_place(self) -> bool:
         """Whether it matters where its origin is, and solves may change it."""
         return self._kind in ("revolute", "ball")
 
@@ -136,12 +136,12 @@ class Joint(Owner):
         if self.acts:
             for name, default in self._defaults.items():
                 numbers[label, name] = self._given.get(name, default)
-        if self._pivots:
+        if self.has_place:
             numbers[label, "origin"] = self.origin
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
         found = {name: gradient.value(label, name)[0] for name in self._given}
-        if self._pivots:
+        if self.has_place:
             found["origin"] = gradient.value(label, "origin")[0]
         if self.rate is not None:
             rows = gradient.others.get("own_velocities")
@@ -149,7 +149,7 @@ class Joint(Owner):
             for place in values.moved_by(self) if rows is not None else ():
                 moved = rows[place.points]
                 found["rate"] = found["rate"] + self._rate_gradient(place.rest, moved)
-                if self._pivots:
+                if self.has_place:
                     found["origin"] = found["origin"] + np.cross(self._turning, moved).sum(axis=0)
         return found
 
