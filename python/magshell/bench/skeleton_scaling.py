@@ -1,4 +1,4 @@
-"""How costs of skeletons grow with their links, and what one adds to a solid: tables of `python -m magshell.bench scaling`."""
+"""How costs of skeletons grow with their links, and what one adds to a solid: of `python -m magshell.bench scaling`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .timing import clocked
 
 LINKS = (25, 50, 100, 200)
 QUICK_LINKS = (5, 10)
-CELLS, QUICK_CELLS = (15, 6, 6), (6, 2, 2)  # 3240 tetrahedra
+CELLS, QUICK_CELLS = (15, 6, 6), (8, 4, 4)  # 3240 tetrahedra
 BONES = 6
 ALLOWED_TWISTS = 1e-4  # s, of a chain of 100 links
 ALLOWED_SHARE = 1.3  # of an iteration with bones over one without
@@ -41,7 +41,7 @@ def fleshed(cells: tuple[int, int, int]) -> ms.Scene:
     solid = bare.bodies[0]
     at = solid.mesh.rest_positions
     low, high = at.min(axis=0), at.max(axis=0)
-    inside = np.abs(at[:, 1:] - (low + high)[1:] / 2).max(axis=1) < 0.2 * (high - low)[1]
+    inside = np.abs(at[:, 1:] - (low + high)[1:] / 2).max(axis=1) < 0.26 * (high - low)[1]
     edges = np.linspace(low[0] + 0.1 * (high - low)[0], high[0] + 1e-9, BONES + 1)
     middle = (low + high) / 2
     links, joints = [], []

@@ -221,7 +221,7 @@ def check_joints(inputs, points: np.ndarray) -> None:
         gap = float(np.linalg.norm(at(own.child, origin) - at(own.parent, origin)))
         if gap > _OPEN * max(scene.mesh.size if first else 0.0, float(np.abs(points).max())):
             raise ValueError(
-                f"start had another origin of {own!r:.60}: its links would be {gap:.3g} m apart there; give origin the value "
+                f"start had another origin of {own!r:.60}: links would be {gap:.3g} m apart there; give origin the value "
                 "of that solve, or start at rest positions"
             )
 
