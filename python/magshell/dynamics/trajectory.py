@@ -223,7 +223,10 @@ class Trajectory:
         """Of the core."""
         positions, rotations = (detached(each)[index] for each in (self.positions, self.edge_rotations))
         model = self.scene._model
-        state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
+        with self._values.in_core():
+            state = model.state(
+                np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64)
+            )
         before = 3 * self.scene._bodies.n_points
         if self._own_points is not None:  # free parts are where no vertex tells
             own = np.asarray(detached(self._own_points)[index], dtype=np.float64)
