@@ -7,10 +7,10 @@ from typing import ClassVar
 import numpy as np
 
 from .._checks.selections import indices, selection
+from ..bodies.actuator import Actuator, number
 from ..bodies.bodies import BODIES, Bodies, on_body
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
-from .actuator import Actuator, number
 from .actuator_results import CavityResult
 from .closed_surface import ClosedSurface, of_faces
 

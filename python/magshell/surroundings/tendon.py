@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from .._checks.quantity import quantity
+from ..bodies.actuator import Actuator, number
 from ..bodies.bodies import BODIES, Bodies, on_body
 from ..bodies.rigid import Rigid
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
-from .actuator import Actuator, number
 from .actuator_results import TendonResult
 from .riding import riding_points
 
@@ -83,6 +83,10 @@ class Tendon(Actuator):
         self.rest_length = number("rest_length", "m", rest, 0.0, above=True)
         smooth = _SMOOTHING * length if smoothing is None else smoothing
         self.smoothing = number("smoothing", "m", smooth, 0.0, above=True)
+
+    @property
+    def is_spring(self) -> bool:
+        return bool(self.stiffness > 0.0)
 
     @property
     def points(self) -> np.ndarray:
