@@ -41,7 +41,7 @@ class Tendon(Actuator):
     >>> mesh = ms.meshes.box((1, 0.1, 0.1), cells=(4, 2, 2))
     >>> bar = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=100.0, poisson_ratio=0.0))
     >>> pull = ms.Tendon([(0, 0.05, 0.05), (1, 0.05, 0.05)], bar, tension=0.01)
-    >>> found = ms.equilibrium(ms.Scene(bar, supports=[ms.Pin(mesh.vertices_at(x=0.0))], actuators=[pull]))
+    >>> found = ms.equilibrium(ms.Scene(bar, supports=[ms.Pin(bar.mesh.vertices_at(x=0.0))], actuators=[pull]))
     >>> float(found[pull].length) < 0.99
     True
     """
