@@ -298,7 +298,7 @@ class TestInput:
     def test_a_scene(self):
         muscle = ms.Muscle(self.body, (1, 0, 0), peak_stress=1.0)
         other = block("linear")
-        with pytest.raises(ValueError, match="of a solid that is not in the scene"):
+        with pytest.raises(ValueError, match="a Muscle is about a body that is not in the scene"):
             ms.Scene(other, supports=SIDES, actuators=[muscle])
         with pytest.raises(ValueError, match="actuator 1 is there twice"):
             ms.Scene(self.body, supports=SIDES, actuators=[muscle, muscle])

@@ -126,8 +126,9 @@ void Model::hand_out_values() {
 
 NodeMatrix Model::surrogate() const {
     NodeMatrix sum(nodes().n_nodes());
+    // Dampers act on few coordinates, whose stiffness in a step secants learn.
     for (const std::unique_ptr<Term>& term : terms_)
-        if (!term->add_surrogate(sum))
+        if (term.get() != damper_term_ && !term->add_surrogate(sum))
             throw InvalidInput("Projective Dynamics has no constant matrix for the " +
                                std::string(term->name()) + " energy of this scene");
     sum.finish();

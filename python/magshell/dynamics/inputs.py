@@ -109,11 +109,6 @@ class MotionInputs:
         ends = a_step * self.record_every * np.arange(1, count) - 1
         return np.concatenate([[0], ends])
 
-    @property
-    def activations(self) -> InTime | None:
-        """What is in time of muscles, if anything is."""
-        return self._in_time if self._in_time.activations else None
-
     def _all_controls(self) -> np.ndarray:
         """(knots, m), in the core's layout."""
         layout, moving = self.inputs.scene._control_layout, {**self._poses(), **self._in_time.poses}

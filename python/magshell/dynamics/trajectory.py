@@ -12,6 +12,7 @@ from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.tensors import detached
 from .._machine.files import replace_file
+from ..bodies.actuator import Actuator
 from ..bodies.body_result import BodyResult
 from ..bodies.of_body import result_of
 from ..bodies.rigid import Rigid
@@ -145,8 +146,6 @@ class Trajectory:
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
     _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
-    _activations: Any = field(repr=False, default=None)  # what changed of the values
-    _record_every: int = field(repr=False, default=1)
 
     def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
         """What it says of one body of the scene."""
@@ -161,17 +160,12 @@ class Trajectory:
         return self.positions - self.positions.new_tensor(np.array(rest))
 
     def _values_at(self, index: int):
-        """With the values in time that muscles had then."""
-        return (
-            self._values
-            if self._activations is None
-            else self._activations.values(self._values, self._knot(index))
-        )
-
-    def _knot(self, index: int) -> int:
-        """Where a recorded state is among the times at which controls are given."""
-        step = range(len(self))[index] * self._record_every
-        return 0 if step == 0 else (len(self.integrator._times) + 1) * step - 1
+        """With the actuators as they were then."""
+        then: dict[Actuator, dict] = {}
+        for (actuator, name), rows in self._varied.items():
+            then.setdefault(actuator, {})[name] = rows[index]
+        now = {each: self._values.current(each).replaced(**named) for each, named in then.items()}
+        return self._values.with_objects(now) if now else self._values
 
     @property
     def _obstacles(self) -> tuple:

@@ -7,10 +7,10 @@ from typing import ClassVar
 import numpy as np
 
 from .._checks.selections import indices, selection
+from ..bodies.actuator import Actuator, number
 from ..bodies.bodies import BODIES, Bodies, on_body
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
-from .actuator import Actuator, number
 from .actuator_results import CavityResult
 from .closed_surface import ClosedSurface, of_faces
 
@@ -56,7 +56,7 @@ class Cavity(Actuator):
     >>> floor = ms.Pin(sheet.mesh.vertices_at(z=0.0))
     >>> air = ms.Cavity(sheet, pressure=200.0)
     >>> blown = ms.equilibrium(ms.Scene(sheet, supports=[floor], actuators=[air]))
-    >>> water = ms.Cavity(sheet, volume=blown[air].volume, bulk_modulus=1e7)
+    >>> water = ms.Cavity(sheet, volume=blown[air].volume, bulk_modulus=1e9)
     >>> filled = ms.equilibrium(ms.Scene(sheet, supports=[floor], actuators=[water]))
     >>> round(float(filled[water].pressure))
     200

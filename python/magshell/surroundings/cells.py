@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from .._checks.selections import indices, selection
+from ..bodies.actuator import Actuator, numbers
 from ..bodies.bodies import Bodies, on_body
 from ..bodies.solid import Solid
-from .actuator import Actuator, numbers
 from .actuator_results import CellsResult
 from .closed_surface import of_tetrahedra
 
