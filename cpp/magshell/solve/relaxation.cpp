@@ -159,10 +159,11 @@ class Relaxation {
 
 RelaxationReport relax(Newton& newton, VectorXd& q, const Controls& controls, int max_steps) {
     RelaxationReport report = Relaxation(newton, q, controls).run(max_steps);
-    if (report.converged || !newton.model().has_body_contact()) return report;
+    const Model& model = newton.model();
+    if (report.converged || !model.has_body_contact() || !model.refusal(q).empty()) return report;
     // Whatever the reason, what touches may be what is in the way.
     newton.evaluate(q, controls, {});
-    if (const std::string hardest = newton.model().body_contact()->hardest(); !hardest.empty())
+    if (const std::string hardest = model.body_contact()->hardest(); !hardest.empty())
         report.reason += "; bodies touch: " + hardest;
     return report;
 }
