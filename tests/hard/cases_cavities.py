@@ -25,7 +25,7 @@ def scene_of(body: ms.Solid, *actuators) -> ms.Scene:
     return ms.Scene(body, supports=pins, actuators=actuators)
 
 
-@case("a ball filled to {:g} times its hollow's volume in one call, by water", over=(3.0, 30.0, 100.0))
+@case("a ball filled to {:g} times its hollow's volume in one call, by water", over=(3.0, 30.0))
 def filled(times):
     body = hollow_ball()
     rest = ms.Cavity(body, pressure=0.0).rest_volume(scene_of(body))

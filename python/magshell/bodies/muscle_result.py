@@ -75,8 +75,9 @@ class MuscleResult:
         if self.muscle.force_velocity is not None and hasattr(result, "velocities"):
             rows = np.asarray(detached(result.velocities), dtype=np.float64)[index]
             velocity = scene._model.full_vector(np.ascontiguousarray(rows))
+        state = result._state_at(index)
         with values.in_core():
-            return FibreStates(*_core.fibre_states(scene._model, number, result._state_at(index), velocity))
+            return FibreStates(*_core.fibre_states(scene._model, number, state, velocity))
 
     def activation(self, index: int = -1) -> np.ndarray:
         """(k,), 1, of each tetrahedron with fibres."""

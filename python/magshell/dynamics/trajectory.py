@@ -107,7 +107,8 @@ class Trajectory:
         leaves the model, of which ms.LargeStrainWarning warns.
     steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
     taken}. calmed: the steps, or steps with parts, that implicit Euler took instead of the integrator, because bodies
-    touched and the step would have gained energy that nothing put in. end: the last state, from which another simulation goes on. bytes: kept for gradients.
+    touched and the step would have gained energy that nothing put in. end: the last state, from which another simulation
+    goes on. bytes: kept for gradients.
     """
 
     scene: Scene

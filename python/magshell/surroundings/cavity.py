@@ -37,6 +37,8 @@ class Cavity(Actuator):
         outside_pressure: Pa, that of the surroundings, by default one atmosphere.
     volume: m3, of a liquid. Its pressure is what that takes: that of a bulk modulus (Pa, by default water's) and no
         multiplier, so it takes bulk_modulus / pressure digits of what a double has; solves treat it as a constraint.
+        A volume far from that at rest is reached bit by bit, by ms.WarmStart: the load steps of one solve scale what the
+        liquid does, not how much of it there is.
 
     cap_rims: close what is open by lids without stiffness, fans of triangles from one vertex of each rim, flat where the rim
         is. The pressure on them pulls at the rim.
