@@ -6,7 +6,7 @@ the air that is let in: as much as it takes is a value of the cavity too, and th
 
 What comes out:
 
-- The finger bends away from its channel, by 6.5 degrees, faster and faster: the channel's cross-section grows, and with it
+- The finger bends away from its channel, by 6.8 degrees, faster and faster: the channel's cross-section grows, and with it
   what the same pressure does. At half the pressure the angle is a sixth. At 17.3 kPa is the largest pressure it can hold.
 - Air that would press with 13.7 kPa in the channel at rest (115 kPa absolute) does so with 1.9 kPa once it has room.
 

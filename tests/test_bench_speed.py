@@ -79,6 +79,8 @@ def test_dynamics(tmp_path, capsys) -> None:
     projective = results["projective errors"]["Projective"]
     assert projective["accelerated"]["error"][-1] < projective["accelerated"]["error"][0]
     assert [each["kept"] for each in results["projective memory"]] == ["stages", "checkpoints"]
+    bars = results["thrown bars"]
+    assert bars["pairs"] > 100 and bars["touching"]["iterations"] > bars["free"]["iterations"] == 1
     (surroundings,) = results["surroundings"].values()
     assert min(row["step"] for row in surroundings.values()) > 0
     assert surroundings["contact"]["way"] != surroundings["contact, friction"]["way"]

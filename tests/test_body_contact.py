@@ -272,6 +272,20 @@ def test_supports_that_push_bodies_through_each_other_are_told():
         ms.equilibrium(scene)
 
 
+def test_a_relaxation_that_ends_early_tells_what_touches():
+    touching = two_sheets(height=1.03e-3)
+    scene = ms.Scene(
+        touching.bodies,
+        supports=touching.supports,
+        contacts=touching.contacts,
+        gravity=(0, 0, -1e5),
+        allow_rigid_motions=True,
+    )
+    hardest = r"not at rest after 1 steps; bodies touch: face \d+ of body [01] and face \d+ of body [01] push"
+    with pytest.raises(ms.NotConverged, match=hardest):
+        ms.equilibrium(scene, solver=ms.MixedNewton(max_iterations=4, max_relaxation_steps=1))
+
+
 def test_equilibrium_at_rest_is_that_of_the_scene_without_friction():
     rubbing, smooth = two_sheets(rubbing=0.5), two_sheets()
     with pytest.raises(ValueError, match="at_rest=True"):

@@ -35,6 +35,12 @@ def test_strip_folds_flat_and_opens_again(result) -> None:
     np.testing.assert_allclose(fold["positions"][-1], fold["positions"][0], atol=1e-9)
 
 
+def test_searches_end_soon(result) -> None:
+    """310 and 804 iterations; cuts of a tenth, without a way back, took 1072 and 4540."""
+    assert result["fold"]["iterations"].sum() < 600
+    assert result["coil"]["iterations"].sum() < 1600
+
+
 def test_strip_coils_up(result) -> None:
     coil = result["coil"]
     assert np.ptp(coil["turned"]) > 640

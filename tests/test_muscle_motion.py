@@ -98,3 +98,21 @@ def test_pictures_and_files_have_the_muscles(tmp_path):
     assert found["fibre_tension"][0][muscle.elements] == pytest.approx(move[muscle].tensions)
     with pytest.raises(ValueError, match="activation"):
         ms.plot(ms.Scene(muscle.body, allow_rigid_motions=True), color="activation")
+
+
+def test_what_an_environment_sees_knows_the_actuators_then():
+    from magshell.envs.snapshot import Snapshot
+
+    move, muscle = twitching(10, ms.ImplicitEuler())
+    tendon = ms.Tendon([(0.1, 0, 0), (0.1, 0, 0.04)], muscle.body, tension=2.0)
+    scene = ms.Scene(muscle.body, supports=move.scene.supports, actuators=[muscle, tendon])
+    pulls = {muscle: {"activation": np.linspace(0, 0.2, 5)}, tendon: {"tension": np.linspace(1.0, 3.0, 5)}}
+    move = ms.simulate(
+        scene, steps=4, time_step=1e-3, values=pulls, load_factor=np.linspace(0, 1, 5), progress=False
+    )
+    for index in (0, 2, -1):
+        now = Snapshot(move, index, np.zeros(0))
+        when = range(5)[index]
+        assert now[muscle].activation()[0] == pytest.approx(0.05 * when)
+        assert float(now[tendon].tension) == pytest.approx(0.25 * when * (1.0 + 0.5 * when))
+        assert float(move[tendon].tension[index]) == pytest.approx(0.25 * when * (1.0 + 0.5 * when))

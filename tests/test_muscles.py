@@ -14,7 +14,7 @@ HILL = {"peak_stress": 5e4, "force_length": FORCE_LENGTH, "passive": PASSIVE}
 FORCE_VELOCITY = np.stack([np.linspace(-1, 1, 9), 1.0 + 0.5 * np.tanh(2 * np.linspace(-1, 1, 9))], axis=1)
 FORCE_VELOCITY[4, 1] = 1.0
 
-# /work/shared/validation: bodies.json, P1a (closed form): host energy + w/2 (|F m| - r)^2, E = 1e5, nu = 0.45, w = 2e5;
+# Reference case P1a (closed form): host energy + w/2 (|F m| - r)^2, E = 1e5, nu = 0.45, w = 2e5;
 # (host, r, stretch along the fibre, transverse stretch).
 P1A = [
     ("NH-lnJ", 0.5, 0.7082428514, 1.164916177),
@@ -298,7 +298,7 @@ class TestInput:
     def test_a_scene(self):
         muscle = ms.Muscle(self.body, (1, 0, 0), peak_stress=1.0)
         other = block("linear")
-        with pytest.raises(ValueError, match="of a solid that is not in the scene"):
+        with pytest.raises(ValueError, match="a Muscle is about a body that is not in the scene"):
             ms.Scene(other, supports=SIDES, actuators=[muscle])
         with pytest.raises(ValueError, match="actuator 1 is there twice"):
             ms.Scene(self.body, supports=SIDES, actuators=[muscle, muscle])

@@ -314,7 +314,8 @@ def test_of_many_states_some_are_drawn(mesh) -> None:
         (
             {"color": "colour"},
             "color must be None, 'auto', 'magnetization', 'displacement', 'magnetic_energy', 'contact_pressure', "
-            "'volume_ratio', 'von_mises_stress', 'activation', 'fibre_stretch', 'fibre_tension', 'membrane_force', 'bending_moment' or an array",
+            "'volume_ratio', 'von_mises_stress', 'activation', 'fibre_stretch', "
+            "'fibre_tension', 'membrane_force', 'bending_moment' or an array",
         ),
         ({"color": "magnetization"}, "needs a magnetized sheet"),
         ({"color": "magnetic_energy"}, "needs a magnetized sheet in a field"),

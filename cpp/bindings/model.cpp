@@ -257,6 +257,14 @@ void register_model(py::module_& module) {
             "What hessian(), called last, leaves out: columns u (n, k) and stiffnesses s (k,), the sum of s "
             "u u^T. Of "
             "cavities, cells and tendons, which couple all of their nodes.")
+        .def(
+            "linearize",
+            [](Model& model, const VectorXd& q) {
+                const std::lock_guard lock(model.in_use());
+                model.linearize(q);
+            },
+            py::arg("q"), py::call_guard<py::gil_scoped_release>(),
+            "How nodes of links and rigid parts move, at a state: evaluations begin with it.")
         .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true);
 }
 

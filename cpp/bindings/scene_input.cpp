@@ -135,6 +135,7 @@ std::vector<SkeletonInput> skeletons_of(const py::list& given) {
         SkeletonInput& skeleton = skeletons.emplace_back();
         skeleton.links = each["links"].cast<std::vector<Index>>();
         skeleton.owners = each["owners"].cast<std::vector<std::string>>();
+        skeleton.labels = each["labels"].cast<std::vector<std::string>>();
         for (const py::handle joint : each["joints"])
             skeleton.joints.push_back({joint_kind(joint["kind"].cast<std::string>()),
                                        joint["parent"].cast<Index>(), to_vec3(joint["origin"]),

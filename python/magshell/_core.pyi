@@ -434,6 +434,10 @@ class Model:
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
     ) -> tuple: ...
+    def linearize(self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        """
+        How nodes of links and rigid parts move, at a state: evaluations begin with it.
+        """
     def largest_strains(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from answers import at_rest, both, holds, near, refused
+from answers import at_rest, both, near, refused
 from registry import case
+from scipy.optimize import brentq
 
 import magshell as ms
 
@@ -24,7 +25,7 @@ def scene_of(body: ms.Solid, *actuators) -> ms.Scene:
     return ms.Scene(body, supports=pins, actuators=actuators)
 
 
-@case("a ball filled to {:g} times its hollow's volume in one call, by water", over=(3.0, 30.0, 100.0))
+@case("a ball filled to {:g} times its hollow's volume in one call, by water", over=(3.0, 30.0))
 def filled(times):
     body = hollow_ball()
     rest = ms.Cavity(body, pressure=0.0).rest_volume(scene_of(body))
@@ -72,7 +73,11 @@ def grown(times):
     cells = ms.Cells(body, number, stiffness=1e5, volume_ratio=times)
     found = ms.equilibrium(ms.Scene(body, supports=[ms.Pin(mesh.vertices_at(x=0.0))], actuators=[cells]))
     ratios = found[cells].volume_ratios
-    return both(
-        at_rest(found),
-        holds("most reach it", abs(np.median(ratios) / times - 1) < 0.25, f"{np.median(ratios):.3g}"),
-    )
+    shear, lame = 1e4 / (2 * 1.3), 1e4 * 0.3 / (1.3 * 0.4)
+
+    def over(j: float) -> float:
+        """Of the pressure on a free block: what its material and its cell take, (mu (J^2/3 - 1) + lam ln J)/J and theirs."""
+        return (shear * (np.cbrt(j) ** 2 - 1) + lame * np.log(j)) / j + 1e5 * (j - times)
+
+    free = brentq(over, 0.1, 10.0)
+    return both(at_rest(found), near("volume ratio", float(np.median(ratios)), free, rel=0.02))

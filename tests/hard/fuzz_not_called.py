@@ -41,6 +41,7 @@ NOT_CALLED = {
     "ImplicitEuler": "takes nothing",
     "UniformField": "takes nothing",
     "envs.Snapshot": "a result",
+    "envs.robots.fish": "makes an Environment",
     "envs.robots.magnetic_strip": "makes an Environment",
     "envs.robots.soft_arm": "makes an Environment",
     "num_threads": "takes nothing",

@@ -248,7 +248,8 @@ def test_a_body_squeezed_until_it_cannot_move():
 def test_what_has_no_place_left_is_told():
     """Two plates that are to pass through each other, and what is between them."""
     scene = squeezed(5.5e-3, axes=(2,))
-    with pytest.raises(ms.NotConverged) as told:
+    way = r"face \d+ of body \d and face \d+ of body \d are in each other's way"
+    with pytest.raises(ms.NotConverged, match=way) as told:
         moved(scene, 10, 1e-3, **PRESSING)
     assert told.value.last_good.steps_done > 5
     assert_nothing_passes(scene, told.value.last_good)

@@ -41,7 +41,7 @@ class Backward {
             end = std::min(end, at->first);
         }
         back_to_start();
-        model_.reduction().settle_vjp(motion_.start.q, motion_.start.v, g_.positions, g_.velocities);
+        model_.reduction().settle_vjp(motion_.start.q, motion_.start.v, g_.positions, g_.velocities, scene_);
         g_.values = std::move(scene_.values);
         g_.factorizations = newton_.factorizations();
         return std::move(g_);
@@ -214,7 +214,7 @@ class Backward {
         model_.vjp(stage.q, controls, lambda, scene_);
         KinematicsGradient by_forces;
         if (model_.has_forces()) by_forces = model_.forces_vjp(controls, lambda, scene_);
-        if (model_.reduction().moves()) {
+        if (model_.reduction().has_values()) {
             // Once more: the factorization has turned the blocks of framed nodes.
             model_.assemble(stage.q, controls, false);
             if (model_.has_forces()) model_.assemble_forces(controls);

@@ -14,13 +14,13 @@ Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorX
 
     model.set_turns(equilibrium.turns);
     model.evaluate(q, controls);
-    if (model.follows() || reduction.moves()) model.assemble(q, controls, false);
+    if (model.follows() || reduction.has_values()) model.assemble(q, controls, false);
     VectorXd reduced = -reduction.vector(by_state);
     solve_at_equilibrium(model, *equilibrium.factor, true, reduced);
     const VectorXd lambda = reduction.expand(reduced);
     Gradient gradient(model.registry());
     model.vjp(q, controls, lambda, gradient);
-    if (reduction.moves()) {
+    if (reduction.has_values()) {
         VectorXd reaction(q.size());
         model.multiply(lambda, reaction);
         model.remainder().add_product(lambda, true, reaction);

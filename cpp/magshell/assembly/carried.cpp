@@ -1,6 +1,7 @@
 #include "magshell/assembly/carried.h"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 namespace magshell {
@@ -15,6 +16,7 @@ Carried::Carried(Carriers carriers, const SystemMatrix& matrix)
         chunk.first = coordinates_;
         coordinates_ += chunk.carrier->coordinates();
         drives_ |= chunk.carrier->driven() > 0;
+        placed_ |= chunk.carrier->placed();
         Index row = 0;
         for (const Index node : chunk.carrier->nodes())
             for (int c = 0; c < 3; ++c) {
@@ -68,6 +70,16 @@ Index place_in(const SparsePattern& pattern, Index column, Index row) {
     return k;
 }
 
+// B^T B.
+MatrixXd normal_of(const LinkTwists& b) {
+    return b.product(VectorXd::Ones(b.rows()));
+}
+
+// The coordinates, driven ones too, of a motion of the nodes.
+VectorXd all_of(const LinkTwists& b, const VectorXd& rows) {
+    return normal_of(b).ldlt().solve(b.pull_back(rows));
+}
+
 }  // namespace
 
 void Carried::find_places(const std::vector<const SystemMatrix*>& matrices, const std::vector<Index>& reduced,
@@ -90,37 +102,46 @@ void Carried::find_places(const std::vector<const SystemMatrix*>& matrices, cons
 
 void Carried::find_places(std::size_t which, const SystemMatrix& matrix, const std::vector<Index>& reduced,
                           const SparsePattern& pattern) {
+    struct Mixed {
+        Index carrier, to, link, from, row;
+    };
+    std::vector<Mixed> mixed;
     const auto of = [&](Index carrier) -> Places& { return chunks_[carrier].places[which]; };
+    const auto link = [&](Index unknown) {
+        return chunks_[carrier_of_[unknown]].twists.link_of_row(row_of_[unknown]);
+    };
+    const auto add_mixed = [&](Index free, Index carried, Index k) {
+        const Index carrier = carrier_of_[carried];
+        const Index to = place_in(pattern, reduced[free], free_ + chunks_[carrier].first);
+        mixed.push_back({carrier, to, link(carried), k, row_of_[carried]});
+    };
     for (Index column = 0; column < matrix.size(); ++column)
         for (Index k = matrix.column_starts()[column]; k < matrix.column_starts()[column + 1]; ++k) {
             const Index row = matrix.rows()[k], of_row = carrier_of_[row], of_column = carrier_of_[column];
             if (of_row >= 0 && of_column >= 0) {
-                if (of_row == of_column)
-                    of(of_row).inner.push_back({k, row_of_[row], row_of_[column]});
+                if (of_row < of_column)
+                    of(of_row).across[of_column].add(k, row_of_[column], link(column), row_of_[row],
+                                                     link(row), 1.0);
                 else if (of_row > of_column)
-                    of(of_column).across[of_row].push_back({k, row_of_[row], row_of_[column]});
-                else
-                    of(of_row).across[of_column].push_back({k, row_of_[column], row_of_[row]});
-            } else if (of_row >= 0 && reduced[column] >= 0) {
-                const Index to = place_in(pattern, reduced[column], free_ + chunks_[of_row].first);
-                of(of_row).mixed.push_back({k, row_of_[row], to});
-            } else if (of_column >= 0 && reduced[row] >= 0) {
-                const Index to = place_in(pattern, reduced[row], free_ + chunks_[of_column].first);
-                of(of_column).mixed.push_back({k, row_of_[column], to});
-            }
+                    of(of_column).across[of_row].add(k, row_of_[row], link(row), row_of_[column],
+                                                     link(column), 1.0);
+                else  // the lower half stands for both
+                    of(of_row).inner.add(k, row_of_[row], link(row), row_of_[column], link(column),
+                                         row == column ? 0.5 : 1.0);
+            } else if (of_row >= 0 && reduced[column] >= 0)
+                add_mixed(column, row, k);
+            else if (of_column >= 0 && reduced[row] >= 0)
+                add_mixed(row, column, k);
         }
+    std::ranges::sort(mixed, {}, [](const Mixed& m) { return std::tuple(m.carrier, m.to, m.link, m.from); });
+    for (const Mixed& each : mixed) of(each.carrier).mixed.add(each.from, each.row, each.link, each.to);
 }
 
 void Carried::linearize(const VectorXd& q) {
     at_ = q;
     for (Chunk& chunk : chunks_) {
-        MatrixXd all = chunk.carrier->jacobian(q);
-        if (chunk.carrier->driven() > 0) {
-            chunk.driven = all.rightCols(chunk.carrier->driven());
-            chunk.jacobian = all.leftCols(chunk.carrier->coordinates());
-        } else
-            chunk.jacobian = std::move(all);
-        chunk.normal.compute(chunk.jacobian.transpose() * chunk.jacobian);
+        chunk.twists = chunk.carrier->twists(q);
+        chunk.normal.reset();
     }
 }
 
@@ -133,33 +154,29 @@ void Carried::add_matrix(std::size_t which, const SystemMatrix& full, double* va
     const double* entries = full.values().data();
     for (const Chunk& chunk : chunks_) {
         const Places& places = chunk.places[which];
-        const MatrixXd& b = chunk.jacobian;
+        const LinkTwists& b = chunk.twists;
         const Index n = chunk.carrier->coordinates();
-        for (const Mixed& each : places.mixed)
-            for (Index j = 0; j < n; ++j) values[each.to + j] += entries[each.from] * b(each.row, j);
-        MatrixXd hb = MatrixXd::Zero(b.rows(), n);
-        for (const Inner& each : places.inner) {
-            hb.row(each.row) += entries[each.from] * b.row(each.column);
-            if (each.row != each.column) hb.row(each.column) += entries[each.from] * b.row(each.row);
+        places.mixed.add_columns(entries, b, n, values);
+        if (!places.inner.empty()) {
+            const MatrixXd half = b.product(places.inner.blocks(entries, b, b), b).topLeftCorner(n, n);
+            add_lower(chunk, half + half.transpose(), values);
         }
-        add_lower(chunk, b.transpose() * hb, values);
         for (const auto& [other, across] : places.across) {
-            const MatrixXd& beside = chunks_[other].jacobian;
-            MatrixXd block = MatrixXd::Zero(beside.cols(), n);
-            for (const Inner& each : across)
-                block += entries[each.from] * beside.row(each.row).transpose() * b.row(each.column);
+            const LinkTwists& beside = chunks_[other].twists;
+            const MatrixXd block = b.product(across.blocks(entries, beside, b), beside);
             const std::vector<Index>& to = chunk.beside.at(other);
             for (Index j = 0; j < n; ++j)
-                for (Index i = 0; i < block.rows(); ++i) values[to[j] + i] += block(i, j);
+                for (Index i = 0; i < chunks_[other].carrier->coordinates(); ++i)
+                    values[to[j] + i] += block(i, j);
         }
     }
 }
 
 void Carried::add_weights(const VectorXd& weights, double* values) const {
-    for (const Chunk& chunk : chunks_)
-        add_lower(chunk,
-                  chunk.jacobian.transpose() * chunk.carrier->gather(weights).asDiagonal() * chunk.jacobian,
-                  values);
+    for (const Chunk& chunk : chunks_) {
+        const Index n = chunk.carrier->coordinates();
+        add_lower(chunk, chunk.twists.product(chunk.carrier->gather(weights)).topLeftCorner(n, n), values);
+    }
 }
 
 void Carried::add_curvature(const VectorXd& gradient, double* values) const {
@@ -186,22 +203,31 @@ void Carried::add_driven_increment(const VectorXd& q, VectorXd& increment) const
         if (chunk.carrier->driven() == 0) continue;
         const VectorXd z = chunk.carrier->driven_increment(q);
         if (z.isZero(0.0)) continue;
-        const MatrixXd b = chunk.carrier->jacobian(q);
-        chunk.carrier->scatter(b.rightCols(z.size()) * z, increment);
+        chunk.carrier->scatter(chunk.carrier->twists(q).motion_from(chunk.carrier->coordinates(), z),
+                               increment);
     }
 }
 
+const Eigen::LDLT<MatrixXd>& Carried::normal(const Chunk& chunk) {
+    const Index n = chunk.carrier->coordinates();
+    if (!chunk.normal) chunk.normal.emplace(normal_of(chunk.twists).topLeftCorner(n, n));
+    return *chunk.normal;
+}
+
+VectorXd Carried::pull_back_free(const Chunk& chunk, const VectorXd& rows) const {
+    return chunk.twists.pull_back(rows).head(chunk.carrier->coordinates());
+}
+
+VectorXd Carried::driven_of(const Chunk& chunk, const VectorXd& rows) {
+    return chunk.twists.pull_back(rows).tail(chunk.carrier->driven());
+}
+
 VectorXd Carried::free_part(const Chunk& chunk, const VectorXd& full) const {
-    return chunk.normal.solve(chunk.jacobian.transpose() * chunk.carrier->gather(full));
+    return normal(chunk).solve(pull_back_free(chunk, chunk.carrier->gather(full)));
 }
 
 VectorXd Carried::driven_part(const Chunk& chunk, const VectorXd& full) const {
-    MatrixXd b(chunk.jacobian.rows(), chunk.jacobian.cols() + chunk.driven.cols());
-    b << chunk.jacobian, chunk.driven;
-    return (b.transpose() * b)
-        .ldlt()
-        .solve(b.transpose() * chunk.carrier->gather(full))
-        .tail(chunk.driven.cols());
+    return all_of(chunk.twists, chunk.carrier->gather(full)).tail(chunk.carrier->driven());
 }
 
 void Carried::add_driven_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const {
@@ -211,21 +237,24 @@ void Carried::add_driven_forces(const VectorXd& gradient, const VectorXd& move, 
         const VectorXd pull =
             chunk.carrier->curvature(at_, gradient).topRightCorner(n, m) * driven_part(chunk, move);
         VectorXd own = chunk.carrier->gather(forces);
-        own += chunk.jacobian * chunk.normal.solve(pull);
+        own += chunk.twists.motion(normal(chunk).solve(pull));
         chunk.carrier->scatter(own, forces);
     }
 }
 
-void Carried::driven_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
-                         Gradient& out) const {
+void Carried::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+                  Gradient& out) const {
     for (const Chunk& chunk : chunks_) {
-        const Index n = chunk.carrier->coordinates(), m = chunk.carrier->driven();
+        const Carrier& carrier = *chunk.carrier;
+        const Index n = carrier.coordinates(), m = carrier.driven();
+        if (m == 0 && !carrier.placed()) continue;
+        VectorXd z = VectorXd::Zero(n + m);
+        if (n > 0) z.head(n) = free_part(chunk, lambda);
+        carrier.places_vjp(at_, by_state, z, gradient, out);
         if (m == 0) continue;
-        VectorXd by_driven = chunk.driven.transpose() * chunk.carrier->gather(by_state);
-        if (n > 0)
-            by_driven +=
-                chunk.carrier->curvature(at_, gradient).bottomLeftCorner(m, n) * free_part(chunk, lambda);
-        chunk.carrier->driven_vjp(by_driven, out);
+        VectorXd by_driven = driven_of(chunk, carrier.gather(by_state));
+        if (n > 0) by_driven += carrier.curvature(at_, gradient).bottomLeftCorner(m, n) * z.head(n);
+        carrier.driven_vjp(by_driven, out);
     }
 }
 
@@ -235,8 +264,8 @@ VectorXd Carried::driving(const VectorXd& gradient) const {
         const Index m = chunk.carrier->driven();
         if (m == 0) continue;
         all.conservativeResize(all.size() + m);
-        all.tail(m) = chunk.carrier->driven_units().cwiseProduct(chunk.driven.transpose() *
-                                                                 chunk.carrier->gather(gradient));
+        all.tail(m) =
+            chunk.carrier->driven_units().cwiseProduct(driven_of(chunk, chunk.carrier->gather(gradient)));
     }
     return all;
 }
@@ -244,25 +273,26 @@ VectorXd Carried::driving(const VectorXd& gradient) const {
 void Carried::pull_back(const VectorXd& full, VectorXd& reduced) const {
     for (const Chunk& chunk : chunks_)
         reduced.segment(free_ + chunk.first, chunk.carrier->coordinates()) =
-            chunk.jacobian.transpose() * chunk.carrier->gather(full);
+            pull_back_free(chunk, chunk.carrier->gather(full));
 }
 
 void Carried::diagonal(const VectorXd& weights, VectorXd& reduced) const {
-    for (const Chunk& chunk : chunks_)
-        reduced.segment(free_ + chunk.first, chunk.carrier->coordinates()) =
-            chunk.jacobian.cwiseAbs2().transpose() * chunk.carrier->gather(weights);
+    for (const Chunk& chunk : chunks_) {
+        const Index n = chunk.carrier->coordinates();
+        reduced.segment(free_ + chunk.first, n) =
+            chunk.twists.product(chunk.carrier->gather(weights)).diagonal().head(n);
+    }
 }
 
 void Carried::push_forward(const VectorXd& reduced, VectorXd& full) const {
     for (const Chunk& chunk : chunks_)
         chunk.carrier->scatter(
-            chunk.jacobian * reduced.segment(free_ + chunk.first, chunk.carrier->coordinates()), full);
+            chunk.twists.motion(reduced.segment(free_ + chunk.first, chunk.carrier->coordinates())), full);
 }
 
 void Carried::project(VectorXd& full) const {
-    for (const Chunk& chunk : chunks_) {
-        chunk.carrier->scatter(chunk.jacobian * free_part(chunk, full), full);
-    }
+    for (const Chunk& chunk : chunks_)
+        chunk.carrier->scatter(chunk.twists.motion(free_part(chunk, full)), full);
 }
 
 void Carried::replace(const VectorXd& from, VectorXd& to) const {
@@ -273,8 +303,7 @@ void Carried::advance(VectorXd& q, const VectorXd& p) const {
     const VectorXd from = q;
     q += p;
     for (const Chunk& chunk : chunks_) {
-        const MatrixXd b = chunk.carrier->jacobian(from);
-        const VectorXd z = (b.transpose() * b).ldlt().solve(b.transpose() * chunk.carrier->gather(p));
+        const VectorXd z = all_of(chunk.carrier->twists(from), chunk.carrier->gather(p));
         chunk.carrier->scatter(chunk.carrier->gather(from), q);
         chunk.carrier->advance(q, z);
     }
@@ -284,8 +313,9 @@ void Carried::settle(VectorXd& q, VectorXd* v) const {
     for (const Chunk& chunk : chunks_) chunk.carrier->settle(q, v);
 }
 
-void Carried::settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const {
-    for (const Chunk& chunk : chunks_) chunk.carrier->settle_vjp(q, v, by_q, by_v);
+void Carried::settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
+                         Gradient& out) const {
+    for (const Chunk& chunk : chunks_) chunk.carrier->settle_vjp(q, v, by_q, by_v, out);
 }
 
 void Carried::append_points(const std::vector<Vec3>& full, std::vector<Vec3>& points) const {
@@ -299,10 +329,14 @@ void Carried::append_points(const std::vector<Vec3>& full, std::vector<Vec3>& po
 
 std::size_t Carried::bytes() const {
     std::size_t total = (carrier_of_.capacity() + row_of_.capacity()) * sizeof(Index);
-    for (const Chunk& chunk : chunks_)
-        for (const Places& places : chunk.places)
-            total += places.mixed.capacity() * sizeof(Mixed) + places.inner.capacity() * sizeof(Inner);
-    for (const Chunk& chunk : chunks_) total += chunk.jacobian.size() * sizeof(double);
+    for (const Chunk& chunk : chunks_) {
+        for (const Places& places : chunk.places) {
+            total += places.mixed.bytes() + places.inner.bytes();
+            for (const auto& [other, across] : places.across) total += across.bytes();
+        }
+        const Index n = chunk.carrier->coordinates();
+        total += chunk.twists.bytes() + n * n * sizeof(double);
+    }
     return total;
 }
 

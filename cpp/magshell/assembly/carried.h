@@ -5,10 +5,12 @@
 #include <Eigen/Cholesky>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <vector>
 
 #include "magshell/assembly/carrier.h"
+#include "magshell/assembly/link_coupling.h"
 #include "magshell/assembly/system_matrix.h"
 #include "magshell/linalg/factor.h"
 
@@ -46,11 +48,12 @@ class Carried {
     /// away; and adds the gradients by those values, of a number whose gradient by all nodes is `by_state`, at an adjoint
     /// lambda of all unknowns under a gradient g. driving: the forces [N], or moments [N m], that hold them, by g.
     bool drives() const { return drives_; }
+    /// Whether values say where joints are, which vjp adds to as well.
+    bool placed() const { return placed_; }
     void set_values(const Values& values);
     void add_driven_increment(const VectorXd& q, VectorXd& increment) const;
     void add_driven_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const;
-    void driven_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
-                    Gradient& out) const;
+    void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient, Gradient& out) const;
     VectorXd driving(const VectorXd& gradient) const;
 
     /// The last numbers of a reduced vector: B^T f, and the diagonal of B^T w B.
@@ -66,7 +69,8 @@ class Carried {
     /// Moves q, the nodes carried along what of p they can follow.
     void advance(VectorXd& q, const VectorXd& p) const;
     void settle(VectorXd& q, VectorXd* v) const;
-    void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const;
+    void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
+                    Gradient& out) const;
 
     /// Where each coordinate is: the mean of the nodes that it moves.
     void append_points(const std::vector<Vec3>& full, std::vector<Vec3>& points) const;
@@ -74,23 +78,16 @@ class Carried {
     std::size_t bytes() const;
 
   private:
-    // An entry of the full matrix and the rows of B that its row and its column stand for.
-    struct Mixed {  // the other one is free: to is where the carrier's rows begin in that column
-        Index from, row, to;
-    };
-    struct Inner {
-        Index from, row, column;
-    };
-    struct Places {  // of one of the matrices
-        std::vector<Mixed> mixed;
-        std::vector<Inner> inner;
-        std::map<Index, std::vector<Inner>> across;  // rows of a later carrier
+    struct Places {                            // of one of the matrices
+        LinkCoupling mixed, inner;             // with free unknowns, and with others of this carrier
+        std::map<Index, LinkCoupling> across;  // rows of a later carrier
     };
     struct Chunk {
         std::unique_ptr<Carrier> carrier;
-        Index first = 0;                   // among the carriers' coordinates
-        Eigen::MatrixXd jacobian, driven;  // by what is free, and by what values prescribe
-        Eigen::LDLT<Eigen::MatrixXd> normal;
+        Index first = 0;    // among the carriers' coordinates
+        LinkTwists twists;  // B
+        // Of B^T B of the free ones, once something asks for it.
+        mutable std::optional<Eigen::LDLT<Eigen::MatrixXd>> normal;
         std::vector<Places> places;
         std::set<Index> later;                       // carriers after it that it is coupled with
         std::vector<Index> own;                      // where each column's rows of this carrier begin
@@ -102,11 +99,14 @@ class Carried {
     /// The free coordinates of a motion of all nodes; those of driven ones; forces with which B^T gives these.
     VectorXd free_part(const Chunk& chunk, const VectorXd& full) const;
     VectorXd driven_part(const Chunk& chunk, const VectorXd& full) const;
+    static const Eigen::LDLT<Eigen::MatrixXd>& normal(const Chunk& chunk);
+    static VectorXd driven_of(const Chunk& chunk, const VectorXd& rows);
+    VectorXd pull_back_free(const Chunk& chunk, const VectorXd& rows) const;
     void add_lower(const Chunk& chunk, const Eigen::MatrixXd& block, double* values) const;
 
     std::vector<Chunk> chunks_;
     Index coordinates_ = 0, free_ = 0;
-    bool drives_ = false;
+    bool drives_ = false, placed_ = false;
     VectorXd at_;                               // q of the linearization
     std::vector<Index> carrier_of_, row_of_;    // by unknown: its carrier, its row of B there
     std::map<Index, std::set<Index>> coupled_;  // by free unknown: carriers

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "magshell/assembly/link_twists.h"
 #include "magshell/core/parameters.h"
 #include "magshell/core/types.h"
 
@@ -25,8 +26,10 @@ class Carrier {
     virtual Index coordinates() const = 0;
     virtual Index driven() const { return 0; }
 
-    /// B at q: a row for each component of its nodes, a column a coordinate, driven ones too.
-    virtual Eigen::MatrixXd jacobian(const VectorXd& q) const = 0;
+    /// B at q: a row for each component of its nodes, a column a coordinate, driven ones too. As twists of its links, and
+    /// as it is.
+    virtual LinkTwists twists(const VectorXd& q) const = 0;
+    Eigen::MatrixXd jacobian(const VectorXd& q) const { return twists(q).matrix(); }
 
     /// sum_i g_i d2x_i/dz2 at q, for a gradient of all unknowns; symmetric. Of all coordinates.
     virtual Eigen::MatrixXd curvature(const VectorXd& q, const VectorXd& gradient) const = 0;
@@ -38,6 +41,12 @@ class Carrier {
     virtual VectorXd driven_units() const { return {}; }
     virtual void driven_vjp(const VectorXd& /*by_driven*/, Gradient& /*out*/) const {}
 
+    /// Whether values say where its joints are; and adds the gradients by these, at q, of a number with this gradient by
+    /// all nodes, with what they do to sum g . B z at the rates z of all coordinates under a gradient g.
+    virtual bool placed() const { return false; }
+    virtual void places_vjp(const VectorXd& /*q*/, const VectorXd& /*by_state*/, const VectorXd& /*z*/,
+                            const VectorXd& /*gradient*/, Gradient& /*out*/) const {}
+
     /// Moves its nodes in q along z, all coordinates.
     virtual void advance(VectorXd& q, const VectorXd& z) const = 0;
 
@@ -45,8 +54,10 @@ class Carrier {
     /// the vertices' order is mended. With the velocities v of the vertices those of all its nodes.
     virtual void settle(VectorXd& q, VectorXd* v) const = 0;
 
-    /// From gradients by what settle makes, at a settled q, to those by what it is given; v and by_v may be empty.
-    virtual void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const = 0;
+    /// From gradients by what settle makes, at a settled q, to those by what it is given, and by values; v and by_v may be
+    /// empty.
+    virtual void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
+                            Gradient& out) const = 0;
 
     /// Its nodes' rows of a vector of all unknowns, and back.
     VectorXd gather(const VectorXd& full) const {

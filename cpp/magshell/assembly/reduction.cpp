@@ -36,8 +36,8 @@ Reduction::Reduction(const SystemMatrix& matrix, std::vector<HeldNode> held, con
     if (!carriers.empty()) carried_ = std::make_unique<Carried>(std::move(carriers), matrix);
     for (Index u = 0; u < matrix.size(); ++u)
         if (!is_held[u] && !(carried_ && carried_->carries(u))) free_unknowns_.push_back(u);
-    set_pattern(matrix, nullptr);
     if (carried_) carried_->linearize(rest_state(nodes));
+    set_pattern(matrix, nullptr);
 }
 
 void Reduction::Pieces::add(Index from, Index to) {
@@ -157,7 +157,7 @@ Vec3 Reduction::rate(Index node, Index move, double progress) const {
 
 void Reduction::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
                     const Controls& controls, Gradient& out) const {
-    if (drives()) carried_->driven_vjp(by_state, lambda, gradient, out);
+    if (carried_) carried_->vjp(by_state, lambda, gradient, out);
     const double t = progress(controls);
     std::vector<SupportMove> by_move(moves_.size());
     for (const HeldNode& h : held_)

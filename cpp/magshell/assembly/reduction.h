@@ -37,6 +37,8 @@ class Reduction {
     bool moves() const { return !moves_.empty() || drives(); }
     /// Whether values prescribe coordinates of carriers.
     bool drives() const { return carried_ && carried_->drives(); }
+    /// Whether values act through it: vjp adds gradients by them.
+    bool has_values() const { return moves() || (carried_ && carried_->placed()); }
 
     /// The free unknowns that are no coordinates of carriers, ascending: these come first in the reduced order. Those of a
     /// framed node count along its frame.
@@ -58,7 +60,7 @@ class Reduction {
     VectorXd prescribed_rate(const Controls& controls) const;
 
     /// Adds the gradients by the moves and by their progress, given the gradient by what supports hold; and by what
-    /// carriers are driven to, at an adjoint lambda under the gradient of the energy, with inertia in a motion.
+    /// carriers are driven to and where their joints are, at an adjoint lambda under the gradient of the energy, with inertia in a motion.
     void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
              const Controls& controls, Gradient& out) const;
     /// Adds to the forces that prescribed increments cause, K p, what a curved way of carried nodes adds.
@@ -110,8 +112,9 @@ class Reduction {
     void settle(VectorXd& q, VectorXd* v) const {
         if (carried_) carried_->settle(q, v);
     }
-    void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const {
-        if (carried_) carried_->settle_vjp(q, v, by_q, by_v);
+    void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
+                    Gradient& out) const {
+        if (carried_) carried_->settle_vjp(q, v, by_q, by_v, out);
     }
     /// Of points of all unknowns, the same for the three of a node, those of the free ones.
     std::vector<Vec3> free(const std::vector<Vec3>& full) const;

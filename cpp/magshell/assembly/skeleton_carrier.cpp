@@ -1,6 +1,7 @@
 #include "magshell/assembly/skeleton_carrier.h"
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -43,8 +44,10 @@ auto solver_of(const MatrixXd& rows) {
 }  // namespace
 
 SkeletonCarrier::SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Joint> joints,
-                                 std::vector<Slot> motors)
+                                 std::vector<Slots> slots)
     : Carrier(nodes_of(links)), links_(std::move(links)), joints_(std::move(joints)) {
+    slots.resize(links_.size());
+    for (const Slots& each : slots) origins_.push_back(each.origin);
     Index row = 0;
     bool vertices = false;
     for (Index k = 0; k < n_links(); ++k) {
@@ -53,11 +56,17 @@ SkeletonCarrier::SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Join
         row_.push_back(row);
         row += links_[k].size();
         vertices |= links_[k].has_vertices();
-        if (joints_[k].driven) driven_.push_back({k, motors[k]});
+        if (joints_[k].driven) driven_.push_back({k, slots[k].motor});
     }
     Index free = 0, held = coordinates();
     for (const Joint& joint : joints_)
         for (Index j = 0; j < joint.freedom(); ++j) place_.push_back(joint.driven ? held++ : free++);
+    auto paths = std::make_shared<LinkPaths>();
+    for (Index k = 0; k < n_links(); ++k) {
+        const auto own = place_.begin() + first_[k];
+        paths->add_link(joints_[k].parent, {own, own + joints_[k].freedom()}, links_[k].size());
+    }
+    paths_ = std::move(paths);
     for (Index k = 0; k < n_links(); ++k)
         for (Index n = vertices ? links_[k].own() : 0; n < (vertices ? links_[k].size() : RigidNodes::points);
              ++n)
@@ -96,21 +105,28 @@ std::vector<SkeletonCarrier::Column> SkeletonCarrier::columns(const std::vector<
     return all;
 }
 
-MatrixXd SkeletonCarrier::jacobian(const VectorXd& q) const {
-    const std::vector<Column> columns = this->columns(poses(q));
-    MatrixXd b = MatrixXd::Zero(3 * nodes().size(), coordinates_);
-    for (Index k = 0; k < n_links(); ++k)
-        for (Index joint = k; joint >= 0; joint = joints_[joint].parent)
-            for (Index j = first_[joint]; j < first_[joint] + joints_[joint].freedom(); ++j) {
-                const Column& column = columns[j];
-                const Vec3 axis = column.share * column.axis;
-                for (Index n = 0; n < links_[k].size(); ++n) {
-                    const Vec3 x = q.segment<3>(3 * links_[k].nodes()[n]);
-                    b.block<3, 1>(3 * (row_[k] + n), place_[j]) =
-                        column.turns ? axis.cross(x - column.origin) : axis;
-                }
-            }
-    return b;
+LinkTwists SkeletonCarrier::twists(const VectorXd& q) const {
+    const std::vector<Pose> poses = this->poses(q);
+    const std::vector<Column> columns = this->columns(poses);
+    std::vector<Vec3> points, arms;
+    points.reserve(n_links());
+    arms.reserve(nodes().size());
+    LinkTwists::Twists twists(6, paths_->coordinate.size());
+    std::vector<const Column*> by_place(coordinates_);
+    for (Index j = 0; j < coordinates_; ++j) by_place[place_[j]] = &columns[j];
+    for (Index k = 0; k < n_links(); ++k) {
+        points.push_back(poses[k].center);
+        for (const Index node : links_[k].nodes()) arms.push_back(q.segment<3>(3 * node) - points[k]);
+        for (Index at = paths_->start[k]; at < paths_->start[k + 1]; ++at) {
+            const Column& column = *by_place[paths_->coordinate[at]];
+            const Vec3 axis = column.share * column.axis;
+            if (column.turns)
+                twists.col(at) << axis.cross(points[k] - column.origin), axis;
+            else
+                twists.col(at) << axis, Vec3::Zero();
+        }
+    }
+    return {paths_, std::move(points), std::move(arms), std::move(twists)};
 }
 
 // With F = sum g and M = sum (x - o_b) g^T over all that b moves, for turns about w_a and w_b
@@ -123,20 +139,20 @@ MatrixXd SkeletonCarrier::second_derivative(const VectorXd& q, const VectorXd& g
                                Mat3::Zero());  // sum (x - place) g^T, each about a place of its own
     std::vector<Vec3> place(n_links());
     MatrixXd out = MatrixXd::Zero(coordinates_, coordinates_);
+    for (Index k = 0; k < n_links(); ++k)
+        place[k] = joints_[k].freedom() > 0 ? columns[first_[k]].origin : links_[k].center(q);
     for (Index k = n_links() - 1; k >= 0; --k) {
         const Joint& joint = joints_[k];
-        // Those that come after have added their own about their places, which are near.
-        place[k] = joint.freedom() > 0 ? columns[first_[k]].origin : links_[k].center(q);
         for (const Index node : links_[k].nodes()) {
             const Vec3 g = gradient.segment<3>(3 * node);
             forces[k] += g;
             products[k] += (q.segment<3>(3 * node) - place[k]) * g.transpose();
         }
-        for (Index child = k + 1; child < n_links(); ++child)
-            if (joints_[child].parent == k) {
-                forces[k] += forces[child];
-                products[k] += products[child] + (place[child] - place[k]) * forces[child].transpose();
-            }
+        // No later link adds to it.
+        if (const Index parent = joint.parent; parent >= 0) {
+            forces[parent] += forces[k];
+            products[parent] += products[k] + (place[k] - place[parent]) * forces[k].transpose();
+        }
         for (Index b = first_[k]; b < first_[k] + joint.freedom(); ++b) {
             const Column& inner = columns[b];
             const auto turn_and = [&](const Column& outer) {
@@ -173,6 +189,8 @@ double SkeletonCarrier::coordinate(Index link, const std::vector<Pose>& poses) c
 
 void SkeletonCarrier::set_values(const Values& values) {
     for (Motor& motor : driven_) motor.target = values.number(motor.slot);
+    for (Index k = 0; k < n_links(); ++k)
+        if (origins_[k].size() > 0) joints_[k].origin = values.vector(origins_[k]);
 }
 
 // By the shorter way round.
@@ -208,6 +226,46 @@ VectorXd SkeletonCarrier::driven_units() const {
 void SkeletonCarrier::driven_vjp(const VectorXd& by_driven, Gradient& out) const {
     const VectorXd units = driven_units();
     for (Index m = 0; m < driven(); ++m) out.values[driven_[m].slot.first] += units[m] * by_driven[m];
+}
+
+bool SkeletonCarrier::placed() const {
+    return std::ranges::any_of(origins_, [](const Slot& slot) { return slot.size() > 0; });
+}
+
+// Links keep their places at rest as an origin o moves; later, at the same angles, all that the joint carries slides:
+//
+//   dx/do = R_p - R_k,        d(B z)/do = [w_p]x R_p - [w_k]x R_k
+//
+// with the turns R of its two links and the rates w at which z turns them.
+void SkeletonCarrier::places_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
+                                 const VectorXd& gradient, Gradient& out) const {
+    if (!placed()) return;
+    const std::vector<Pose> poses = this->poses(q);
+    const std::vector<Column> columns = this->columns(poses);
+    std::vector<Vec3> rates(n_links(), Vec3::Zero()), by_slide = rates, forces = rates;
+    for (Index k = 0; k < n_links(); ++k) {
+        if (joints_[k].parent >= 0) rates[k] = rates[joints_[k].parent];
+        for (Index j = first_[k]; j < first_[k] + joints_[k].freedom(); ++j)
+            if (columns[j].turns) rates[k] += columns[j].share * z[place_[j]] * columns[j].axis;
+    }
+    for (Index k = n_links() - 1; k >= 0; --k) {
+        for (const Index node : links_[k].nodes()) {
+            by_slide[k] += by_state.segment<3>(3 * node);
+            forces[k] += gradient.segment<3>(3 * node);
+        }
+        const Index parent = joints_[k].parent;
+        if (parent >= 0) {
+            by_slide[parent] += by_slide[k];
+            forces[parent] += forces[k];
+        }
+        if (origins_[k].size() == 0) continue;
+        const auto by_point = [&](const Mat3& turn, const Vec3& rate) -> Vec3 {
+            return turn.transpose() * (by_slide[k] + forces[k].cross(rate));
+        };
+        out.values.segment<3>(origins_[k].first) +=
+            (parent < 0 ? by_slide[k] : by_point(poses[parent].rotation, rates[parent])) -
+            by_point(poses[k].rotation, rates[k]);
+    }
 }
 
 SkeletonCarrier::Pose SkeletonCarrier::moved(Index link, const std::vector<Pose>& from,
@@ -291,26 +349,30 @@ void SkeletonCarrier::settle(VectorXd& q, VectorXd* v) const {
 }
 
 // v = B z with z = B_l^+ v_l; as the pose moves by dz, B changes, whose products with z are d2x.
-void SkeletonCarrier::settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const {
+void SkeletonCarrier::settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
+                                 Gradient& out) const {
     const MatrixXd b = jacobian(q), led = leading(b);
     const auto inverse = solver_of(MatrixXd(led.transpose() * led));
     VectorXd by_pose = b.transpose() * gather(by_q);
     const VectorXd nothing = VectorXd::Zero(3 * nodes().size());
+    VectorXd rates = VectorXd::Zero(coordinates_), apart = VectorXd::Zero(q.size()), by_state = apart;
     if (by_v.size() > 0) {
         const VectorXd by_rates = gather(by_v);
         const VectorXd by_leading = led * inverse.solve(b.transpose() * by_rates);
         VectorXd given = nothing;
         scatter_leading(by_leading, given);
-        const VectorXd z = inverse.solve(led.transpose() * leading(gather(v)));
+        rates = inverse.solve(led.transpose() * leading(gather(v)));
         scatter(given, by_v);
-        VectorXd apart = VectorXd::Zero(q.size());
         scatter(by_rates - given, apart);
-        by_pose += second_derivative(q, apart).transpose() * z;
+        by_pose += second_derivative(q, apart).transpose() * rates;
     }
-    if (leading_.size() == nodes().size()) return;  // its pose is the caller's own
-    VectorXd given = nothing;
-    scatter_leading(led * inverse.solve(by_pose), given);
-    scatter(given, by_q);
+    if (leading_.size() < nodes().size()) {  // else its pose is the caller's own
+        VectorXd given = nothing;
+        scatter_leading(led * inverse.solve(by_pose), given);
+        scatter(gather(by_q) - given, by_state);
+        scatter(given, by_q);
+    }
+    places_vjp(q, by_state, rates, apart, out);
 }
 
 }  // namespace magshell

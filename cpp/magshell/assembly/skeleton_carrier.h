@@ -18,8 +18,12 @@ namespace magshell {
 
 class SkeletonCarrier final : public Carrier {
   public:
-    /// joints[k] leads to links[k]; parents come first. motors: where the values of driven joints stand.
-    SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Joint> joints, std::vector<Slot> motors = {});
+    /// Where values of a joint stand, empty where there are none: what its motor prescribes, and its origin.
+    struct Slots {
+        Slot motor, origin;
+    };
+    /// joints[k] leads to links[k]; parents come first.
+    SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Joint> joints, std::vector<Slots> slots = {});
 
     Index coordinates() const override { return coordinates_ - driven(); }
     Index driven() const override { return static_cast<Index>(driven_.size()); }
@@ -27,11 +31,15 @@ class SkeletonCarrier final : public Carrier {
     VectorXd driven_increment(const VectorXd& q) const override;
     VectorXd driven_units() const override;
     void driven_vjp(const VectorXd& by_driven, Gradient& out) const override;
-    Eigen::MatrixXd jacobian(const VectorXd& q) const override;
+    bool placed() const override;
+    void places_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z, const VectorXd& gradient,
+                    Gradient& out) const override;
+    LinkTwists twists(const VectorXd& q) const override;
     Eigen::MatrixXd curvature(const VectorXd& q, const VectorXd& gradient) const override;
     void advance(VectorXd& q, const VectorXd& z) const override;
     void settle(VectorXd& q, VectorXd* v) const override;
-    void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v) const override;
+    void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
+                    Gradient& out) const override;
 
   private:
     using Pose = RigidNodes::Pose;
@@ -70,8 +78,10 @@ class SkeletonCarrier final : public Carrier {
         double target = 0.0;
     };
     std::vector<Motor> driven_;
+    std::vector<Slot> origins_;   // of each joint
     std::vector<Index> leading_;  // nodes, among all
     Index coordinates_ = 0;
+    std::shared_ptr<const LinkPaths> paths_;
 };
 
 }  // namespace magshell

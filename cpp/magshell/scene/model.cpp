@@ -36,15 +36,18 @@ Carriers carriers_of(const Bodies& bodies, const std::vector<SkeletonInput>& ske
             links.push_back(link(part));
             joined[part] = 1;
         }
-        std::vector<Slot> motors(skeleton.joints.size());
-        for (std::size_t k = 0; k < motors.size(); ++k)
-            if (skeleton.joints[k].driven)
-                motors[k] = registry.values.add(
-                    skeleton.owners[k],
-                    skeleton.joints[k].kind == JointKind::revolute ? "motor_angle" : "motor_displacement",
-                    "SI", 1, 1);
+        std::vector<SkeletonCarrier::Slots> slots(skeleton.joints.size());
+        for (std::size_t k = 0; k < slots.size(); ++k) {
+            const Joint& joint = skeleton.joints[k];
+            const bool hinge = joint.kind == JointKind::revolute;
+            if (joint.driven)
+                slots[k].motor = registry.values.add(
+                    skeleton.owners[k], hinge ? "motor_angle" : "motor_displacement", "SI", 1, 1);
+            if (hinge || joint.kind == JointKind::ball)
+                slots[k].origin = registry.values.add(skeleton.labels[k], "origin", "m", 1, 3);
+        }
         carriers.push_back(
-            std::make_unique<SkeletonCarrier>(std::move(links), skeleton.joints, std::move(motors)));
+            std::make_unique<SkeletonCarrier>(std::move(links), skeleton.joints, std::move(slots)));
     }
     for (Index part = 0; part < static_cast<Index>(joined.size()); ++part)
         if (!joined[part])
@@ -123,8 +126,9 @@ void Model::hand_out_values() {
 
 NodeMatrix Model::surrogate() const {
     NodeMatrix sum(nodes().n_nodes());
+    // Dampers act on few coordinates, whose stiffness in a step secants learn.
     for (const std::unique_ptr<Term>& term : terms_)
-        if (!term->add_surrogate(sum))
+        if (term.get() != damper_term_ && !term->add_surrogate(sum))
             throw InvalidInput("Projective Dynamics has no constant matrix for the " +
                                std::string(term->name()) + " energy of this scene");
     sum.finish();

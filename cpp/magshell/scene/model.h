@@ -52,6 +52,8 @@ class Model {
     const Nodes& nodes() const { return bodies_.nodes(); }
     const MembraneFaces& membrane_faces(Index body) const { return *membrane_faces_[body]; }
     const Reduction& reduction() const { return reduction_; }
+    /// As evaluate does, and nothing else.
+    void linearize(const VectorXd& q) { reduction_.linearize(q); }
     SystemMatrix& matrix() { return matrix_; }
     /// Of matrix() and what touching bodies add to it: its product with x, its diagonal, its free rows and columns.
     void multiply(const VectorXd& x, VectorXd& out) const;

@@ -86,6 +86,7 @@ struct SkeletonInput {
     std::vector<Index> links;  // of SceneInput::rigid
     std::vector<Joint> joints;
     std::vector<std::string> owners;  // of joints in which something acts; empty where nothing does
+    std::vector<std::string> labels;  // of all joints; empty where there is none
 };
 
 /// A point of one rigid part that is pulled to a point of another, or of the world (negative).

@@ -98,8 +98,9 @@ class Newton {
     /// As far along a step as there are states; the share of it, negative where that leads nowhere, and the report
     /// says why.
     double advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
-    /// From the end of a step, last evaluated, back towards `from` by secants where the energy has risen again there,
-    /// which fell at `slope` [J] at the beginning; the share of the step that is left.
+    /// From the end of a step, last evaluated, back towards `from` where the energy has risen again there, which fell
+    /// at `slope` [J] at the beginning, to where it hardly changes, between too far and not far enough; the share of the
+    /// step that is left.
     double search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
                   const VectorXd& step, double slope);
 

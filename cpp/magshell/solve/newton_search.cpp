@@ -83,16 +83,30 @@ void Newton::tell_contact(NewtonReport& report) const {
 
 double Newton::search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
                       const VectorXd& step, double slope) {
-    constexpr double rising = 0.5, least = 0.1;  // of the slope at the beginning; of a cut
-    constexpr int most_cuts = 12;
-    double part = 1.0;
-    for (int cut = 0; cut < most_cuts; ++cut) {
-        const double there = -gradient(q, anchor).dot(step);
-        if (there >= -rising * slope) break;
-        part *= std::clamp(slope / (slope - there), least, 0.5);
+    constexpr double enough = 0.5;  // of the slope at the beginning is left, or has come back
+    constexpr int most_trials = 12;
+    const auto slope_here = [&] { return gradient(q, anchor).dot(step); };
+    double part = 1.0, near = 0.0, far = 1.0, at_near = -slope, at_far = slope_here();
+    if (at_far <= enough * slope) return part;
+    for (int trial = 0; trial < most_trials; ++trial) {
+        // What touches rises ever faster: a secant falls short. Illinois' rule halves the end that stays.
+        part = std::clamp(near + (far - near) * at_near / (at_near - at_far), near + 0.1 * (far - near),
+                          far - 0.1 * (far - near));
         q = from;
         model_.reduction().advance(q, part * step);
         evaluate(q, controls, anchor);
+        const double there = slope_here();
+        if (there > enough * slope) {
+            far = part;
+            at_far = there;
+            at_near *= trial > 0 ? 0.5 : 1.0;
+        } else if (there < -enough * slope) {
+            near = part;
+            at_near = there;
+            at_far *= trial > 0 ? 0.5 : 1.0;
+        } else {
+            break;
+        }
     }
     return part;
 }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "magshell/solve/modes.h"
+#include "magshell/term/body_contact_term.h"
 
 namespace magshell {
 namespace {
@@ -157,7 +158,14 @@ class Relaxation {
 }  // namespace
 
 RelaxationReport relax(Newton& newton, VectorXd& q, const Controls& controls, int max_steps) {
-    return Relaxation(newton, q, controls).run(max_steps);
+    RelaxationReport report = Relaxation(newton, q, controls).run(max_steps);
+    const Model& model = newton.model();
+    if (report.converged || !model.has_body_contact() || !model.refusal(q).empty()) return report;
+    // Whatever the reason, what touches may be what is in the way.
+    newton.evaluate(q, controls, {});
+    if (const std::string hardest = model.body_contact()->hardest(); !hardest.empty())
+        report.reason += "; bodies touch: " + hardest;
+    return report;
 }
 
 }  // namespace magshell

@@ -48,7 +48,9 @@ NewtonReport Stepper::solve(VectorXd& q, const Controls& controls, const Anchor&
     const VectorXd predicted = q;
     const Model::Turns turns = model.turns();
     NewtonReport report = newton_.solve(q, controls, anchor);
-    if (!report.converged && !model.has_body_contact() && (model.has_contact() || newton_.options().mixed)) {
+    // Where bodies touched, Newton has searched already.
+    const bool searched = model.has_body_contact() && report.touched;
+    if (!report.converged && !searched && (model.has_contact() || newton_.options().mixed)) {
         q = predicted;
         model.set_turns(turns);
         report = model.has_contact() ? newton_.solve_damped(q, controls, anchor)

@@ -22,8 +22,9 @@ struct MotionState {
     StrainSet e;       // of the Maxwell branch; empty without one
     StageRates rates;  // at the end of the step that led here, for a method that begins with them; else empty
     VectorXd driving;  // what motors do there [N, N m]; empty where none is, and before the first step
-    VectorXd held;  // [N] what supports pulled with at the end of that step, as Reduction::held; else empty
-    VectorXd v_before;       // where motors are: at the beginning of the step that led here
+    VectorXd held =
+        {};  // [N] what supports pulled with at the end of that step, as Reduction::held; else empty
+    VectorXd v_before = {};  // where motors are: at the beginning of the step that led here
     double dt_before = 0.0;  // [s] of that step; 0: there was none
 };
 

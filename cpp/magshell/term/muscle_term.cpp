@@ -45,6 +45,31 @@ class MuscleEnergy final : public MuscleTerm {
         });
     }
 
+    /// w m m^T, as stiff as it is at rest, fully activated: so that it stays the same whatever the activation.
+    bool add_surrogate(NodeMatrix& out) const override {
+        const FibreLaw::Response law = fibres_->law.at(Pack(1.0), Pack(1.0));
+        const Pack stiffness = max(max(law.slope, law.tension), Pack(0.0));
+        for (Index pack = 0; pack < loop_.packs(); ++pack) {
+            const Pieces& each = fibres_->at(pack);
+            Pack sum[N][N];
+            for (int k = 0; k < N; ++k)
+                for (int l = 0; l <= k; ++l) {
+                    sum[k][l] = Pack(0.0);
+                    for (int p = 0; p < points; ++p)
+                        sum[k][l] += (each.strength * stiffness * each.volume[p]) *
+                                     (each.m[p].alpha[k] * each.m[p].alpha[l]);
+                }
+            for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+                const std::span<const Index> nodes = fibres_->fibres.nodes_of(loop_.element(pack, lane));
+                for (int k = 0; k < N; ++k) {
+                    out.add_diagonal(nodes[k], sum[k][k][lane]);
+                    for (int l = 0; l < k; ++l) out.add_pair(nodes[k], nodes[l], sum[k][l][lane]);
+                }
+            }
+        }
+        return true;
+    }
+
     void evaluate(const double* q, const Controls&, Residual& out) override {
         loop_.scatter_packs([&](Index pack) {
             const Pieces& each = fibres_->at(pack);

@@ -17,9 +17,6 @@ class Owner:
         for name in self._replaceable:
             numbers[label, name] = getattr(self, name)
 
-    def check_in_time(self, name: str, rows) -> None:
-        """Raises ValueError where a value over time, rows of it, cannot be."""
-
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
         """By its values, from the core's gradient; a row for each of its parts."""
         return {name: gradient.value(label, name) for name in self._replaceable}

@@ -9,7 +9,7 @@ import numpy as np
 
 import magshell as ms
 
-from . import motion_costs, projective_motions, solid_motions, surrounding_costs
+from . import motion_costs, projective_motions, solid_motions, surrounding_costs, thrown_bars
 from .ratios import note
 from .report import add_rounds, chosen, print_table
 
@@ -55,6 +55,7 @@ def run(options: argparse.Namespace) -> dict:
         **motion_costs.measure(options.rounds, options.quick, cells),
         **solid_motions.measure(options.rounds, options.quick),
         **projective_motions.measure(options.rounds, options.quick),
+        "thrown bars": thrown_bars.measure(options.rounds, options.quick),
         "surroundings": surrounding_costs.measure(options.rounds, options.quick),
     }
     if options.long:

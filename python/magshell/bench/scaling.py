@@ -14,7 +14,7 @@ import magshell as ms
 from magshell import _core
 from magshell.scene.inputs import Inputs
 
-from . import busy_machine, solid_scaling
+from . import busy_machine, skeleton_scaling, solid_scaling
 from .ratios import note
 from .report import add_rounds, bar, chosen, print_table
 from .statics import strongly_bent
@@ -83,6 +83,7 @@ def run(options: argparse.Namespace) -> dict:
         print(f"\nThe process of {ended} faces was ended, {_WHY}. It and larger sizes are left out.")
     return {
         "solids": solid_scaling.measure(options.rounds, options.quick),
+        "skeletons": skeleton_scaling.measure(options.rounds, options.quick),
         "busy machine": busy_machine.measure(company),
         "bending": options.bending,
         "sizes": {str(threads): each for threads, each in zip(THREADS, (one, two), strict=True)},

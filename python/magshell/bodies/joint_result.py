@@ -88,13 +88,13 @@ class JointResult:
 
     @property
     def place(self):
-        """(..., 3) m, of the joint, on its child."""
+        """(..., 3) m, of the joint as the scene has it, on its child: that point where a solve has another origin."""
         return self._place_of(self._child)
 
     @property
     def gap(self):
         """(...) m, between its place on the child and on the parent: what is left of a Closure, and round-off of others but
-        a Prismatic, whose displacement it is."""
+        a Prismatic, whose displacement it is. Where a solve has another origin, that of the place as the scene has it."""
         return ((self.place - self._place_of(self._parent)) ** 2).sum(-1) ** 0.5
 
     @property

@@ -44,7 +44,11 @@ class Joint(Owner):
         self._check_together()
         self.rate = None if rate is None else self._checked_rate(rate)
         # What it was made without, a solve cannot give it.
-        self._replaceable = (*self._given, *(() if rate is None else ("rate",)))
+        self._replaceable = (
+            *self._given,
+            *(() if rate is None else ("rate",)),
+            *(("origin",) if self.has_place else ()),
+        )
         self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
 
     def __getattr__(self, name: str):
@@ -119,22 +123,34 @@ class Joint(Owner):
         own = {name: getattr(self, name) for name in self._replaceable}
         return self._again({**own, **values})
 
+    @property
+    def has_place(self) -> bool:
+        """Whether it matters where its origin is, and solves may change it."""
+        return self._kind in ("revolute", "ball")
+
     def _again(self, law: dict) -> Joint:
         axis = {"axis": self.axis} if self.axis.any() else {}
-        return type(self)(child=self.child, parent=self.parent, origin=self.origin, **axis, **law)
+        return type(self)(child=self.child, parent=self.parent, **{"origin": self.origin, **axis, **law})
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         if self.acts:
             for name, default in self._defaults.items():
                 numbers[label, name] = self._given.get(name, default)
+        if self.has_place:
+            numbers[label, "origin"] = self.origin
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
         found = {name: gradient.value(label, name)[0] for name in self._given}
+        if self.has_place:
+            found["origin"] = gradient.value(label, "origin")[0]
         if self.rate is not None:
             rows = gradient.others.get("own_velocities")
             found["rate"] = np.zeros(np.shape(self.rate))
             for place in values.moved_by(self) if rows is not None else ():
-                found["rate"] = found["rate"] + self._rate_gradient(place.rest, rows[place.points])
+                moved = rows[place.points]
+                found["rate"] = found["rate"] + self._rate_gradient(place.rest, moved)
+                if self.has_place:
+                    found["origin"] = found["origin"] + np.cross(self._turning, moved).sum(axis=0)
         return found
 
     def velocities(self, points: np.ndarray) -> np.ndarray:
@@ -143,6 +159,11 @@ class Joint(Owner):
 
     def _rate_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
         return (by_velocities * self._directions(points)).sum()
+
+    @property
+    def _turning(self) -> np.ndarray:
+        """How fast it turns to start with: (3,) rad/s."""
+        return self.rate * self.axis if self._kind == "revolute" else self.rate
 
     def _directions(self, points: np.ndarray) -> np.ndarray:
         """How points move as its coordinate does: (n, 3), m/rad or 1."""
@@ -190,7 +211,8 @@ class Revolute(Joint):
         servo and limits. How fast it is to start with, `rate` says.
     rate: rad/s, at the start of a motion from rest positions, in a tree without vertices.
 
-    All but the rate and the places may change in ms.simulate, one value a step or at the ends of steps.
+    Solves take another origin too, with the same links at rest. All but the rate and the places may change in ms.simulate,
+    one value a step or at the ends of steps.
 
     >>> import numpy as np
     >>> import magshell as ms
@@ -218,7 +240,7 @@ class Revolute(Joint):
         "limit_smoothing": 1.0,
     }
     _in_time = tuple(_defaults)
-    _replaceable = (*_in_time, "rate")
+    _replaceable = (*_in_time, "rate", "origin")
 
     def __init__(
         self,
@@ -318,7 +340,7 @@ class Ball(Joint):
         "limit_smoothing": 1.0,
     }
     _in_time = tuple(_defaults)
-    _replaceable = (*_in_time, "rate")
+    _replaceable = (*_in_time, "rate", "origin")
 
     def __init__(
         self,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from copy import copy
+from typing import ClassVar
 
 import numpy as np
 
-from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers, shape_of
 from .._checks.scalars import positive
-from .._checks.tensors import detached
+from .actuator import Actuator
 from .fibre_tables import checked_force_velocity, checked_table, core_curve
 from .fibres import checked_directions, checked_weights, fibres_of
 from .solid import Solid
@@ -17,7 +17,7 @@ from .solid import Solid
 _TABLES = ("force_length", "passive", "force_velocity")
 
 
-class Muscle(Owner):
+class Muscle(Actuator):
     """Fibres in a solid's tetrahedra that pull along themselves: one of the actuators of a scene.
 
     body: the Solid that they are in. With F the deformation and m the unit vector along a fibre at rest, its stretch is
@@ -60,6 +60,8 @@ class Muscle(Owner):
 
     _replaceable = ("activation", "fibres", "weights", "stiffness", "peak_stress", "shortening_rate")
     _in_time = ("activation",)
+    _units: ClassVar[dict[str, str]] = {"activation": "1"}
+    is_spring = False  # its stiffness is there at rest, as its solid's
 
     def __init__(
         self,
@@ -79,7 +81,7 @@ class Muscle(Owner):
     ):
         if not isinstance(body, Solid):
             raise ValueError(f"body of a Muscle must be a Solid, got {body!r:.60}")
-        self.body = body
+        self.bodies = (body,)
         found = fibres_of(fibres, body.mesh, elements)
         count = body.mesh.n_tetrahedra
         self.elements = np.flatnonzero(found.elements) if found.elements.dtype == bool else found.elements
@@ -149,11 +151,6 @@ class Muscle(Owner):
     def range(self) -> tuple[float, float]:
         """Of the activation."""
         return (0.0 if self.stiffness is None else -1.0), 1.0
-
-    def check_in_time(self, name: str, rows) -> None:
-        """Raises ValueError where activations over time leave their range."""
-        if name == "activation":
-            self._in_range(np.asarray(detached(rows)))
 
     def _activation(self, given, row: tuple[int, ...]) -> np.ndarray:
         array = real_numbers("activation", given)

@@ -32,7 +32,7 @@ class FibreStates(NamedTuple):
 def muscles_of(result, body: Solid, index: int) -> dict[str, np.ndarray] | None:
     """Of each tetrahedron of a solid (n_t,): activation and stretch as its muscles have them in the mean, by their weights,
     and the sum of their tensions; NaN without any. None where the solid has no muscle."""
-    muscles = [each for each in _muscles(result.scene) if each.body is body]
+    muscles = [each for each in muscles_in(result.scene) if each.body is body]
     if not muscles:
         return None
     weights, *sums = np.zeros((4, body.mesh.n_tetrahedra))
@@ -60,7 +60,7 @@ class MuscleResult:
     """
 
     def __init__(self, result, muscle: Muscle):
-        if not any(muscle is each for each in _muscles(result.scene)):
+        if not any(muscle is each for each in muscles_in(result.scene)):
             raise ValueError(
                 f"a muscle of the scene is one of scene.actuators, got {muscle!r} that is not in it"
             )
@@ -70,13 +70,14 @@ class MuscleResult:
         """Of its fibres; of a motion or a path in a recorded state, by default the last."""
         result = self._result
         scene, values = result.scene, result._values_at(index)
-        number = next(k for k, each in enumerate(_muscles(scene)) if each is self.muscle)
+        number = next(k for k, each in enumerate(muscles_in(scene)) if each is self.muscle)
         velocity = None
         if self.muscle.force_velocity is not None and hasattr(result, "velocities"):
             rows = np.asarray(detached(result.velocities), dtype=np.float64)[index]
             velocity = scene._model.full_vector(np.ascontiguousarray(rows))
+        state = result._state_at(index)
         with values.in_core():
-            return FibreStates(*_core.fibre_states(scene._model, number, result._state_at(index), velocity))
+            return FibreStates(*_core.fibre_states(scene._model, number, state, velocity))
 
     def activation(self, index: int = -1) -> np.ndarray:
         """(k,), 1, of each tetrahedron with fibres."""
@@ -115,6 +116,6 @@ class MuscleResult:
         )
 
 
-def _muscles(scene) -> list[Muscle]:
+def muscles_in(scene) -> list[Muscle]:
     """In the core's numbers: the other actuators of a scene are not among them."""
     return [each for each in scene.actuators if isinstance(each, Muscle)]

@@ -196,3 +196,34 @@ def _not_from(start, what: str) -> ValueError:
     return ValueError(
         f"the {what} is that of a motion that starts at rest positions; this one goes on from {type(start).__name__}"
     )
+
+
+def check_joints(inputs, points: np.ndarray) -> None:
+    """Raises ValueError where a motion goes on from points (n, 3) m whose joints had other origins.
+
+    points: as the core has them, those of rigid parts last.
+    """
+    scene, first = inputs.scene, inputs.scene.mesh.n_vertices
+
+    def at(link, place: np.ndarray) -> np.ndarray:
+        if link is None:
+            return place
+        k = scene._bodies.rigid_number(link)
+        rigid, rows = scene._rigid[k], points[first + 10 * k :][:4]
+        middle = rows.mean(axis=0)
+        turn = (rows - middle).T @ (rigid.rest[:4] - rigid.rest[:4].mean(axis=0)) / (4.0 * rigid.length**2)
+        return middle + turn @ (place - rigid.rest[:4].mean(axis=0))
+
+    for own in scene.joints:
+        if not own.has_place:
+            continue
+        origin = inputs.values.current(own).origin
+        gap = float(np.linalg.norm(at(own.child, origin) - at(own.parent, origin)))
+        if gap > _OPEN * max(scene.mesh.size if first else 0.0, float(np.abs(points).max())):
+            raise ValueError(
+                f"start had another origin of {own!r:.60}: links would be {gap:.3g} m apart there; give origin the value "
+                "of that solve, or start at rest positions"
+            )
+
+
+_OPEN = 1e-8

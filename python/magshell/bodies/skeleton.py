@@ -19,7 +19,7 @@ class Skeleton:
     Soft material around a link rides on it by its vertices, Link(vertices=..., body=solid). Joints hold to round-off, also
     over many steps. Values of joints go by the joint, values={hinge: {"torque": ...}}, and may change in time;
     `result[hinge].angle` and `result[link]` tell how it moves. ms.simulate takes it by TRBDF2 or ImplicitEuler.
-    Places and axes of joints have no gradient.
+    There are gradients by origins of Revolute and Ball joints; by axes, and by the place of a Closure, there are none.
 
     >>> import numpy as np
     >>> import magshell as ms

@@ -35,6 +35,7 @@ def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -
         "links": [part[id(link)] for link in links],
         "joints": [_joint(each, place) for each in joints],
         "owners": [label[id(each)] if each is not None and each.acts else "" for each in joints],
+        "labels": ["" if each is None else label[id(each)] for each in joints],
     }
 
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._checks.tensors import detached
-from ..bodies.muscle import Muscle
+from ..bodies.actuator import Actuator
 from ..obstacles import Obstacle
 from ..scene.courses import Course
-from ..scene.values import Values
-from ..surroundings.actuator import Actuator
 from ..surroundings.supports import Support
 from .obstacle_paths import ObstaclePath
 from .supports_in_time import check_supports
@@ -19,7 +16,7 @@ class InTime:
     """What of a scene's values changes during one motion.
 
     entries: of the core's values, those that follow the other controls; rows: (knots, m), theirs. poses: {number of an
-    obstacle: its poses at the knots (knots, 4, 3)}.
+    obstacle: its poses at the knots (knots, 4, 3)}. of_actuators: {(actuator, name): (knots, ...)}.
     """
 
     def __init__(self, asked, courses: list[Course]):
@@ -33,8 +30,6 @@ class InTime:
             course.check(asked.steps)
         of_values = [each for each in courses if not isinstance(each.owner, Obstacle)]
         knots = [asked.at_knots(each.name, each.unit, each.value, each.row) for each in of_values]
-        for course, at_knots in zip(of_values, knots, strict=True):
-            course.owner.check_in_time(course.name, at_knots)
         check_supports(
             asked, [(c, k) for c, k in zip(of_values, knots, strict=True) if isinstance(c.owner, Support)]
         )
@@ -47,19 +42,8 @@ class InTime:
                 self.of_actuators[course.owner, course.name] = numbers.reshape(-1, *course.row)
                 self._check_actuator(course)
             rows += [numbers] * self._add(course, numbers.shape[1])
-        self.activations: dict[Muscle, np.ndarray] = {
-            course.owner: np.asarray(detached(at_knots), dtype=np.float64)
-            for course, at_knots in zip(of_values, knots, strict=True)
-            if isinstance(course.owner, Muscle)
-        }
         self.rows = np.concatenate(rows, axis=1)
         self._add_obstacles([each for each in courses if isinstance(each.owner, Obstacle)])
-
-    def values(self, values: Values, knot: int) -> Values:
-        """Those of the motion with the activations at one of its knots."""
-        return values.with_objects(
-            {muscle: muscle.replaced(activation=rows[knot]) for muscle, rows in self.activations.items()}
-        )
 
     def _add(self, course: Course, width: int) -> int:
         """Finds the places of a value in the core; how many there are."""

@@ -10,7 +10,7 @@ from .._checks.quantity import quantity, shape_of
 from .._checks.scalars import not_negative, positive
 from .._checks.tensors import detached, is_tensor, wants_gradient
 from .._machine.memory import check_memory
-from ..bodies.rigid_place import check_rigid, own_velocities
+from ..bodies.rigid_place import check_joints, check_rigid, own_velocities
 from ..methods.clock import Clock, clock_of
 from ..methods.integrators import Integrator
 from ..methods.solvers import Newton
@@ -109,11 +109,6 @@ class MotionInputs:
         ends = a_step * self.record_every * np.arange(1, count) - 1
         return np.concatenate([[0], ends])
 
-    @property
-    def activations(self) -> InTime | None:
-        """What is in time of muscles, if anything is."""
-        return self._in_time if self._in_time.activations else None
-
     def _all_controls(self) -> np.ndarray:
         """(knots, m), in the core's layout."""
         layout, moving = self.inputs.scene._control_layout, {**self._poses(), **self._in_time.poses}
@@ -195,6 +190,8 @@ class MotionInputs:
     def _begin(self, start, velocities) -> MotionState:
         inputs, model = self.inputs, self.inputs.scene._model
         origin = self._origin(start)
+        if inputs.scene.joints:
+            check_joints(inputs, model.points(origin.state))
         goes_on = isinstance(start, Trajectory | MotionState)
         own = own_velocities(inputs, start, goes_on)
         if goes_on and inputs.scene.rigid_parts:  # free bodies go on as they did, whatever the vertices do
@@ -210,7 +207,8 @@ class MotionInputs:
         inputs.scene._bodies.check_welded("velocities", "m/s", rows)
         velocity = model.full_vector(np.concatenate([rows, own]))
         if inputs.scene.rigid_parts:
-            velocity = model.settled_velocity(origin.state, velocity)
+            with inputs.in_core():
+                velocity = model.settled_velocity(origin.state, velocity)
             fastest = np.abs(rows).max(initial=0.0)
             check_rigid(inputs.scene, rows, model.positions(velocity), "velocities [m/s]", fastest)
         return MotionState(
@@ -247,7 +245,8 @@ class MotionInputs:
         inputs.scene._bodies.check_welded("start", "m", positions)
         check_faces(inputs.scene, positions)
         self._outside = positions
-        state = model.state(positions, np.zeros(mesh.n_edges))
+        with inputs.in_core():
+            state = model.state(positions, np.zeros(mesh.n_edges))
         check_rigid(inputs.scene, positions, model.positions(state), "start [m]", mesh.size)
         return MotionState(0.0, state, still, rotations_known=False)
 

@@ -266,8 +266,6 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         _own_points=points[:, n_v:] if rigid else None,
         _own_velocities=velocities[:, n_v:] if rigid else None,
         _driving=found.driving(),
-        _activations=asked.activations,
-        _record_every=asked.record_every,
     )
 
 

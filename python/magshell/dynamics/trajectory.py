@@ -12,6 +12,7 @@ from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.tensors import detached
 from .._machine.files import replace_file
+from ..bodies.actuator import Actuator
 from ..bodies.body_result import BodyResult
 from ..bodies.of_body import result_of
 from ..bodies.rigid import Rigid
@@ -106,7 +107,8 @@ class Trajectory:
         leaves the model, of which ms.LargeStrainWarning warns.
     steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
     taken}. calmed: the steps, or steps with parts, that implicit Euler took instead of the integrator, because bodies
-    touched and the step would have gained energy that nothing put in. end: the last state, from which another simulation goes on. bytes: kept for gradients.
+    touched and the step would have gained energy that nothing put in. end: the last state, from which another simulation
+    goes on. bytes: kept for gradients.
     """
 
     scene: Scene
@@ -145,8 +147,6 @@ class Trajectory:
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
     _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
-    _activations: Any = field(repr=False, default=None)  # what changed of the values
-    _record_every: int = field(repr=False, default=1)
 
     def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
         """What it says of one body of the scene."""
@@ -161,17 +161,12 @@ class Trajectory:
         return self.positions - self.positions.new_tensor(np.array(rest))
 
     def _values_at(self, index: int):
-        """With the values in time that muscles had then."""
-        return (
-            self._values
-            if self._activations is None
-            else self._activations.values(self._values, self._knot(index))
-        )
-
-    def _knot(self, index: int) -> int:
-        """Where a recorded state is among the times at which controls are given."""
-        step = range(len(self))[index] * self._record_every
-        return 0 if step == 0 else (len(self.integrator._times) + 1) * step - 1
+        """With the actuators as they were then."""
+        then: dict[Actuator, dict] = {}
+        for (actuator, name), rows in self._varied.items():
+            then.setdefault(actuator, {})[name] = rows[index]
+        now = {each: self._values.current(each).replaced(**named) for each, named in then.items()}
+        return self._values.with_objects(now) if now else self._values
 
     @property
     def _obstacles(self) -> tuple:
@@ -223,7 +218,10 @@ class Trajectory:
         """Of the core."""
         positions, rotations = (detached(each)[index] for each in (self.positions, self.edge_rotations))
         model = self.scene._model
-        state = model.state(np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64))
+        with self._values.in_core():
+            state = model.state(
+                np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64)
+            )
         before = 3 * self.scene._bodies.n_points
         if self._own_points is not None:  # free parts are where no vertex tells
             own = np.asarray(detached(self._own_points)[index], dtype=np.float64)

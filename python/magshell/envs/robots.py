@@ -17,9 +17,10 @@ from ..scene.scene import Scene
 from ..surroundings.supports import Clamp, Pin
 from .actuator import Actuator
 from .environment import Environment
+from .fish import SOLVER, STEPS, TARGET, TETRAHEDRA, TIME_STEP, TORQUES, Fish
 from .library import require_gymnasium
 
-__all__ = ["magnetic_strip", "soft_arm"]
+__all__ = ["fish", "magnetic_strip", "soft_arm"]
 
 
 STRIP_LENGTH, STRIP_TARGET = 0.05, 0.01  # m
@@ -89,7 +90,45 @@ def soft_arm(target: float = 0.6, render_mode: str | None = None) -> Environment
     )
 
 
-REGISTERED = {"magshell/MagneticStrip-v0": magnetic_strip, "magshell/SoftArm-v0": soft_arm}
+def fish(n_tetrahedra: int = TETRAHEDRA, target=TARGET, render_mode: str | None = None) -> Environment:
+    """A soft fish with six bones in water; torques in its neck, back, tail and two fins are to take its center of mass to a
+    target, (3,) m from where it was. An action lasts 20 ms, an episode 2 s: [Qiao21] Figure 4c. Observed: way and velocity
+    of the center of mass, angles and rates of the joints. Rewarded: what an action comes nearer, over the way there.
+    n_tetrahedra: about how many.
+    """
+    swimmer = Fish(n_tetrahedra)
+    goal = np.array(target, dtype=float)
+    rest = swimmer.flesh.mesh.rest_positions
+
+    def away(now):
+        return np.linalg.norm(swimmer.weights @ (now.positions - rest) - goal)
+
+    def seen(now):
+        way, velocity = (swimmer.weights @ each for each in (now.positions - rest, now.velocities))
+        turned = [(now[joint].angle, now[joint].rate) for joint in swimmer.joints]
+        return np.concatenate([way, velocity, np.ravel(turned)])
+
+    return Environment(
+        swimmer.scene,
+        actuators=[
+            Actuator(joint, "torque", lower=-most, upper=most)
+            for joint, most in zip(swimmer.joints, TORQUES, strict=True)
+        ],
+        observation=seen,
+        reward=lambda now: (away(now.before) - away(now)) / np.linalg.norm(goal),
+        start=lambda generator: {"velocities": generator.normal(scale=1e-3, size=3)},
+        time_step=TIME_STEP,
+        actions_per_episode=STEPS,
+        simulate={"integrator": ImplicitEuler(), "solver": SOLVER},
+        render_mode=render_mode,
+    )
+
+
+REGISTERED = {
+    "magshell/Fish-v0": fish,
+    "magshell/MagneticStrip-v0": magnetic_strip,
+    "magshell/SoftArm-v0": soft_arm,
+}
 
 for _id, _make in REGISTERED.items():
     require_gymnasium("envs.robots").register(id=_id, entry_point=f"{__name__}:{_make.__name__}")

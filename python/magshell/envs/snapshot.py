@@ -94,6 +94,10 @@ class Snapshot:
     def _own_velocities(self):
         return None if self.motion._own_velocities is None else self.motion._own_velocities[self.index]
 
+    @property
+    def _load_factors(self) -> np.ndarray:
+        return self.motion._load_factors[self.index]
+
     def _values_at(self, index: int):
         return self.motion._values_at(self.index)
 

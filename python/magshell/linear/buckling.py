@@ -106,7 +106,7 @@ def linear_buckling(
     if modes >= model.free_size:
         raise ValueError(f"modes must be below the {model.free_size} unknowns of the scene, got {modes}")
     with inputs.in_core():
-        stiffness = RestStiffness(scene)
+        stiffness = RestStiffness(inputs)
         response = stiffness.response(inputs)
         displacement = float(np.abs(model.points(response)).max())
         change = _stiffness_change(scene, stiffness, response, displacement, inputs)

@@ -84,7 +84,7 @@ def linear_response(
     began = time.perf_counter()
     model = scene._model
     with inputs.in_core():
-        change = RestStiffness(scene).response(inputs)
+        change = RestStiffness(inputs).response(inputs)
     return LinearResponse(
         scene=scene,
         displacements=like(model.positions(change), *inputs.given),

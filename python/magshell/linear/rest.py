@@ -6,26 +6,29 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from .. import _core
+from ..bodies.muscle_result import FibreStates, muscles_in
 from ..scene.inputs import Inputs
-from ..scene.scene import Scene
+
+_ROUND_OFF = 1e-9  # of a muscle's strength
 
 
 class RestStiffness:
     """The Hessian K at the rest shape without controls, factorized once. Works on the free unknowns, (n,).
 
-    Raises ValueError where K is not positive definite: the scene is not held, or not stable at rest; and where actuators
-    have a stiffness of their own, which is no part of K.
+    Raises ValueError where K is not positive definite: the scene is not held, or not stable at rest; where actuators are
+    springs of their own, which are no part of K; and as `refuse_what_acts`.
     """
 
-    def __init__(self, scene: Scene):
-        springs = [each for each in scene.actuators if getattr(each, "is_spring", False)]
-        if springs:
+    def __init__(self, inputs: Inputs):
+        scene = inputs.scene
+        if springs := [each for each in map(inputs.values.current, scene.actuators) if each.is_spring]:
             raise ValueError(
                 f"linear theory takes the stiffness at rest without what acts there, and {springs[0]!r} is a spring that "
                 "acts: ms.equilibrium, ms.follow and ms.vibration_modes have it"
             )
         self._model = scene._model
         self.rest = self._model.rest_state()
+        refuse_what_acts(inputs)
         *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())
         self._factor = _core.analyze(*self._pattern, points=self._model.free_points)
         report = self._factor.factorize(self._values)
@@ -69,6 +72,18 @@ class RestStiffness:
         if moved.any():
             forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved
         return moved + model.expand(self.solve(model.reduce(forces)))
+
+
+def refuse_what_acts(inputs: Inputs) -> None:
+    """Raises ValueError where a muscle pulls at the rest shape, whatever the controls: it is no equilibrium then."""
+    model = inputs.scene._model
+    for k, muscle in enumerate(muscles_in(inputs.scene)):
+        states = FibreStates(*_core.fibre_states(model, k, model.rest_state(), None))
+        if np.abs(states.tensions).max() > _ROUND_OFF * inputs.values.current(muscle).strength:
+            raise ValueError(
+                f"{muscle!r} pulls at the rest shape, which is no equilibrium then: ms.equilibrium and ms.follow have it, "
+                "and ms.vibration_modes about their result; without activation its stiffness at rest counts"
+            )
 
 
 def symmetric(size: int, starts: np.ndarray, rows: np.ndarray, values: np.ndarray) -> csc_array:

@@ -20,7 +20,7 @@ from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
 from .inertia import consistent_masses, in_places
 from .mode_shapes import mode_shapes
-from .rest import symmetric
+from .rest import refuse_what_acts, symmetric
 
 _ROUND_OFF_SHARE = (
     64.0 * np.finfo(float).eps
@@ -120,6 +120,7 @@ def vibration_modes(
         )
     with inputs.in_core():
         if equilibrium is None:
+            refuse_what_acts(inputs)
             stiffness = model.hessian(model.rest_state(), scene._control_layout.zeros())
         else:
             stiffness = model.hessian(equilibrium._state, equilibrium._controls)

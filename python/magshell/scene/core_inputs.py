@@ -28,9 +28,10 @@ def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
 
 
 def muscle_inputs(scene) -> list[dict]:
-    solids = scene._bodies.solids
+    bodies = scene._bodies
+    first = len(bodies.shells) - len(bodies.solids)
     return [
-        muscle._core_input(label, next(k for k, solid in enumerate(solids) if solid is muscle.body))
+        muscle._core_input(label, bodies.core_number(bodies.of(muscle)) - first)
         for muscle, label in scene._labels
         if isinstance(muscle, Muscle)
     ]

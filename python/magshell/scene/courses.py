@@ -9,13 +9,12 @@ import numpy as np
 
 from .._checks.quantity import shape_of
 from .._machine.keywords import nearest_first
+from ..bodies.actuator import Actuator
 from ..bodies.joints import Joint
-from ..bodies.muscle import Muscle
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
-from ..surroundings.actuator import Actuator
 
-_JUMPING = (AppliedField, Joint, Muscle, Actuator)  # their values may change at once, others move
+_JUMPING = (AppliedField, Joint, Actuator)  # their values may change at once, others move
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,6 @@ _UNITS = {
     "rotation": "rad",
     "displacement": "m",
     "pressure": "Pa",
-    "activation": "1",
 }
 
 

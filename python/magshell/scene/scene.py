@@ -12,10 +12,10 @@ import numpy as np
 from .. import _core
 from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity
+from ..bodies.actuator import Actuator
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
 from ..bodies.joints import Joint
-from ..bodies.muscle import Muscle
 from ..bodies.rigid import Rigid
 from ..bodies.rigid_place import places
 from ..bodies.shell import Shell
@@ -25,7 +25,6 @@ from ..bodies.solid import Solid
 from ..bodies.ties import Tie
 from ..fields.field import AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
-from ..surroundings.actuator import Actuator
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.constraints import free_rigid_motions, gather
 from ..surroundings.contact import Contact
@@ -47,6 +46,7 @@ from .values import Values
 
 _LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure)
 _SUPPORTS = (Pin, Clamp, SymmetryPlane)
+_ACTUATORS = "Muscle, Cavity, Cells and Tendon objects"
 
 
 class Scene:
@@ -106,7 +106,10 @@ class Scene:
         self._bodies = Bodies(bodies, ties, shapes_that_touch(self._body_contacts))
         self.supports = checked_list("supports", supports, _SUPPORTS)
         self.loads = checked_list("loads", loads, _LOADS)
-        self.actuators = _checked_actuators(self._bodies, actuators)
+        self.actuators = checked_list("actuators", actuators, (Actuator,), _ACTUATORS)
+        for k, each in enumerate(self.actuators):
+            if any(each is other for other in self.actuators[:k]):
+                raise ValueError(f"actuators must differ, but actuator {k} is there twice")
         self.fields = () if field is None else checked_list("field", field, (AppliedField,))
         self.obstacles = obstacles_of(self._obstacle_contacts)
         if water is not None and not isinstance(water, Water):
@@ -344,18 +347,6 @@ class Scene:
         if len(self.bodies) < 2 or item.body is None:
             return ""
         return f" (body {self._bodies.number(item.body)})"
-
-
-def _checked_actuators(bodies: Bodies, given) -> tuple[Muscle | Actuator, ...]:
-    """Raises ValueError where one is of no solid of the scene, or is there twice."""
-    kinds = "Muscle, Cavity, Cells and Tendon objects"
-    actuators = checked_list("actuators", given, (Muscle, Actuator), kinds)
-    for k, each in enumerate(actuators):
-        if isinstance(each, Muscle) and not any(each.body is solid for solid in bodies.solids):
-            raise ValueError(f"actuator {k} is a Muscle of a solid that is not in the scene: {each.body!r}")
-        if any(each is other for other in actuators[:k]):
-            raise ValueError(f"actuators must differ, but actuator {k} is there twice")
-    return actuators
 
 
 def _refuse_support(parts, held: np.ndarray) -> None:

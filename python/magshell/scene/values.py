@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from copy import copy
+from functools import cached_property
 
 import numpy as np
 
@@ -184,12 +185,19 @@ class Values:
         """These with other objects, {object of the scene: as it is}, whose numbers are their own alone."""
         other = copy(self)
         other._now = {**self._now, **now}
+        other._others = now, self.numbers
+        del other.numbers
+        return other
+
+    @cached_property
+    def numbers(self) -> np.ndarray:
+        """Of `with_objects`, found when asked for: of a motion every state may have its own."""
+        now, before = self._others
         numbers: dict[tuple[str, str], np.ndarray] = {}
         for owner, label in self.scene._labels:
             if owner in now:
-                now[owner].add_numbers(label, other, numbers)
-        other.numbers = self.scene._value_layout.packed(numbers, self.numbers)
-        return other
+                now[owner].add_numbers(label, self, numbers)
+        return self.scene._value_layout.packed(numbers, before)
 
     def move(self, obstacle, path) -> None:
         """Has an obstacle, whose own place is the origin in `numbers`, follow a path."""

@@ -71,10 +71,6 @@ class Equilibria(Sequence):
     def _load_factors(self) -> np.ndarray:
         return np.array([case._load_factors for case in self._cases])
 
-    @property
-    def _varied(self) -> dict:
-        return {}
-
     def _state_at(self, index: int) -> np.ndarray:
         return self._cases[index]._state
 

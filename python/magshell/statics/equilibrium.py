@@ -92,10 +92,6 @@ class Equilibrium:
         """Of its one state, ()."""
         return self.scene._control_layout.of(self._controls, "scene", "load_factor")[0]
 
-    @property
-    def _varied(self) -> dict:
-        return {}
-
     def _state_at(self, index: int) -> np.ndarray:
         return self._state
 

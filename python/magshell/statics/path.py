@@ -127,10 +127,6 @@ class Path:
     def _load_factors(self) -> np.ndarray:
         return self._control("load_factor")[:, 0]
 
-    @property
-    def _varied(self) -> dict:
-        return {}
-
     def _values_at(self, index: int):
         return self._moving.values(self.parameters[index])
 

@@ -43,7 +43,8 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     scene._bodies.check_welded("start", "m", positions)
     check_faces(scene, positions)
     check_outside(scene, inputs.values, positions, 0.0)
-    state = model.state(positions, np.zeros(scene.mesh.n_edges))
+    with inputs.in_core():
+        state = model.state(positions, np.zeros(scene.mesh.n_edges))
     check_rigid(scene, positions, model.positions(state), "start [m]", scene.mesh.size)
     return state, [], inputs.controls, False
 

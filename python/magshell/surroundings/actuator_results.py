@@ -27,11 +27,7 @@ class ActuatorResult:
 
     def _at(self, k: int):
         """The actuator as it was in a state."""
-        varied = {
-            name: rows[k] for (owner, name), rows in self._result._varied.items() if owner is self.actuator
-        }
-        now = self._result._values_at(k).current(self.actuator)
-        return now.replaced(**varied) if varied else now
+        return self._result._values_at(k).current(self.actuator)
 
     def __repr__(self) -> str:
         return f"{type(self._result).__name__} of {self.actuator!r}"

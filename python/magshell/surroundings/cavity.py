@@ -7,10 +7,10 @@ from typing import ClassVar
 import numpy as np
 
 from .._checks.selections import indices, selection
+from ..bodies.actuator import Actuator, number
 from ..bodies.bodies import BODIES, Bodies, on_body
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
-from .actuator import Actuator, number
 from .actuator_results import CavityResult
 from .closed_surface import ClosedSurface, of_faces
 
@@ -37,6 +37,8 @@ class Cavity(Actuator):
         outside_pressure: Pa, that of the surroundings, by default one atmosphere.
     volume: m3, of a liquid. Its pressure is what that takes: that of a bulk modulus (Pa, by default water's) and no
         multiplier, so it takes bulk_modulus / pressure digits of what a double has; solves treat it as a constraint.
+        A volume far from that at rest is reached bit by bit, by ms.WarmStart: the load steps of one solve scale what the
+        liquid does, not how much of it there is.
 
     cap_rims: close what is open by lids without stiffness, fans of triangles from one vertex of each rim, flat where the rim
         is. The pressure on them pulls at the rim.
@@ -56,7 +58,7 @@ class Cavity(Actuator):
     >>> floor = ms.Pin(sheet.mesh.vertices_at(z=0.0))
     >>> air = ms.Cavity(sheet, pressure=200.0)
     >>> blown = ms.equilibrium(ms.Scene(sheet, supports=[floor], actuators=[air]))
-    >>> water = ms.Cavity(sheet, volume=blown[air].volume, bulk_modulus=1e7)
+    >>> water = ms.Cavity(sheet, volume=blown[air].volume, bulk_modulus=1e9)
     >>> filled = ms.equilibrium(ms.Scene(sheet, supports=[floor], actuators=[water]))
     >>> round(float(filled[water].pressure))
     200

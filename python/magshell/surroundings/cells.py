@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from .._checks.selections import indices, selection
+from ..bodies.actuator import Actuator, numbers
 from ..bodies.bodies import Bodies, on_body
 from ..bodies.solid import Solid
-from .actuator import Actuator, numbers
 from .actuator_results import CellsResult
 from .closed_surface import of_tetrahedra
 
@@ -106,8 +106,11 @@ def _groups(groups, n_tetrahedra: int) -> list[np.ndarray]:
                 f"groups must be {n_tetrahedra} integers, one a tetrahedron, or a list of arrays of tetrahedra, "
                 f"got shape {array.shape} of {array.dtype}"
             )
-        count = int(array.max(initial=-1)) + 1
-        cells = [np.flatnonzero(array == k) for k in range(count)]
+        found = sorted({int(each) for each in array if each >= 0})
+        missing = next((k for k, each in enumerate(found) if each != k), None)
+        if missing is not None:
+            raise ValueError(f"cell {missing} has no tetrahedron")
+        cells = [np.flatnonzero(array == array.dtype.type(k)) for k in found]
     for k, cell in enumerate(cells):
         if not len(cell):
             raise ValueError(f"cell {k} has no tetrahedron")

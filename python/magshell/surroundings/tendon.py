@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from .._checks.quantity import quantity
+from ..bodies.actuator import Actuator, number
 from ..bodies.bodies import BODIES, Bodies, on_body
 from ..bodies.rigid import Rigid
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
-from .actuator import Actuator, number
 from .actuator_results import TendonResult
 from .riding import riding_points
 
@@ -41,7 +41,7 @@ class Tendon(Actuator):
     >>> mesh = ms.meshes.box((1, 0.1, 0.1), cells=(4, 2, 2))
     >>> bar = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=100.0, poisson_ratio=0.0))
     >>> pull = ms.Tendon([(0, 0.05, 0.05), (1, 0.05, 0.05)], bar, tension=0.01)
-    >>> found = ms.equilibrium(ms.Scene(bar, supports=[ms.Pin(mesh.vertices_at(x=0.0))], actuators=[pull]))
+    >>> found = ms.equilibrium(ms.Scene(bar, supports=[ms.Pin(bar.mesh.vertices_at(x=0.0))], actuators=[pull]))
     >>> float(found[pull].length) < 0.99
     True
     """
@@ -83,6 +83,10 @@ class Tendon(Actuator):
         self.rest_length = number("rest_length", "m", rest, 0.0, above=True)
         smooth = _SMOOTHING * length if smoothing is None else smoothing
         self.smoothing = number("smoothing", "m", smooth, 0.0, above=True)
+
+    @property
+    def is_spring(self) -> bool:
+        return bool(self.stiffness > 0.0)
 
     @property
     def points(self) -> np.ndarray:

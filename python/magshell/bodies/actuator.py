@@ -11,10 +11,11 @@ from .._checks.quantity import quantity, real_numbers
 
 
 class Actuator(Owner):
-    """Works in bodies by numbers that a controller sets: pressures, volumes, tensions. All of them may change during a
-    motion, at once or gradually, and the load factor scales what it does.
+    """Works in bodies by numbers that a controller sets: activations, pressures, volumes, tensions. They may change during
+    a motion, at once or gradually.
 
-    bodies: those that it works in. is_spring: whether it has a stiffness of its own, which linear theory leaves out.
+    bodies: those that it works in. is_spring: whether it has a stiffness that the load factor scales, which the one at
+    rest, without controls, leaves out.
     """
 
     for_all = False
