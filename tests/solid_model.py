@@ -72,6 +72,7 @@ class SolidModel:
             n_vertices=len(self.nodes),
             original=[],
             sheets=[],
+            six_node_sheets=[],
             skins=[],
             rigid=[],
             skeletons=[],
