@@ -101,6 +101,8 @@ OPTIONAL_MODULES = [
     "distributed",
     "cloudpickle",
     "gymnasium",
+    "pandas",
+    "xarray",
 ]
 LONGEST_FILE = 400
 SPELLINGS = {"cent" + "re": "center"}  # in two halves, as this file is read as well

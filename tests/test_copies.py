@@ -80,11 +80,3 @@ def test_what_goes_together_stays_together():
     sheet, clamp = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6), ms.Clamp(mesh.edges_at(x=0.0))
     scene, same_clamp = pickle.loads(pickle.dumps((ms.Scene(sheet, supports=[clamp]), clamp)))
     assert scene.supports[0] is same_clamp
-
-
-def test_an_equilibrium_says_that_it_cannot():
-    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(2, 1))
-    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
-    rest = ms.equilibrium(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))]))
-    with pytest.raises(TypeError, match=r"an Equilibrium cannot be copied or pickled.*keep its positions"):
-        pickle.dumps(rest)

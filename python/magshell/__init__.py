@@ -55,7 +55,10 @@ from .scene.touching import Touching
 from .starts.multistart import multistart
 from .starts.sampling import random_starts
 from .starts.starts import Multistart
+from .states.saved import load, save
 from .states.series import write_series
+from .states.surface_files import write_surface
+from .states.tables import to_pandas, to_xarray
 from .statics.energies_at import energies
 from .statics.equilibria import Equilibria
 from .statics.equilibrium import Equilibrium
@@ -170,6 +173,7 @@ __all__ = [
     "follow",
     "linear_buckling",
     "linear_response",
+    "load",
     "meshes",
     "minimize",
     "multistart",
@@ -183,15 +187,19 @@ __all__ = [
     "read_fields",
     "read_mesh",
     "residual_to_remanent",
+    "save",
     "set_num_threads",
     "shapes",
     "show_config",
     "simulate",
+    "to_pandas",
+    "to_xarray",
     "vibration_modes",
     "weld",
     "write_mesh",
     "write_page",
     "write_series",
+    "write_surface",
 ]
 
 

@@ -31,6 +31,7 @@ import numpy as np
 from fuzz_calls import Call, Sample, calls
 from fuzz_contact_calls import contact_calls
 from fuzz_env_calls import env_calls
+from fuzz_file_calls import file_calls
 from fuzz_rigid_calls import rigid_calls
 from fuzz_solid_calls import solid_calls
 from fuzz_values import junk, spoilt
@@ -76,6 +77,7 @@ def everything(folder: Path) -> list[Call]:
         *calls(sample),
         *contact_calls(sample),
         *env_calls(sample),
+        *file_calls(sample),
         *rigid_calls(sample),
         *solid_calls(sample),
         *torch_calls(sample),

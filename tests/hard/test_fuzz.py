@@ -13,6 +13,7 @@ import pytest
 from fuzz_calls import Sample, calls
 from fuzz_contact_calls import contact_calls
 from fuzz_env_calls import env_calls
+from fuzz_file_calls import file_calls
 from fuzz_not_called import NOT_CALLED
 from fuzz_rigid_calls import rigid_calls
 from fuzz_solid_calls import solid_calls
@@ -53,6 +54,7 @@ def table(tmp_path):
         *calls(sample),
         *contact_calls(sample),
         *env_calls(sample),
+        *file_calls(sample),
         *rigid_calls(sample),
         *solid_calls(sample),
         *torch_calls(sample),

@@ -59,6 +59,11 @@ def detached(value):
     return numbers_of(value) if is_tensor(value) and not why_not(value) else value
 
 
+def plain_arrays(named: dict) -> dict:
+    """The same with arrays in the place of tensors."""
+    return {name: detached(value) for name, value in named.items()}
+
+
 def to_array(name: str, value):
     """A tensor's numbers; anything else as it came. Tensors that ask for a gradient are refused."""
     if is_tensor(value) and value.requires_grad and not why_not(value):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
@@ -64,6 +65,32 @@ class ObstaclePath:
         )
 
 
+@dataclass(frozen=True)
+class ReadPath:
+    """A path as numbers, read at the times (n,) s of recorded states and at those that its rates are taken from there:
+    centers (n, 3) m, rotations (n, 3) rad. Between them it lies on straight lines."""
+
+    times: np.ndarray
+    centers: np.ndarray
+    rotations: np.ndarray
+
+    @classmethod
+    def of(cls, path, recorded: np.ndarray) -> ReadPath:
+        early = (recorded >= 0) & (recorded < 2 * STEP)  # as `rates` has it
+        ahead = recorded[early][:, None] + np.array(list(FORWARD)) * STEP
+        around = recorded[~early][:, None] + np.array([0, *CENTRAL]) * STEP
+        times = np.unique(np.concatenate([ahead.ravel(), around.ravel()]))
+        centers, rotations = zip(*(path(time) for time in times.tolist()), strict=True)
+        return cls(times, np.array(centers), np.array(rotations))
+
+    def __call__(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        center, rotation = (
+            np.array([np.interp(time, self.times, column) for column in rows.T])
+            for rows in (self.centers, self.rotations)
+        )
+        return center, rotation
+
+
 def _slopes(ends, time_step):
     """(steps + 1, 3): at the ends of steps, those of the parabolas through three of them that lie next to each other."""
     xp, (ends, time_step) = alike((ends, time_step))
@@ -79,7 +106,7 @@ def _slope(function, time):
     """The derivative of a function of the time, numbers or a tensor, from times that it may be asked for."""
     weights = FORWARD if 0 <= float(detached(time)) < 2 * STEP else CENTRAL
     found = [function(time + steps * STEP) for steps in weights]
-    _, found = alike(found)
+    _, found = alike([list(each) if isinstance(each, tuple) else each for each in found])
     return sum(weight / STEP * each for weight, each in zip(weights.values(), found, strict=True))
 
 

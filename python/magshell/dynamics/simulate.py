@@ -254,15 +254,6 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         _values=values,
         _directions=found.directions(model),
         _held_forces=found.held_forces(model),
-        _placed=[
-            (
-                values.current(contact),
-                [values.current(each) for each in contact.obstacles],
-                values.touching(contact),
-                scene._bodies,
-            )
-            for contact in scene._obstacle_contacts
-        ],
         _own_points=points[:, n_v:] if rigid else None,
         _own_velocities=velocities[:, n_v:] if rigid else None,
         _driving=found.driving(),

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._checks.arrays import index_array
 from .._checks.quantity import quantity
-from .._checks.tensors import detached
+from .._checks.tensors import detached, plain_arrays
 from .._machine.files import replace_file
 from ..bodies.actuator import Actuator
 from ..bodies.body_result import BodyResult
@@ -28,10 +28,12 @@ from ..scene.body_kinks import near_body_kinks
 from ..scene.reactions import Reaction, reaction_in
 from ..scene.scene import Scene
 from ..scene.touching import Touching, touching_in
+from ..scene.values import Values
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import near_kinks
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane
+from .obstacle_paths import ObstaclePath, ReadPath
 
 
 @dataclass(frozen=True)
@@ -141,12 +143,29 @@ class Trajectory:
     _values: Any = field(repr=False)
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
     _held_forces: np.ndarray = field(repr=False)  # (n, m, 3) N, of the constraints' held nodes
-    _placed: list = field(
-        repr=False, default_factory=list
-    )  # the first arguments of near_kinks, of each contact
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
     _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
+
+    def __copy__(self) -> Trajectory:
+        return self  # nothing of it changes
+
+    def __getstate__(self) -> dict:
+        """What a copy, another process or a file makes it from again: tensors as arrays, without their gradients, and paths
+        of obstacles as far as the recorded states need them."""
+        pairs = zip(self.scene.obstacles, self._obstacles, strict=True)
+        paths = {
+            each: ReadPath.of(now.motion, self.times)
+            for each, now in pairs
+            if isinstance(now.motion, ObstaclePath | ReadPath)
+        }
+        return {**plain_arrays(vars(self)), "_values": {**self._values.kept(), "paths": paths}}
+
+    def __setstate__(self, kept: dict) -> None:
+        values = Values.again(kept["scene"], kept["_values"])
+        for obstacle, path in kept["_values"]["paths"].items():
+            values.move(obstacle, path)
+        vars(self).update(kept, _values=values)
 
     def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
         """What it says of one body of the scene."""
@@ -171,7 +190,7 @@ class Trajectory:
     @property
     def _obstacles(self) -> tuple:
         """Of the scene, where they were and went."""
-        return tuple({id(each): each for _, obstacles, *_ in self._placed for each in obstacles}.values())
+        return tuple(self._values.current(each) for each in self.scene.obstacles)
 
     @property
     def energy(self) -> np.ndarray:
@@ -196,10 +215,14 @@ class Trajectory:
         >>> ms.simulate(scene, steps=1, time_step=1e-3, velocities=(0, 0, -1e-4)).kinks
         {0: array([3, 4, 5], dtype=int32), 1: array([3, 4, 5], dtype=int32)}
         """
-        positions = detached(self.positions)
+        positions, now, bodies = detached(self.positions), self._values.current, self.scene._bodies
+        placed = [
+            (now(each), [now(obstacle) for obstacle in each.obstacles], self._values.touching(each), bodies)
+            for each in self.scene._obstacle_contacts
+        ]
         found = {}
         for k, time in enumerate(self.times):
-            near = [near_kinks(*each, positions[k], time) for each in self._placed]
+            near = [near_kinks(*each, positions[k], time) for each in placed]
             near += [self._near_body_kinks(contact, k) for contact in self.scene._body_contacts]
             if near and (every := np.unique(np.concatenate(near))).size:
                 found[k] = every

@@ -89,7 +89,8 @@ def write_mesh(
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in _WRITERS:
-        raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}")
+        other = "; write_surface writes .stl and .obj" if ending in (".stl", ".obj") else ""
+        raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}{other}")
     solid = isinstance(mesh, TetMesh)
     if not solid and not isinstance(mesh, TriangleMesh) and hasattr(mesh, "surface"):
         raise ValueError(

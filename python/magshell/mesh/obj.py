@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -34,3 +35,9 @@ def _vertex(word: str, n_points: int) -> int:
     if index == 0:
         raise ValueError("vertices are numbered from 1")
     return index - 1 if index > 0 else n_points + index
+
+
+def write_obj(file: BinaryIO, points: np.ndarray, faces: np.ndarray) -> None:
+    rows = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in points.tolist()]
+    rows += [f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist()]
+    file.write("".join(["# written by magshell\n", *rows]).encode())

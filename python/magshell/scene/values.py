@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from copy import copy
+from copy import copy, deepcopy
 from functools import cached_property
 
 import numpy as np
 
+from .._checks.quantity import quantity
 from ..bodies.bodies import Whole, joined
 from ..bodies.shell import Shell
 from ..surroundings.constraints import Constraints, gather
@@ -19,7 +20,7 @@ class Values:
 
     The scene itself has the names "gravity" and "vertex_loads". magnetization: (n_f of all, 3) A/m, of a scene in a field,
     in place of the bodies' own.
-    numbers: (n,), all of them, in the core's layout.
+    replaced: a copy of what was given. numbers: (n,), all of them, in the core's layout.
     Raises ValueError where a value does not fit.
     """
 
@@ -30,6 +31,7 @@ class Values:
         magnetization: np.ndarray | None = None,
     ):
         self.scene = scene
+        self.replaced = {item: deepcopy(values) for item, values in (replaced or {}).items()}
         self._now = {
             item: item.replaced(**values) for item, values in (replaced or {}).items() if item is not scene
         }
@@ -198,6 +200,17 @@ class Values:
             if owner in now:
                 now[owner].add_numbers(label, self, numbers)
         return self.scene._value_layout.packed(numbers, before)
+
+    def kept(self) -> dict:
+        """What `again` makes them from in another process, or after the scene was made anew."""
+        return {"replaced": self.replaced, "numbers": self.numbers}
+
+    @classmethod
+    def again(cls, scene, kept: dict) -> Values:
+        """Raises ValueError where they do not fit the scene."""
+        values = cls(scene, kept["replaced"])
+        values.numbers = quantity("values", "SI", kept["numbers"], (scene._value_layout.size,))
+        return scene._values if not values.replaced and values.same_as(scene._values) else values
 
     def move(self, obstacle, path) -> None:
         """Has an obstacle, whose own place is the origin in `numbers`, follow a path."""

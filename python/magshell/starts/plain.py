@@ -10,9 +10,13 @@ import numpy as np
 
 from .._checks.tensors import is_tensor, require_torch
 from ..design.minimum import Minimum, Record
+from ..dynamics.obstacle_paths import ReadPath
 from ..dynamics.trajectory import MotionState
+from ..methods.clock import Clock
+from ..methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler, ProjectiveDynamics
 
-_RECORDS = {each.__name__: each for each in (Minimum, Record, MotionState)}
+_INTEGRATORS = (ImplicitEuler, TRBDF2, SDIRK2, SDIRK3, ProjectiveDynamics)
+_RECORDS = {each.__name__: each for each in (Minimum, Record, MotionState, Clock, ReadPath, *_INTEGRATORS)}
 _ADVICE = "return numbers, arrays and tensors, such as (minimum, equilibrium.positions)"
 
 

@@ -48,10 +48,12 @@ class AlongPath:
             return self._after
         there = copy.copy(self._after)
         there.numbers = (1.0 - parameter) * self._before.numbers + parameter * self._after.numbers
-        there._now = dict(self._after._now)
+        there._now, there.replaced = dict(self._after._now), dict(self._after.replaced)
         for owner in self._owners.values():
             ends = [values.current(owner) for values in (self._before, self._after)]
-            there._now[owner] = _between(*ends, parameter)
+            named = _between(*ends, parameter)
+            there._now[owner] = ends[1].replaced(**named)
+            there.replaced[owner] = {**there.replaced.get(owner, {}), **named}
         if any(isinstance(owner, Support) for owner in self._owners.values()):
             there.constraints = there._moved()
         return there
@@ -69,12 +71,12 @@ def _keys_that_move(inputs: Inputs) -> dict[tuple[str, str], object]:
     return can
 
 
-def _between(before, after, parameter: float):
-    """The object with its place between two."""
+def _between(before, after, parameter: float) -> dict[str, np.ndarray]:
+    """The values of an object between two."""
     at = [each._move.as_arguments() if isinstance(each, Support) else vars(each) for each in (before, after)]
     named = {}
     for name in names_in_time(after):
         ends = [np.zeros(3) if each[name] is None and name != "center" else each[name] for each in at]
         if all(end is not None for end in ends):
             named[name] = (1.0 - parameter) * ends[0] + parameter * ends[1]
-    return after.replaced(**named)
+    return named

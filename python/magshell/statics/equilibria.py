@@ -27,6 +27,12 @@ class Equilibria(Sequence):
         self.positions = stacked([case.positions for case in self._cases])
         self.edge_rotations = stacked([case.edge_rotations for case in self._cases])
 
+    def __getstate__(self) -> dict:
+        return {"_cases": self._cases}
+
+    def __setstate__(self, kept: dict) -> None:
+        self.__init__(kept["_cases"])
+
     @property
     def scene(self):
         return self._cases[0].scene

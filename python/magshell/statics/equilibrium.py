@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._checks.tensors import detached
+from .._checks.tensors import detached, plain_arrays
 from ..bodies.body_result import BodyResult
 from ..bodies.of_body import result_of
 from ..bodies.rigid import Rigid
@@ -20,6 +20,7 @@ from ..mesh.crossings import told
 from ..scene.reactions import Reaction, reaction_in
 from ..scene.scene import Scene
 from ..scene.touching import Touching, touching_in
+from ..scene.values import Values
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.contact import Contact
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane
@@ -66,11 +67,15 @@ class Equilibrium:
     _values: Any = field(repr=False)
     _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
 
-    def __getstate__(self):
-        raise TypeError(
-            "an Equilibrium cannot be copied or pickled, as it holds the solver's own state: keep its positions, "
-            "edge_rotations and energies"
-        )
+    def __copy__(self) -> Equilibrium:
+        return self  # nothing of it changes
+
+    def __getstate__(self) -> dict:
+        """What a copy, another process or a file makes it from again: tensors as arrays, without their gradients."""
+        return {**plain_arrays(vars(self)), "_values": self._values.kept()}
+
+    def __setstate__(self, kept: dict) -> None:
+        vars(self).update(kept, _values=Values.again(kept["scene"], kept["_values"]))
 
     def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
         """What it says of one body of the scene."""

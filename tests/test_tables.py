@@ -1,0 +1,76 @@
+"""Results as tables of pandas and labelled arrays of xarray."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import magshell as ms
+
+MESH = ms.meshes.rectangle(0.05, 0.01, cells=(6, 2))
+SHEET = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+SCENE = ms.Scene(SHEET, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=ms.UniformField())
+MAGNETIZED = {"remanent_magnetization": (4e4, 0, 0)}
+
+
+@pytest.fixture(scope="module")
+def results():
+    rest = ms.equilibrium(SCENE, **MAGNETIZED, applied_flux_density=(0, 0, 1e-3))
+    cases = ms.equilibrium(SCENE, **MAGNETIZED, applied_flux_density=[(0, 0, 1e-3), (0, 0, 2e-3)])
+    path = ms.follow(SCENE, **MAGNETIZED, start=rest, applied_flux_density=(0, 0, 3e-3))
+    move = ms.simulate(SCENE, **MAGNETIZED, steps=3, time_step=1e-3, applied_flux_density=(0, 0, 2e-3))
+    return {"rest": rest, "cases": cases, "path": path, "move": move}
+
+
+@pytest.mark.parametrize(
+    "name, along", [("rest", ()), ("cases", ("case",)), ("path", ("parameter",)), ("move", ("time",))]
+)
+def test_xarray(name, along, results):
+    pytest.importorskip("xarray")
+    result = results[name]
+    table = ms.to_xarray(result)
+    assert table.positions.dims == (*along, "vertex", "axis") and table.positions.attrs == {"units": "m"}
+    np.testing.assert_array_equal(table.positions, result.positions)
+    np.testing.assert_array_equal(table.sel(axis="z").displacements, result.displacements[..., 2])
+    np.testing.assert_array_equal(table.faces, MESH.faces)
+    if name == "move":
+        assert table.time.attrs == {"units": "s"}
+        np.testing.assert_array_equal(table.time, result.times)
+        np.testing.assert_array_equal(table.velocities, result.velocities)
+        np.testing.assert_array_equal(table.bending_energy, result.energies["bending"])
+        assert table.bending_energy.attrs == {"units": "J"}
+    if name == "cases":
+        assert table.membrane_energy.values.tolist() == [case.energies["membrane"] for case in result]
+
+
+def test_pandas(results):
+    pytest.importorskip("pandas")
+    move = results["move"]
+    states, vertices = ms.to_pandas(move), ms.to_pandas(move, per="vertex")
+    assert states.index.name == "time [s]" and states.index.tolist() == move.times.tolist()
+    np.testing.assert_array_equal(states["kinetic_energy [J]"], move.kinetic_energy)
+    np.testing.assert_array_equal(states["applied_flux_density z [T]"], 2e-3)
+    np.testing.assert_array_equal(vertices.xs(4, level="vertex")["positions z [m]"], move.positions[:, 4, 2])
+    assert ms.to_pandas(results["rest"]).shape[0] == 1 and len(ms.to_pandas(results["cases"])) == 2
+    assert ms.to_pandas(results["path"]).index.name == "parameter"
+
+
+def test_tensors(results):
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("xarray")
+    strength = torch.tensor([4e4, 0, 0], dtype=torch.float64, requires_grad=True)
+    rest = ms.equilibrium(SCENE, remanent_magnetization=strength, applied_flux_density=(0, 0, 1e-3))
+    np.testing.assert_array_equal(ms.to_xarray(rest).positions, results["rest"].positions)
+
+
+def test_bad_input(results, monkeypatch):
+    with pytest.raises(
+        ValueError, match=r"result must be an Equilibrium, Equilibria, a Path or a Trajectory, got Scene"
+    ):
+        ms.to_xarray(SCENE)
+    with pytest.raises(ValueError, match=r'per must be "state" or "vertex", got \'face\''):
+        ms.to_pandas(results["move"], per="face")
+    for package, call in (("xarray", ms.to_xarray), ("pandas", ms.to_pandas)):
+        monkeypatch.setitem(sys.modules, package, None)
+        with pytest.raises(ImportError, match=rf'needs {package}: pip install "magshell\[tables\]"'):
+            call(results["rest"])
