@@ -59,6 +59,7 @@ from .states.series import write_series
 from .statics.energies_at import energies
 from .statics.equilibria import Equilibria
 from .statics.equilibrium import Equilibrium
+from .statics.extrapolation import Extrapolation, extrapolated
 from .statics.path import CriticalPoint, Path, follow
 from .statics.solve import equilibrium
 from .statics.warm_start import WarmStart
@@ -100,6 +101,7 @@ __all__ = [
     "Equilibria",
     "Equilibrium",
     "EquilibriumJumped",
+    "Extrapolation",
     "Fibres",
     "Fixed",
     "Guccione",
@@ -166,6 +168,7 @@ __all__ = [
     "energies",
     "envs",
     "equilibrium",
+    "extrapolated",
     "fibres_along",
     "follow",
     "linear_buckling",
