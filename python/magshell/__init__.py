@@ -62,6 +62,7 @@ from .states.tables import to_pandas, to_xarray
 from .statics.energies_at import energies
 from .statics.equilibria import Equilibria
 from .statics.equilibrium import Equilibrium
+from .statics.extrapolation import Extrapolation, extrapolated
 from .statics.path import CriticalPoint, Path, follow
 from .statics.solve import equilibrium
 from .statics.warm_start import WarmStart
@@ -103,6 +104,7 @@ __all__ = [
     "Equilibria",
     "Equilibrium",
     "EquilibriumJumped",
+    "Extrapolation",
     "Fibres",
     "Fixed",
     "Guccione",
@@ -169,6 +171,7 @@ __all__ = [
     "energies",
     "envs",
     "equilibrium",
+    "extrapolated",
     "fibres_along",
     "follow",
     "linear_buckling",

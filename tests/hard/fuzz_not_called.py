@@ -6,6 +6,7 @@ NOT_CALLED = {
     "DesignRejected": "an error",
     "EquilibriumJumped": "an error",
     "Equilibrium": "a result",
+    "Extrapolation": "a result",
     "Interrupted": "an error",
     "BodyResult": "a result",
     "RigidResult": "a result",

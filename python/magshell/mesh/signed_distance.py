@@ -10,6 +10,7 @@ Distance = Callable[[np.ndarray], np.ndarray]
 
 _STEP = 1e-5  # of differences, relative to the length that the caller names
 _ROUNDS = 20
+_ON_SURFACE = 1e-3  # of an edge: both its ends lie this near to the surface that its middle moves onto
 
 
 def checked_distance(name: str, function) -> Distance:
@@ -83,3 +84,12 @@ def onto_surface(distance: Distance, points: np.ndarray, lengths: np.ndarray) ->
     arrived = np.abs(distance(moved)) <= 1e-6 * lengths
     near = np.linalg.norm(moved - points, axis=1) <= 0.25 * lengths
     return np.where((arrived & near)[:, None], moved, points)
+
+
+def middles_on_surface(mesh, edges: np.ndarray, surface: Distance) -> tuple[np.ndarray, np.ndarray]:
+    """Those of the edges (k,) whose ends both lie on the surface, and where their middles are once moved onto it."""
+    distance = checked_distance("surface", surface)
+    lengths = mesh.edge_lengths[edges]
+    at_ends = np.abs(distance(mesh.rest_positions))[mesh.edges[edges]]
+    on_it = (at_ends <= _ON_SURFACE * lengths[:, None]).all(axis=1)
+    return edges[on_it], onto_surface(distance, mesh.edge_midpoints[edges[on_it]], lengths[on_it])

@@ -7,11 +7,10 @@ from itertools import count
 
 import numpy as np
 
-from .signed_distance import Distance, checked_distance, onto_surface
+from .signed_distance import Distance, middles_on_surface
 from .tet_jacobian import jacobians, not_positive, straight_volumes
 
 Projection = Distance
-_ON_SURFACE = 1e-3  # of an edge: both its ends lie this near to the surface that its node moves onto
 _LEAST_JACOBIAN = 0.1  # of the straight tetrahedron's
 
 
@@ -20,14 +19,9 @@ def quadratic(mesh, surface: Projection | None):
     positions = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
     if surface is None:
         return type(mesh)(positions, nodes, mesh.parts, mesh.part_names)
-    distance = checked_distance("surface", surface)
-    edges = mesh.boundary_edges
-    lengths = mesh.edge_lengths[edges]
-    at_ends = np.abs(distance(mesh.rest_positions))[mesh.edges[edges]]
-    on_it = (at_ends <= _ON_SURFACE * lengths[:, None]).all(axis=1)
-    edges, lengths = edges[on_it], lengths[on_it]
+    edges, middles = middles_on_surface(mesh, mesh.boundary_edges, surface)
     target = positions.copy()
-    target[mesh.n_vertices + edges] = onto_surface(distance, mesh.edge_midpoints[edges], lengths)
+    target[mesh.n_vertices + edges] = middles
     return type(mesh)(held_back(positions, target, nodes), nodes, mesh.parts, mesh.part_names)
 
 

@@ -14,6 +14,8 @@ from .._checks.quantity import quantity
 from .._checks.scalars import positive
 from .mesh_base import MeshBase, frozen
 from .quality import MeshQuality
+from .refine import refined
+from .signed_distance import Distance
 from .summary import boundary_loops, summary
 from .transforms import moved
 
@@ -171,6 +173,14 @@ class TriangleMesh(MeshBase):
     def flipped(self) -> TriangleMesh:
         """The same surface with its normals on the other side; faces and vertices keep their numbers."""
         return TriangleMesh(self.rest_positions, self.faces[:, [0, 2, 1]])
+
+    def refined(self, surface: Distance | None = None) -> TriangleMesh:
+        """Each face divided into four, 4 f to 4 f + 3, at the middles of its edges.
+
+        Vertices keep their numbers, and edge k gets vertex n_v + k. surface: a signed distance in m, (n, 3) -> (n,), such
+        as an ms.shapes.Shape, onto which the middles of edges move whose ends lie on it; by default they stay straight.
+        """
+        return refined(self, surface)
 
     def transformed(self, rotation=None, translation=None) -> TriangleMesh:
         """The mesh moved by x -> rotation x + translation.

@@ -1,0 +1,111 @@
+"""Whether a mesh divides the cells of a coarser one, and where its vertices are among the fine ones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.spatial import cKDTree
+
+from .tet_mesh import TetMesh
+from .triangle_mesh import TriangleMesh
+
+_SAME_PLACE = 1e-6  # of the shortest edge
+_REMEDY = (
+    "Make the finer one by mesh.refined(), or by the same generator with a multiple of its cells and without "
+    "irregular=..."
+)
+
+
+class Nesting(NamedTuple):
+    """ratio: into how many parts each edge of the coarse mesh is divided; vertices: (n_v,) its vertices' numbers in the
+    fine one."""
+
+    ratio: int
+    vertices: np.ndarray
+
+
+def nesting(coarse, fine, names: tuple[str, str]) -> Nesting:
+    """Raises ValueError, which names the meshes, unless each cell of the coarse one is a union of fine ones, each edge
+    divided alike. Vertices on a curved surface may lie beside the coarse one's edges."""
+    ratio = _ratio(coarse, fine, names)
+    vertices = _places(coarse, fine)
+    missing = np.flatnonzero(vertices < 0)
+    if missing.size:
+        at = ", ".join(f"{x:.4g}" for x in coarse.rest_positions[missing[0]])
+        raise ValueError(
+            f"{names[0]} and {names[1]} are not nested: {missing.size} of the {coarse.n_vertices} vertices of {names[0]} "
+            f"are none of {names[1]}, the first {missing[0]} at ({at}) m. {_REMEDY}"
+        )
+    apart = _far_apart(coarse, fine, vertices, ratio)
+    if apart.size:
+        ends = coarse.edges[apart[0]]
+        raise ValueError(
+            f"{names[0]} and {names[1]} are not nested: {apart.size} of the {coarse.n_edges} edges of {names[0]} are not "
+            f"{ratio} edges of {names[1]}, the first that from vertex {ends[0]} to {ends[1]}. {_REMEDY}"
+        )
+    return Nesting(ratio, vertices)
+
+
+def _ratio(coarse, fine, names) -> int:
+    kind = TetMesh if isinstance(coarse, TetMesh) else TriangleMesh
+    if not isinstance(fine, kind):
+        raise ValueError(
+            f"meshes must be of one kind, got {names[0]} a {type(coarse).__name__} and {names[1]} a {type(fine).__name__}"
+        )
+    solid = kind is TetMesh
+    if solid and coarse.order != fine.order:
+        raise ValueError(
+            f"meshes must have tetrahedra of one order: {names[0]} is of order {coarse.order}, {names[1]} of {fine.order}"
+        )
+    cells = [mesh.n_tetrahedra if solid else mesh.n_faces for mesh in (coarse, fine)]
+    power = 3 if solid else 2
+    ratio = round((cells[1] / cells[0]) ** (1.0 / power))
+    if ratio < 2 or cells[0] * ratio**power != cells[1]:
+        wanted = ", ".join(str(k**power) for k in (2, 3))
+        raise ValueError(
+            f"{names[0]} and {names[1]} are not nested: {cells[0]} and {cells[1]} "
+            f"{'tetrahedra' if solid else 'faces'}, where the finer one must have {wanted}, ... times as many. {_REMEDY}"
+        )
+    return ratio
+
+
+def _places(coarse, fine) -> np.ndarray:
+    """(n_v,): -1 where there is none. On the two sides of a slit, the one on the same side."""
+    n_v = coarse.n_vertices
+    tolerance = _SAME_PLACE * coarse.edge_lengths.min()
+    first = fine.rest_positions[:n_v]
+    if len(first) == n_v and np.abs(first - coarse.rest_positions).max() <= tolerance:
+        return np.arange(n_v)
+    reach = 1e3 * tolerance
+    tree = cKDTree(_told_apart(fine, reach))
+    vertices = tree.query(_told_apart(coarse, reach))[1]
+    off = np.linalg.norm(fine.rest_positions[vertices] - coarse.rest_positions, axis=1)
+    return np.where(off <= tolerance, vertices, -1)
+
+
+def _told_apart(mesh, reach: float) -> np.ndarray:
+    """(n_v, 6): the positions, and where the faces or edges of each vertex lie, of little weight: it decides between
+    vertices in one place only."""
+    ends = np.concatenate([mesh.edges, mesh.edges[:, ::-1]])
+    arms = mesh.rest_positions[ends[:, 1]] - mesh.rest_positions[ends[:, 0]]
+    sums = np.stack([np.bincount(ends[:, 0], arm, mesh.n_vertices) for arm in arms.T], axis=1)
+    lengths = np.bincount(ends[:, 0], np.linalg.norm(arms, axis=1), mesh.n_vertices)
+    return np.concatenate([mesh.rest_positions, reach * sums / np.maximum(lengths, 1e-300)[:, None]], axis=1)
+
+
+def _far_apart(coarse, fine, vertices: np.ndarray, ratio: int) -> np.ndarray:
+    """The edges of the coarse mesh whose ends are more than `ratio` edges apart in the fine one."""
+    n = fine.n_vertices
+    ends = np.concatenate([fine.edges, fine.edges[:, ::-1]])
+    graph = coo_array((np.ones(len(ends), dtype=np.int32), tuple(ends.T)), shape=(n, n)).tocsr()
+    shape = (len(vertices), n)
+    reached = coo_array(
+        (np.ones(len(vertices), dtype=np.int32), (np.arange(len(vertices)), vertices)), shape=shape
+    ).tocsr()
+    for _ in range(ratio):
+        reached = reached @ graph
+        reached.data[:] = 1
+    near = np.asarray(reached[coarse.edges[:, 0], vertices[coarse.edges[:, 1]]]).ravel()
+    return np.flatnonzero(near == 0)
