@@ -7,6 +7,7 @@
 #pragma once
 
 #include "magshell/energy/magnetic.h"
+#include "magshell/strain/deformation.h"
 #include "magshell/strain/six_nodes.h"
 
 namespace magshell {

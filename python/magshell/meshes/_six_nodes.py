@@ -21,15 +21,17 @@ def sheet_of_order(
 
 def round_sheet(mesh: TriangleMesh, order: int, axes: tuple[int, ...]) -> TriangleMesh | SixNodeMesh:
     """Likewise, with nodes on edges at the mean of their ends' distances from the origin of the given axes: an edge on a
-    circle around it, or on a sphere, is an arc of it."""
+    cylinder around it, or on a sphere, is an arc of it. Of a sheet in the plane of two axes only edges on the border are
+    bent: inside, straight ones are exact and bent ones are not, the less the nearer they are to the middle."""
     across = list(axes)
+    flat = not np.delete(mesh.rest_positions, across, axis=1).any() and len(axes) == 2
+    bent = mesh.boundary_edges if flat else np.arange(mesh.n_edges)
     radii = np.linalg.norm(mesh.rest_positions[:, across], axis=1)[mesh.edges].mean(axis=1)
 
     def place(middles: np.ndarray) -> np.ndarray:
         there = np.linalg.norm(middles[:, across], axis=1)
-        middles[:, across] *= np.divide(radii, there, out=np.ones_like(radii), where=there > 1e-9 * radii)[
-            :, None
-        ]
+        factors = np.divide(radii, there, out=np.ones_like(radii), where=there > 1e-9 * radii)
+        middles[np.ix_(bent, across)] *= factors[bent, None]
         return middles
 
     return sheet_of_order(mesh, order, place)

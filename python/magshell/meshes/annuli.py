@@ -30,7 +30,7 @@ def annulus(
         inner_radius, outer_radius: m.
         cells: (radial, around).
         diagonals, irregular, seed: as for `rectangle`.
-        order: likewise; edges around are arcs.
+        order: likewise; edges on its rims are arcs.
     """
     return sector(inner_radius, outer_radius, 2 * np.pi, cells, diagonals, irregular, seed, order=order)
 
@@ -53,7 +53,7 @@ def sector(
         angle: rad, from 0 to `angle` or (from, to). A full turn closes the ring: then the seam is joined.
         cells: (radial, around).
         diagonals, irregular, seed: as for `rectangle`.
-        order: likewise; edges around are arcs.
+        order: likewise; edges on its rims are arcs.
 
     >>> import math
     >>> sector(0.0, 0.01, math.pi / 2, cells=(4, 6)).boundary_loops[0].size
