@@ -20,6 +20,7 @@ from gradient_kinds_bodies import (
 from gradient_kinds_contact import CONTACT_MAKERS
 from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
+from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
 from gradient_kinds_skeletons import (
     driven_skeleton_at_rest,
     driven_skeleton_in_motion,
@@ -265,6 +266,8 @@ MAKERS = {
     "a solid with muscles at rest": muscles_at_rest,
     "a solid with muscles in motion, euler": lambda: muscles_in_motion(ms.ImplicitEuler(), in_time=3),
     "a solid with muscles in motion, tr_bdf2": lambda: muscles_in_motion(ms.TRBDF2()),
+    "a six-node sheet at rest": six_nodes_at_rest,
+    "a six-node sheet in motion": six_nodes_in_motion,
     "in motion, euler": lambda: moving(ms.ImplicitEuler(), "hinge"),
     "in motion, tr_bdf2": lambda: moving(ms.TRBDF2()),
     "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),

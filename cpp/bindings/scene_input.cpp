@@ -94,6 +94,9 @@ std::vector<SixNodeSheetInput> six_node_sheets_of(const py::list& given) {
         sheet.mesh.corners = each["corners"].cast<std::shared_ptr<TriangleMesh>>();
         sheet.mesh.vertices = each["vertices"].cast<std::vector<Index>>();
         sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
+        sheet.surface = surface_of(each);
+        sheet.magnetic = each["magnetic"].cast<bool>();
+        sheet.surface_acts = each["surface_acts"].cast<bool>();
     }
     return sheets;
 }

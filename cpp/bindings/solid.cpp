@@ -10,11 +10,6 @@
 namespace magshell::bindings {
 namespace {
 
-SolidSurface surface_of(const py::handle& given) {
-    return {given["surface"].cast<std::shared_ptr<TriangleMesh>>(),
-            given["surface_vertices"].cast<std::vector<Index>>()};
-}
-
 // (F, Cauchy stress, volumes) at the points of integration: (n_t, p, 3, 3) twice and (n_t, p).
 py::tuple point_states(const Model& model, Index solid, const VectorXd& q) {
     PointStates states;
@@ -31,6 +26,11 @@ py::tuple point_states(const Model& model, Index solid, const VectorXd& q) {
 }
 
 }  // namespace
+
+SolidSurface surface_of(const py::handle& given) {
+    return {given["surface"].cast<std::shared_ptr<TriangleMesh>>(),
+            given["surface_vertices"].cast<std::vector<Index>>()};
+}
 
 std::vector<SolidInput> solids_of(const py::list& given) {
     std::vector<SolidInput> solids;

@@ -6,6 +6,8 @@
 
 namespace magshell::bindings {
 
+/// The keys "surface" and "surface_vertices" of a body.
+SolidSurface surface_of(const py::handle& given);
 std::vector<SolidInput> solids_of(const py::list& given);
 std::vector<SkinInput> skins_of(const py::list& given);
 /// Volumes of cavities and cells, and tendons.

@@ -42,6 +42,7 @@ from .linear.buckling import Buckling, linear_buckling
 from .linear.response import LinearResponse, linear_response
 from .linear.vibration import VibrationModes, vibration_modes
 from .mesh.io import read_fields, read_mesh, write_mesh
+from .mesh.six_node_mesh import SixNodeMesh
 from .mesh.tet_mesh import TetMesh
 from .mesh.triangle_mesh import TriangleMesh
 from .mesh.welding import Weld, weld
@@ -146,6 +147,7 @@ __all__ = [
     "Scene",
     "SelfContact",
     "Shell",
+    "SixNodeMesh",
     "Skeleton",
     "Skin",
     "Solid",

@@ -163,19 +163,8 @@ class BendingSix {
         return sum;
     }
 
-    static constexpr std::array<std::array<double, 6>, points> firsts_ = [] {
-        std::array<std::array<double, 6>, points> all{};
-        for (int p = 0; p < points; ++p) all[p] = six_nodes::derivative(2, six_nodes::inside[p].at);
-        return all;
-    }();
-    static constexpr std::array<std::array<double, 6>, points> seconds_ = [] {
-        std::array<std::array<double, 6>, points> all{};
-        for (int p = 0; p < points; ++p) {
-            all[p] = six_nodes::derivative(1, six_nodes::inside[p].at);
-            for (double& by_node : all[p]) by_node = -by_node;
-        }
-        return all;
-    }();
+    static constexpr std::array<std::array<double, 6>, points> firsts_ = six_nodes::inside_towards(2, 1.0),
+                                                               seconds_ = six_nodes::inside_towards(1, -1.0);
     static constexpr std::array<std::array<double, points>, 9> weights_ = [] {
         std::array<std::array<double, points>, 9> all{};
         for (int r = 0; r < 9; ++r)

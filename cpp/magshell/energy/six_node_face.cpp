@@ -5,13 +5,11 @@
 #include "magshell/strain/six_nodes.h"
 
 namespace magshell {
-namespace {
 
 using Row9 = Eigen::Matrix<double, 3, 9>;
 
-// The strain along t_i at a point, doubled, from the measures of direction i: the linear function of these two values on
-// edge i and of this mean.
-Row9 interpolation(const std::array<double, 3>& at) {
+// Of each direction, the linear function of these two values on its edge and of this mean.
+Row9 membrane_interpolation(const std::array<double, 3>& at) {
     Row9 rows = Row9::Zero();
     for (int i = 0; i < 3; ++i) {
         // A linear function is its values at the corners; its mean is theirs. On the edge, test() gives both Gauss functions,
@@ -21,8 +19,6 @@ Row9 interpolation(const std::array<double, 3>& at) {
     }
     return rows;
 }
-
-}  // namespace
 
 SixNodeFace::SixNodeFace(const std::array<Vec3, 6>& rest) : area(0.0) {
     for (int p = 0; p < 6; ++p) {
@@ -46,6 +42,12 @@ SixNodeFace::SixNodeFace(const std::array<Vec3, 6>& rest) : area(0.0) {
     }
 }
 
+std::array<double, 9> SixNodeFace::tests(const std::array<double, 3>& at) const {
+    std::array<double, 9> values;
+    for (int k = 0; k < 9; ++k) values[k] = scale[k] * six_nodes::test(k / 3, k % 3, at);
+    return values;
+}
+
 template <class Stiffness>
 Mat9 SixNodeFace::membrane(const Stiffness& at_point) const {
     Mat9 sum = Mat9::Zero();
@@ -53,7 +55,7 @@ Mat9 SixNodeFace::membrane(const Stiffness& at_point) const {
         const auto& t = tangents_[p];
         // A flat face with these edges.
         const Vec3 corners[3] = {Vec3::Zero(), t[2], t[2] + t[0]};
-        const Row9 rows = interpolation(six_nodes::inside[p].at);
+        const Row9 rows = membrane_interpolation(six_nodes::inside[p].at);
         sum += six_nodes::inside[p].weight * rows.transpose() * at_point(RestFace(corners)) * rows;
     }
     return sum;
@@ -77,8 +79,7 @@ Mat9 SixNodeFace::compliance(double factor, double by_products, double by_traces
         Mat3 inner;
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) inner(i, j) = t[i].dot(t[j]);
-        double tests[9];
-        for (int k = 0; k < 9; ++k) tests[k] = scale[k] * six_nodes::test(k / 3, k % 3, point.at);
+        const std::array<double, 9> tests = this->tests(point.at);
         Mat3 of_directions;
         for (int i = 0; i < 3; ++i)
             for (int l = 0; l < 3; ++l) {

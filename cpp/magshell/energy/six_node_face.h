@@ -17,6 +17,9 @@ namespace magshell {
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
+/// The strain along each t_i at a point, doubled, from the membrane's measures.
+Eigen::Matrix<double, 3, 9> membrane_interpolation(const std::array<double, 3>& at);
+
 class SixNodeFace {
   public:
     explicit SixNodeFace(const std::array<Vec3, 6>& rest);
@@ -31,6 +34,9 @@ class SixNodeFace {
     /// What measure 3 i + k of the bending multiplies its tested curvature by.
     std::array<double, 9> scale;
     double area;
+
+    /// What the moments' test functions are at a point, without their directions.
+    std::array<double, 9> tests(const std::array<double, 3>& at) const;
 
   private:
     std::array<std::array<Vec3, 3>, 6> tangents_;  // at each point inside, dx/dt_i

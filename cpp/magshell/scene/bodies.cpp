@@ -22,6 +22,15 @@ Bodies::Bodies(const SceneInput& input) {
     for (const SkinInput& skin : input.skins)
         owned_skins_.push_back(
             std::make_unique<Surface>(skin.owner, *skin.surface.mesh, skin.surface.vertices, numbering));
+    std::vector<const Surface*> flat;  // of six-node sheets
+    for (const SixNodeSheetInput& sheet : input.six_node_sheets)
+        flat.push_back(sheet.surface_acts
+                           ? owned_skins_
+                                 .emplace_back(std::make_unique<Surface>(sheet.owner, *sheet.surface.mesh,
+                                                                         sheet.surface.vertices, numbering))
+                                 .get()
+                           : nullptr);
+    const std::size_t n_skins = input.skins.size();
     add_rigid(input.rigid, numbering);
     couple_links(input);
     nodes_ = numbering.finish(input.directions, input.original);
@@ -42,14 +51,16 @@ Bodies::Bodies(const SceneInput& input) {
     for (std::size_t k = 0; k < sheets_.size(); ++k) faces_.push_back({sheets_[k], static_cast<Index>(k)});
     for (std::size_t k = 0; k < solids_.size(); ++k)
         add_surface(input.solids[k].surface_acts ? solids_[k]->surface() : nullptr);
-    for (const std::unique_ptr<Surface>& skin : owned_skins_) add_surface(skin.get());
+    for (std::size_t k = 0; k < n_skins; ++k) add_surface(owned_skins_[k].get());
     for (std::size_t k = 0; k < owned_six_node_sheets_.size(); ++k) {
         const SixNodeSheetInput& given = input.six_node_sheets[k];
         owned_six_node_sheets_[k]->add_folds(given.mesh, given.directed_edges, nodes_);
         n_edges_ += owned_six_node_sheets_[k]->n_edge_rotations();
         six_node_sheets_.push_back(owned_six_node_sheets_[k].get());
+        six_node_bodies_.push_back(static_cast<Index>(all_.size()));
         all_.push_back(owned_six_node_sheets_[k].get());
     }
+    for (const Surface* surface : flat) add_surface(surface);
     for (const MuscleInput& muscle : input.muscles) {
         const Fibres* fibres =
             owned_fibres_.emplace_back(std::make_unique<Fibres>(*solids_[muscle.solid], muscle.elements))

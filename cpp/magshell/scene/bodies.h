@@ -18,11 +18,13 @@ class Bodies {
     const std::vector<const Sheet*>& sheets() const { return sheets_; }
     const std::vector<const Solid*>& solids() const { return solids_; }
     const std::vector<const SixNodeSheet*>& six_node_sheets() const { return six_node_sheets_; }
+    /// Which of all() each of them is.
+    const std::vector<Index>& six_node_bodies() const { return six_node_bodies_; }
     /// Sheets, then solids, then the surfaces of solids that something acts on, then skins, then sheets of six-node faces,
-    /// then fibres of muscles.
+    /// then the surfaces of those that something acts on, then fibres of muscles.
     const std::vector<const Body*>& all() const { return all_; }
     /// Triangles of bodies, and which of all() has their chunks: of sheets, of solids (none where nothing acts on them), of
-    /// skins.
+    /// skins, of sheets of six-node faces (as of solids).
     struct Faces {
         const Surface* surface = nullptr;
         Index body = -1;
@@ -47,8 +49,8 @@ class Bodies {
     /// What each element of a sheet couples, and each couple.
     std::vector<Stencil> stencils(const SceneInput& input) const;
 
-    /// What each element of a solid or of a sheet of six-node faces couples, the corners of rigid parts that a joint couples, and what volumes and tendons
-    /// couple beyond that.
+    /// What each element of a solid or of a sheet of six-node faces couples, the corners of rigid parts that a joint
+    /// couples, and what volumes and tendons couple beyond that.
     std::vector<Clique> cliques() const;
 
     VectorXd rest_state() const;
@@ -90,12 +92,13 @@ class Bodies {
     std::vector<std::unique_ptr<Sheet>> owned_;
     std::vector<std::unique_ptr<Solid>> owned_solids_;
     std::vector<std::unique_ptr<SixNodeSheet>> owned_six_node_sheets_;
-    std::vector<std::unique_ptr<Surface>> owned_skins_;
+    std::vector<std::unique_ptr<Surface>> owned_skins_;  // then the flat triangles of six-node sheets
     std::vector<std::unique_ptr<SurfaceBody>> owned_surfaces_;
     std::vector<std::unique_ptr<Fibres>> owned_fibres_;
     std::vector<const Sheet*> sheets_;
     std::vector<const Solid*> solids_;
     std::vector<const SixNodeSheet*> six_node_sheets_;
+    std::vector<Index> six_node_bodies_;
     std::vector<const Body*> all_;
     std::vector<Faces> faces_;
     std::vector<OfMuscle> fibres_;

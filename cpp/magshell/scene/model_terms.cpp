@@ -4,8 +4,8 @@
 
 #include "magshell/scene/model.h"
 #include "magshell/strain/fold_angle.h"
-#include "magshell/term/bending_six_term.h"
 #include "magshell/term/ball_torque_term.h"
+#include "magshell/term/bending_six_term.h"
 #include "magshell/term/bending_term.h"
 #include "magshell/term/body_contact_term.h"
 #include "magshell/term/body_friction_term.h"
@@ -14,6 +14,7 @@
 #include "magshell/term/friction_term.h"
 #include "magshell/term/joint_term.h"
 #include "magshell/term/load_term.h"
+#include "magshell/term/magnetic_six_term.h"
 #include "magshell/term/magnetic_solid_term.h"
 #include "magshell/term/magnetic_term.h"
 #include "magshell/term/membrane_six_term.h"
@@ -67,7 +68,7 @@ void Model::add_terms(const SceneInput& input) {
         elastic_.add(term.get());
         terms_.push_back(std::move(term));
     }
-    for (const SixNodeSheet* sheet : bodies_.six_node_sheets()) add_six_node_sheet(*sheet);
+    for (std::size_t k = 0; k < input.six_node_sheets.size(); ++k) add_six_node_sheet(k);
     add_magnetic_terms(input);
     add_solids(input);
     add_muscles(input);
@@ -88,15 +89,21 @@ void Model::add_terms(const SceneInput& input) {
     if (!input.couples.empty()) add_couples(input);
     if (!input.contacts.empty()) add_contacts(input);
     if (!input.body_contacts.empty()) add_body_contacts(input);
-    if (input.water)
-        for (Index k = 0; k < count + static_cast<Index>(input.solids.size()); ++k)
-            forces_.push_back(std::make_unique<WaterTerm>(*bodies_.faces()[k].surface, *loops_[k],
-                                                          *input.water, registry_));
+    if (input.water) add_water(input);
 }
 
-void Model::add_six_node_sheet(const SixNodeSheet& sheet) {
-    const std::vector<const Body*>& all = bodies_.all();
-    const Index body = static_cast<Index>(std::find(all.begin(), all.end(), &sheet) - all.begin());
+void Model::add_water(const SceneInput& input) {
+    const std::vector<Bodies::Faces>& faces = bodies_.faces();
+    const std::size_t skins = input.sheets.size() + input.solids.size(), after = skins + input.skins.size();
+    for (std::size_t k = 0; k < faces.size(); ++k)
+        if (k < skins || k >= after)
+            forces_.push_back(
+                std::make_unique<WaterTerm>(*faces[k].surface, *loops_[k], *input.water, registry_));
+}
+
+void Model::add_six_node_sheet(std::size_t number) {
+    const SixNodeSheet& sheet = *bodies_.six_node_sheets()[number];
+    const Index body = bodies_.six_node_bodies()[number];
     const auto add = [&](auto term) {
         elastic_.add(term.get());
         terms_.push_back(std::move(term));
@@ -115,6 +122,12 @@ void Model::add_magnetic_terms(const SceneInput& input) {
     for (std::size_t k = 0; k < sheets; ++k)
         if (input.sheets[k].magnetic) add(k);
     for (std::size_t k = 0; k < input.skins.size(); ++k) add(sheets + solids + k);
+    for (std::size_t k = 0; k < input.six_node_sheets.size(); ++k) {
+        const Index body = bodies_.six_node_bodies()[k];
+        if (input.six_node_sheets[k].magnetic)
+            terms_.push_back(std::make_unique<MagneticSixTerm>(
+                *bodies_.six_node_sheets()[k], body, schedule_.of(body), matrix_, sources_, registry_));
+    }
     for (std::size_t k = 0; k < solids; ++k) {
         const Index body = static_cast<Index>(sheets + k);
         if (input.solids[k].magnetic)

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "magshell/scene/sheet_loops.h"
+#include "magshell/scene/six_node_stresses.h"
 
 namespace magshell {
 namespace {
@@ -102,6 +103,12 @@ PrincipalStrains principal_strains(const Model& model, const VectorXd& q, const 
                   out);
         first_row += sheet.n_faces();
     }
+    for (Index sheet = 0; sheet < static_cast<Index>(model.bodies().six_node_sheets().size()); ++sheet)
+        for (const auto& [green, curvature] : six_node_strains(model, sheet, q)) {
+            const Eigen::Vector2d stretched = principal_in_plane(green), bent = principal_in_plane(curvature);
+            out.row(first_row) << stretched.transpose(), 0.5 * thickness[first_row] * bent.transpose();
+            ++first_row;
+        }
     return out;
 }
 

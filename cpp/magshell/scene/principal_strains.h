@@ -16,7 +16,8 @@ namespace magshell {
 /// Stretch is measured on the triangles on which the membrane energy measures it (body/membrane_faces.h).
 using PrincipalStrains = Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor>;
 
-/// thickness [m]: per face of the caller.
+/// Sheets of six-node faces follow the others, four rows a face: at the middles of its flat triangles.
+/// thickness [m]: per row.
 PrincipalStrains principal_strains(const Model& model, const VectorXd& q, const VectorXd& thickness);
 
 /// The largest magnitudes among them, and the caller's numbers of the faces that have them.

@@ -42,7 +42,11 @@ struct SheetInput {
 struct SixNodeSheetInput {
     std::string owner;  // under which its parameters are registered
     SixNodeInput mesh;
-    std::vector<DirectedEdge> directed_edges;  // of mesh.corners; directions are rows of SceneInput::directions
+    std::vector<DirectedEdge>
+        directed_edges;    // of mesh.corners; directions are rows of SceneInput::directions
+    SolidSurface surface;  // four flat triangles a face
+    bool magnetic = false;
+    bool surface_acts = false;  // whether water, or a face energy, acts on its surface
 };
 
 struct SolidInput {

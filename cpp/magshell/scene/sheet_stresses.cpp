@@ -4,6 +4,7 @@
 
 #include "magshell/energy/material.h"
 #include "magshell/scene/sheet_loops.h"
+#include "magshell/scene/six_node_stresses.h"
 
 namespace magshell {
 namespace {
@@ -51,6 +52,8 @@ Vec3 squared_lengths(const Vec3 x[3]) {
 }  // namespace
 
 std::vector<FaceStress> sheet_stresses(const Model& model, Index number, const VectorXd& q) {
+    const Index flat = static_cast<Index>(model.bodies().sheets().size());
+    if (number >= flat) return six_node_stresses(model, number - flat, q);
     const Sheet& sheet = *model.bodies().sheets()[number];
     const MembraneFaces& membrane = model.membrane_faces(number);
     const std::vector<double> turns = sheet_loops::fold_turns(sheet, q.data());

@@ -18,7 +18,8 @@ struct FaceStress {
 };
 
 /// A row per face of the caller, with the elastic stresses of the values that the model has. sheet: which of
-/// Bodies::sheets().
+/// Bodies::sheets(), or after them of Bodies::six_node_sheets(): of those four rows a face, at the middles of its four flat
+/// triangles (scene/six_node_stresses.h).
 std::vector<FaceStress> sheet_stresses(const Model& model, Index sheet, const VectorXd& q);
 
 }  // namespace magshell

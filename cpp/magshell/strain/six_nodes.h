@@ -66,6 +66,26 @@ constexpr std::array<double, 6> derivative(int i, const std::array<double, 3>& a
     return by_node;
 }
 
+/// Along t_i, times a sign, at each of the points inside.
+constexpr std::array<std::array<double, 6>, 6> inside_towards(int i, double sign) {
+    std::array<std::array<double, 6>, 6> all{};
+    for (int p = 0; p < 6; ++p) {
+        all[p] = derivative(i, inside[p].at);
+        for (double& by_node : all[p]) by_node *= sign;
+    }
+    return all;
+}
+
+/// The shape functions of the six nodes.
+constexpr std::array<double, 6> shapes(const std::array<double, 3>& at) {
+    std::array<double, 6> by_node{};
+    for (int k = 0; k < 3; ++k) {
+        by_node[k] = at[k] * (2.0 * at[k] - 1.0);
+        by_node[middle(k)] = 4.0 * at[(k + 1) % 3] * at[(k + 2) % 3];
+    }
+    return by_node;
+}
+
 /// The linear functions of one direction i: two that are 1 at one Gauss point of edge i, 0 at the other and at the corner
 /// opposite, and the barycentric coordinate of that corner.
 constexpr double test(int i, int which, const std::array<double, 3>& at) {

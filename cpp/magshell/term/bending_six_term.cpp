@@ -168,7 +168,7 @@ void BendingSixTerm::rate(Index pack, const double* p, Pack d[9]) const {
     measure(pack, p, [&](Index fold, int g) { return folds_[fold][g].rate; }, d);
 }
 
-double BendingSixTerm::energy(const double* q, const Controls&) const {
+std::vector<std::array<double, 2>> BendingSixTerm::turns_at(const double* q) const {
     std::vector<std::array<double, 2>> turns(folds_.size());
     chunks_.each([&](const Chunk& chunk) {
         for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
@@ -179,6 +179,21 @@ double BendingSixTerm::energy(const double* q, const Controls&) const {
             }
         }
     });
+    return turns;
+}
+
+Strains BendingSixTerm::look(const double* q) const {
+    const std::vector<std::array<double, 2>> turns = turns_at(q);
+    Strains out(sheet_.n_faces(), 9);
+    each_pack([&](Index pack) {
+        inside(pack, q, out.at(pack));
+        measure(pack, q, [&](Index fold, int g) { return turns[fold][g]; }, out.at(pack));
+    });
+    return out;
+}
+
+double BendingSixTerm::energy(const double* q, const Controls&) const {
+    const std::vector<std::array<double, 2>> turns = turns_at(q);
     return loop_.sum([&](Index pack) {
         Pack d[9], stress[9];
         inside(pack, q, d);

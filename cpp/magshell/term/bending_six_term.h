@@ -33,6 +33,10 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void add_forces(const Strains& stresses, Residual& out) override;
     std::size_t bytes() const override;
 
+    /// d at a state that is only looked at.
+    Strains look(const double* q) const;
+    const SixNodeFace& rest(Index face) const { return rest_[face]; }
+
   private:
     friend class StrainScaffold<BendingSixTerm, 9>;
     // A fold at one of its points, at the last evaluated state.
@@ -52,6 +56,8 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void each_pack(const Body& body) const {
         loop_.each_pack(body);
     }
+    /// theta - theta~ at both points of every fold.
+    std::vector<std::array<double, 2>> turns_at(const double* q) const;
     FoldSix folds_at(Index first, Index last, int point, const double* q) const;
     double turn_from(Index fold, int point, double angle) const;
     template <class Turn>

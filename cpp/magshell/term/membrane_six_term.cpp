@@ -69,6 +69,12 @@ void MembraneSixTerm::assemble(const Chunk& chunk, const double* q, const Contro
     });
 }
 
+Strains MembraneSixTerm::look(const double* q) const {
+    Strains out(sheet_.n_faces(), 9);
+    loop_.each_pack([&](Index pack) { strain(pack, q, out.at(pack)); });
+    return out;
+}
+
 void MembraneSixTerm::strain(Index pack, const double* q, Pack d[9]) const {
     Pack3 x[6];
     loop_.gather(pack, q, x);

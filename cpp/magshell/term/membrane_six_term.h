@@ -28,6 +28,10 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     void add_forces(const Strains& stresses, Residual& out) override;
     std::size_t bytes() const override;
 
+    /// d at a state that is only looked at.
+    Strains look(const double* q) const;
+    const SheetMaterial& material(Index face) const { return materials_[face]; }
+
   private:
     friend class StrainScaffold<MembraneSixTerm, 9>;
     template <class Body>

@@ -9,6 +9,7 @@ import numpy as np
 
 from .._checks.checked_list import checked_list
 from ..mesh.quality import MeshQuality
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from .joined_mesh import JoinedMesh
 from .joints import Joint
@@ -24,7 +25,8 @@ BODIES = (Shell, Solid)
 
 
 class Span(NamedTuple):
-    """One body, or all of them: `mesh`, and the numbers in the scene of its first vertex, edge and face.
+    """One body, or all of them: `mesh`, and the numbers in the scene of its first vertex, edge and face, of its first
+    rotation, and of its first row in a magnetization of all bodies.
 
     bodies: which of the scene's they are.
     """
@@ -34,6 +36,8 @@ class Span(NamedTuple):
     first_vertex: int = 0
     first_edge: int = 0
     first_face: int = 0
+    first_rotation: int = 0
+    first_row: int = 0
 
     @property
     def vertices(self) -> slice:
@@ -48,10 +52,28 @@ class Span(NamedTuple):
     def faces(self) -> slice:
         return slice(self.first_face, self.first_face + self.mesh.n_faces)
 
+    @property
+    def rotations(self) -> slice:
+        return slice(self.first_rotation, self.first_rotation + rotations_of(self.mesh))
+
+    @property
+    def rows(self) -> slice:
+        return slice(self.first_row, self.first_row + magnetized_rows(self.mesh))
+
 
 def turning_edges(mesh) -> int:
     """How many edges the core has for a mesh: of a solid, none."""
-    return mesh.n_edges if isinstance(mesh, TriangleMesh) else 0
+    return mesh.n_edges if isinstance(mesh, TriangleMesh | SixNodeMesh) else 0
+
+
+def rotations_of(mesh) -> int:
+    """How many rotations it has: one an edge, two where there are six nodes, of a solid none."""
+    return turning_edges(mesh) * getattr(mesh, "order", 1)
+
+
+def magnetized_rows(mesh) -> int:
+    """How many rows it has in a magnetization of all bodies: one an element of a sheet, of a solid one a face."""
+    return mesh.n_elements if isinstance(mesh, TriangleMesh | SixNodeMesh) else mesh.n_faces
 
 
 class Bodies:
@@ -85,15 +107,23 @@ class Bodies:
                     "its mesh"
                 )
         self.spans: list[Span] = []
-        vertex = edge = face = 0
+        rotation = dict(zip(map(id, self.sheets), self._first_rotations(), strict=True))
+        vertex = edge = face = row = 0
         for k, shell in enumerate(self.shells):
             mesh = shell.mesh
-            self.spans.append(Span(mesh, slice(k, k + 1), vertex, edge, face))
+            self.spans.append(
+                Span(mesh, slice(k, k + 1), vertex, edge, face, rotation.get(id(shell), 0), row)
+            )
             vertex, edge, face = vertex + mesh.n_vertices, edge + turning_edges(mesh), face + mesh.n_faces
+            row += magnetized_rows(mesh)
         self.ties: tuple[Tie, ...] = checked_list("ties", ties, (Tie,))
         self._welded = np.concatenate([np.zeros((0, 2), dtype=np.int64), *map(self._pairs, self.ties)])
         self.original = originals(vertex, self._welded)
         self._check_welded_once()
+
+    def _first_rotations(self) -> list[int]:
+        """Of each of `sheets`."""
+        return np.cumsum([0, *(rotations_of(sheet.mesh) for sheet in self.sheets)])[:-1].tolist()
 
     def _pairs(self, tie: Tie) -> np.ndarray:
         """(k, 2), the scene's vertices."""
@@ -151,7 +181,7 @@ class Bodies:
             return self.shells[0].mesh
         if not self.shells:
             return NoMesh()
-        if self.solids:
+        if not self.flat_sheets_alone:
             return JoinedMesh(self.meshes)
         faces = [span.mesh.faces + span.first_vertex for span in self.spans]
         return TriangleMesh(
@@ -193,7 +223,31 @@ class Bodies:
 
     @property
     def sheets(self) -> tuple[Shell, ...]:
-        return tuple(body for body in self.shells if isinstance(body, Shell))
+        """In the core's order: those of six-node elements come last."""
+        return (*self.flat_sheets, *self.six_node_sheets)
+
+    @property
+    def flat_sheets(self) -> tuple[Shell, ...]:
+        return tuple(body for body in self.shells if isinstance(body.mesh, TriangleMesh))
+
+    @property
+    def six_node_sheets(self) -> tuple[Shell, ...]:
+        return tuple(body for body in self.shells if isinstance(body.mesh, SixNodeMesh))
+
+    @property
+    def flat_sheets_alone(self) -> bool:
+        """Whether there are no solids, and no sheets of six-node elements."""
+        return len(self.flat_sheets) == len(self.shells)
+
+    @property
+    def n_rotations(self) -> int:
+        """Of all sheets, in the core's order."""
+        return sum(rotations_of(mesh) for mesh in self.meshes)
+
+    @property
+    def n_magnetized(self) -> int:
+        """How many rows a magnetization of all bodies has."""
+        return sum(map(magnetized_rows, self.meshes))
 
     @property
     def solids(self) -> tuple[Solid, ...]:
@@ -292,21 +346,25 @@ class Bodies:
         of = np.searchsorted(first, edges, side="right") - 1
         return of, edges - first[of]
 
-    def core_number(self, span: Span) -> int:
-        """Of one body, where sheets come first and solids after them."""
-        number = span.bodies.start or 0
-        solid = isinstance(self.shells[number], Solid)
-        before = sum(isinstance(body, Solid) is solid for body in self.shells[:number])
-        return before + solid * len(self.sheets)
+    def core_number(self, span: Span, n_skins: int = 0) -> int:
+        """Of one body, where flat sheets come first, solids after them, then so many skins, then six-node sheets."""
+        body = self.shells[span.bodies.start or 0]
+        before = 0
+        for kind, others in ((self.flat_sheets, 0), (self.solids, n_skins), (self.six_node_sheets, 0)):
+            for k, each in enumerate(kind):
+                if each is body:
+                    return before + k
+            before += len(kind) + others
+        raise ValueError("a body of the scene is one of scene.bodies")
 
     def sheets_before(self, body) -> tuple[Shell, ...]:
-        """The sheets that come before a body, whose rows come before its own where there are rows of sheets alone."""
-        return tuple(each for each in self.shells[: self.number(body)] if isinstance(each, Shell))
+        """The sheets that come before one of them where there are rows of sheets alone."""
+        return self.sheets[: next(k for k, each in enumerate(self.sheets) if each is body)]
 
     def sheets_of(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As `split`, with the number of the body among the sheets."""
+        """As `split`, with the number of the body among the flat sheets."""
         of, own = self.split(edges)
-        before = np.cumsum([0, *(isinstance(body, Shell) for body in self.shells)])
+        before = np.cumsum([0, *(isinstance(body.mesh, TriangleMesh) for body in self.shells)])
         return before[of], own
 
 
@@ -319,7 +377,7 @@ class Whole:
 
     def __init__(self, mesh: TriangleMesh, sheets: tuple[Shell, ...]):
         self.mesh = mesh
-        self.thickness = joined([sheet.thickness for sheet in sheets] or [np.zeros(0)])
+        self.thickness = joined([sheet.face_thickness for sheet in sheets] or [np.zeros(0)])
         self.young_modulus = joined([sheet.young_modulus for sheet in sheets] or [np.zeros(0)])
 
     @cached_property

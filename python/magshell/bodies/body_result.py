@@ -38,8 +38,9 @@ class BodyResult:
 
     @property
     def edge_rotations(self):
-        """(..., n_e) rad, zero where an edge has none."""
-        return self._result.edge_rotations[..., self._span.edges]
+        """(..., n_e) rad, zero where an edge has none; of a SixNodeMesh (..., 2 n_e), two an edge, at its Gauss points from
+        the lower to the higher corner."""
+        return self._result.edge_rotations[..., self._span.rotations]
 
     @property
     def velocities(self):
@@ -47,14 +48,14 @@ class BodyResult:
         return self._result.velocities[..., self._span.vertices, :]
 
     def strains(self, index: int = -1) -> Strains:
-        """The principal strains of its faces, as `strains` of the result has them for all sheets; of a motion or a path in
-        a recorded state, by default the last."""
+        """The principal strains of its faces (of a SixNodeMesh at the middles of its flat faces, four an element), as
+        `strains` of the result has them for all sheets; of a motion or a path in a recorded state, by default the last."""
         arguments = () if np.ndim(self._result.positions) == 2 else (index,)
         rows = slice(self._first_row, self._first_row + self.mesh.n_faces)
         return Strains(*(each[rows] for each in self._result.strains(*arguments)))
 
     def stresses(self, index: int = -1) -> ShellStresses:
-        """Membrane force and bending moment of its faces with the strain and curvature that make them, stress at the
+        """Membrane force and bending moment of its faces (of a SixNodeMesh at the middles of its flat faces) with the strain and curvature that make them, stress at the
         surfaces, von Mises stress, with the values that the result was found with; of a motion or a path in a recorded
         state, by default the last. Of a solid, `stresses` has the same names where they mean the same.
 
@@ -70,9 +71,9 @@ class BodyResult:
 
     @property
     def remanent_magnetization(self):
-        """(n_f, 3) or (3,) A/m, or None."""
+        """(n_f, 3), of a SixNodeMesh one an element, or (3,) A/m, or None."""
         given = self._result.remanent_magnetization
-        return given if np.ndim(given) < 2 else given[self._span.faces]
+        return given if np.ndim(given) < 2 else given[self._span.rows]
 
     def __repr__(self) -> str:
         return f"{type(self._result).__name__} of {self.body!r}"

@@ -72,7 +72,7 @@ class Caps:
 
 def warn_of_caps(scene, positions: np.ndarray, shell, bending_energy: float, where: str) -> None:
     """Says once a scene that caps stiffen the sheet where it is bent like this. where: the result, in words."""
-    if scene._warned_of_caps or not scene.bodies or scene._bodies.solids:
+    if scene._warned_of_caps or not scene.bodies or not scene._bodies.flat_sheets_alone:
         return
     caps = scene._caps
     shares = caps.held_back(positions, shell, bending_energy)

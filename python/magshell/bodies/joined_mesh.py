@@ -1,4 +1,4 @@
-"""The meshes of several bodies as one, where some are of tetrahedra."""
+"""The meshes of several bodies as one, where some are of tetrahedra or of six-node elements."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 
 
@@ -39,7 +40,7 @@ class JoinedMesh:
         sheets = [
             mesh.edges + first
             for mesh, first in zip(self.meshes, self._first, strict=False)
-            if isinstance(mesh, TriangleMesh)
+            if isinstance(mesh, TriangleMesh | SixNodeMesh)
         ]
         return np.concatenate(sheets) if sheets else np.zeros((0, 2), dtype=np.int32)
 

@@ -100,7 +100,7 @@ def stresses_of(values, body: Shell, state: np.ndarray) -> ShellStresses:
     positions = positions[scene._bodies.spans[scene._bodies.number(body)].vertices]
     rest_axes, axes = _axes(mesh.rest_positions[mesh.faces], positions[mesh.faces])
     in_plane = [np.einsum("fai,fij,fbj->fab", rest_axes, each, rest_axes) for each in tensors]
-    return ShellStresses(*in_plane, rest_axes, axes, values.current(body).thickness, mesh.face_areas)
+    return ShellStresses(*in_plane, rest_axes, axes, values.current(body).face_thickness, mesh.face_areas)
 
 
 def _axes(rest: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

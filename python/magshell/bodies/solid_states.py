@@ -54,7 +54,7 @@ def states_at(values, body: Solid, positions: np.ndarray) -> SolidStates:
     """At positions (n_v of the scene, 3) m, with these values of the scene in its core."""
     scene = values.scene
     with values.in_core():
-        rotations = np.zeros(scene.mesh.n_edges)
+        rotations = np.zeros(scene._bodies.n_rotations)
         return states_of(scene, body, scene._model.state(np.ascontiguousarray(positions), rotations))
 
 

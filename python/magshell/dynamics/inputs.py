@@ -246,7 +246,7 @@ class MotionInputs:
         check_faces(inputs.scene, positions)
         self._outside = positions
         with inputs.in_core():
-            state = model.state(positions, np.zeros(mesh.n_edges))
+            state = model.state(positions, np.zeros(inputs.scene._bodies.n_rotations))
         check_rigid(inputs.scene, positions, model.positions(state), "start [m]", mesh.size)
         return MotionState(0.0, state, still, rotations_known=False)
 

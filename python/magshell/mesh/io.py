@@ -18,6 +18,7 @@ from .._machine.files import replacing
 from .obj import read_obj
 from .ply import read_ply, write_ply
 from .selection import RELATIVE_TOLERANCE
+from .six_node_mesh import SixNodeMesh
 from .tet_io import TetContent, TetFields, cells_and_data, tetrahedra_of
 from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh, checked_mesh
@@ -26,6 +27,7 @@ _MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
 _READABLE = (".obj", ".ply", *_MESHIO_MODULES)
 _WRITERS = (".vtu", ".ply")
 _LOWER_CELLS = ("vertex", "line", "line3")  # gmsh writes them beside the surface
+_TRIANGLES = ("triangle", "triangle6")
 
 
 class Fields(NamedTuple):
@@ -35,9 +37,10 @@ class Fields(NamedTuple):
     face: dict[str, np.ndarray]
 
 
-def read_mesh(path, drop_unused: bool = False) -> TriangleMesh | TetMesh:
+def read_mesh(path, drop_unused: bool = False) -> TriangleMesh | SixNodeMesh | TetMesh:
     """The mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`): a TetMesh where a VTU or
-    MSH file holds tetrahedra, else a TriangleMesh.
+    MSH file holds tetrahedra, a SixNodeMesh where it holds triangles of six points (gmsh's second order), else a
+    TriangleMesh.
 
     Coordinates are taken to be in m: use `.scaled(1e-3)` on a file in mm. Points in the plane get z = 0. An
     STL file stores each triangle apart: its corners within 1e-6 of the mesh's size are one vertex.
@@ -65,7 +68,7 @@ def read_fields(path, drop_unused: bool = False) -> Fields | TetFields:
 
 def write_mesh(
     path,
-    mesh: TriangleMesh | TetMesh,
+    mesh: TriangleMesh | SixNodeMesh | TetMesh,
     positions=None,
     vertex_fields=None,
     face_fields=None,
@@ -76,7 +79,8 @@ def write_mesh(
     Args:
         path: ends in .vtu or .ply.
         mesh: gives the faces, or the tetrahedra: their parts are written as the field `part`, without names. Fields on a
-            solid's faces go to a file of its `surface`.
+            solid's faces go to a file of its `surface`. Of a SixNodeMesh the curved elements are written, and what
+            `face_fields` says of them; fields on its flat faces go to a file of its `surface` too.
         positions: (n_v, 3), m, instead of the rest positions.
         vertex_fields: name -> (n_v,) or (n_v, k).
         face_fields: name -> (n_f,) or (n_f, k).
@@ -91,13 +95,15 @@ def write_mesh(
     if ending not in _WRITERS:
         other = "; write_surface writes .stl and .obj" if ending in (".stl", ".obj") else ""
         raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}{other}")
-    solid = isinstance(mesh, TetMesh)
-    if not solid and not isinstance(mesh, TriangleMesh) and hasattr(mesh, "surface"):
+    solid, six = isinstance(mesh, TetMesh), isinstance(mesh, SixNodeMesh)
+    if not (solid or six or isinstance(mesh, TriangleMesh)) and hasattr(mesh, "surface"):
         raise ValueError(
             "mesh is that of several bodies, some of tetrahedra: write_series writes a result of all of them, and of one "
             "write its own, result[body].mesh"
         )
-    points = mesh.rest_positions if solid else checked_mesh(mesh).rest_positions
+    if six and ending == ".ply":
+        raise ValueError("PLY holds no triangles of six nodes: write .vtu, or the mesh's `surface`")
+    points = mesh.rest_positions if solid or six else checked_mesh(mesh).rest_positions
     if positions is not None:
         points = quantity("positions", "m", detached(positions), (mesh.n_vertices, 3))
     _refuse_misplaced(solid, ending, face_fields, tetrahedron_fields)
@@ -106,8 +112,9 @@ def write_mesh(
         on_cells = _checked_fields("tetrahedron", tetrahedron_fields, mesh.n_tetrahedra)
         cells, cell_data = cells_and_data(mesh, on_cells)
     else:
-        on_faces = _checked_fields("face", face_fields, mesh.n_faces)
-        cells, cell_data = [("triangle", mesh.faces)], {name: [values] for name, values in on_faces.items()}
+        on_faces = _checked_fields("face", face_fields, mesh.n_elements)
+        cells = [(_TRIANGLES[mesh.order - 1], mesh.elements)]
+        cell_data = {name: [values] for name, values in on_faces.items()}
     if ending == ".ply":
         write_ply(path, points, mesh.faces, on_vertices, on_faces)
         return
@@ -133,7 +140,7 @@ def _refuse_misplaced(solid: bool, ending: str, face_fields, tetrahedron_fields)
         raise ValueError("tetrahedron_fields: a TriangleMesh has no tetrahedra")
 
 
-def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields] | tuple[TetMesh, TetFields]:
+def _read(path, drop_unused: bool) -> tuple[TriangleMesh | SixNodeMesh, Fields] | tuple[TetMesh, TetFields]:
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in _READABLE:
@@ -161,7 +168,7 @@ def _read(path, drop_unused: bool) -> tuple[TriangleMesh, Fields] | tuple[TetMes
 
     points, faces, vertex_fields = _used(path, "triangle", points, faces, vertex_fields, drop_unused)
     try:
-        mesh = TriangleMesh(points, faces)
+        mesh = (TriangleMesh if faces.shape[1] == 3 else SixNodeMesh)(points, faces)
     except ValueError as error:
         raise ValueError(f"{str(path)!r}: {error}") from error
     return mesh, Fields(vertex_fields, face_fields)
@@ -208,17 +215,19 @@ def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict] |
     solid = tetrahedra_of(content)
     if solid is not None:
         return solid
+    there = {block.type for block in content.cells}
+    kind = next((each for each in _TRIANGLES if each in there), _TRIANGLES[0])
     others = {
         block.type: len(block.data)
         for block in content.cells
-        if block.type not in ("triangle", *_LOWER_CELLS)
+        if block.type not in (kind, *_LOWER_CELLS)
     }
     if others:
-        kind, count = next(iter(others.items()))
+        other, count = next(iter(others.items()))
         raise ValueError(
-            f"it holds {count} cells of type {kind!r}; only triangles (of 3 points) are supported"
+            f"it holds {count} cells of type {other!r}; only triangles, all of 3 points or all of 6, are supported"
         )
-    triangles = [k for k, block in enumerate(content.cells) if block.type == "triangle"]
+    triangles = [k for k, block in enumerate(content.cells) if block.type == kind]
     if not triangles:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), {}, {}
     faces = np.concatenate([content.cells[k].data for k in triangles])

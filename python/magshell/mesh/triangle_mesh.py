@@ -49,6 +49,8 @@ class TriangleMesh(MeshBase):
     def __repr__(self) -> str:
         return summary(self)
 
+    order = 1
+
     # Connectivity
 
     @cached_property
@@ -60,6 +62,20 @@ class TriangleMesh(MeshBase):
     def faces(self) -> np.ndarray:
         """(n_f, 3) vertex indices, int32, read-only."""
         return self._core.faces
+
+    @property
+    def elements(self) -> np.ndarray:
+        """What has a thickness and a magnetization of its own: here the faces, of a SixNodeMesh its elements."""
+        return self.faces
+
+    @property
+    def nodes_of_edges(self) -> np.ndarray:
+        """(n_e, 2): all nodes on each edge, here its ends."""
+        return self.edges
+
+    @property
+    def n_elements(self) -> int:
+        return self.n_faces
 
     @cached_property
     def edges(self) -> np.ndarray:
@@ -117,6 +133,11 @@ class TriangleMesh(MeshBase):
     def face_areas(self) -> np.ndarray:
         """(n_f,), m2."""
         return frozen(np.linalg.norm(self._area_vectors, axis=1))
+
+    @property
+    def element_areas(self) -> np.ndarray:
+        """(n_f,), m2: of the faces."""
+        return self.face_areas
 
     @cached_property
     def face_normals(self) -> np.ndarray:

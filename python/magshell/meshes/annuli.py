@@ -6,9 +6,11 @@ import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import angle_span, is_full_turn
 from ._grid import grid
+from ._six_nodes import round_sheet
 from ._surface import surface
 
 
@@ -19,15 +21,18 @@ def annulus(
     diagonals: str = "alternating",
     irregular: float | None = None,
     seed: int = 0,
-) -> TriangleMesh:
+    *,
+    order: int = 1,
+) -> TriangleMesh | SixNodeMesh:
     """The ring between two radii [m] around the origin in the plane z = 0, its normal along +z.
 
     Args:
         inner_radius, outer_radius: m.
         cells: (radial, around).
         diagonals, irregular, seed: as for `rectangle`.
+        order: likewise; edges on its rims are arcs.
     """
-    return sector(inner_radius, outer_radius, 2 * np.pi, cells, diagonals, irregular, seed)
+    return sector(inner_radius, outer_radius, 2 * np.pi, cells, diagonals, irregular, seed, order=order)
 
 
 def sector(
@@ -38,7 +43,9 @@ def sector(
     diagonals: str = "alternating",
     irregular: float | None = None,
     seed: int = 0,
-) -> TriangleMesh:
+    *,
+    order: int = 1,
+) -> TriangleMesh | SixNodeMesh:
     """The part of a ring between two angles from the x axis, in the plane z = 0, its normal along +z.
 
     Args:
@@ -46,6 +53,7 @@ def sector(
         angle: rad, from 0 to `angle` or (from, to). A full turn closes the ring: then the seam is joined.
         cells: (radial, around).
         diagonals, irregular, seed: as for `rectangle`.
+        order: likewise; edges on its rims are arcs.
 
     >>> import math
     >>> sector(0.0, 0.01, math.pi / 2, cells=(4, 6)).boundary_loops[0].size
@@ -60,4 +68,5 @@ def sector(
     radius = inner + (outer - inner) * g.parameters[:, 0]
     theta = start + (stop - start) * g.parameters[:, 1]
     points = np.stack([radius * np.cos(theta), radius * np.sin(theta), np.zeros_like(theta)], axis=1)
-    return surface(points, g.faces, lambda barycenters: np.array([0.0, 0.0, 1.0]))
+    mesh = surface(points, g.faces, lambda barycenters: np.array([0.0, 0.0, 1.0]))
+    return round_sheet(mesh, order, axes=(0, 1))

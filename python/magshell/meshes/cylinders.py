@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.scalars import positive
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
+from ._six_nodes import round_sheet
 from ._surface import surface
 
 
@@ -20,7 +22,8 @@ def cylinder(
     diagonals: str = "alternating",
     irregular: float | None = None,
     seed: int = 0,
-) -> TriangleMesh:
+    order: int = 1,
+) -> TriangleMesh | SixNodeMesh:
     """A cylinder around the y axis, 0 <= y <= length, its normal outwards.
 
         x = radius sin(phi),   z = radius cos(phi)
@@ -32,6 +35,7 @@ def cylinder(
             joined.
         cells: (around, along).
         diagonals, irregular, seed: as for `rectangle`.
+        order: likewise; nodes between corners lie on the cylinder too.
 
     >>> import math
     >>> roof = cylinder(25.0, 50.0, angle=math.radians(80.0), cells=(16, 16))
@@ -46,4 +50,5 @@ def cylinder(
     y = length * (1 - g.parameters[:, 0])
     phi = start + (stop - start) * g.parameters[:, 1]
     points = np.stack([radius * np.sin(phi), y, radius * np.cos(phi)], axis=1)
-    return surface(points, g.faces, lambda barycenters: barycenters * [1, 0, 1])
+    mesh = surface(points, g.faces, lambda barycenters: barycenters * [1, 0, 1])
+    return round_sheet(mesh, order, axes=(0, 2))

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.scalars import positive
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._grid import check_size
+from ._six_nodes import round_sheet
 
 
-def disk(radius: float, cells: int) -> TriangleMesh:
+def disk(radius: float, cells: int, *, order: int = 1) -> TriangleMesh | SixNodeMesh:
     """The disk of the given radius [m] around the origin in the plane z = 0, its normal along +z.
+
+    order: 1 for three nodes a face; 2 for a SixNodeMesh, whose edges on its rims are arcs.
 
     Ring k of `cells` rings holds 6 k vertices, so all faces are nearly equilateral: 6 cells^2 of them.
 
@@ -25,7 +29,8 @@ def disk(radius: float, cells: int) -> TriangleMesh:
     for k in range(1, cells + 1):
         angle = 2 * np.pi * np.arange(6 * k) / (6 * k)
         rings.append(radius * k / cells * np.stack([np.cos(angle), np.sin(angle), np.zeros(6 * k)], axis=1))
-    return TriangleMesh(np.concatenate(rings), np.concatenate([_ring_faces(k) for k in range(1, cells + 1)]))
+    faces = np.concatenate([_ring_faces(k) for k in range(1, cells + 1)])
+    return round_sheet(TriangleMesh(np.concatenate(rings), faces), order, axes=(0, 1))
 
 
 def _ring_faces(k: int) -> np.ndarray:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.scalars import positive
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._grid import grid
+from ._six_nodes import sheet_of_order
 
 
 def rectangle(
@@ -16,7 +18,9 @@ def rectangle(
     diagonals: str = "alternating",
     irregular: float | None = None,
     seed: int = 0,
-) -> TriangleMesh:
+    *,
+    order: int = 1,
+) -> TriangleMesh | SixNodeMesh:
     """The sheet [0, length] x [0, width] [m] in the plane z = 0, its normal along +z.
 
     Args:
@@ -25,6 +29,7 @@ def rectangle(
         diagonals: "alternating", "aligned" (all from the origin outwards) or "crossed" (four faces a cell).
         irregular: moves interior vertices at random by up to this fraction of their spacing, at most 0.25.
         seed: of these moves; the same seed gives the same mesh.
+        order: 1 for three nodes a face; 2 for a SixNodeMesh, whose `elements` the same triangles are.
 
     >>> rectangle(0.12, 0.02, cells=(60, 10)).n_faces
     1200
@@ -32,4 +37,5 @@ def rectangle(
     length, width = positive("length", "m", length), positive("width", "m", width)
     g = grid(cells, diagonals, irregular, seed)
     x, y = g.parameters.T
-    return TriangleMesh(np.stack([length * x, width * y, np.zeros_like(x)], axis=1), g.faces)
+    mesh = TriangleMesh(np.stack([length * x, width * y, np.zeros_like(x)], axis=1), g.faces)
+    return sheet_of_order(mesh, order)

@@ -6,9 +6,11 @@ import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
+from ._six_nodes import round_sheet
 from ._surface import surface
 
 
@@ -22,7 +24,8 @@ def spherical_cap(
     diagonals: str = "alternating",
     irregular: float | None = None,
     seed: int = 0,
-) -> TriangleMesh:
+    order: int = 1,
+) -> TriangleMesh | SixNodeMesh:
     """The part of the sphere around the origin between two polar angles, its normal outwards.
 
     Args:
@@ -32,6 +35,7 @@ def spherical_cap(
         sector_angle: azimuth in rad from the x axis, from 0 to it or (from, to). A full turn joins its seam.
         cells: (around, along the meridian).
         diagonals, irregular, seed: as for `rectangle`.
+        order: likewise; nodes between corners lie on the sphere too.
 
     >>> import math
     >>> quarter = spherical_cap(10.0, math.radians(18), math.pi / 2, math.pi / 2, cells=(16, 16))
@@ -55,4 +59,5 @@ def spherical_cap(
     phi = start + (stop - start) * g.parameters[:, 1]
     sine = np.sin(theta)
     points = radius * np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=1)
-    return surface(points, g.faces, lambda barycenters: barycenters)
+    mesh = surface(points, g.faces, lambda barycenters: barycenters)
+    return round_sheet(mesh, order, axes=(0, 1, 2))

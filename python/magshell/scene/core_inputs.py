@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..bodies.muscle import Muscle
-from ..bodies.shell import Shell
 from ..bodies.solid import Solid
+from ..mesh.six_node_mesh import SixNodeMesh
+from ..mesh.triangle_mesh import TriangleMesh
 from ..surroundings.cavity import Cavity
 from ..surroundings.cells import Cells
 from ..surroundings.face_energies import FaceEnergy
@@ -19,6 +20,7 @@ def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
     return {
         "sheets": _sheets(scene, directed_edges),
         "six_node_sheets": [],
+        "six_node_sheets": _six_node_sheets(scene, directed_edges),
         "solids": _solids(scene),
         "skins": _skins(scene),
         "rigid": [
@@ -30,7 +32,7 @@ def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
 
 def muscle_inputs(scene) -> list[dict]:
     bodies = scene._bodies
-    first = len(bodies.shells) - len(bodies.solids)
+    first = len(bodies.flat_sheets)
     return [
         muscle._core_input(label, bodies.core_number(bodies.of(muscle)) - first)
         for muscle, label in scene._labels
@@ -40,10 +42,10 @@ def muscle_inputs(scene) -> list[dict]:
 
 def face_inputs(scene) -> dict[str, list[dict]]:
     """Energies of faces, and pressures."""
-    bodies = scene._bodies
+    bodies, n_skins = scene._bodies, len(_skins(scene))
     return {
         "face_energies": [
-            {"owner": label, "body": bodies.core_number(bodies.of(load)), "energy": load._core}
+            {"owner": label, "body": bodies.core_number(bodies.of(load), n_skins), "energy": load._core}
             for load, label in scene._labels
             if isinstance(load, FaceEnergy)
         ],
@@ -67,9 +69,15 @@ def actuator_inputs(scene) -> dict[str, list[dict]]:
     return {"volumes": volumes, "tendons": tendons}
 
 
-def _sheets(scene, directed_edges: np.ndarray) -> list[dict]:
+def _directed_by_body(scene, directed_edges: np.ndarray) -> list[np.ndarray]:
+    """Of each body, its edges and the rows of their directions, (k, 2)."""
     of, edges = scene._bodies.split(directed_edges[:, 0])
     pairs = np.stack([edges, directed_edges[:, 1]], axis=1).astype(np.int32)
+    return [pairs[of == k] for k in range(len(scene.bodies))]
+
+
+def _sheets(scene, directed_edges: np.ndarray) -> list[dict]:
+    directed = _directed_by_body(scene, directed_edges)
     return [
         {
             "owner": f"body {k}",
@@ -78,20 +86,46 @@ def _sheets(scene, directed_edges: np.ndarray) -> list[dict]:
             "curvature_scale": shell.curvature_scale,
             "directors": shell.bending == "midedge",
             "magnetic": bool(scene.fields),
-            "directed_edges": pairs[of == k],
+            "directed_edges": directed[k],
         }
         for k, (shell, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True))
-        if isinstance(shell, Shell)
+        if isinstance(shell.mesh, TriangleMesh)
     ]
+
+
+def _six_node_sheets(scene, directed_edges: np.ndarray) -> list[dict]:
+    directed = _directed_by_body(scene, directed_edges)
+    return [
+        {
+            "owner": f"body {k}",
+            "rest_positions": span.mesh.rest_positions,
+            "faces": span.mesh.elements,
+            "corners": span.mesh.corners._core,
+            "vertices": scene._bodies.original[span.vertices],
+            "surface": span.mesh.surface._core,
+            "surface_vertices": scene._bodies.original[span.vertices],
+            "surface_acts": _surface_acts(scene, k),
+            "magnetic": bool(scene.fields),
+            "directed_edges": directed[k],
+        }
+        for k, (shell, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True))
+        if isinstance(shell.mesh, SixNodeMesh)
+    ]
+
+
+def _surface_acts(scene, body: int) -> bool:
+    """Whether water, or a face energy, acts on the surface of a body."""
+    return scene.water is not None or any(
+        scene._bodies.of(load).bodies.start == body for load in scene.loads if isinstance(load, FaceEnergy)
+    )
 
 
 def _solids(scene) -> list[dict]:
     bodies = scene._bodies
-    loaded = [bodies.of(load).bodies.start for load in scene.loads if isinstance(load, FaceEnergy)]
     return [
         {
             **body._core_input(f"body {k}", bodies.original[span.vertices]),
-            "surface_acts": scene.water is not None or k in loaded,
+            "surface_acts": _surface_acts(scene, k),
         }
         for k, (body, span) in enumerate(zip(scene.bodies, bodies.spans, strict=True))
         if isinstance(body, Solid)

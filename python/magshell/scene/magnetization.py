@@ -1,4 +1,5 @@
-"""The magnetization of a solve: of all faces at once, of each body by itself, or their own."""
+"""The magnetization of a solve: of all faces at once (of six-node sheets, their elements), of each body by itself, or their
+own."""
 
 from __future__ import annotations
 
@@ -40,9 +41,9 @@ def check_on_skins(scene, given: np.ndarray) -> None:
                 "remanent_magnetization was given for all faces, but the scene has no Shell, and no Solid with a skin"
             )
         return
-    bare = np.zeros(scene.mesh.n_faces, dtype=bool)
+    bare = np.zeros(scene._bodies.n_magnetized, dtype=bool)
     for body, span in zip(scene.bodies, scene._bodies.spans, strict=True):
-        bare[span.faces] = isinstance(body, Solid)
+        bare[span.rows] = isinstance(body, Solid)
     for _, _, faces in _carriers(scene):
         bare[faces] = False
     idle = bare & given.any(axis=1)
@@ -62,7 +63,7 @@ def of_carriers(scene, magnetization: np.ndarray):
 def gradient_by_all(scene, gradient) -> np.ndarray:
     """(n_f of all, 3): the transpose of `of_carriers`."""
     labels = {id(each): label for each, label in scene._labels}
-    found = np.zeros((scene.mesh.n_faces, 3))
+    found = np.zeros((scene._bodies.n_magnetized, 3))
     for _, carrier, faces in _carriers(scene):
         found[faces] = gradient.value(labels[id(carrier)], _NAME)
     return found
@@ -80,14 +81,14 @@ def of_all_bodies(scene, replaced: dict[object, dict]):
         (replaced.get(carrier, {}).get(_NAME, carrier.remanent_magnetization), faces)
         for _, carrier, faces in _carriers(scene)
     ]
-    n_faces = scene.mesh.n_faces
+    n_rows = scene._bodies.n_magnetized
     if not any(is_tensor(given) for given, _ in parts):
-        rows = np.zeros((n_faces, 3))
+        rows = np.zeros((n_rows, 3))
         for given, faces in parts:
             rows[faces] = given
         return rows
     torch = require_torch("a tensor")
-    rows = torch.zeros((n_faces, 3), dtype=torch.float64)
+    rows = torch.zeros((n_rows, 3), dtype=torch.float64)
     for given, faces in parts:
         tensor = given if is_tensor(given) else torch.tensor(np.array(given, dtype=float))
         rows = rows.index_put((torch.from_numpy(faces),), tensor.to(rows).expand(len(faces), 3))
@@ -95,9 +96,9 @@ def of_all_bodies(scene, replaced: dict[object, dict]):
 
 
 def _carriers(scene):
-    """(number of the body, Shell or Skin, its faces among those of all (k,)) of what faces are magnetized with."""
+    """(number of the body, Shell or Skin, its rows among those of all (k,)) of what faces are magnetized with."""
     for k, (body, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True)):
         if not isinstance(body, Solid):
-            yield k, body, span.first_face + np.arange(body.mesh.n_faces)
+            yield k, body, span.first_row + np.arange(body.mesh.n_elements)
         elif body.skin is not None:
-            yield k, body.skin, span.first_face + body.skin.faces
+            yield k, body.skin, span.first_row + body.skin.faces

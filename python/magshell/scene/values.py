@@ -102,11 +102,12 @@ class Values:
 
     @property
     def whole(self) -> Shell | Whole:
-        """All sheets as one, for what looks at their faces; with solids beside them, without their mesh."""
-        sheets = tuple(body for body in self.sheets if isinstance(body, Shell))
-        if len(sheets) == len(self.sheets) == 1:
+        """All sheets as one, for what looks at their faces; unless they are flat and alone, without their mesh."""
+        sheets = tuple(self.current(body) for body in self.scene._bodies.sheets)
+        flat = self.scene._bodies.flat_sheets_alone
+        if flat and len(sheets) == 1:
             return sheets[0]
-        return Whole(self.scene.mesh if len(sheets) == len(self.sheets) else None, sheets)
+        return Whole(self.scene.mesh if flat else None, sheets)
 
     def touching(self, contact) -> tuple:
         """The sheets that a contact is about, as they are in this solve."""

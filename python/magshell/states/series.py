@@ -17,6 +17,7 @@ from .._checks.quantity import quantity, shape_of
 from .._checks.tensors import detached
 from .._machine.files import replacing
 from ..mesh.io import check_field_name, write_mesh
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.tet_mesh import TetMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from .element_fields import element_fields
@@ -111,9 +112,10 @@ def write_series(
             on_faces, on_tetrahedra = (
                 {name: values[k] for name, values in more[kind].items()} for kind in ("face", "tetrahedron")
             )
-            if isinstance(state.mesh, TriangleMesh):
+            if isinstance(state.mesh, TriangleMesh | SixNodeMesh):
                 on_faces = _of_sheets(state, magnetized) | on_faces
-                write_mesh(path.parent / names[k], state.mesh, state.positions, on_vertices, on_faces)
+                flat = state.mesh if isinstance(state.mesh, TriangleMesh) else state.mesh.surface
+                write_mesh(path.parent / names[k], flat, state.positions, on_vertices, on_faces)
             else:
                 write_solids(path.parent / names[k], state, on_vertices, on_faces, on_tetrahedra)
             done.append(k)
@@ -123,7 +125,7 @@ def write_series(
 def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
     fields = named_values(f"{kind}_fields", fields)
     mesh = states[0].mesh
-    if kind == "tetrahedron" and fields and isinstance(mesh, TriangleMesh):
+    if kind == "tetrahedron" and fields and isinstance(mesh, TriangleMesh | SixNodeMesh):
         raise ValueError("tetrahedron_fields: there are no tetrahedra")
     rows = _counts(mesh)[kind]
     for name, values in fields.items():

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.tensors import detached
+from ..bodies.bodies import magnetized_rows
 from ..bodies.joined_mesh import JoinedMesh
 from ..bodies.of_body import result_of
 from ..bodies.shell import Shell
@@ -18,6 +19,8 @@ from ..bodies.solid import Solid
 from ..bodies.solid_states import SolidStates
 from ..dynamics.trajectory import Trajectory
 from ..fields.field import UniformField
+from ..mesh.face_shapes import sides
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.tet_mesh import TetMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ..obstacles import Obstacle
@@ -44,7 +47,7 @@ class State:
     loads: () -> ContactLoads of a result of a scene with contacts, or None without any.
     """
 
-    mesh: TriangleMesh | TetMesh | JoinedMesh
+    mesh: TriangleMesh | SixNodeMesh | TetMesh | JoinedMesh
     positions: np.ndarray
     remanent_magnetization: np.ndarray | None = None
     flux_density: np.ndarray | None = None
@@ -119,7 +122,7 @@ def states_of(
         "field": field,
         "obstacles": obstacles,
     }
-    if isinstance(what, TriangleMesh | TetMesh):
+    if isinstance(what, TriangleMesh | SixNodeMesh | TetMesh):
         return _states(what, given)
     if isinstance(what, Shell | Solid):
         return _states(what.mesh, _magnetized(given, [what]))
@@ -293,6 +296,11 @@ def _magnetization(mesh: TriangleMesh, values) -> np.ndarray | None:
     if values is None:
         return None
     array = quantity("remanent_magnetization", "A/m", detached(values), ("...", 3))
+    meshes = getattr(mesh, "meshes", [mesh])
+    parts = [sides(each)[1] if isinstance(each, SixNodeMesh) else 1 for each in meshes]
+    rows = [magnetized_rows(each) for each in meshes]
+    if max(parts, default=1) > 1 and array.shape == (sum(rows), 3):
+        return np.repeat(array, np.repeat(parts, rows), axis=0)
     if array.shape not in ((3,), (mesh.n_faces, 3)):
         wanted = f"(n_f, 3) = ({mesh.n_faces}, 3) or (3,)"
         raise ValueError(f"remanent_magnetization [A/m] must have shape {wanted}, got {array.shape}")

@@ -96,7 +96,7 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
             "Start from positions where no element is so, take smaller steps there, or a material that has an energy "
             "there (StableNeoHookean)."
         )
-    if scene._bodies.solids:
+    if not scene._bodies.flat_sheets_alone:
         return _advice_of_any(inputs, found, at_rest)
     mesh, quality = scene.mesh, shell.quality
     tiny = np.flatnonzero(quality.heights < SHORTEST_HEIGHT * np.median(mesh.edge_lengths))

@@ -84,10 +84,10 @@ def energies(
     places = quantity("positions", "m", to_array("positions", positions), (mesh.n_vertices, 3))
     scene._bodies.check_welded("positions", "m", places)
     check_faces(scene, places)
-    rotations = np.zeros(mesh.n_edges)
+    rotations = np.zeros(scene._bodies.n_rotations)
     if edge_rotations is not None:
         rotations = to_array("edge_rotations", edge_rotations)
-        rotations = quantity("edge_rotations", "rad", rotations, (mesh.n_edges,))
+        rotations = quantity("edge_rotations", "rad", rotations, (scene._bodies.n_rotations,))
     with inputs.in_core():
         state = model.state(places, rotations)
         if reason := model.refusal(state):
@@ -103,7 +103,7 @@ def energies(
 
 def _of_body(scene, number: int, of_terms: list[tuple[str, float]]) -> dict[str, float]:
     """Elastic terms stand in the order of their bodies, one each."""
-    kind = type(scene.bodies[number])
-    before = sum(isinstance(each, kind) for each in scene.bodies[:number])
-    names = ("solid",) if issubclass(kind, Solid) else _ELASTIC
+    body, bodies = scene.bodies[number], scene._bodies
+    kind, names = (bodies.solids, ("solid",)) if isinstance(body, Solid) else (bodies.sheets, _ELASTIC)
+    before = next(k for k, each in enumerate(kind) if each is body)
     return {name: [energy for each, energy in of_terms if each == name][before] for name in names}

@@ -284,7 +284,7 @@ def follow(
 
 def _bending_energies(scene: Scene, found, controls) -> list[float]:
     """Of its points, where faces are to be looked at for which that matters."""
-    if scene._bodies.solids or not scene._caps.faces.size:
+    if not scene._bodies.flat_sheets_alone or not scene._caps.faces.size:
         return []
     return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]
 

@@ -44,7 +44,7 @@ def starting_point(scene: Scene, start, inputs: Inputs):
     check_faces(scene, positions)
     check_outside(scene, inputs.values, positions, 0.0)
     with inputs.in_core():
-        state = model.state(positions, np.zeros(scene.mesh.n_edges))
+        state = model.state(positions, np.zeros(scene._bodies.n_rotations))
     check_rigid(scene, positions, model.positions(state), "start [m]", scene.mesh.size)
     return state, [], inputs.controls, False
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..bodies.solid import Solid
-from ..mesh.face_shapes import rule, shapes, sides
+from ..mesh.face_shapes import sides
+from ..mesh.six_node_integrals import rule, shapes
 from ..mesh.tet_topology import FACE_NODES, FACES, groups
 
 _NAMED = 4  # edges that an error names

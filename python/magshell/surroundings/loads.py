@@ -9,7 +9,8 @@ from .._checks.quantity import quantity, real_numbers
 from .._checks.selections import indices, selection
 from ..bodies.bodies import checked_body
 from ..bodies.shell import Shell
-from ..mesh.face_shapes import shares
+from ..mesh.face_shapes import edge_shares, shares
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 
 
@@ -71,7 +72,8 @@ class PointLoad(DeadLoad):
 
 
 class EdgeLoad(DeadLoad):
-    """A force per rest length [N/m] along some edges, half to each end: (3,) or (k, 3), one an edge.
+    """A force per rest length [N/m] along some edges, half to each end (of six-node elements by their shapes): (3,) or
+    (k, 3), one an edge.
 
     body: the Shell whose edges they are, in a scene of several.
     """
@@ -86,8 +88,7 @@ class EdgeLoad(DeadLoad):
         return EdgeLoad(self.edges, force_per_length, self.body)
 
     def _shares(self, mesh: TriangleMesh):
-        edges = indices("EdgeLoad edges", self.edges, mesh.n_edges)
-        return mesh.edges[edges], (mesh.edge_lengths[edges] / 2.0)[:, None]
+        return edge_shares(mesh, indices("EdgeLoad edges", self.edges, mesh.n_edges))
 
 
 class AreaLoad(DeadLoad):
@@ -137,7 +138,13 @@ class EdgeCouple(Owner):
         self.couple_per_length = quantity("couple_per_length", "N", array, array.shape)
 
     def edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn."""
+        """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn, and for six-node
+        sheets, whose couples are not built yet."""
+        if isinstance(mesh, SixNodeMesh):
+            raise ValueError(
+                'an EdgeCouple is for sheets with bending="midedge" or "hinge"; with "midedge2", turn the edge by a Clamp with '
+                "a rotation"
+            )
         if not isinstance(mesh, TriangleMesh):
             raise ValueError(
                 "an EdgeCouple turns edges of a shell: a couple on a solid is one of PointLoads on its face"

@@ -13,6 +13,7 @@ from .._checks.scalars import not_negative
 from .._checks.selections import indices, selection
 from ..bodies.bodies import checked_body, on_body
 from ..bodies.shell import Shell
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 
 _AXES = "xyz"
@@ -116,7 +117,9 @@ class Pin(Support):
 
     def held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = indices("Pin vertices", self.vertices, mesh.n_vertices)
-        if not isinstance(mesh, TriangleMesh):
+        if isinstance(mesh, SixNodeMesh):
+            _refuse_ends_alone(mesh, vertices)
+        elif not isinstance(mesh, TriangleMesh):
             _refuse_corners_alone(mesh, vertices)
         directions = np.eye(3)[[_AXES.index(c) for c in self.components]]
         move = self._move.about(mesh.rest_positions[vertices], self)
@@ -154,9 +157,9 @@ class Clamp(Support):
         self._move = _Move(displacement, rotation, center)
 
     def held(self, mesh: TriangleMesh) -> list[Held]:
-        if not isinstance(mesh, TriangleMesh):
+        if not isinstance(mesh, TriangleMesh | SixNodeMesh):
             raise ValueError("a Clamp holds edges of a shell: a Pin of the vertices of a face clamps a solid")
-        vertices = np.unique(mesh.edges[self._checked(mesh)])
+        vertices = np.unique(mesh.nodes_of_edges[self._checked(mesh)])
         return [Held(vertices, np.broadcast_to(np.eye(3), (len(vertices), 3, 3)), self._move_on(mesh))]
 
     def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
@@ -172,7 +175,7 @@ class Clamp(Support):
         return indices("Clamp edges", self.edges, mesh.n_edges)
 
     def _move_on(self, mesh: TriangleMesh) -> RigidMove | None:
-        return self._move.about(mesh.rest_positions[np.unique(mesh.edges[self._checked(mesh)])], self)
+        return self._move.about(mesh.rest_positions[np.unique(mesh.nodes_of_edges[self._checked(mesh)])], self)
 
     def __repr__(self) -> str:
         return f"Clamp({len(self.edges)} edges{self._move.summary()}{on_body(self.body)})"
@@ -225,12 +228,12 @@ class SymmetryPlane(Support):
         return [Held(vertices, np.broadcast_to(self.normal, (len(vertices), 1, 3)), None)]
 
     def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
-        if not isinstance(mesh, TriangleMesh):
+        if not isinstance(mesh, TriangleMesh | SixNodeMesh):
             return []  # a solid has no angle across the plane
         on_plane = np.zeros(mesh.n_vertices, dtype=bool)
         on_plane[self._vertices(mesh)] = True
         boundary = mesh.boundary_edges
-        edges = boundary[on_plane[mesh.edges[boundary]].all(axis=1)]
+        edges = boundary[on_plane[mesh.nodes_of_edges[boundary]].all(axis=1)]
         if edges.size == 0:
             return []
         steepness = continuations(mesh, edges) @ self.normal
@@ -262,6 +265,19 @@ def _refuse_corners_alone(mesh, vertices: np.ndarray) -> None:
             f"Pin vertices hold the corners of {np.count_nonzero(corners)} faces of a quadratic Solid, and none of the "
             "nodes between them: select on the mesh of the solid, as in solid.mesh.vertices_at(x=0.0), which has "
             "ten nodes a tetrahedron"
+        )
+
+
+def _refuse_ends_alone(mesh: SixNodeMesh, vertices: np.ndarray) -> None:
+    """What was selected on the mesh of three nodes would hold a row of edges by their ends, and let the nodes between go."""
+    held = np.zeros(mesh.n_vertices, dtype=bool)
+    held[vertices] = True
+    edges = mesh.edges[held[mesh.edges].all(axis=1)]
+    in_a_row = len(edges) and np.bincount(edges.ravel()).max() > 1
+    if in_a_row and not held[mesh.edge_nodes].any():
+        raise ValueError(
+            f"Pin vertices hold the ends of {len(edges)} edges of six-node elements, and none of the nodes between them: "
+            "select on the mesh of the shell, as in shell.mesh.vertices_at(x=0.0)"
         )
 
 
@@ -309,11 +325,12 @@ class _Move:
 
 def continuations(mesh: TriangleMesh, edges: np.ndarray) -> np.ndarray:
     """Unit vectors across edges, in the plane of their first face and away from it, (k, 3)."""
-    faces = np.where(mesh.edge_faces[edges, 0] >= 0, mesh.edge_faces[edges, 0], mesh.edge_faces[edges, 1])
+    flat = mesh.corners if isinstance(mesh, SixNodeMesh) else mesh
+    faces = np.where(flat.edge_faces[edges, 0] >= 0, flat.edge_faces[edges, 0], flat.edge_faces[edges, 1])
     ends = mesh.rest_positions[mesh.edges[edges]]
     along = ends[:, 1] - ends[:, 0]
-    forward = (mesh.edge_faces[edges, 0] == faces)[:, None]
-    outwards = np.cross(np.where(forward, along, -along), mesh.face_normals[faces])
+    forward = (flat.edge_faces[edges, 0] == faces)[:, None]
+    outwards = np.cross(np.where(forward, along, -along), flat.face_normals[faces])
     return outwards / np.linalg.norm(outwards, axis=1, keepdims=True)
 
 

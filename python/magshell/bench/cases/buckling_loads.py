@@ -6,7 +6,7 @@ import numpy as np
 
 import magshell as ms
 
-from .outcome import Comparison, Outcome, mesh_name, outcome
+from .outcome import Comparison, Outcome, mesh_name, order_of, outcome
 
 LENGTH, WIDTH, THICKNESS, YOUNG_MODULUS, POISSON_RATIO = 1.0, 0.1, 0.001, 1e9, 0.3
 
@@ -42,7 +42,7 @@ def columns(
     cells: tuple[int, int] = (40, 4), bending: str = "midedge", *, irregular: float | None = 0.25
 ) -> Outcome:
     """The four Euler columns: the computed load over each one's closed form, times that form."""
-    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular)
+    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, order=order_of(bending))
     found = [ms.linear_buckling(column(mesh, ends, bending)) for ends in COLUMNS]
     loads = [factor * buckling.factors[0] for factor, buckling in zip(COLUMNS.values(), found, strict=True)]
     comparison = Comparison("P L2 / EI", loads, list(COLUMNS.values()), at=tuple(COLUMNS), allowed=0.01)
@@ -53,12 +53,12 @@ def plate(
     cells: tuple[int, int] = (32, 32), bending: str = "midedge", *, irregular: float | None = None
 ) -> Outcome:
     """A simply supported square under uniaxial compression."""
-    mesh = ms.meshes.rectangle(LENGTH, LENGTH, cells, irregular=irregular)
+    mesh = ms.meshes.rectangle(LENGTH, LENGTH, cells, irregular=irregular, order=order_of(bending))
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
     )
     unit = np.pi**2 * YOUNG_MODULUS * THICKNESS**3 / (12.0 * (1.0 - POISSON_RATIO**2)) / LENGTH**2
-    rim = np.unique(mesh.edges[mesh.boundary_edges])
+    rim = mesh.boundary_vertices
     supports = [
         ms.Pin(rim, "z"),
         ms.Pin(mesh.vertices_at(x=0.0), "x"),

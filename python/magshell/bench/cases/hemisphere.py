@@ -6,18 +6,23 @@ import numpy as np
 
 import magshell as ms
 
-from .outcome import Comparison, Outcome, mesh_name, outcome
+from .outcome import Comparison, Outcome, mesh_name, order_of, outcome
 
 RADIUS, THICKNESS, YOUNG_MODULUS, POISSON_RATIO = 10.0, 0.04, 6.825e7, 0.3
 HOLE = np.radians(18.0)
 
 
-def quarter(cells: tuple[int, int], hole: float = HOLE, irregular: float | None = None) -> ms.TriangleMesh:
+def quarter(
+    cells: tuple[int, int], bending: str, hole: float = HOLE, irregular: float | None = None
+) -> ms.TriangleMesh | ms.SixNodeMesh:
     """A quarter of the hemisphere, cells as those of the whole: around, along the meridian."""
     if cells[0] % 4:
         raise ValueError(f"a quarter needs a multiple of 4 cells around, got {cells[0]}")
     of_quarter = (cells[0] // 4, cells[1])
-    return ms.meshes.spherical_cap(RADIUS, hole, np.pi / 2, np.pi / 2, cells=of_quarter, irregular=irregular)
+    span = (hole, np.pi / 2, np.pi / 2)
+    return ms.meshes.spherical_cap(
+        RADIUS, *span, cells=of_quarter, irregular=irregular, order=order_of(bending)
+    )
 
 
 def scene(mesh: ms.TriangleMesh, bending: str, force: float) -> ms.Scene:
@@ -49,7 +54,7 @@ def large_deflection(
     References: Sze, Liu, Lo, Finite Elem. Anal. Des. 40 (2004) 1551, Abaqus S4R: 4.067 outwards, 8.178
     inwards.
     """
-    mesh = quarter(cells, irregular=irregular)
+    mesh = quarter(cells, bending, irregular=irregular)
     state = ms.equilibrium(scene(mesh, bending, force=400.0), solver=solver)
     pulled, pushed = radial_displacements(mesh, state.displacements)
     comparisons = [
@@ -67,7 +72,7 @@ def small_deflection(
     References: FinEtools (0.0924 without the hole, 0.093 with a slightly larger one), MacNeal and Harder
     (0.094).
     """
-    meshes = quarter(cells, HOLE, irregular), quarter(cells, 0.0, irregular)
+    meshes = quarter(cells, bending, HOLE, irregular), quarter(cells, bending, 0.0, irregular)
     responses = [ms.linear_response(scene(mesh, bending, force=2.0)) for mesh in meshes]
     hole, closed = (
         np.mean(radial_displacements(mesh, response.displacements))

@@ -9,7 +9,7 @@ import numpy as np
 import magshell as ms
 
 from . import shear_strip
-from .outcome import Comparison, Outcome, mesh_name, outcome, sweep, tip
+from .outcome import Comparison, Outcome, mesh_name, order_of, outcome, sweep, tip
 
 LENGTH, WIDTH, YOUNG_MODULUS, MAGNETIZATION = 0.1, 0.01, 1e6, 1e5
 THICKNESS = LENGTH / 400  # thin, because the elastica does not stretch: 1e-5 of its length here
@@ -53,6 +53,12 @@ def scene(mesh: ms.TriangleMesh, bending: str) -> ms.Scene:
     return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
 
 
+def _strip(cells, bending: str, irregular: float | None, seed: int) -> ms.TriangleMesh | ms.SixNodeMesh:
+    return ms.meshes.rectangle(
+        LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending)
+    )
+
+
 def controls(beta: float, direction: tuple[float, float, float]) -> dict:
     """Magnetised along x, in the field [T] along `direction` that makes beta."""
     flux_density = beta * YOUNG_MODULUS * THICKNESS**2 / (12.0 * MAGNETIZATION * LENGTH**2)
@@ -72,7 +78,7 @@ def field_across(
     solver: ms.Newton | None = None,
 ) -> Outcome:
     """C1-90: the end of the strip against the elastica, at every beta."""
-    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed)
+    mesh = _strip(cells, bending, irregular, seed)
     references = {beta: ACROSS[beta] for beta in betas}
     return _against_elastica(mesh_name(cells, irregular), mesh, bending, references, (0.0, 0.0, 1.0), solver)
 
@@ -87,7 +93,7 @@ def field_against(
     solver: ms.Newton | None = None,
 ) -> Outcome:
     """C1-180: the same past the critical field, where the straight strip is a saddle that has to be left."""
-    mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed)
+    mesh = _strip(cells, bending, irregular, seed)
     references = {beta: AGAINST[beta] for beta in betas}
     return _against_elastica(mesh_name(cells, irregular), mesh, bending, references, (-1.0, 0.0, 0.0), solver)
 
@@ -112,7 +118,7 @@ def magnetic_end_shear(
     For a tangential uniform M and a uniform B the magnetic energy is the work of the dead traction h (M . nu)
     B on the boundary (divergence theorem), nu its outward normal: here the end load P = h w M B.
     """
-    mesh = shear_strip.strip(cells, seed)
+    mesh = shear_strip.strip(cells, bending, seed)
     magnetic = _sheared_by_a_field(mesh, bending)
     loaded = ms.equilibrium(shear_strip.scene(mesh, bending))
     ends = [tip(mesh, state.displacements, x=shear_strip.LENGTH) for state in (magnetic, loaded)]
@@ -132,7 +138,7 @@ def shear_against_elastica(
     solver: ms.Newton | None = None,
 ) -> Outcome:
     """C4 against the exact elastica under the force that the field stands for."""
-    mesh = shear_strip.strip(cells, seed, irregular)
+    mesh = shear_strip.strip(cells, bending, seed, irregular)
     state = _sheared_by_a_field(mesh, bending, solver)
     end = tip(mesh, state.displacements, x=shear_strip.LENGTH)
     shortening, deflection = shear_strip.ELASTICA[1.0]

@@ -78,7 +78,7 @@ def outcome(
     return Outcome(
         mesh=mesh_name,
         comparisons=tuple(comparisons),
-        n_faces=mesh.n_faces,
+        n_faces=mesh.n_elements,
         solves=len(results),
         time=sum(result.wall_time for result in results),
         factorizations=sum(result.factorizations for result in results),
@@ -96,6 +96,11 @@ def sweep(scene: ms.Scene, controls: Iterable[dict], **common) -> list[ms.Equili
 
 def mesh_name(cells: tuple[int, int], irregular: float | None = None) -> str:
     return f"{'irregular ' if irregular else ''}{cells[0]}x{cells[1]}"
+
+
+def order_of(bending: str) -> int:
+    """Of the meshes that a way of bending is for."""
+    return 2 if bending == "midedge2" else 1
 
 
 def tip(mesh: ms.TriangleMesh, displacements: np.ndarray, **at: float) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 
 import magshell as ms
 
-from .outcome import Comparison, Outcome, mesh_name, outcome
+from .outcome import Comparison, Outcome, mesh_name, order_of, outcome
 
 POISSON_RATIO = 0.3
 THICKNESS = 0.01
@@ -38,7 +38,7 @@ def square_plate(
     even = ms.meshes.rectangle(0.5, 0.5, cells, diagonals="crossed", irregular=irregular)
     positions = even.rest_positions.copy()
     positions[:, :2] = 0.5 * (2.0 * positions[:, :2]) ** GRADING
-    mesh = ms.TriangleMesh(positions, even.faces)
+    mesh = _of_order(ms.TriangleMesh(positions, even.faces), bending)
     return _quarter(mesh, bending, f"{mesh_name(cells, irregular)} crossed, graded, a quarter", allowed=0.005)
 
 
@@ -52,31 +52,45 @@ def even_plate(
     if cells[0] % 2 or cells[1] % 2:
         raise ValueError(f"a quarter needs even numbers of cells, got {cells}")
     mesh = ms.meshes.rectangle(0.5, 0.5, (cells[0] // 2, cells[1] // 2), irregular=irregular)
+    mesh = _of_order(mesh, bending)
     return _quarter(mesh, bending, mesh_name(cells, irregular), allowed=None)
 
 
 def circular_plate(rings: int = 48, bending: str = "midedge", *, irregular: float | None = None) -> Outcome:
     """The four deflections of a disk of radius 1.
 
-    Its rim is a polygon, simply supported at its vertices. The lowest-order Hellan-Herrmann-Johnson element
+    Its rim is a polygon (of second order, of parabolas), simply supported at its vertices. The lowest-order Hellan-Herrmann-Johnson element
     does not fall for Babuska's paradox there (Arnold and Walker 2020).
     """
-    mesh = _disk(rings, irregular)
+    mesh = _disk(rings, irregular, bending)
     name = f"{'irregular ' if irregular else ''}{rings} rings"
     return _middle_deflections(mesh, mesh.boundary_edges, [], 1, bending, CIRCULAR, name, 0.005)
 
 
-def _disk(rings: int, irregular: float | None) -> ms.TriangleMesh:
+def _of_order(mesh: ms.TriangleMesh, bending: str) -> ms.TriangleMesh | ms.SixNodeMesh:
+    return mesh if order_of(bending) == 1 else ms.SixNodeMesh.of(mesh)
+
+
+def _disk(rings: int, irregular: float | None, bending: str) -> ms.TriangleMesh | ms.SixNodeMesh:
     """Of radius 1. irregular: by which share of a ring's width its vertices move, but for the rim's and the middle."""
     mesh = ms.meshes.disk(1.0, rings)
     if irregular is None:
-        return mesh
+        return ms.meshes.disk(1.0, rings, order=order_of(bending))
     positions = mesh.rest_positions.copy()
     radii = np.linalg.norm(positions, axis=1)
     movable = (radii > 0.5 / rings) & (radii < 1.0 - 0.5 / rings)
     moves = np.random.default_rng(0).uniform(-irregular, irregular, (len(positions), 2)) / rings
     positions[:, :2] += moves * movable[:, None]
-    return ms.TriangleMesh(positions, mesh.faces)
+    moved = ms.TriangleMesh(positions, mesh.faces)
+    if order_of(bending) == 1:
+        return moved
+
+    def onto_the_rim(points: np.ndarray) -> np.ndarray:
+        rim = moved.boundary_edges
+        points[rim] /= np.linalg.norm(points[rim], axis=1, keepdims=True)
+        return points
+
+    return ms.SixNodeMesh.of(moved, place=onto_the_rim)
 
 
 def _quarter(mesh: ms.TriangleMesh, bending: str, name: str, allowed: float | None) -> Outcome:
@@ -100,7 +114,7 @@ def _middle_deflections(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
     )
     middle = mesh.nearest_vertex((0, 0, 0))
-    held = {"supported": ms.Pin(np.unique(mesh.edges[rim])), "clamped": ms.Clamp(rim)}
+    held = {"supported": ms.Pin(np.unique(mesh.nodes_of_edges[rim])), "clamped": ms.Clamp(rim)}
     loads = {"pressure": ms.AreaLoad((0, 0, 1.0)), "force": ms.PointLoad(middle, (0, 0, 1.0 / parts))}
     comparisons, responses = [], []
     for (support, load), reference in references.items():

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import magshell as ms
 
-from .outcome import Comparison, Outcome, mesh_name, outcome, sweep, tip
+from .outcome import Comparison, Outcome, mesh_name, order_of, outcome, sweep, tip
 
 LENGTH, WIDTH, THICKNESS, YOUNG_MODULUS = 10.0, 1.0, 0.1, 1.2e6
 FULL_LOAD = 4.0  # 4 EI / L^2, on the whole end
@@ -38,8 +38,12 @@ ELASTICA = {
 }
 
 
-def strip(cells: tuple[int, int], seed: int = 0, irregular: float | None = 0.25) -> ms.TriangleMesh:
-    return ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed)
+def strip(
+    cells: tuple[int, int], bending: str, seed: int = 0, irregular: float | None = 0.25
+) -> ms.TriangleMesh | ms.SixNodeMesh:
+    return ms.meshes.rectangle(
+        LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending)
+    )
 
 
 def shell(mesh: ms.TriangleMesh, bending: str) -> ms.Shell:
@@ -64,7 +68,7 @@ def end_shear(
     solver: ms.Newton | None = None,
 ) -> Outcome:
     """Deflection and shortening of the end against the exact elastica, at every load."""
-    mesh = strip(cells, seed, irregular)
+    mesh = strip(cells, bending, seed, irregular)
     states = sweep(scene(mesh, bending), [{"load_factor": load} for load in loads], solver=solver)
     tips = [tip(mesh, state.displacements, x=LENGTH) for state in states]
     at = [f"P/Pmax = {load:g}" for load in loads]

@@ -1,0 +1,58 @@
+// The magnetic energy of a sheet of six-node faces: energy/magnetic_six.h on every face, the field sampled at its points.
+#pragma once
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/body/six_node_sheet.h"
+#include "magshell/energy/magnetic_six.h"
+#include "magshell/term/field_sources.h"
+#include "magshell/term/term.h"
+
+namespace magshell {
+
+class MagneticSixTerm final : public Term {
+  public:
+    /// The sources have to outlive it.
+    MagneticSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
+                    const SystemMatrix& matrix, const FieldSources& sources, Registry& registry);
+
+    std::string_view name() const override { return Magnetic::name; }
+    Index body() const override { return body_; }
+    bool set_values(const Values& values) override;
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void prepare_assembly(const double* q, const Controls& controls) override;
+    void assemble(const Chunk& chunk, const double* q, const Controls& controls, bool,
+                  SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    static constexpr int points = MagneticSix::points;
+    struct Points {
+        MagneticSix::Element at[points];
+    };
+    struct Fields {
+        Magnetic::Field at[points];
+    };
+
+    Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
+    /// (a~_1, a~_2, n~) at a point of a face.
+    Mat3 rest_frame(Index face, int point) const;
+    /// The places and the magnetizations [A/m] of the points, one face after another.
+    void place(const double* q, std::vector<Vec3>& places, std::vector<Vec3>& magnetizations) const;
+    /// The applied field there, in packs; none where it is uniform. Order as in AppliedField::add_samples.
+    std::vector<Fields> sample(const double* q, const Controls& controls, int order) const;
+
+    const SixNodeSheet& sheet_;
+    const Index body_;
+    const ElementLoop<6> loop_;
+    const FieldSources& sources_;
+    Slot magnetization_, thickness_;    // values
+    Slot flux_density_, field_factor_;  // controls
+    std::vector<double> thicknesses_;
+    std::vector<Points> elements_;
+    std::vector<Fields> fields_;  // sampled for the assembly at hand; empty in a uniform field
+    bool normal_magnetization_ = false;
+};
+
+}  // namespace magshell
