@@ -3,6 +3,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/watch.h"
+#include "magshell/solve/modes.h"
 #include "magshell/solve/response.h"
 
 namespace magshell::bindings {
@@ -23,6 +24,42 @@ VectorXd change(Model& model, const StaticsResult& equilibrium, const Controls& 
     return first_order_change(model, equilibrium, to);
 }
 
+// Shapes of all unknowns and their eigenvalues [N/m3] about an equilibrium, and its number of unstable directions.
+py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::Turns& turns,
+                       const Controls& controls, int count, const py::object& progress) {
+    const Watch watch(progress);
+    std::vector<Mode> modes;
+    Index negative = 0;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        model.set_turns(turns);
+        Newton newton(model, {}, [&](double residual) { watch(1.0, residual); });
+        const FactorReport report = newton.factorize_at(state, controls);
+        negative = report.negative_pivots;
+        if (report.succeeded && report.perturbed_pivots == 0)
+            modes = modes_near_zero(newton, count + static_cast<int>(negative));
+    }
+    py::list shapes;
+    std::vector<double> eigenvalues;
+    for (Mode& each : modes) {
+        eigenvalues.push_back(each.eigenvalue);
+        shapes.append(each.shape);
+    }
+    return py::make_tuple(eigenvalues, shapes, negative);
+}
+
+// As far along as bodies in contact let it.
+VectorXd moved(Model& model, const VectorXd& state, const VectorXd& step) {
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard lock(model.in_use());
+    model.linearize(state);
+    const double share = model.has_body_contact() ? 0.9 * model.largest_share(state, step) : 1.0;
+    VectorXd there = state;
+    model.reduction().advance(there, share * step);
+    return there;
+}
+
 }  // namespace
 
 void register_statics(py::module_& module) {
@@ -40,6 +77,8 @@ void register_statics(py::module_& module) {
         .def_readwrite("smallest_step", &StaticsOptions::smallest_step)
         .def_readwrite("require_stable", &StaticsOptions::require_stable)
         .def_readwrite("keep_factor", &StaticsOptions::keep_factor)
+        .def_readwrite("away_from", &StaticsOptions::away_from)
+        .def_readwrite("away_length", &StaticsOptions::away_length)
         .def_readwrite("start_at_rest", &StaticsOptions::start_at_rest)
         .def_readwrite("max_relaxation_steps", &StaticsOptions::max_relaxation_steps);
 
@@ -78,6 +117,13 @@ void register_statics(py::module_& module) {
 
     module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("turns"),
                py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("progress") = py::none());
+    module.def(
+        "lowest_modes", &lowest_modes, py::arg("model"), py::arg("state"), py::arg("turns"),
+        py::arg("controls"), py::arg("count"), py::arg("progress") = py::none(),
+        "Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of "
+        "unstable directions of an equilibrium; none where it is neutral.");
+    module.def("moved", &moved, py::arg("model"), py::arg("state"), py::arg("step"),
+               "A state after a step of all unknowns, as far as bodies in contact let it.");
     module.def("first_order_change", &change, py::arg("model"), py::arg("equilibrium"), py::arg("to"),
                "The change of the state to first order, from an equilibrium whose factor was kept to these "
                "controls and the values that the model holds now.");

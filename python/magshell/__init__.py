@@ -64,6 +64,7 @@ from .statics.energies_at import energies
 from .statics.equilibria import Equilibria
 from .statics.equilibrium import Equilibrium
 from .statics.extrapolation import Extrapolation, extrapolated
+from .statics.multistable import equilibria
 from .statics.path import CriticalPoint, Path, follow
 from .statics.solve import equilibrium
 from .statics.warm_start import WarmStart
@@ -172,6 +173,7 @@ __all__ = [
     "control",
     "energies",
     "envs",
+    "equilibria",
     "equilibrium",
     "extrapolated",
     "fibres_along",

@@ -552,6 +552,19 @@ class StaticsOptions:
     start_at_rest: bool
     def __init__(self) -> None: ...
     @property
+    def away_from(
+        self,
+    ) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]: ...
+    @away_from.setter
+    def away_from(
+        self,
+        arg0: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]],
+    ) -> None: ...
+    @property
+    def away_length(self) -> float: ...
+    @away_length.setter
+    def away_length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
     def first_step(self) -> float: ...
     @first_step.setter
     def first_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
@@ -903,6 +916,27 @@ def find_equilibrium(
     options: StaticsOptions,
     progress: typing.Any = None,
 ) -> StaticsResult: ...
+def lowest_modes(
+    model: Model,
+    state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    count: typing.SupportsInt | typing.SupportsIndex,
+    progress: typing.Any = None,
+) -> tuple:
+    """
+    Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of unstable directions of an equilibrium; none where it is neutral.
+    """
+
+def moved(
+    model: Model,
+    state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    step: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    A state after a step of all unknowns, as far as bodies in contact let it.
+    """
+
 def first_order_change(
     model: Model,
     equilibrium: StaticsResult,

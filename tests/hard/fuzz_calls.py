@@ -222,6 +222,15 @@ def _solves(s: Sample) -> Iterator[Call]:
         ms.equilibrium,
         {**magnetic, "applied_flux_density": [s.field, -s.field], "solver": quick},
     )
+    hunt = dict(
+        start=s.positions, unstable=True, attempts=1, same_within=1e-3, at_rest=False, seed=0, solver=quick
+    )
+    yield Call("equilibria", ms.equilibria, {**magnetic, **replaced, **hunt}, cost=3)
+    meshes = [s.mesh, s.mesh.refined()]
+    yield Call(
+        "extrapolated", ms.extrapolated, {"solve": lambda mesh: mesh.size, "meshes": meshes, "order": 2.0}
+    )
+    yield Call("TriangleMesh.refined", s.mesh.refined, {"surface": ms.shapes.ball(1.0)})
     options = {"start": None, "until": None, "first_step": 0.5, "largest_step": 0.5, "lowest_parameter": -1.0}
     yield Call(
         "follow",

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "magshell/core/errors.h"
+#include "magshell/solve/deflation.h"
 #include "magshell/solve/relaxation.h"
 
 namespace magshell {
@@ -22,7 +23,7 @@ class Statics {
 
     bool run() {
         result_.reason = newton_.model().refusal(result_.state);
-        if (!result_.reason.empty() || !load()) return false;
+        if (!result_.reason.empty() || !(options_.away_from.empty() ? load() : go_elsewhere())) return false;
         return result_.stable || !options_.require_stable || descend(1.0);
     }
 
@@ -62,6 +63,18 @@ class Statics {
             step = longest_step;
         }
         return factor.succeeded ? judge(factor) : check_stability();
+    }
+
+    bool go_elsewhere() {
+        constexpr int times_longer = 3;  // than Newton's way to an equilibrium that is near
+        VectorXd trial = result_.state;
+        const NewtonReport report =
+            solve_away_from(newton_, trial, to_, {options_.away_from, options_.away_length},
+                            times_longer * newton_.options().max_iterations);
+        result_.reason = report.reason;
+        if (!report.converged) return false;
+        accept(trial, to_, 1.0, report.residual);
+        return check_stability();
     }
 
     // A sheet bent far already may be too much for the mixed steps, and not for plain ones.

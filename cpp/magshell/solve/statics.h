@@ -13,6 +13,9 @@ struct StaticsOptions {
     bool start_at_rest = true;   // the start is an equilibrium at the old controls: worth halving load steps
     int max_relaxation_steps = 500;
     bool keep_factor = false;  // for gradients
+    std::vector<VectorXd> away_from =
+        {};                    // equilibria at the new controls, where the start is already: another one
+    double away_length = 0.0;  // [m] how far their deflection reaches
 };
 
 enum class Outcome { converged, failed, interrupted };

@@ -1,4 +1,4 @@
-"""The equilibria of several load cases."""
+"""Several equilibria of one scene: of load cases, or at the same controls."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .equilibrium import Equilibrium
 
 
 class Equilibria(Sequence):
-    """A scene at rest in each of k load cases; a sequence of Equilibrium.
+    """A scene at rest in each of k load cases, or in k ways in one; a sequence of Equilibrium.
 
     positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
     """
@@ -40,6 +40,11 @@ class Equilibria(Sequence):
     @property
     def displacements(self):
         return stacked([case.displacements for case in self._cases])
+
+    @property
+    def energy(self) -> np.ndarray:
+        """(k,) J, the potential energy of each."""
+        return np.array([case.energy for case in self._cases])
 
     @property
     def stable(self) -> bool:
@@ -91,4 +96,4 @@ class Equilibria(Sequence):
         return Equilibria(chosen) if isinstance(index, slice) else chosen
 
     def __repr__(self) -> str:
-        return "\n".join([f"Equilibria: {len(self)} load cases", *(repr(case) for case in self._cases)])
+        return "\n".join([f"Equilibria: {len(self)}", *(repr(case) for case in self._cases)])
