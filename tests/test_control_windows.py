@@ -193,7 +193,7 @@ def test_errors_and_interrupts_come_through_with_what_was_found() -> None:
         ({"smoothings": 1.0}, "smoothings must have shape"),
         ({"tolerance": "a"}, "tolerance"),
         ({"hold": 1}, "hold must be True or False"),
-        ({"objective": 3}, "must be functions"),
+        ({"objective": 3}, "must be a function"),
     ],
 )
 def test_bad_input(changes, complaint) -> None:

@@ -54,8 +54,9 @@ Tube::Tube(std::span<const Vec3> points, std::span<const double> radii, bool clo
     }
     const int segments = static_cast<int>(coefficients_.size()) - 3;
     last_ = segments;
-    for (int k = 0; k <= samples_a_segment * segments; ++k)
-        samples_.push_back(section(static_cast<double>(k) / samples_a_segment).value);
+    samples_.resize(samples_a_segment * segments + 1, 4);
+    for (int k = 0; k < samples_.rows(); ++k)
+        samples_.row(k) = section(static_cast<double>(k) / samples_a_segment).value.transpose().array();
     check(closed ? 0.0 : transition);
 
     for (const int side : {0, 1}) {
@@ -66,7 +67,7 @@ Tube::Tube(std::span<const Vec3> points, std::span<const double> radii, bool clo
 }
 
 void Tube::check(double first_knot) const {
-    for (std::size_t k = 0; k < samples_.size(); ++k) {
+    for (int k = 0; k < samples_.rows(); ++k) {
         const double s = static_cast<double>(k) / samples_a_segment;
         const Section at = section(s);
         std::ostringstream problem;
@@ -104,7 +105,7 @@ Tube::Slope Tube::slope_at(const Section& at, const Vec3& point) {
 
 // The minimum of psi between the neighbours of a sample that is lower than they are: psi_s = 0 by Newton's
 // iteration, guarded by bisection. At an end of the curve psi may still fall outwards.
-double Tube::nearest(const Vec3& point, std::size_t sample) const {
+double Tube::nearest(const Vec3& point, Eigen::Index sample) const {
     constexpr double close = 1e-8;  // knots; the next Newton step is far below rounding
     const double spacing = 1.0 / samples_a_segment;
     double s = static_cast<double>(sample) * spacing;
@@ -149,20 +150,19 @@ bool Tube::beyond(const Ray& ray, const Vec3& point, double value, Distance& out
 }
 
 Distance Tube::distance(const Vec3& point) const {
-    const std::size_t count = samples_.size();
-    thread_local std::vector<double> psi;
-    psi.resize(count);
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < count; ++k) {
-        const Vec4& ball = samples_[k];
-        psi[k] = (point - ball.head<3>()).norm() - ball[3];
-        least = std::min(least, psi[k]);
-    }
+    const Eigen::Index count = samples_.rows();
+    thread_local Eigen::ArrayXd of_this_thread;
+    Eigen::ArrayXd& psi = of_this_thread;
+    psi = ((samples_.col(0) - point.x()).square() + (samples_.col(1) - point.y()).square() +
+           (samples_.col(2) - point.z()).square())
+              .sqrt() -
+          samples_.col(3);
+    const double least = psi.minCoeff();
 
     // Refine every sampled minimum that may be the lowest: it lies at most as far below its sample as a
     // neighbour lies above it.
     double best = std::numeric_limits<double>::infinity(), place = 0.0;
-    for (std::size_t k = 0; k < count; ++k) {
+    for (Eigen::Index k = 0; k < count; ++k) {
         const double before = k > 0 ? psi[k - 1] : psi[k], after = k + 1 < count ? psi[k + 1] : psi[k];
         if (psi[k] > before || psi[k] > after || 2.0 * psi[k] - std::max(before, after) > least) continue;
         const double s = nearest(point, k);

@@ -43,7 +43,7 @@ class Tube final : public Obstacle {
         double value, first, second;
     };
     static Slope slope_at(const Section& section, const Vec3& point);
-    double nearest(const Vec3& point, std::size_t sample) const;
+    double nearest(const Vec3& point, Eigen::Index sample) const;
     Distance distance_at(double s, const Vec3& point) const;
 
     // What continues the curve of an open tube: a straight line outwards with a constant radius.
@@ -55,7 +55,8 @@ class Tube final : public Obstacle {
 
     bool closed_;
     std::vector<Vec4> coefficients_;  // c_{i-1} ... c_{i+2} belong to the segment from knot i on
-    std::vector<Vec4> samples_;       // of center and radius, several a segment
+    // Of center and radius, several a segment, a column a coordinate: the search through them is most of the work.
+    Eigen::Array<double, Eigen::Dynamic, 4> samples_;
     double last_;                     // knot; the first is 0
     std::array<Ray, 2> rays_;
 };

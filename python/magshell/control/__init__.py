@@ -10,10 +10,12 @@
 [Chen22] bounds every component of the field by 0.05 T: the box of `ms.optim.MMA` or `LBFGS` on per-step values, or on
 the control points of a spline, holds it exactly.
 
-Where contact makes gradients of long motions useless, `ms.control.in_windows` searches the first steps first.
+Where contact makes gradients of long motions useless, `ms.control.in_windows` searches the first steps first. Where noise
+grows with time, `ms.control.receding` goes on from where what it found has led.
 """
 
 from .curves import Arc, Chain, Curve, Polyline
+from .horizons import Horizon, Receding, receding
 from .motions import (
     curve_distance,
     frames_at,
@@ -33,7 +35,9 @@ __all__ = [
     "Arc",
     "Chain",
     "Curve",
+    "Horizon",
     "Polyline",
+    "Receding",
     "Window",
     "Windows",
     "curve_distance",
@@ -52,6 +56,7 @@ __all__ = [
     "key_frames",
     "path_following",
     "pulse",
+    "receding",
     "rotating",
     "spline",
     "step_times",

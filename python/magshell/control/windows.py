@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from .._checks.arrays import count, index_array
-from .._checks.quantity import quantity, real_numbers
+from .._checks.quantity import quantity
 from .._checks.scalars import flag, not_negative
-from .._checks.tensors import real_tensor, require_torch
-from ..design.minimize import minimize
+from .._checks.tensors import require_torch
 from ..design.minimum import Minimum
-from ..errors import DesignRejected, Interrupted, ObjectiveFailed
+from ..errors import Interrupted
+from ._search import check_functions, given_controls, row_bound, search_rows
 
 
 @dataclass(frozen=True)
@@ -87,15 +87,10 @@ def in_windows(
     >>> len(found.searches), bool(found.searches[-1][1].objective < 1e-6)
     (3, True)
     """
-    torch = require_torch("control.in_windows")
-    now = real_tensor("controls", controls, ("...", "k")).detach().clone()
-    if not torch.isfinite(now).all():
-        raise ValueError("controls must be finite")
+    torch, now = require_torch("control.in_windows"), given_controls(controls)
     windows = _windows(len(now), lengths, smoothings, depth)
-    low, high = (_bound(name, value, now) for name, value in (("lower", lower), ("upper", upper)))
-    make = _lbfgs if optimizer is None else optimizer
-    if not callable(make) or not callable(objective):
-        raise ValueError("objective and optimizer must be functions")
+    low, high = row_bound("lower", lower, now), row_bound("upper", upper, now)
+    check_functions(objective=objective, **({} if optimizer is None else {"optimizer": optimizer}))
     count("max_iterations", max_iterations)
     tolerance, hold = not_negative("tolerance", "", tolerance), flag("hold", hold)
     searches: list[tuple[Window, Minimum]] = []
@@ -106,36 +101,34 @@ def in_windows(
             now[reached : window.steps] = now[reached - 1]
         reached = max(reached, window.steps)
         kept = now[: window.first].clone()
-        rows = now[window.first : window.steps].clone().requires_grad_()
+        rows = slice(window.first, window.steps)
 
         def of_window(changed, kept=kept, window=window):
             return objective(torch.cat([kept, changed]), window)
 
         try:
-            found = minimize(
+            found, failure = search_rows(
                 of_window,
-                [rows],
-                make([rows], low[window.first : window.steps], high[window.first : window.steps]),
+                now[rows],
+                low[rows],
+                high[rows],
+                optimizer,
                 max_iterations=max_iterations,
                 tolerance=tolerance,
                 progress=progress,
             )
         except Interrupted as error:
             if error.last_good is not None:
-                now[window.first : window.steps] = error.last_good.parameters[0].detach()
+                now[rows] = error.last_good.parameters[0].detach()
             told = f"interrupted in window {len(searches) + 1} of {len(windows)}"
             raise Interrupted(told, Windows(now, searches, failures)) from error
-        except ObjectiveFailed as error:
-            if not isinstance(error.__cause__, DesignRejected):
-                raise
-            found = error.last_good
-            failures.append((window, str(error.__cause__)))
-        except DesignRejected as error:
-            if not searches:
-                raise
-            failures.append((window, str(error)))
+        if failure is not None:
+            if found is None and not searches:
+                raise failure
+            failures.append((window, str(failure)))
+        if found is None:
             continue
-        now[window.first : window.steps] = found.parameters[0].detach()
+        now[rows] = found.parameters[0].detach()
         searches.append((window, found))
     return Windows(now, searches, failures)
 
@@ -151,19 +144,3 @@ def _windows(steps: int, lengths, smoothings, depth) -> list[Window]:
     if any(b - a > back for a, b in pairwise([0, *ends])):
         raise ValueError(f"depth must be no less than what a window adds, got {depth} for {lengths!r:.60}")
     return [Window(end, max(0, end - back), level) for end in ends for level in levels]
-
-
-def _bound(name: str, value, controls):
-    """Of every entry; infinite where there is none."""
-    shape, array = tuple(controls.shape[1:]), real_numbers(name, value)
-    if np.isnan(array).any():
-        raise ValueError(f"{name} must be numbers, got nan")
-    if array.shape not in ((), shape):
-        raise ValueError(f"{name} must be a number or have the shape of a row, {shape}, got {array.shape}")
-    return controls.new_tensor(np.broadcast_to(array, controls.shape).copy())
-
-
-def _lbfgs(parameters, lower, upper):
-    from ..optim import LBFGS
-
-    return LBFGS(parameters, lower=lower, upper=upper, first_step=0.1, max_evaluations=5)
