@@ -9,7 +9,12 @@ import magshell as ms
 
 ROUND = [
     ("cylinder", lambda **o: ms.meshes.cylinder(1.0, 2.0, cells=(16, 4), **o), 4 * np.pi, (0, 2)),
-    ("sphere", lambda **o: ms.meshes.spherical_cap(1.0, 0.0, np.pi, cells=(16, 8), **o), 4 * np.pi, (0, 1, 2)),
+    (
+        "sphere",
+        lambda **o: ms.meshes.spherical_cap(1.0, 0.0, np.pi, cells=(16, 8), **o),
+        4 * np.pi,
+        (0, 1, 2),
+    ),
 ]
 FLAT = [
     ("disk", lambda **o: ms.meshes.disk(1.0, 4, **o), np.pi),
@@ -49,7 +54,9 @@ def test_what_it_is_made_of():
     corners = mesh.first_order()
     assert isinstance(corners, ms.TriangleMesh) and corners.n_faces == 4
     # flat face 4 k + i is at corner i of element k
-    assert (mesh.faces[:12:4, 0] == mesh.elements[:3, 0]).all() and (mesh.faces[1::4, 1] == mesh.elements[:, 1]).all()
+    assert (mesh.faces[:12:4, 0] == mesh.elements[:3, 0]).all() and (
+        mesh.faces[1::4, 1] == mesh.elements[:, 1]
+    ).all()
     assert "4 elements of six nodes" in repr(mesh)
 
 
@@ -87,7 +94,9 @@ def with_element(k, row):
 def inside_out():
     positions, elements = good()
     middle = elements[0, 3]
-    positions[middle] = positions[elements[0, 1]] + 0.6 * (positions[elements[0, 1]] - positions[elements[0, 0]])
+    positions[middle] = positions[elements[0, 1]] + 0.6 * (
+        positions[elements[0, 1]] - positions[elements[0, 0]]
+    )
     return positions, elements
 
 

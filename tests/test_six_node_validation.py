@@ -172,7 +172,9 @@ def test_sphere_under_pressure():
     planes = [ms.SymmetryPlane(normal) for normal in np.eye(3)]
     blown = ms.equilibrium(ms.Scene(sheet, supports=planes, loads=[ms.Pressure(-pressure)]))
     grown = np.linalg.norm(blown.positions, axis=1) - radius
-    assert grown.mean() == pytest.approx(pressure * radius**2 * (1 - nu) / (2 * modulus * thickness), rel=3e-3)
+    assert grown.mean() == pytest.approx(
+        pressure * radius**2 * (1 - nu) / (2 * modulus * thickness), rel=3e-3
+    )
     forces = blown[sheet].stresses().principal_membrane_forces
     assert forces.mean() == pytest.approx(pressure * radius / 2, rel=3e-3)
     assert np.abs(forces - pressure * radius / 2).max() < 0.05 * pressure * radius
