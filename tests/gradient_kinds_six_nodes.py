@@ -33,7 +33,7 @@ def curved(own_magnetization: bool) -> ms.Shell:
 
 
 def six_nodes_at_rest() -> Kind:
-    """A clamp that moves, all loads, gravity, a uniform field over dipoles, a floor, and a sheet of three nodes beside it."""
+    """A clamp that moves, all loads, gravity, fields, a floor, and a sheet of three nodes beside it."""
     sheet = curved(own_magnetization=True)
     mesh = sheet.mesh
     other = ms.Shell(

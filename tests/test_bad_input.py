@@ -76,12 +76,12 @@ test_shell_is_refused = refused(
         (
             "bending",
             lambda: shell(bending="quad"),
-            r"bending must be one of \('midedge', 'hinge'\), got 'quad'",
+            r"bending must be one of \('midedge', 'midedge2', 'hinge'\), got 'quad'",
         ),
         (
             "mesh",
             lambda: ms.Shell("mesh", thickness=1, young_modulus=1),
-            "mesh must be a TriangleMesh, got str",
+            "mesh must be a TriangleMesh or a SixNodeMesh, got str",
         ),
     ]
 )

@@ -35,6 +35,15 @@ Bodies::Bodies(const SceneInput& input) {
     couple_links(input);
     nodes_ = numbering.finish(input.directions, input.original);
     couple_volumes_and_tendons(input);
+    for (const EdgeCoupleInput& couple : input.couples) {
+        if (couple.sheet < static_cast<Index>(owned_.size())) continue;
+        const std::size_t k = couple.sheet - owned_.size();
+        const Index face = input.six_node_sheets[k].mesh.corners->edge_faces().row(couple.edge).maxCoeff();
+        const SixNodeSheet& sheet = *owned_six_node_sheets_[k];
+        std::vector<Index>& nodes = coupled_.emplace_back();
+        for (const Index node : sheet.own_nodes[sheet.faces.core[face]]) nodes.push_back(node);
+        nodes.push_back(nodes_.direction_node(couple.direction));
+    }
     for (Index user = 0; user < nodes_.n_user_vertices(); ++user)
         if (nodes_.vertices.is_copy(user)) copies_.push_back(user);
     for (std::size_t k = 0; k < owned_.size(); ++k) {
@@ -144,6 +153,7 @@ std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
     std::vector<Stencil> all;
     for (const Sheet* sheet : sheets_) all.insert(all.end(), sheet->stencils.begin(), sheet->stencils.end());
     for (const EdgeCoupleInput& couple : input.couples) {
+        if (couple.sheet >= static_cast<Index>(sheets_.size())) continue;  // a clique of its own
         const Sheet& sheet = *sheets_[couple.sheet];
         const Index user_face = input.sheets[couple.sheet].mesh->edge_faces().row(couple.edge).maxCoeff();
         Stencil s;

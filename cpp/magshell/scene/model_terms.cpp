@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "magshell/scene/model.h"
-#include "magshell/strain/fold_angle.h"
+#include "magshell/strain/fold_six.h"
 #include "magshell/term/ball_torque_term.h"
 #include "magshell/term/bending_six_term.h"
 #include "magshell/term/bending_term.h"
@@ -38,7 +38,46 @@ CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& m
                                         at.direction_node(given.direction)};
     const Fold fold(broadcast(at.rest[nodes[0]]), broadcast(at.rest[nodes[1]]), broadcast(at.rest[nodes[2]]),
                     broadcast(at.rest[nodes[3]]), Pack(0.0));
-    return {nodes, fold.angle()[0], sheet.rotation_of_edge[given.edge], forward ? 1.0 : -1.0, 0.0};
+    return {{nodes[0], nodes[1], nodes[2], nodes[3], -1, -1, -1, -1, -1},
+            -1,
+            fold.angle()[0],
+            sheet.rotation_of_edge[given.edge],
+            forward ? 1.0 : -1.0,
+            0};
+}
+
+// At both Gauss points of a six-node edge, in proportion to how far the edge goes there.
+std::array<CoupleTerm::Couple, 2> couples_of(const EdgeCoupleInput& given, const TriangleMesh& mesh,
+                                             const SixNodeSheet& sheet, const Nodes& at) {
+    using six_nodes::middle;
+    const Index user = mesh.edge_faces().row(given.edge).maxCoeff(), f = sheet.faces.core[user];
+    int i = 0;
+    while (mesh.face_edges()(user, i) != given.edge) ++i;
+    const int from = (i + 1) % 3, to = (i + 2) % 3;
+    const std::array<Index, 6>& own = sheet.own_nodes[f];
+    const std::array<Index, 9> nodes = {own[from],
+                                        own[to],
+                                        own[middle(i)],
+                                        own[i],
+                                        own[middle(from)],
+                                        own[middle(to)],
+                                        at.direction_node(given.direction),
+                                        -1,
+                                        -1};
+    Pack3 x[9] = {};
+    for (int k = 0; k < 7; ++k) x[k] = broadcast(at.rest[nodes[k]]);
+    const FaceSideSix& side = sheet.sides[f][i];
+    double lengths[2];
+    for (int g = 0; g < 2; ++g) {
+        const std::array<double, 3> along = six_nodes::along(six_nodes::gauss[g]);
+        const std::array<Vec3, 6>& rest = sheet.rest[f];
+        lengths[g] = (along[0] * rest[from] + along[1] * rest[to] + along[2] * rest[middle(i)]).norm();
+    }
+    const auto at_point = [&](int g) {
+        return CoupleTerm::Couple{nodes,     g, FoldSix(x, Pack(0.0), g).angle()[0],   side.rotation[g],
+                                  side.sign, 0, lengths[g] / (lengths[0] + lengths[1])};
+    };
+    return {at_point(0), at_point(1)};
 }
 
 }  // namespace
@@ -211,10 +250,22 @@ void Model::add_muscles(const SceneInput& input) {
 
 void Model::add_couples(const SceneInput& input) {
     std::vector<CoupleTerm::Couple> couples;
-    for (const EdgeCoupleInput& given : input.couples)
-        couples.push_back(
-            couple_of(given, *input.sheets[given.sheet].mesh, *bodies_.sheets()[given.sheet], nodes()));
-    terms_.push_back(std::make_unique<CoupleTerm>(nodes(), matrix_, std::move(couples), registry_));
+    const Index flat = static_cast<Index>(input.sheets.size());
+    Index row = 0;
+    std::size_t numbered = 0;
+    for (const EdgeCoupleInput& given : input.couples) {
+        if (given.sheet < flat)
+            couples.push_back(
+                couple_of(given, *input.sheets[given.sheet].mesh, *bodies_.sheets()[given.sheet], nodes()));
+        else
+            for (const CoupleTerm::Couple& couple :
+                 couples_of(given, *input.six_node_sheets[given.sheet - flat].mesh.corners,
+                            *bodies_.six_node_sheets()[given.sheet - flat], nodes()))
+                couples.push_back(couple);
+        for (; numbered < couples.size(); ++numbered) couples[numbered].row = row;
+        ++row;
+    }
+    terms_.push_back(std::make_unique<CoupleTerm>(nodes(), matrix_, std::move(couples), row, registry_));
 }
 
 void Model::add_contacts(const SceneInput& input) {

@@ -3,7 +3,8 @@
 //   E = - factor C psi,   psi = theta_d - theta~_d - s phi                          [J]
 //
 // theta_d is the angle of the edge's face to a fixed direction, and the director stands off that face by s
-// phi. The couple follows the edge: its axis is always the edge itself, the sheet to the left.
+// phi. The couple follows the edge: its axis is always the edge itself, the sheet to the left. On an edge of a six-node face
+// it acts at its two Gauss points, where both the angle and phi are known.
 #pragma once
 
 #include "magshell/assembly/lanes.h"
@@ -15,14 +16,24 @@ namespace magshell {
 class CoupleTerm final : public Term {
   public:
     struct Couple {
-        std::array<Index, 4> nodes;  // edge from, to, the face's third corner, the direction
+        // Edge from, to, the face's third corner, the direction; or those of strain/fold_six.h. Others are -1.
+        std::array<Index, 9> nodes;
+        int point;  // which of the two Gauss points; -1 on a face of three nodes
         double rest_angle;
         Index rotation;  // -1 without directors
         double rotation_sign;
-        double couple = 0.0;  // [N m]
+        Index row;            // whose couple
+        double share = 1.0;   // of it
+        double couple = 0.0;  // that share [N m]
     };
+    using Nine = std::array<Pack3, 9>;
 
-    CoupleTerm(const Nodes& nodes, const SystemMatrix& matrix, std::vector<Couple> couples,
+    /// The angle to the direction where the nodes are at q, and its gradient by them.
+    static double angle(const Couple& couple, const double* q);
+    static Nine gradient(const Couple& couple, const double* q);
+
+    /// rows: how many couples there are, each on one edge.
+    CoupleTerm(const Nodes& nodes, const SystemMatrix& matrix, std::vector<Couple> couples, Index rows,
                Registry& registry);
 
     std::string_view name() const override { return "couple"; }
@@ -41,7 +52,7 @@ class CoupleTerm final : public Term {
     const Index first_scalar_;
     Slot slot_, factor_;
     std::vector<Couple> couples_;
-    std::vector<PairSlots<4>> slots_;
+    std::vector<PairSlots<9>> slots_;
     std::vector<double>
         last_turn_;  // full circles count: an angle is taken as the one nearest to the last evaluated
 };

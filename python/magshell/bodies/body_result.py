@@ -55,9 +55,10 @@ class BodyResult:
         return Strains(*(each[rows] for each in self._result.strains(*arguments)))
 
     def stresses(self, index: int = -1) -> ShellStresses:
-        """Membrane force and bending moment of its faces (of a SixNodeMesh at the middles of its flat faces) with the strain and curvature that make them, stress at the
-        surfaces, von Mises stress, with the values that the result was found with; of a motion or a path in a recorded
-        state, by default the last. Of a solid, `stresses` has the same names where they mean the same.
+        """Membrane force and bending moment of its faces (of a SixNodeMesh at the middles of its flat faces) with the strain
+        and curvature that make them, stress at the surfaces, von Mises stress, with the values that the result was found
+        with; of a motion or a path in a recorded state, by default the last. Of a solid, `stresses` has the same names where
+        they mean the same.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))

@@ -194,8 +194,8 @@ class Shell(Owner):
 
     @property
     def vertex_masses(self) -> np.ndarray:
-        """Lumped masses for inertia, (n_v,), kg: a third of each face's at its corners; 1/19 of each six-node element's at its
-        corners and 16/57 between them. A sheet without mass density has none."""
+        """Lumped masses for inertia, (n_v,), kg: a third of each face's at its corners; 1/19 of each six-node element's at
+        its corners and 16/57 between them. A sheet without mass density has none."""
         return self._gathered(self._shares[0])
 
     @property

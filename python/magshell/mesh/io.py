@@ -218,9 +218,7 @@ def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict] |
     there = {block.type for block in content.cells}
     kind = next((each for each in _TRIANGLES if each in there), _TRIANGLES[0])
     others = {
-        block.type: len(block.data)
-        for block in content.cells
-        if block.type not in (kind, *_LOWER_CELLS)
+        block.type: len(block.data) for block in content.cells if block.type not in (kind, *_LOWER_CELLS)
     }
     if others:
         other, count = next(iter(others.items()))

@@ -48,8 +48,8 @@ def area_vectors(positions: np.ndarray) -> np.ndarray:
 
 
 def shape_integrals(positions: np.ndarray, part: np.ndarray | None = None) -> np.ndarray:
-    """(n, 6), m2: of the shape functions over elements (n, 6, 3), or over the flat face `part` (3,) of theirs alone, given by
-    its nodes."""
+    """(n, 6), m2: of the shape functions over elements (n, 6, 3), or over the flat face `part` (3,) of theirs alone, given
+    by its nodes."""
     points, weights = rule(_WHOLE if part is None else _NODES[part])
     densities = np.linalg.norm(across(positions, points), axis=2)
     return np.einsum("p,pk,pn->kn", weights, densities, shapes(points)[0])

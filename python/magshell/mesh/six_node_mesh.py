@@ -11,9 +11,9 @@ from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
 from .mesh_base import MeshBase, frozen
+from .selection import _where
 from .six_node_checks import check_elements, check_jacobians, check_middle_nodes
 from .six_node_integrals import area_vectors, edge_lengths, shape_integrals
-from .selection import _where
 from .tet_topology import FLAT
 from .transforms import moved
 from .triangle_mesh import TriangleMesh, checked_mesh
@@ -87,7 +87,9 @@ class SixNodeMesh(MeshBase):
                     f"place(midpoints) [m] must have shape (n_e, 3) = {mesh.edge_midpoints.shape}, got {middles.shape}"
                 )
         nodes = mesh.n_vertices + mesh.face_edges[:, [2, 0, 1]]  # edge i is opposite corner i
-        return cls(np.concatenate([mesh.rest_positions, middles]), np.concatenate([mesh.faces, nodes], axis=1))
+        return cls(
+            np.concatenate([mesh.rest_positions, middles]), np.concatenate([mesh.faces, nodes], axis=1)
+        )
 
     def __reduce__(self):  # copies and worker processes rebuild the connectivity, which is cheap
         return SixNodeMesh, (self.rest_positions, self.elements)

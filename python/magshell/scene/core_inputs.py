@@ -19,7 +19,6 @@ def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
     """Sheets, solids, skins, rigid parts. directed_edges: (k, 2), the scene's edges and the rows of their directions."""
     return {
         "sheets": _sheets(scene, directed_edges),
-        "six_node_sheets": [],
         "six_node_sheets": _six_node_sheets(scene, directed_edges),
         "solids": _solids(scene),
         "skins": _skins(scene),

@@ -71,7 +71,9 @@ class Inputs:
         replaced = replaced or {}
         check_given_once(scene, remanent_magnetization, replaced)
         numbers = self._numbers("remanent_magnetization", remanent_magnetization)
-        self.magnetization = None if numbers is None else magnetization_of(numbers, scene._bodies.n_magnetized)
+        self.magnetization = (
+            None if numbers is None else magnetization_of(numbers, scene._bodies.n_magnetized)
+        )
         flux_density = self._flux_density(self._numbers("applied_flux_density", applied_flux_density))
         if numbers is not None:
             check_on_skins(scene, np.asarray(numbers))

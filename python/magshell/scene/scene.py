@@ -149,7 +149,7 @@ class Scene:
     def _build(self, allow_rigid_motions: bool) -> None:
         bodies, mesh = self._bodies, self.mesh
         edges = _couple_edges(bodies, self.loads)
-        self._couple_directions = _couple_directions(mesh, edges)
+        self._couple_directions = _couple_directions(bodies, edges)
         constraints = gather(bodies, self.supports, self._couple_directions)
         self._rigid = places(bodies)
         for k, part in enumerate(self.rigid_parts):
@@ -382,6 +382,10 @@ def _couple_edges(bodies: Bodies, loads) -> np.ndarray:
     return np.unique(np.concatenate(edges)) if edges else np.zeros(0, dtype=np.int64)
 
 
-def _couple_directions(mesh, edges: np.ndarray) -> np.ndarray:
+def _couple_directions(bodies: Bodies, edges: np.ndarray) -> np.ndarray:
     """What each couple's edge angle is measured to: outwards in the plane of its face at rest, (k, 3)."""
-    return continuations(mesh, edges) if len(edges) else np.zeros((0, 3))
+    of, own = bodies.split(edges)
+    directions = np.zeros((len(edges), 3))
+    for k in np.unique(of):
+        directions[of == k] = continuations(bodies.meshes[k], own[of == k])
+    return directions

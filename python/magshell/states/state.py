@@ -10,13 +10,13 @@ import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.tensors import detached
-from ..bodies.bodies import magnetized_rows
 from ..bodies.joined_mesh import JoinedMesh
 from ..bodies.of_body import result_of
 from ..bodies.shell import Shell
 from ..bodies.shell_stresses import ShellStresses
 from ..bodies.solid import Solid
 from ..bodies.solid_states import SolidStates
+from ..bodies.spans import magnetized_rows
 from ..dynamics.trajectory import Trajectory
 from ..fields.field import UniformField
 from ..mesh.face_shapes import sides

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..bodies.bodies import Bodies, Span
+from ..bodies.bodies import Bodies
+from ..bodies.spans import Span
 from .supports import DirectedEdges, Held, RigidMove
 
 

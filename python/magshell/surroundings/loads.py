@@ -138,14 +138,8 @@ class EdgeCouple(Owner):
         self.couple_per_length = quantity("couple_per_length", "N", array, array.shape)
 
     def edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn, and for six-node
-        sheets, whose couples are not built yet."""
-        if isinstance(mesh, SixNodeMesh):
-            raise ValueError(
-                'an EdgeCouple is for sheets with bending="midedge" or "hinge"; with "midedge2", turn the edge by a Clamp with '
-                "a rotation"
-            )
-        if not isinstance(mesh, TriangleMesh):
+        """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn."""
+        if not isinstance(mesh, TriangleMesh | SixNodeMesh):
             raise ValueError(
                 "an EdgeCouple turns edges of a shell: a couple on a solid is one of PointLoads on its face"
             )
@@ -185,7 +179,8 @@ class EdgeCouple(Owner):
         if self.couple_per_length.ndim == 0:
             return edges, lengths[:, None]
         ends = mesh.rest_positions[mesh.edges[edges]]
-        along = (ends[:, 1] - ends[:, 0]) * np.where(mesh.edge_faces[edges, 0] >= 0, 1.0, -1.0)[:, None]
+        faces = mesh.corners.edge_faces if isinstance(mesh, SixNodeMesh) else mesh.edge_faces
+        along = (ends[:, 1] - ends[:, 0]) * np.where(faces[edges, 0] >= 0, 1.0, -1.0)[:, None]
         return edges, along
 
 

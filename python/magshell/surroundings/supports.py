@@ -175,7 +175,9 @@ class Clamp(Support):
         return indices("Clamp edges", self.edges, mesh.n_edges)
 
     def _move_on(self, mesh: TriangleMesh) -> RigidMove | None:
-        return self._move.about(mesh.rest_positions[np.unique(mesh.nodes_of_edges[self._checked(mesh)])], self)
+        return self._move.about(
+            mesh.rest_positions[np.unique(mesh.nodes_of_edges[self._checked(mesh)])], self
+        )
 
     def __repr__(self) -> str:
         return f"Clamp({len(self.edges)} edges{self._move.summary()}{on_body(self.body)})"

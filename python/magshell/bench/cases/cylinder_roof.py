@@ -57,7 +57,7 @@ BEYOND = 1.2  # times the full load: towards there the path is followed, past th
 
 
 def quarter(
-    cells: tuple[int, int], bending: str, irregular: float | None = None
+    cells: tuple[int, int], bending: str = "midedge", irregular: float | None = None
 ) -> ms.TriangleMesh | ms.SixNodeMesh:
     """A quarter of the roof, from its center at x = y = 0 to the hinge and to the free curved edge."""
     span = (0.0, HALF_ANGLE)

@@ -54,9 +54,7 @@ def scene(mesh: ms.TriangleMesh, bending: str) -> ms.Scene:
 
 
 def _strip(cells, bending: str, irregular: float | None, seed: int) -> ms.TriangleMesh | ms.SixNodeMesh:
-    return ms.meshes.rectangle(
-        LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending)
-    )
+    return ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending))
 
 
 def controls(beta: float, direction: tuple[float, float, float]) -> dict:

@@ -59,8 +59,8 @@ def even_plate(
 def circular_plate(rings: int = 48, bending: str = "midedge", *, irregular: float | None = None) -> Outcome:
     """The four deflections of a disk of radius 1.
 
-    Its rim is a polygon (of second order, of parabolas), simply supported at its vertices. The lowest-order Hellan-Herrmann-Johnson element
-    does not fall for Babuska's paradox there (Arnold and Walker 2020).
+    Its rim is a polygon, of second order one of parabolas, simply supported at its vertices. The lowest-order
+    Hellan-Herrmann-Johnson element does not fall for Babuska's paradox there (Arnold and Walker 2020).
     """
     mesh = _disk(rings, irregular, bending)
     name = f"{'irregular ' if irregular else ''}{rings} rings"

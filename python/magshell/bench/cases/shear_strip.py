@@ -41,9 +41,7 @@ ELASTICA = {
 def strip(
     cells: tuple[int, int], bending: str, seed: int = 0, irregular: float | None = 0.25
 ) -> ms.TriangleMesh | ms.SixNodeMesh:
-    return ms.meshes.rectangle(
-        LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending)
-    )
+    return ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending))
 
 
 def shell(mesh: ms.TriangleMesh, bending: str) -> ms.Shell:
