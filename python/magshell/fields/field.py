@@ -220,7 +220,7 @@ class SampledField(AppliedField):
         >>> rows += [f"{x}, {y}, {z}, 0, 0, {10 + x}" for x in (0, 5, 10) for y in (0, 5) for z in (0, 5)]
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     path = pathlib.Path(folder, "field.csv")
-        ...     _ = path.write_text("\n".join(rows))
+        ...     _ = path.write_text("\\n".join(rows))
         ...     field = SampledField.from_table(path)
         >>> field, field.flux_density((0.0025, 0, 0)).round(6)
         (SampledField(3 x 2 x 2 samples, from (0, 0, 0) to (0.01, 0.005, 0.005) m), array([0.    , 0.    , 0.0125]))
