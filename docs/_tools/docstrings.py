@@ -5,7 +5,17 @@ import re
 _FIELD = re.compile(r"^((?:\*{0,2}[A-Za-z_][\w.]*(?:\([^)]*\))?)(?:, \*{0,2}[A-Za-z_][\w.]*)*): (.*)$")
 _SECTION = re.compile(r"^(Args|Raises|Returns):$")
 # Of classes, for those who extend them; a user calls none of these.
-_INNER = {"add_numbers", "gradients", "replaced", "held", "directed", "by_thickness", "sides", "riding", "current"}
+_INNER = {
+    "add_numbers",
+    "gradients",
+    "replaced",
+    "held",
+    "directed",
+    "by_thickness",
+    "sides",
+    "riding",
+    "current",
+}
 
 
 def process(app, what, name, obj, options, lines) -> None:
@@ -42,8 +52,16 @@ def _converted(block: list[str]) -> list[str]:
             indent = 4
         elif (field := _FIELD.match(text)) and depth <= indent:
             names = ", ".join(f"``{each.strip()}``" for each in field[1].split(", "))
-            found += [*([] if found and found[-1].startswith(("- ", "  ")) else [""]), f"- {names}: {_escaped(field[2])}"]
-        elif found and found[-1].startswith(("- ", "  ")) and depth > indent - 4 * (indent > 0) and (depth or indent):
+            found += [
+                *([] if found and found[-1].startswith(("- ", "  ")) else [""]),
+                f"- {names}: {_escaped(field[2])}",
+            ]
+        elif (
+            found
+            and found[-1].startswith(("- ", "  "))
+            and depth > indent - 4 * (indent > 0)
+            and (depth or indent)
+        ):
             found.append(f"  {_escaped(text)}")
         else:
             found += [*([""] if found and found[-1].startswith(("- ", "  ")) else []), _escaped(text)]

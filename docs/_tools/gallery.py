@@ -68,7 +68,11 @@ def _is_new(picture: Path, name: str) -> bool:
 
 def _digest(name: str) -> str:
     found = hashlib.blake2b(SMALL[name].encode() + _SCRIPT.encode())
-    sources = [EXAMPLES / f"{name}.py", *EXAMPLES.glob("_*/*.py"), *(ROOT / "python" / "magshell").rglob("*.py")]
+    sources = [
+        EXAMPLES / f"{name}.py",
+        *EXAMPLES.glob("_*/*.py"),
+        *(ROOT / "python" / "magshell").rglob("*.py"),
+    ]
     for path in sorted(sources):
         found.update(path.read_bytes())
     return found.hexdigest()
@@ -96,9 +100,15 @@ def _image(name: str, picture: Path) -> str:
 
 def _page(name: str, picture: Path) -> str:
     first, rest = _words(name)
-    small = f"The picture is of `main({SMALL[name]})`, smaller than what the script computes.\n\n" if name in SMALL else ""
+    small = (
+        f"The picture is of `main({SMALL[name]})`, smaller than what the script computes.\n\n"
+        if name in SMALL
+        else ""
+    )
     code = f"## The code\n\n```{{literalinclude}} ../../examples/{name}.py\n:language: python\n```\n"
-    return f"# {_title(name)}\n\n{_image(name, picture)}{small}{_markdown(first)}\n\n{_markdown(rest)}\n\n{code}"
+    return (
+        f"# {_title(name)}\n\n{_image(name, picture)}{small}{_markdown(first)}\n\n{_markdown(rest)}\n\n{code}"
+    )
 
 
 def _markdown(text: str) -> str:
@@ -111,10 +121,13 @@ def _index(names: list[str]) -> str:
         f"### [{_title(name)}]({name}.md)\n\n{_image(name, MADE / f'{name}.png')}{_markdown(_words(name)[0])}\n"
         for name in drawn
     ]
-    others = [f"- [{_title(name)}]({name}.md): {_markdown(_words(name)[0])}" for name in names if name not in drawn]
+    others = [
+        f"- [{_title(name)}]({name}.md): {_markdown(_words(name)[0])}" for name in names if name not in drawn
+    ]
     listed = "\n".join(names)
     return (
-        "# Gallery\n\nEvery picture is made by an example's own `plot()` while this manual is built; its title leads to the code. "
+        "# Gallery\n\nEvery picture is made by an example's own `plot()` while this manual is built; its title leads to the "
+        "code. "
         "`python examples/NAME.py` computes the full version, and writes its pictures and movies to `out/`.\n\n"
         + "\n".join(parts)
         + "\n## Longer ones, without a picture here\n\n"
