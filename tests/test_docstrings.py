@@ -118,7 +118,7 @@ def examples():
                 yield pytest.param(test, id=test.name.removeprefix("magshell."))
 
 
-@pytest.mark.parametrize("test", examples())
+@pytest.mark.parametrize("test", list(examples()))
 def test_it_runs(test, tmp_path, monkeypatch):
     for library in LIBRARIES:
         if library in test.docstring:

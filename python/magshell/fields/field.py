@@ -22,6 +22,8 @@ def residual_to_remanent(residual_flux_density):
     Numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph. Raises ValueError on
     what is not real and finite.
 
+    residual_flux_density: T, of any shape.
+
     >>> round(residual_to_remanent(0.1))
     79577
     """
