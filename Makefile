@@ -9,11 +9,11 @@ PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 # What the installed package is made from; a newer one means another build, an incremental one.
 sources := CMakeLists.txt pyproject.toml README.md LICENSE \
     $(shell find cpp cmake python/magshell -type f ! -name '*.so' ! -name '*.pyc' 2>/dev/null)
-pythons := $(wildcard python tests examples)
+pythons := $(wildcard python tests examples docs)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test sanitize lint format stubs clean
+.PHONY: help demo test docs wheel sanitize lint format stubs clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -25,6 +25,13 @@ demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pict
 
 test: $(VENV)/.with-test  ## every test, the notebooks and examples included
 	$(VENV)/bin/python -m pytest
+
+docs: $(VENV)/.with-docs  ## the manual, in docs/_build/html; warnings are errors
+	$(VENV)/bin/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@echo "The manual is $(CURDIR)/docs/_build/html/index.html"
+
+wheel: $(VENV)/.created  ## a wheel for other machines and the sdist, in dist/, tried in a bare environment
+	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/wheel.sh
 
 sanitize: $(VENV)/.with-test  ## tests against an extension that watches its memory, arithmetic and threads
 	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/sanitize.sh address,undefined
@@ -46,7 +53,7 @@ stubs: $(VENV)/.with-dev  ## write python/magshell/_core.pyi again, from the bui
 	$(VENV)/bin/ruff format --quiet python/magshell/_core.pyi
 
 clean:  ## remove the environment, the build and what the demo wrote
-	rm -rf $(VENV) build out
+	rm -rf $(VENV) build dist out docs/_build docs/_gallery
 
 # The build tools are in the environment itself, so that a rebuild finds them where the last one did.
 $(VENV)/.created: scripts/setup.sh

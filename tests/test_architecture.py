@@ -62,6 +62,7 @@ ROOMS = [
     "plotting",
     "envs",
     "__init__",
+    "__main__",
     "bench",
 ]
 OFFERED_ROOMS = {

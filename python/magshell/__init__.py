@@ -1,5 +1,8 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
+from ._machine import instructions as _  # noqa: F401 - first: it says whether the extension can run here
+
+# isort: split
 from . import control, envs, meshes, objectives, obstacles, optim, parametrize, shapes
 from ._core import __version__
 from ._machine.threads import num_threads, set_num_threads, show_config

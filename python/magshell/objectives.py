@@ -16,6 +16,10 @@ def shape_matching(positions, target, vertices=None, weights=None):
     positions: (n_v, 3) or (k, n_v, 3). target: as the positions, or (n_v, 3) for all cases; with only the chosen
     vertices, in their order. vertices: (n_chosen,) indices, by default all.
     weights: one a distance, (n_chosen,) or (k, n_chosen), for example vertex areas; by default 1.
+
+    >>> import magshell as ms
+    >>> round(float(ms.objectives.shape_matching([(0, 0, 0), (0, 0, 0.2)], [(0, 0, 0.1)], vertices=[1])), 9)
+    0.01
     """
     positions = real_tensor("positions", positions, ("...", "n_v", 3))
     chosen = positions if vertices is None else _at(positions, vertices)
@@ -31,6 +35,11 @@ def height_map(positions, rest_positions, image, extent, weights=None):
     (n_v, 3). image: (rows, columns) heights [m], row 0 at the largest y as pictures are drawn; one for all cases.
     extent: (x_min, x_max, y_min, y_max) [m] of the centers of its outermost pixels; beyond, the nearest pixel counts.
     weights: (n_v,) or (k, n_v), by default 1.
+
+    >>> import magshell as ms
+    >>> flat = [(0.25, 0.5, 0.0)]
+    >>> float(ms.objectives.height_map(flat, flat, [[0.0, 1.0], [0.0, 1.0]], (0, 1, 0, 1)))
+    0.0625
     """
     positions = real_tensor("positions", positions, ("...", "n_v", 3))
     rest_positions = real_tensor("rest_positions", rest_positions, (positions.shape[-2], 3))
@@ -39,7 +48,12 @@ def height_map(positions, rest_positions, image, extent, weights=None):
 
 
 def bilinear(image, points, extent):
-    """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in `height_map`."""
+    """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in `height_map`.
+
+    >>> import magshell as ms
+    >>> ms.objectives.bilinear([[0.0, 1.0], [0.0, 1.0]], [(0.25, 0.5)], (0, 1, 0, 1))
+    tensor([0.2500], dtype=torch.float64)
+    """
     torch = require_torch("objectives.bilinear")
     image = real_tensor("image", image, ("rows", "columns")).to(torch.float64)
     if min(image.shape) < 2:
@@ -67,6 +81,10 @@ def extension(positions, vertices, direction):
 
     positions: (n_v, 3) or (k, n_v, 3). vertices: an index, or (n_chosen,). direction: (3,), of any length but zero, or
     one a case, (k, 3).
+
+    >>> import magshell as ms
+    >>> float(ms.objectives.extension([(0, 0, 0), (0, 0, 2e-3)], [0, 1], (0, 0, 1)))
+    -0.001
     """
     torch = require_torch("objectives.extension")
     positions = real_tensor("positions", positions, ("...", "n_v", 3))
@@ -79,7 +97,14 @@ def extension(positions, vertices, direction):
 
 
 def magnitude(values, areas=None):
-    """Sum of squares, weighted by areas [m2] where given: of magnetizations (n_f, 3), or of any (n, ...)."""
+    """Sum of squares, weighted by areas [m2] where given: of magnetizations (n_f, 3), or of any (n, ...).
+
+    values: (n, ...); areas: (n,) m2.
+
+    >>> import magshell as ms
+    >>> float(ms.objectives.magnitude([(3.0, 0, 0), (0, 4.0, 0)]))
+    25.0
+    """
     values = real_tensor("values", values, ("...",))
     if values.ndim == 0:
         raise ValueError("values must have shape (n, ...), got a number")
@@ -94,6 +119,10 @@ def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
     values: (n_f,) or (n_f, k). edge_faces: (n_e, 2), with -1 where an edge has no second face, as in
     `TriangleMesh`. edge_lengths: (n_e,) [m], by default 1.
     smoothing eps > 0: in units of the values; jumps far below it count by their squares.
+
+    >>> import magshell as ms
+    >>> round(float(ms.objectives.total_variation([0.0, 1.0], [(0, 1), (0, -1)])), 2)
+    1.0
     """
     smoothing = positive_number("smoothing", "as values", smoothing)
     values = real_tensor("values", values, ("...",))
@@ -121,6 +150,10 @@ def cap(remanent_magnetization, limit, sharpness=None):
     remanent_magnetization: (n_f, 3) A/m. limit: A/m. One constraint a face, (n_f,); with a sharpness p > 1, a single
     one, (1,), from the p-norm over all faces: for optimizers it costs one gradient instead of n_f, and it is never
     looser than the limit.
+
+    >>> import magshell as ms
+    >>> ms.objectives.cap([(3e4, 0, 0), (0, 6e4, 0)], 6e4)
+    tensor([-0.7500,  0.0000], dtype=torch.float64)
     """
     remanent_magnetization = real_tensor("remanent_magnetization", remanent_magnetization, ("n_f", "k"))
     limit = positive_number("limit", "A/m", limit)
@@ -143,6 +176,10 @@ def printable(remanent_magnetization, directions, sharpness=None):
     remanent_magnetization: (n_f, 3) A/m. directions: (k, 3), of any length but zero; no magnetization at all can be
     printed too. The distance is to the ray that starts at zero.
     sharpness: replaces the minimum over the rays by a smooth one, in 1 / (A2/m2).
+
+    >>> import magshell as ms
+    >>> float(ms.objectives.printable([(3.0, 4.0, 0)], directions=[(1, 0, 0), (-1, 0, 0)]))
+    16.0
     """
     torch = require_torch("objectives.printable")
     remanent_magnetization = real_tensor("remanent_magnetization", remanent_magnetization, ("n_f", 3))

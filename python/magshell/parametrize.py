@@ -12,6 +12,10 @@ def from_regions(values, regions):
     """Values a face, (n_f, ...), equal within a region.
 
     values: (n_regions, ...). regions: (n_f,) the region of each face, from 0.
+
+    >>> import magshell as ms
+    >>> ms.parametrize.from_regions([1e6, 1e8], [0, 1, 1])
+    tensor([  1000000., 100000000., 100000000.], dtype=torch.float64)
     """
     torch = require_torch("parametrize.from_regions")
     values = real_tensor("values", values, ("...",))
@@ -35,6 +39,11 @@ def along(amplitude, directions):
     """Magnetizations (n_f, 3) of free amplitude in fixed directions.
 
     amplitude: (n_f,) A/m. directions: (3,) or (n_f, 3), of any length but zero.
+
+    >>> import magshell as ms
+    >>> ms.parametrize.along([1e4, 2e4], (0, 0, 2))
+    tensor([[    0.,     0., 10000.],
+            [    0.,     0., 20000.]], dtype=torch.float64)
     """
     torch = require_torch("parametrize.along")
     amplitude = real_tensor("amplitude", amplitude, ("n_f",))
@@ -54,26 +63,52 @@ def log_scaled(shares, lower, upper):
     [0, 1].
 
     Moduli over decades: young_modulus = log_scaled(s, 1e4, 1e8), with the bounds 0 and 1 of s left to the optimizer.
+
+    >>> import magshell as ms
+    >>> [round(each) for each in ms.parametrize.log_scaled([0.0, 0.5, 1.0], 1e4, 1e8).tolist()]
+    [10000, 1000000, 100000000]
     """
     lower, ratio = _bounds(lower, upper)
     return lower * (real_tensor("shares", shares, ("...",)) * math.log(ratio)).exp()
 
 
 def log_shares(values, lower, upper):
-    """The shares of `log_scaled` that give these values."""
+    """The shares of `log_scaled` that give these values.
+
+    values, lower, upper: in one unit.
+
+    >>> import magshell as ms
+    >>> ms.parametrize.log_shares([1e4, 1e6], 1e4, 1e8).round(decimals=9)
+    tensor([0.0000, 0.5000], dtype=torch.float64)
+    """
     lower, ratio = _bounds(lower, upper)
     return (real_tensor("values", values, ("...",)) / lower).log() / math.log(ratio)
 
 
 def capped(vectors, limit):
-    """Magnetizations (n_f, 3) below a limit [A/m], smoothly from any (n_f, 3): v / sqrt(1 + |v|^2 / limit^2)."""
+    """Magnetizations (n_f, 3) below a limit [A/m], smoothly from any (n_f, 3): v / sqrt(1 + |v|^2 / limit^2).
+
+    vectors: (n_f, 3), A/m. limit: A/m.
+
+    >>> import magshell as ms
+    >>> round(float(ms.parametrize.capped([(1e9, 0, 0)], 6e4)[0, 0]))
+    60000
+    """
     vectors = real_tensor("vectors", vectors, ("...", 3))
     limit = positive_number("limit", "A/m", limit)
     return vectors / (1 + ((vectors / limit) ** 2).sum(-1, keepdim=True)) ** 0.5
 
 
 def project_to_cap(vectors, limit):
-    """The nearest magnetizations (n_f, 3) that do not exceed a limit [A/m]: longer ones are cut to it."""
+    """The nearest magnetizations (n_f, 3) that do not exceed a limit [A/m]: longer ones are cut to it.
+
+    vectors: (n_f, 3), A/m. limit: A/m.
+
+    >>> import magshell as ms
+    >>> ms.parametrize.project_to_cap([(3e4, 0, 0), (8e4, 0, 0)], 6e4)
+    tensor([[30000.,     0.,     0.],
+            [60000.,     0.,     0.]], dtype=torch.float64)
+    """
     torch = require_torch("parametrize.project_to_cap")
     vectors = real_tensor("vectors", vectors, ("...", 3))
     limit = positive_number("limit", "A/m", limit)

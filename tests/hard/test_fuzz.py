@@ -17,31 +17,12 @@ from fuzz_file_calls import file_calls
 from fuzz_not_called import NOT_CALLED
 from fuzz_rigid_calls import rigid_calls
 from fuzz_solid_calls import solid_calls
+from public_names import public_names
 
 import magshell as ms
 
 HERE = Path(__file__).parent
 CALLS, PROCESSES = 10_000, 4
-
-
-def public_names(module, prefix="") -> set[str]:
-    """What users call, modules opened."""
-    names = set()
-    for name in module.__all__ if hasattr(module, "__all__") else _defined_in(module):
-        each = getattr(module, name)
-        if name.startswith("_"):
-            continue
-        if hasattr(each, "__path__") or each.__class__.__name__ == "module":
-            names |= public_names(each, f"{prefix}{name}.")
-        else:
-            names.add(prefix + name)
-    return names
-
-
-def _defined_in(module) -> list[str]:
-    return [
-        name for name, each in vars(module).items() if getattr(each, "__module__", None) == module.__name__
-    ]
 
 
 @pytest.fixture

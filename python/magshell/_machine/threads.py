@@ -12,7 +12,12 @@ _core.set_num_threads(first_threads(os.environ))
 
 
 def num_threads() -> int:
-    """How many threads magshell's parallel loops use, the caller's included."""
+    """How many threads magshell's parallel loops use, the caller's included.
+
+    >>> import magshell as ms
+    >>> ms.num_threads() >= 1
+    True
+    """
     return _core.num_threads()
 
 

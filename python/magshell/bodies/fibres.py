@@ -23,6 +23,10 @@ class Fibres:
     elements: (k,), the tetrahedra, each once. directions: (k, 3), at rest, of any length but zero. weights: (k,), how much
     of a muscle is there, 1 by default. coordinates: (k,) m, of each along its fibre, or None; length: m, of the fibres, by
     default as far as the coordinates reach.
+
+    >>> import magshell as ms
+    >>> ms.Fibres(elements=[0, 1], directions=[(1, 0, 0), (1, 0, 0)]).elements
+    array([0, 1])
     """
 
     elements: np.ndarray = field(repr=False)

@@ -187,6 +187,15 @@ class Fixed(Joint):
     """Holds a link to its parent, or to the world: they move as one.
 
     origin: has no meaning here; by default the world's.
+
+    child, parent: Link objects; without a parent, the world.
+
+    >>> import magshell as ms
+    >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    >>> mast = ms.Link(mass=1.0, center=(0, 0, 1.0), inertia=0.1)
+    >>> joints = [ms.Ball(bob, origin=(0, 0, 0)), ms.Fixed(mast, bob)]
+    >>> ms.Skeleton([bob, mast], joints)
+    Skeleton(2 links, 2 joints)
     """
 
     _kind = "fixed"
@@ -274,6 +283,13 @@ class Prismatic(Joint):
     N s/m, force N, motor_displacement m (`result[slide].motor_force`), target_displacement m, servo_stiffness N/m,
     force_limit N, lower_limit, upper_limit m, limit_stiffness N/m,
     limit_smoothing m, rate m/s.
+
+    child, parent, origin, axis: as in Revolute.
+
+    >>> import magshell as ms
+    >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    >>> ms.Skeleton([bob], [ms.Prismatic(bob, origin=(0, 0, 0), axis=(0, 0, 1), spring_stiffness=100.0)])
+    Skeleton(1 link, 1 joint)
     """
 
     _kind = "prismatic"
@@ -328,6 +344,11 @@ class Ball(Joint):
         direction as they turn. It has no potential, as a following pressure has none.
     upper_limit, limit_stiffness, limit_smoothing: rad, N m/rad, rad: of that angle, below pi.
     rate: (3,) rad/s, how the child turns to its parent at the start of a motion, as in Revolute; axes of the world.
+
+    >>> import magshell as ms
+    >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    >>> ms.Skeleton([bob], [ms.Ball(bob, origin=(0, 0, 0))])
+    Skeleton(1 link, 1 joint)
     """
 
     _kind = "ball"
@@ -380,6 +401,14 @@ class Closure(Joint):
     """Closes a loop: pulls a point of one link, and the same place on another or in the world, together.
 
     origin: (3,) m, the place at rest. stiffness: N/m; the gap is the force over it, and `result[closure].gap` says it.
+
+    child, parent: the two links; without a parent, the world.
+
+    >>> import magshell as ms
+    >>> a, b = (ms.Link(mass=1.0, center=(x, 0, -1.0), inertia=0.1) for x in (0.0, 1.0))
+    >>> hinges = [ms.Revolute(link, origin=(x, 0, 0), axis=(0, 1, 0)) for link, x in ((a, 0.0), (b, 1.0))]
+    >>> ms.Skeleton([a, b], [*hinges, ms.Closure(a, b, origin=(0.5, 0, -1.0), stiffness=1e4)])
+    Skeleton(2 links, 3 joints)
     """
 
     _kind = "closure"

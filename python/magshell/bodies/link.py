@@ -14,6 +14,8 @@ class Link(Rigid):
     As Rigid; without vertices it needs its center. `shape`: as of a Rigid; by default pictures show
     rods between joints. Link.of makes mass, inertia and center from one.
 
+    magnetic_moment, velocity, angular_velocity, body: as in `Rigid`.
+
     >>> import magshell as ms
     >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0))
     >>> ms.Skeleton([bob], [ms.Ball(bob, origin=(0, 0, 0))])

@@ -152,6 +152,11 @@ class StableNeoHookean(_Isotropic):
     log_barrier: with their barrier, m/2 (I1 - 3) + l/2 (J - a)^2 - m/2 ln((I1 + 1)/4), m = 4/3 mu, l = lam + 5/6 mu,
         a = 1 + 3 m/(4 l), which is stable where elements are flat as well.
     young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
+
+    >>> import magshell as ms
+    >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 1, 1))
+    >>> ms.Solid(bar, material=ms.StableNeoHookean(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
+    array(1000000.)
     """
 
     def __init__(self, *, young_modulus, poisson_ratio, log_barrier: bool = False):
@@ -170,6 +175,11 @@ class StVenantKirchhoff(_Isotropic):
     compression, and a mirror image costs it nothing.
 
     young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
+
+    >>> import magshell as ms
+    >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 1, 1))
+    >>> ms.Solid(bar, material=ms.StVenantKirchhoff(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
+    array(1000000.)
     """
 
 
@@ -177,6 +187,11 @@ class Corotated(_Isotropic):
     """Linear elasticity in a frame that turns along: mu |F - R|^2 + lam/2 tr(R^T F - I)^2, R the nearest rotation.
 
     young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
+
+    >>> import magshell as ms
+    >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 1, 1))
+    >>> ms.Solid(bar, material=ms.Corotated(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
+    array(1000000.)
     """
 
 
@@ -187,6 +202,11 @@ class Projective(_Isotropic):
 
     young_modulus: Pa, positive. poisson_ratio: in [0, 1/2). Each a number, or (n_t,). They give mu and lam as everywhere;
         but for small strains e this energy is mu |e|^2 + lam/6 (tr e)^2: it resists changes of volume with a third of lam.
+
+    >>> import magshell as ms
+    >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 1, 1))
+    >>> ms.Solid(bar, material=ms.Projective(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
+    array(1000000.)
     """
 
     _ranges: ClassVar = {
@@ -206,6 +226,18 @@ class Guccione(SolidMaterial):
     stiffness: C, Pa. fibre_exponent, cross_fibre_exponent, fibre_shear_exponent: bf, bt, bfs. bulk_modulus: K, Pa. All
         positive, numbers or (n_t,).
     fibres: (3,) or (n_t, 3), directions at rest; only the direction counts.
+
+    >>> import magshell as ms
+    >>> heart = ms.Guccione(
+    ...     stiffness=2e3,
+    ...     fibre_exponent=8.0,
+    ...     cross_fibre_exponent=2.0,
+    ...     fibre_shear_exponent=4.0,
+    ...     bulk_modulus=1e5,
+    ...     fibres=(1, 0, 0),
+    ... )
+    >>> heart.stiffness
+    array(2000.)
     """
 
     _ranges: ClassVar = {

@@ -30,10 +30,12 @@ class RigidResult:
 
     @property
     def rotation(self):
+        """Rotation vector, rad: (3,), or (n, 3) of a motion."""
         return self._turned(self._result._own_points[..., self._rows, :])
 
     @property
     def center(self):
+        """m: (3,), or (n, 3) of a motion."""
         return self._result._own_points[..., self._rows, :].mean(-2)
 
     @property

@@ -120,6 +120,7 @@ class Skeleton:
         return order
 
     def parent_of(self, number: int) -> Rigid | None:
+        """The link that a link, by its number, hangs on; None where that is the world."""
         joint = self.joint_to(self.links[number])
         return None if joint is None else joint.parent
 

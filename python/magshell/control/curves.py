@@ -39,10 +39,12 @@ class Curve(ABC):
 
     @property
     def start(self):
+        """(3,) m, where it begins."""
         return self.at([0.0])[0]
 
     @property
     def end(self):
+        """(3,) m, where it ends."""
         return self.at([1.0])[0]
 
 
@@ -133,6 +135,12 @@ class Chain(Curve):
     """Curves one after another, each starting where the one before ends.
 
     pieces: curves of ms.control.
+
+    >>> import magshell as ms
+    >>> along, up = ms.control.Polyline([(0, 0, 0), (1, 0, 0)]), ms.control.Polyline([(1, 0, 0), (1, 1, 0)])
+    >>> ell = ms.control.Chain([along, up])
+    >>> ell.start, ell.end
+    (tensor([0., 0., 0.], dtype=torch.float64), tensor([1., 1., 0.], dtype=torch.float64))
     """
 
     def __init__(self, pieces: Sequence[Curve]):

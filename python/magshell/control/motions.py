@@ -19,6 +19,10 @@ def frames_at(times, wanted):
     """The frames at wanted times [s], (k,) or one.
 
     times: (n,) s, of the frames, ascending. Raises ValueError if the nearest frame is further off than half a step.
+
+    >>> import magshell as ms
+    >>> ms.control.frames_at([0.0, 0.1, 0.2, 0.3], [0.1, 0.3])
+    array([1, 3])
     """
     times = quantity("times", "s", detached(times), ("n",))
     asked = quantity("wanted", "s", detached(wanted), shape_of("wanted [s]", wanted))
@@ -38,6 +42,12 @@ def track(positions, vertices, weights=None):
     """The track (n, 3) m of a vertex, or of the mean of some.
 
     positions: (n, n_v, 3) m. vertices: an index, or (m,). weights: (m,), for example masses; by default equal.
+
+    >>> import magshell as ms
+    >>> import numpy as np
+    >>> path = np.zeros((3, 2, 3))
+    >>> ms.control.track(path, [0, 1]).shape
+    torch.Size([3, 3])
     """
     positions = tensor("positions", "m", positions, ("n", "n_v", 3))
     chosen = positions[:, indices("vertices", vertices, positions.shape[1]).reshape(-1)]
@@ -53,6 +63,12 @@ def key_frames(positions, frames, targets, vertices=None, weights=None):
 
     positions: (n, n_v, 3) m. frames: (k,). targets: (k, m, 3) m. vertices: (m,) indices, by default all.
     weights: (k, m), by default 1.
+
+    >>> import magshell as ms
+    >>> import numpy as np
+    >>> path = np.zeros((3, 1, 3))
+    >>> round(float(ms.control.key_frames(path, [2], [[(0, 0, 0.1)]])), 9)
+    0.01
     """
     positions = tensor("positions", "m", positions, ("n", "n_v", 3))
     chosen = positions[indices("frames", frames, len(positions)).reshape(-1)]
@@ -68,6 +84,11 @@ def path_following(track, targets, weights=None):
     """Sum of squared distances of a track from a target a frame [m2].
 
     track: (n, 3) m. targets: (n, 3) m. weights: (n,), by default 1; 0 where it does not matter.
+
+    >>> import magshell as ms
+    >>> import numpy as np
+    >>> round(float(ms.control.path_following(np.zeros((2, 3)), [(0, 0, 0.1), (0, 0, 0.2)], weights=[0, 1])), 9)
+    0.04
     """
     track = tensor("track", "m", track, ("n", 3))
     squares = ((track - tensor("targets", "m", targets, tuple(track.shape))) ** 2).sum(-1)
@@ -81,6 +102,13 @@ def successive_targets(targets, begin, times, delay: float = 0.0):
     counts once the delay has passed, as in [Chen22] Figure 13.
 
     targets: (k, 3) m. begin: (k,) s, ascending: when each appears. times: (n,) s, of the frames. delay: s.
+
+    >>> import magshell as ms
+    >>> import numpy as np
+    >>> wanted, times = [(0, 0, 1), (0, 0, 2)], np.linspace(0, 1, 5)
+    >>> targets, weights = ms.control.successive_targets(wanted, [0.0, 0.5], times, delay=0.3)
+    >>> weights
+    tensor([0., 0., 0., 0., 1.], dtype=torch.float64)
     """
     targets = tensor("targets", "m", targets, ("k", 3))
     begin = quantity("begin", "s", detached(begin), (len(targets),))
@@ -105,6 +133,11 @@ def curve_distance(track, curve: Curve, smoothing: float | None = None):
 
     track: (n, 3) m. smoothing: m; with it the distances themselves are summed [m], smooth at zero:
     sqrt(d^2 + eps^2) - eps. They count small misses more, and large ones less.
+
+    >>> import magshell as ms
+    >>> line = ms.control.Polyline([(0, 0, 0), (1, 0, 0)])
+    >>> round(float(ms.control.curve_distance([(0.5, 0, 0.1), (0.7, 0, 0.2)], line)), 9)
+    0.05
     """
     squares = _checked_curve(curve).squared_distance(track)
     if smoothing is None:
@@ -122,6 +155,14 @@ def track_fitting(
     all frames from the one to the other. Frames before do not count: the sheet needs time to get there.
 
     track: (n, 3) m. weights: three numbers. smoothing: as in `curve_distance`.
+
+    curve: of ms.control. start_frame, end_frame: numbers of frames.
+
+    >>> import magshell as ms
+    >>> line = ms.control.Polyline([(0, 0, 0), (1, 0, 0)])
+    >>> terms = ms.control.track_fitting([(0, 0, 0), (0.5, 0, 0), (1, 0, 0.1)], line, 0, 2)
+    >>> {name: round(float(each), 9) for name, each in terms.items()}
+    {'start': 0.0, 'end': 0.01, 'curve': 0.01}
     """
     track = tensor("track", "m", track, ("n", 3))
     first, last = (

@@ -23,6 +23,10 @@ def step_times(steps: int, time_step, start: Trajectory | MotionState | None = N
     """The times of the ends of all steps, the start first: (steps + 1,) s.
 
     time_step: s. start: the motion that goes on with these steps, and whose times do; by default they begin at 0.
+
+    >>> import magshell as ms
+    >>> ms.control.step_times(3, 0.5)
+    tensor([0.0000, 0.5000, 1.0000, 1.5000], dtype=torch.float64)
     """
     torch = require_torch("ms.control.step_times")
     time_step, steps = positive_number("time_step", "s", time_step), count("steps", steps)
@@ -38,6 +42,10 @@ def held(values, steps: int):
     """A value a step, (steps, 3) T, from fewer: each is held equally long, to within one step.
 
     values: (k, 3) T, k <= steps. Bounds of the values are bounds of the field.
+
+    >>> import magshell as ms
+    >>> ms.control.held([(1e-3, 0, 0), (2e-3, 0, 0)], steps=4)[:, 0]
+    tensor([0.0010, 0.0010, 0.0020, 0.0020], dtype=torch.float64)
     """
     values = tensor("values", "T", values, ("k", 3))
     if not 1 <= len(values) <= count("steps", steps):
@@ -46,7 +54,13 @@ def held(values, steps: int):
 
 
 def harmonics(number: int, duration):
-    """The angular frequencies 2 pi j / duration, j = 1 ... number: (number,) rad/s. duration: s."""
+    """The angular frequencies 2 pi j / duration, j = 1 ... number: (number,) rad/s. duration: s.
+
+    >>> import magshell as ms
+    >>> import numpy as np
+    >>> ms.control.harmonics(3, 2 * np.pi)
+    tensor([1., 2., 3.], dtype=torch.float64)
+    """
     torch = require_torch("ms.control.harmonics")
     duration = positive_number("duration", "s", duration)
     return torch.arange(1, count("number", number) + 1, dtype=torch.float64) * (2 * math.pi / duration)
@@ -69,6 +83,11 @@ def fourier(times, angular_frequencies, cosine_amplitudes, sine_amplitudes, mean
     times: (n,) or one, s. angular_frequencies w: (J,) rad/s. cosine_amplitudes alpha, sine_amplitudes beta: (J, 3) T.
     mean: (3,) T. Frequencies are numbers far larger than fields: tell the optimizer the scale of each. Bounds of the
     parameters do not bound the field tightly; `field_cap` does.
+
+    >>> import magshell as ms
+    >>> import numpy as np
+    >>> ms.control.fourier(0.0, [2 * np.pi], [(1e-3, 0, 0)], [(0, 0, 0)])
+    tensor([0.0010, 0.0000, 0.0000], dtype=torch.float64)
     """
     cosine_amplitudes = tensor("cosine_amplitudes", "T", cosine_amplitudes, ("J", 3))
     signal = oscillation(times, angular_frequencies, cosine_amplitudes, sine_amplitudes)
@@ -80,6 +99,14 @@ def fit_fourier(values, times, angular_frequencies):
 
     values: (n, 3) T at times (n,) s. angular_frequencies: (J,) rad/s, positive. Raises ValueError where the series does
     not determine them. A start for `fourier` or `dmp`: no gradient goes through it.
+
+    >>> import magshell as ms
+    >>> import numpy as np
+    >>> times = np.linspace(0, 1, 20)
+    >>> series = np.stack([1e-3 * np.cos(2 * np.pi * times), 0 * times, 0 * times], axis=1)
+    >>> mean, cosine, sine = ms.control.fit_fourier(series, times, [2 * np.pi])
+    >>> round(float(cosine[0, 0]), 9)
+    0.001
     """
     times = quantity("times", "s", detached(times), ("n",))
     values = quantity("values", "T", detached(values), (len(times), 3))
@@ -103,6 +130,12 @@ def rotating(times, magnitude, axis, angular_frequency, start):
     times: (n,) or one, s. magnitude: T, a number or, as times, one a time. axis: (3,), of any length but zero; seen
     against it the field turns counter-clockwise. angular_frequency: rad/s. start: (3,), the direction at the time zero,
     of which the part perpendicular to the axis counts; not along the axis.
+
+    >>> import magshell as ms
+    >>> import numpy as np
+    >>> turned = ms.control.rotating(0.25, 1e-3, (0, 0, 1), 2 * np.pi, (1, 0, 0))  # a quarter of a turn
+    >>> turned.round(decimals=6)
+    tensor([0.0000, 0.0010, 0.0000], dtype=torch.float64)
     """
     torch = require_torch("ms.control.rotating")
     times = at_times(times)

@@ -55,6 +55,15 @@ def fit_spline(
     values: (n, 3) T at times (n,) s. limit: T, that no component of a control point may exceed; by default none. Raises
     ValueError where the series does not determine them: too few values, or none in a part of the duration.
     A start for an optimization: no gradient goes through it.
+
+    number: how many control points. duration, degree, periodic: as in `spline`.
+
+    >>> import magshell as ms
+    >>> import numpy as np
+    >>> times = np.linspace(0, 1, 20)
+    >>> series = 1e-3 * np.stack([times, 0 * times, 0 * times], axis=1)
+    >>> ms.control.fit_spline(series, times, number=5, duration=1.0).shape
+    torch.Size([5, 3])
     """
     torch = require_torch("ms.control.fit_spline")
     times = quantity("times", "s", detached(times), ("n",))

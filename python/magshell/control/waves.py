@@ -47,6 +47,10 @@ def pulse(times, places, *, speed, width, amplitude=1.0, delay=0.0, period=None)
     times, places, speed, delay: as of `wave`; it passes place 0 at the delay. width: m: a width from its middle 2 % of the
     amplitude is left. period: s, after which another follows, without end: each as exp(kappa (cos phi - 1)), phi the phase
     and kappa such that its top is the same; None: one only. Arguments may be (k,), of k muscles, as of `wave`.
+
+    >>> import magshell as ms
+    >>> ms.control.pulse(0.5, [0.0, 0.01], speed=0.02, width=5e-3).round(decimals=6)  # it is at 1 cm
+    tensor([0., 1.], dtype=torch.float64)
     """
     given = {"speed": speed, "width": width, "amplitude": amplitude, "delay": delay}
     units = {"speed": "m/s", "width": "m", "amplitude": "1", "delay": "s", "period": "s"}

@@ -46,6 +46,7 @@ class Minimum:
 
     @property
     def iterations(self) -> int:
+        """How many were taken."""
         return self.history[-1].iteration if self.history else 0
 
     def __repr__(self) -> str:

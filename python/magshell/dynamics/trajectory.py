@@ -44,6 +44,17 @@ class MotionState:
     time: s, since the start of the motion that led here; clock: how it was counted, in steps. Everything else is in the
     core's order of unknowns and faces; what the motion had no need of is empty: accelerations and strain rates (TRBDF2),
     strains of a Maxwell branch. rotations_known: False where the edge rotations are still to be put to rest.
+
+    state, velocity, acceleration: of all unknowns, (n,). turns: of folds that have gone round. strain_rates,
+    maxwell_strains, maxwell_strain_rates: of faces.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> first = ms.simulate(scene, steps=2, time_step=1e-3)
+    >>> ms.simulate(scene, steps=2, time_step=1e-3, start=first.end).times.round(6)
+    array([0.002, 0.003, 0.004])
     """
 
     time: float

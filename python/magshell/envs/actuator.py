@@ -19,6 +19,8 @@ class Actuator:
     Fields and what acts in joints stay at the action's value while it lasts; what moves (supports, obstacles, sources)
     goes there in a straight line from where the action before had it, at first from where the scene has it.
 
+    name: of the value.
+
     >>> import magshell as ms
     >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
     >>> hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)

@@ -32,6 +32,12 @@ def magnetic_strip(
     """A magnetized strip, 5 cm long and clamped at one end; a field of up to 4 mT upwards and 1 mT along and across is
     to lift its tip to a height, m. An action lasts 20 ms, an episode 1 s. Observed: heights and speeds of the tip and of
     the middle, over its length. disturbed: whether it starts with a small velocity.
+
+    target: m, the height. render_mode: as in Environment.
+
+    >>> import magshell as ms
+    >>> ms.envs.robots.magnetic_strip().action_space.shape
+    (3,)
     """
     mesh = meshes.rectangle(STRIP_LENGTH, 0.01, cells=(8, 2))
     sheet = Shell(
@@ -64,6 +70,12 @@ def magnetic_strip(
 def soft_arm(target: float = 0.6, render_mode: str | None = None) -> Environment:
     """A soft bar, 40 cm long and held at one end, with two bones and the hinge between them inside; a torque up to 10 N m is
     to bend it to an angle, rad. An action lasts 20 ms, an episode 1 s. Observed: angle and rate of the hinge.
+
+    target, render_mode: as in magnetic_strip.
+
+    >>> import magshell as ms
+    >>> ms.envs.robots.soft_arm().action_space.shape
+    (1,)
     """
     mesh = meshes.box((0.4, 0.06, 0.06), cells=(8, 4, 4))
     flesh = Solid(
@@ -95,6 +107,12 @@ def fish(n_tetrahedra: int = TETRAHEDRA, target=TARGET, render_mode: str | None 
     target, (3,) m from where it was. An action lasts 20 ms, an episode 2 s: [Qiao21] Figure 4c. Observed: way and velocity
     of the center of mass, angles and rates of the joints. Rewarded: what an action comes nearer, over the way there.
     n_tetrahedra: about how many.
+
+    render_mode: as in Environment.
+
+    >>> import magshell as ms
+    >>> ms.envs.robots.fish().action_space.shape
+    (5,)
     """
     swimmer = Fish(n_tetrahedra)
     goal = np.array(target, dtype=float)

@@ -30,6 +30,7 @@ class Snapshot:
 
     @property
     def scene(self) -> Scene:
+        """Of the environment."""
         return self.motion.scene
 
     @property

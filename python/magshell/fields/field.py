@@ -22,6 +22,8 @@ def residual_to_remanent(residual_flux_density):
     Numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph. Raises ValueError on
     what is not real and finite.
 
+    residual_flux_density: T, of any shape.
+
     >>> round(residual_to_remanent(0.1))
     79577
     """
@@ -220,7 +222,7 @@ class SampledField(AppliedField):
         >>> rows += [f"{x}, {y}, {z}, 0, 0, {10 + x}" for x in (0, 5, 10) for y in (0, 5) for z in (0, 5)]
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     path = pathlib.Path(folder, "field.csv")
-        ...     _ = path.write_text("\n".join(rows))
+        ...     _ = path.write_text("\\n".join(rows))
         ...     field = SampledField.from_table(path)
         >>> field, field.flux_density((0.0025, 0, 0)).round(6)
         (SampledField(3 x 2 x 2 samples, from (0, 0, 0) to (0.01, 0.005, 0.005) m), array([0.    , 0.    , 0.0125]))

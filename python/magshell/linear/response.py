@@ -62,6 +62,9 @@ def linear_response(
 
     Raises ValueError on bad input, and where the supports leave the sheet a motion without stiffness; Interrupted.
 
+    remanent_magnetization, applied_flux_density, load_factor, gravity_factor, field_factor, motion_factor: as in
+    `equilibrium`.
+
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)

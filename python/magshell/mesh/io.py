@@ -57,12 +57,29 @@ def read_mesh(path, drop_unused: bool = False) -> TriangleMesh | SixNodeMesh | T
         ValueError: unknown ending, a file that cannot be read, that holds other faces than triangles or none,
             or whose mesh `TriangleMesh` or `TetMesh` refuses.
         ImportError: without meshio, where it is needed.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_mesh(f"{folder}/sheet.ply", mesh)
+    ...     ms.read_mesh(f"{folder}/sheet.ply").n_faces
+    40
     """
     return _read(path, drop_unused)[0]
 
 
 def read_fields(path, drop_unused: bool = False) -> Fields | TetFields:
-    """The fields in a file, for the vertices and faces, or tetrahedra, of `read_mesh` with the same arguments."""
+    """The fields in a file, for the vertices and faces, or tetrahedra, of `read_mesh` with the same arguments.
+
+    path, drop_unused: as in `read_mesh`.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_mesh(f"{folder}/sheet.ply", mesh, vertex_fields={"height": mesh.rest_positions[:, 2]})
+    ...     list(ms.read_fields(f"{folder}/sheet.ply").vertex)
+    ['height']
+    """
     return _read(path, drop_unused)[1]
 
 
@@ -89,6 +106,13 @@ def write_mesh(
     Raises:
         ValueError: unknown ending, wrong shapes, or names with spaces or one of " < > &.
         OSError: it cannot be written; an older file is as it was.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_mesh(f"{folder}/sheet.ply", mesh, vertex_fields={"height": mesh.rest_positions[:, 2]})
+    ...     ms.read_mesh(f"{folder}/sheet.ply").n_faces
+    40
     """
     path = Path(path)
     ending = path.suffix.lower()

@@ -158,6 +158,7 @@ class TetMesh(TetSelection):
 
     @property
     def n_tetrahedra(self) -> int:
+        """How many there are."""
         return len(self.tetrahedra)
 
     # Connectivity

@@ -31,6 +31,10 @@ def annulus(
         cells: (radial, around).
         diagonals, irregular, seed: as for `rectangle`.
         order: likewise; edges on its rims are arcs.
+
+    >>> import magshell as ms
+    >>> ms.meshes.annulus(0.01, 0.02, cells=(2, 24)).n_faces
+    96
     """
     return sector(inner_radius, outer_radius, 2 * np.pi, cells, diagonals, irregular, seed, order=order)
 

@@ -28,7 +28,7 @@ def extruded(sheet: TriangleMesh, height: float, layers: int, order: int = 1) ->
         ValueError: also for a sheet that is not flat.
 
     >>> import magshell as ms
-    >>> extruded(ms.meshes.rectangle(1.0, 1.0, cells=(2, 2)), height=0.5, layers=2).volume
+    >>> round(extruded(ms.meshes.rectangle(1.0, 1.0, cells=(2, 2)), height=0.5, layers=2).volume, 9)
     0.5
     """
     sheet = checked_mesh(sheet, "sheet")

@@ -18,6 +18,13 @@ class Newton:
     first_load_step: of the way from the old controls to the new ones, in (0, 1].
     smallest_load_step: below it, the solve relaxes down the energy instead (implicit Euler steps of a gradient flow).
     max_relaxation_steps: how many of those before it gives up.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.equilibrium(scene, solver=ms.Newton(max_iterations=500)).stable
+    True
     """
 
     tolerance: float = 1e-10
@@ -57,6 +64,15 @@ class MixedNewton(Newton):
 
     Takes a thin shell to a large deflection in a handful of iterations where `Newton` takes dozens; same solution.
     Options as for Newton.
+
+    tolerance, max_iterations, first_load_step, smallest_load_step, max_relaxation_steps: as in `Newton`.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.equilibrium(scene, solver=ms.MixedNewton(max_iterations=100)).stable
+    True
     """
 
     _mixed = True

@@ -24,6 +24,16 @@ class GCMMA(MMA):
     constraints every step keeps them and lowers the objective.
 
     K. Svanberg, A class of globally convergent optimization methods ..., SIAM J. Optim. 12 (2002).
+
+    params, lower, upper, scale, move, asymptote_initial, penalty, max_shortenings and the rest: as in `optim.MMA`.
+
+    >>> import torch, magshell as ms
+    >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
+    >>> optimizer = ms.optim.GCMMA([x], lower=-1.0, upper=0.5)
+    >>> for _ in range(10):
+    ...     weight = optimizer.step(lambda: ((x - 1) ** 2).sum())
+    >>> round(weight, 6)
+    0.75
     """
 
     def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:

@@ -36,6 +36,8 @@ class LBFGS(BoxOptimizer):
     R. H. Byrd, P. Lu, J. Nocedal, C. Zhu, A limited memory algorithm for bound constrained optimization,
     SIAM J. Sci. Comput. 16 (1995).
 
+    params: tensors, or groups of them, as torch's optimizers take.
+
     >>> import torch, magshell as ms
     >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
     >>> ms.optim.LBFGS([x], upper=0.5).step(lambda: ((x - 1) ** 2).sum())

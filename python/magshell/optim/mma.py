@@ -31,6 +31,8 @@ class MMA(BoxOptimizer):
     Every option but the last two can differ between parameter groups. K. Svanberg, The method of moving asymptotes,
     Int. J. Numer. Meth. Eng. 24 (1987), with the asymptotes and the subproblem as in his notes of 2007.
 
+    params: tensors, or groups of them, as torch's optimizers take.
+
     >>> import torch, magshell as ms
     >>> x = torch.full((5,), 5.0, dtype=torch.float64, requires_grad=True)
     >>> optimizer = ms.optim.MMA([x], lower=1.0, upper=10.0)

@@ -66,6 +66,13 @@ def animate(
 
     Raises ValueError on bad input, FileNotFoundError without the folder, OSError if the file cannot be written,
     ImportError without matplotlib or, for an .mp4, ffmpeg.
+
+    >>> import magshell as ms, tempfile, numpy as np
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> rising = np.stack([mesh.rest_positions + np.array([0, 0, height]) for height in (0, 0.01)])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.animate(mesh, f"{folder}/rise.gif", positions=rising, width=400, backend="matplotlib").name
+    'rise.gif'
     """
     fps = float(quantity("fps", "1/s", fps, ()))
     if not SLOWEST <= fps <= FASTEST:

@@ -60,6 +60,12 @@ def write_page(
         spread; the page says how many there were. The mesh takes about 85 bytes a vertex, the viewer 25 kB.
 
     Raises ValueError on bad input, FileNotFoundError without the folder.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_page(mesh, f"{folder}/sheet.html").name
+    'sheet.html'
     """
     path = Path(path)
     if path.suffix.lower() not in (".html", ".htm"):

@@ -28,6 +28,7 @@ class Reaction:
 
     @property
     def force(self) -> np.ndarray:
+        """(3,) N, of all points together."""
         return self.forces.sum(axis=0)
 
     def torque(self, point=(0.0, 0.0, 0.0)) -> np.ndarray:

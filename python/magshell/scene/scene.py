@@ -259,14 +259,17 @@ class Scene:
 
     @property
     def bodies(self) -> tuple[Shell | Solid, ...]:
+        """Shells and solids, in the order of their vertices."""
         return self._bodies.shells
 
     @property
     def ties(self) -> tuple[Tie, ...]:
+        """What welds bodies."""
         return self._bodies.ties
 
     @property
     def rigid_parts(self) -> tuple[Rigid, ...]:
+        """Rigid parts and links."""
         return self._bodies.rigid
 
     @property
@@ -306,6 +309,7 @@ class Scene:
 
     @property
     def has_uniform_field(self) -> bool:
+        """Whether solves need an applied_flux_density."""
         return any(isinstance(f, UniformField) for f in self.fields)
 
     @property

@@ -7,17 +7,35 @@ from .shape import Difference, Intersection, Shape, SmoothUnion, Union, several
 
 
 def union(*shapes: Shape) -> Shape:
-    """All that lies in one of them, `a | b`."""
+    """All that lies in one of them, `a | b`.
+
+    >>> import magshell as ms
+    >>> two = ms.shapes.union(ms.shapes.ball(0.01), ms.shapes.ball(0.01, center=(0.03, 0, 0)))
+    >>> bool(two([(0.03, 0, 0)])[0] < 0)
+    True
+    """
     return Union(several("union", shapes))
 
 
 def intersection(*shapes: Shape) -> Shape:
-    """All that lies in each of them, `a & b`."""
+    """All that lies in each of them, `a & b`.
+
+    >>> import magshell as ms
+    >>> lens = ms.shapes.intersection(ms.shapes.ball(0.01), ms.shapes.ball(0.01, center=(0.01, 0, 0)))
+    >>> bool(lens([(0.015, 0, 0)])[0] > 0)
+    True
+    """
     return Intersection(several("intersection", shapes))
 
 
 def difference(shape: Shape, *others: Shape) -> Shape:
-    """What others leave of a shape, `a - b`."""
+    """What others leave of a shape, `a - b`.
+
+    >>> import magshell as ms
+    >>> bowl = ms.shapes.difference(ms.shapes.ball(0.01), ms.shapes.ball(0.008))
+    >>> bool(bowl([(0, 0, 0)])[0] > 0)
+    True
+    """
     return Difference(several("difference", (shape, *others)))
 
 

@@ -28,6 +28,7 @@ class Shape:
 
     @property
     def bounds(self) -> Bounds:
+        """(2, 3) m, corners of a box around it."""
         raise AttributeError("a Shape without a kind has no bounds: make one by the functions of ms.shapes")
 
     def _distance(self, points: np.ndarray) -> np.ndarray:

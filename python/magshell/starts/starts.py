@@ -56,6 +56,7 @@ class Multistart(Sequence):
 
     @property
     def best(self) -> FinishedStart:
+        """The start that came out best."""
         if not self.finished:
             raise ValueError(
                 f"no start has finished: {len(self.failed)} failed, {len(self.unfinished)} were left"

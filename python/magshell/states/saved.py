@@ -75,6 +75,17 @@ def load(path: str | Path, scene: Scene) -> Equilibrium | Equilibria | Trajector
 
     The file is data: reading it runs nothing, whoever wrote it. Raises ValueError where it is no such file, of a later
     magshell, or of another scene (and says which of its parts differ); OSError where it cannot be read.
+
+    path: of the file.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.save(f"{folder}/rest.npz", ms.equilibrium(scene))
+    ...     ms.load(f"{folder}/rest.npz", scene).stable
+    True
     """
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")

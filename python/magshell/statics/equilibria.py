@@ -17,6 +17,13 @@ class Equilibria(Sequence):
     """A scene at rest in each of k load cases, or in k ways in one; a sequence of Equilibrium.
 
     positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.Equilibria([ms.equilibrium(scene), ms.equilibrium(scene, gravity_factor=0.5)]).positions.shape
+    (2, 33, 3)
     """
 
     def __init__(self, cases: Iterable[Equilibrium]):
@@ -35,10 +42,12 @@ class Equilibria(Sequence):
 
     @property
     def scene(self):
+        """Of all cases."""
         return self._cases[0].scene
 
     @property
     def displacements(self):
+        """(k, n_v, 3) m, from the rest shape."""
         return stacked([case.displacements for case in self._cases])
 
     @property

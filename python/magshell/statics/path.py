@@ -207,6 +207,8 @@ def follow(
 
     Raises NotConverged and Interrupted with the path so far as `last_good`; ValueError on bad input.
 
+    max_points: where the path ends at the latest.
+
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)

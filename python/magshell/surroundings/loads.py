@@ -55,6 +55,10 @@ class PointLoad(DeadLoad):
     """A force [N] on each of some vertices: `force` (3,) on every one of them, or (k, 3), one each.
 
     body: the Shell whose vertices they are, in a scene of several.
+
+    >>> import magshell as ms
+    >>> ms.PointLoad([0, 1], (0, 0, -1e-3)).force
+    array([ 0.   ,  0.   , -0.001])
     """
 
     _replaceable = ("force",)
@@ -76,6 +80,14 @@ class EdgeLoad(DeadLoad):
     (k, 3), one an edge.
 
     body: the Shell whose edges they are, in a scene of several.
+
+    edges: (k,). force_per_length: N/m, by rest length.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, 0.5))
+    >>> round(float(load.vertex_forces(mesh).sum()), 9)  # 0.5 N/m on 0.02 m
+    0.01
     """
 
     _replaceable = ("force_per_length",)
@@ -96,6 +108,12 @@ class AreaLoad(DeadLoad):
     elements are curved, and share it out by their shapes.
 
     body: the Shell or Solid that it acts on; by default all, where no faces are given.
+
+    force_per_area: N/m2, by rest area. faces: (k,), by default all.
+
+    >>> import magshell as ms
+    >>> ms.AreaLoad((0, 0, -10.0)).force_per_area
+    array([  0.,   0., -10.])
     """
 
     _replaceable = ("force_per_area",)
@@ -124,6 +142,14 @@ class EdgeCouple(Owner):
         point to); positive lifts nothing but turns as a right hand along that direction does. Or a vector (3,), of which
         the part along each rest edge counts. The axis follows the edge.
     body: the Shell whose edges they are, in a scene of several.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> couple = ms.EdgeCouple(mesh.edges_at(x=0.1), 1e-3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[couple])
+    >>> bool(abs(ms.equilibrium(scene).displacements[:, 2]).max() > 1e-3)
+    True
     """
 
     _replaceable = ("couple_per_length",)

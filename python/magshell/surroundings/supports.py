@@ -190,6 +190,13 @@ class SymmetryPlane(Support):
     point: (3,) m, in the plane.
     tolerance: m, how far off a vertex may be; by default 1e-9 of the mesh's size.
     body: the Shell that it holds; by default all.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> half = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0)), ms.SymmetryPlane((1, 0, 0), (0.1, 0, 0))])
+    >>> half.n_unknowns < ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))]).n_unknowns
+    True
     """
 
     for_all = True

