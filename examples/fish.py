@@ -26,15 +26,22 @@ Run it: prints a summary and writes pictures and a movie into out/.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
-from _fish.report import draw_search, draw_torques, movie, picture, summary
-from _fish.search import EPISODES, first_torques, found_by_gradient, slope_error
+from _fish.report import VIEW, draw_torques
+from _robots import report
+from _robots.search import EPISODES, searched
 from _run import run
 
 import magshell as ms
 from magshell.envs.fish import STEPS, TARGET, TETRAHEDRA, Fish
+
+STARTS = (  # of the wave along the spine, beside the usual one
+    {},
+    {"amplitude": 0.3},
+    {"frequency": 1.5},
+    {"lag": 0.5},
+)
 
 
 def main(
@@ -42,40 +49,36 @@ def main(
     steps: int = STEPS,
     target=TARGET,
     episodes: int = EPISODES,
+    starts=STARTS,
     slope_steps: int = STEPS,
     difference: float = 1e-4,
 ) -> dict:
-    """{"found": Found, "motion": with its torques, "milliseconds": of the processor, a step, "slope": error of the slope
-    at the start of the search, over so many steps}. difference: of torques, over the largest."""
-    fish, start = Fish(n_tetrahedra), first_torques(steps)
-    found = found_by_gradient(fish, start, target, episodes)
-    began = time.process_time()
-    motion = fish.motion(found.controls)
-    return {
-        "found": found,
-        "motion": motion,
-        "milliseconds": 1e3 * (time.process_time() - began) / steps,
-        "slope": slope_error(fish, first_torques(slope_steps), difference),
-        "slope_steps": slope_steps,
-    }
+    """{"found": [Found of each start], "motion": with the torques of the first, "forward", "backward": ms of the processor,
+    a step, "slope": error of the slope at the start of the search, over so many steps}. difference: of torques, over
+    the largest."""
+    return searched(Fish(n_tetrahedra), steps, target, episodes, starts, slope_steps, difference)
 
 
 def plot(result: dict):
-    """The miss against episodes; the torques found."""
+    """The miss against episodes and time; the torques found."""
     from matplotlib import pyplot as plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
-    draw_search(left, result["found"])
-    draw_torques(right, result["found"])
-    for axes in figure.axes:
-        axes.spines[["top", "right"]].set_visible(False)
+    figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
+    report.draw_search(axes[0], axes[1], result["found"])
+    draw_torques(axes[2], result["found"][0])
+    for each in axes:
+        each.spines[["top", "right"]].set_visible(False)
     return figure
+
+
+def summary(result: dict) -> str:
+    return report.summary(result, [result["found"][0].robot.flesh.mesh])
 
 
 def write(result: dict, out: Path) -> None:
     ms.Picture(plot(result)).save(out / "fish.png", dpi=160)
-    picture(result["motion"]).save(out / "fish_swims.png")
-    movie(result["motion"], out / "fish.gif")
+    report.picture(result["motion"], VIEW).save(out / "fish_swims.png")
+    report.movie(result["motion"], out / "fish.gif", VIEW)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ import importlib
 import pickle
 import sys
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -135,6 +136,19 @@ def test_processes_give_the_same_bits(context):
     for k, seed in enumerate((7, 8)):
         alone, _ = episode(robots.magnetic_strip(), actions[:, k], seed)
         np.testing.assert_array_equal(np.array(all_seen)[:, k], alone)
+
+
+def test_robots_have_the_same_bits_with_the_same_seed():
+    """Made twice; the small ones of the robots that go to a target."""
+    for make in (
+        partial(robots.muscle_octopus, cells=4),
+        partial(robots.cell_gripper, levels=9, ball_cells=2),
+    ):
+        one, other = make(), make()
+        actions = np.random.default_rng(2).uniform(-0.3, 0.3, (3, *one.action_space.shape))
+        first, again = (episode(each, actions, 5)[0] for each in (one, other))
+        np.testing.assert_array_equal(first, again)
+        assert np.abs(first - episode(one, actions, 6)[0]).max() > 1e-6
 
 
 def test_an_environment_that_is_pickled_goes_on_alike():

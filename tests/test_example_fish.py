@@ -9,7 +9,9 @@ from magshell.envs.fish import TORQUES, Fish
 
 @pytest.fixture(scope="module")
 def swum() -> dict:
-    return load("fish").main(n_tetrahedra=1600, steps=15, target=(0, 0, 1e-3), episodes=10, slope_steps=15)
+    return load("fish").main(
+        n_tetrahedra=1600, steps=15, target=(0, 0, 1e-3), episodes=10, starts=({},), slope_steps=15
+    )
 
 
 def test_the_fish_has_the_papers_size() -> None:
@@ -23,16 +25,16 @@ def test_the_fish_has_the_papers_size() -> None:
 
 
 def test_torques_are_found_that_take_it_to_the_target(swum) -> None:
-    found = swum["found"]
+    [found] = swum["found"]
     assert found.controls.size == 75 and np.abs(found.controls).max() <= 1
     assert found.misses[0] > 0.5 and found.episodes is not None
     assert found.misses.min() < 0.01
-    way = found.fish.way(swum["motion"])
+    way = found.robot.way(swum["motion"])
     np.testing.assert_allclose(way, (0, 0, 1e-3), atol=1e-5)
 
 
 def test_bones_stay_as_they_are_and_joints_bend(swum) -> None:
-    fish, motion = swum["found"].fish, swum["motion"]
+    fish, motion = swum["found"][0].robot, swum["motion"]
     rest, end = fish.flesh.mesh.rest_positions, motion.positions[-1]
     for link in fish.links.values():
         a, b = link.vertices[[0, -1]]
@@ -46,7 +48,7 @@ def test_the_slope_is_that_of_differences(swum) -> None:
 
 
 def test_without_torques_it_rests(swum) -> None:
-    fish = swum["found"].fish
+    fish = swum["found"][0].robot
     assert np.abs(fish.motion(np.zeros((3, 5))).displacements).max() < 1e-12
 
 
@@ -54,10 +56,10 @@ def test_the_environment_moves_as_the_motion_does(swum) -> None:
     pytest.importorskip("gymnasium")
     from magshell.envs.robots import fish as environment
 
-    one, controls = environment(n_tetrahedra=1600), swum["found"].controls[:4]
+    one, controls = environment(n_tetrahedra=1600), swum["found"][0].controls[:4]
     one.reset(seed=0, options={"velocities": (0, 0, 0)})
     seen, rewards = zip(*[one.step(action)[:2] for action in controls], strict=True)
-    fish = swum["found"].fish
+    fish = swum["found"][0].robot
     motion = fish.motion(controls)
     np.testing.assert_allclose(seen[-1][:3], fish.way(motion), atol=1e-15)
     assert sum(rewards) == pytest.approx(1 - fish.miss(motion), abs=1e-9)
@@ -66,8 +68,9 @@ def test_the_environment_moves_as_the_motion_does(swum) -> None:
 def test_pictures_of_the_fish(swum, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("MAGSHELL_PLOT", "matplotlib")
     example = load("fish")
-    assert len(example.plot(swum).axes) == 2
-    assert example.picture(swum["motion"])._repr_png_().startswith(b"\x89PNG")
+    assert len(example.plot(swum).axes) == 3
+    assert example.report.picture(swum["motion"], example.VIEW)._repr_png_().startswith(b"\x89PNG")
     options = {"speed": 1.0, "fps": 10.0, "width": 400, "progress": False}
-    assert example.movie(swum["motion"], tmp_path / "a.gif", **options).stat().st_size > 5_000
-    assert "within 1 % of the target" in example.summary(swum)
+    path = example.report.movie(swum["motion"], tmp_path / "a.gif", example.VIEW, **options)
+    assert path.stat().st_size > 5_000
+    assert "to 1 % of the way" in example.summary(swum)

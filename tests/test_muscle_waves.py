@@ -44,6 +44,26 @@ def test_many_muscles_at_once_and_one_time():
     ).all()
 
 
+def test_numbers_that_change_in_time():
+    """Each row is the wave of its own numbers at its time."""
+    rng = np.random.default_rng(3)
+    names = ("speed", "wavelength", "amplitude", "mean", "delay")
+    numbers = {name: 0.2 + 0.1 * rng.random((21, 3)) for name in names}
+    together = control.wave(TIMES, PLACES, **numbers)
+    assert together.shape == (21, 3, 10)
+    for k in (0, 8, 20):
+        for muscle in range(3):
+            alone = control.wave(TIMES[k], PLACES, **{n: float(v[k, muscle]) for n, v in numbers.items()})
+            assert (together[k, muscle] == alone).all()
+    mixed = control.wave(TIMES, PLACES, **{**numbers, "mean": numbers["mean"][0], "speed": 0.1})
+    assert (
+        mixed[0]
+        == control.wave(TIMES[:1], PLACES, **{**{n: v[:1] for n, v in numbers.items()}, "speed": 0.1})[0]
+    ).all()
+    with pytest.raises(ValueError, match=r"delay \[s\] must have shape \(21, k\)"):
+        control.wave(TIMES, PLACES, speed=0.1, wavelength=0.05, delay=np.zeros((20, 3)))
+
+
 @pytest.mark.parametrize(
     "kind, names",
     [

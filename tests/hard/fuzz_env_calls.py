@@ -4,14 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 from fuzz_calls import Call, Sample
 
 import magshell as ms
 
 
+def pendulum() -> ms.envs.Environment:
+    bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
+    return ms.envs.Environment(
+        ms.Scene(ms.Skeleton([bob], [hinge])),
+        actuators=[ms.envs.Actuator(hinge, "torque", lower=-1.0, upper=1.0)],
+        observation=lambda now: [now[hinge].angle],
+        reward=lambda now: 0.0,
+        time_step=1e-2,
+        actions_per_episode=2,
+    )
+
+
 def env_calls(s: Sample) -> Iterator[Call]:
     bounds = {"lower": -1e-4, "upper": 1e-4}
     yield Call("envs.Actuator", ms.envs.Actuator, {"owner": s.clamp, "name": "displacement", **bounds})
+    yield Call(
+        "envs.Steered",
+        ms.envs.Steered,
+        {"owner": s.clamp, "name": "displacement", "numbers": 3, "value": lambda share, time, before: before},
+    )
+    yield Call(
+        "envs.episodes",
+        ms.envs.episodes,
+        {"make": pendulum, "policies": [np.zeros((2, 1))], "seeds": [3], "executor": None},
+    )
     yield Call(
         "envs.Environment",
         ms.envs.Environment,

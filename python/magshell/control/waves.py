@@ -21,8 +21,8 @@ def wave(times, places, *, speed, wavelength, amplitude=0.5, mean=0.5, delay=0.0
     places; negative, the other way. wavelength: m. amplitude, mean: 1; mean +- amplitude must stay in the muscle's range.
     delay: s. ramp: s, R rises smoothly from 0 to 1 in it, as t/ramp; None: at once.
 
-    Any of speed, wavelength, amplitude, mean and delay may be (k,), of k muscles: then (n, k, m), or (k, m). Differentiable
-    in all arguments, the times and places among them.
+    Any of speed, wavelength, amplitude, mean and delay may be (k,), of k muscles: then (n, k, m), or (k, m); or (n, k), at
+    each of the times. Differentiable in all arguments, the times and places among them.
 
     >>> import magshell as ms
     >>> times = ms.control.step_times(100, 1e-2)
@@ -46,7 +46,7 @@ def pulse(times, places, *, speed, width, amplitude=1.0, delay=0.0, period=None)
 
     times, places, speed, delay: as of `wave`; it passes place 0 at the delay. width: m: a width from its middle 2 % of the
     amplitude is left. period: s, after which another follows, without end: each as exp(kappa (cos phi - 1)), phi the phase
-    and kappa such that its top is the same; None: one only. Arguments may be (k,), of k muscles, as of `wave`.
+    and kappa such that its top is the same; None: one only. Arguments may be (k,), of k muscles, or (n, k), as of `wave`.
 
     >>> import magshell as ms
     >>> ms.control.pulse(0.5, [0.0, 0.01], speed=0.02, width=5e-3).round(decimals=6)  # it is at 1 cm
@@ -71,18 +71,17 @@ def pulse(times, places, *, speed, width, amplitude=1.0, delay=0.0, period=None)
 def _checked(times, places, units, **given):
     """The arguments as tensors, with axes for times, muscles where there are several, and places."""
     times, places = at_times(times), tensor("places", "m", places, ("m",))
-    several = [name for name, value in given.items() if shape_of(f"{name} [{units[name]}]", value)]
-    numbers = {
-        name: tensor(name, units[name], value, ("k",) if name in several else ())
-        for name, value in given.items()
-    }
-    counts = {len(numbers[name]) for name in several}
+    shapes = {name: shape_of(f"{name} [{units[name]}]", value) for name, value in given.items()}
+    several = [name for name, shape in shapes.items() if shape]
+    rows = {name: ("k",) if len(shapes[name]) < 2 else (*times.shape, "k") for name in several}
+    numbers = {name: tensor(name, units[name], value, rows.get(name, ())) for name, value in given.items()}
+    counts = {numbers[name].shape[-1] for name in several}
     if len(counts) > 1:
         raise ValueError(
             f"{', '.join(several)} must be of one number of muscles, got {sorted(counts)} of them"
         )
     late = times[..., None, None] if several else times[..., None]
-    return times, places, late, {n: v[:, None] if n in several else v for n, v in numbers.items()}
+    return times, places, late, {n: v[..., None] if n in several else v for n, v in numbers.items()}
 
 
 def _positive(name: str, value) -> None:

@@ -11,8 +11,12 @@
         actions_per_episode=50,
     )
 
+Where an action is not the value itself but sets it through a function (the speed of what moves, a wave along a muscle),
+`Steered` takes that function.
+
 Robots that come along are registered once their module is loaded, which gymnasium does for names before a colon:
-`gymnasium.make("magshell.envs.robots:magshell/MagneticStrip-v0")`, and `gymnasium.make_vec` for many in processes.
+`gymnasium.make("magshell.envs.robots:magshell/MagneticStrip-v0")`, and `gymnasium.make_vec` for many in processes; whole
+episodes run in the processes of any executor by `episodes`.
 
 gymnasium (the extra `gym`) is imported when `Environment` or `robots` is first asked for.
 """
@@ -22,9 +26,11 @@ from __future__ import annotations
 from importlib import import_module
 
 from .actuator import Actuator
+from .rollouts import Episode, episodes
 from .snapshot import Snapshot
+from .steered import Steered
 
-__all__ = ["Actuator", "Environment", "Snapshot", "robots"]
+__all__ = ["Actuator", "Environment", "Episode", "Snapshot", "Steered", "episodes", "robots"]
 
 
 def __getattr__(name: str):

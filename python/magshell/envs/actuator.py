@@ -82,8 +82,8 @@ class Actuator:
         if self._of_scene and self.name not in controls_of(self.owner, scene):
             raise ValueError(f"the scene has no {self.name}")
 
-    def value(self, action: np.ndarray) -> np.ndarray:
-        """Of its own entries of an action, (size,) in -1 to 1."""
+    def value(self, action: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
+        """Of its own entries of an action, (size,) in -1 to 1, that begins at a time [s] with the value before."""
         share = 0.5 * (action.reshape(self.shape) + 1.0)
         return self.lower + share * (self.upper - self.lower)
 

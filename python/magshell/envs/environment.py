@@ -30,7 +30,8 @@ _ROUNDING = 1e-6  # beyond the bounds, of actions that were single precision on 
 class Environment(gymnasium.Env):
     """A scene that actions drive, step by step, as gymnasium has it.
 
-    actuators: what an action sets, Actuator objects. The action holds their numbers one after another, each from -1 to 1.
+    actuators: what an action sets, Actuator or Steered objects. The action holds their numbers one after another, each from
+        -1 to 1.
     observation: function of a Snapshot, the state after an action: finite numbers, always as many, in any one shape.
     reward: function of a Snapshot: a number. `snapshot.before` is the state that the action began in.
     time_step, steps_per_action: s, and how many of them an action lasts. actions_per_episode: after which it is truncated.
@@ -218,7 +219,11 @@ class Environment(gymnasium.Env):
             raise ValueError(f"action must lie between -1 and 1, got {worst:g}")
         ends = np.cumsum([each.size for each in self.actuators])[:-1]
         parts = np.split(np.clip(array, -1.0, 1.0), ends)
-        return [each.value(part) for each, part in zip(self.actuators, parts, strict=True)]
+        time = self._now.time
+        return [
+            each.value(part, time, before)
+            for each, part, before in zip(self.actuators, parts, self._setting, strict=True)
+        ]
 
     def _observed(self, now: Snapshot) -> np.ndarray:
         array = np.array(real_numbers("observation", self._observe(now)), dtype=np.float64)

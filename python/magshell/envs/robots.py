@@ -16,11 +16,15 @@ from ..methods.integrators import ImplicitEuler
 from ..scene.scene import Scene
 from ..surroundings.supports import Clamp, Pin
 from .actuator import Actuator
+from .cell_gripper import SPEED, CellGripper
 from .environment import Environment
-from .fish import SOLVER, STEPS, TARGET, TETRAHEDRA, TIME_STEP, TORQUES, Fish
+from .fish import TARGET, TETRAHEDRA, TORQUES, Fish
 from .library import require_gymnasium
+from .muscle_octopus import CELLS, FREQUENCY, NUMBERS, MuscleOctopus
+from .robot import Robot
+from .steered import Steered
 
-__all__ = ["fish", "magnetic_strip", "soft_arm"]
+__all__ = ["cell_gripper", "fish", "magnetic_strip", "muscle_octopus", "soft_arm"]
 
 
 STRIP_LENGTH, STRIP_TARGET = 0.05, 0.01  # m
@@ -115,36 +119,129 @@ def fish(n_tetrahedra: int = TETRAHEDRA, target=TARGET, render_mode: str | None 
     (5,)
     """
     swimmer = Fish(n_tetrahedra)
+    torques = [
+        Actuator(joint, "torque", lower=-most, upper=most)
+        for joint, most in zip(swimmer.joints, TORQUES, strict=True)
+    ]
+
+    def bent(now):
+        return [(now[joint].angle, now[joint].rate) for joint in swimmer.joints]
+
+    return _to_target(swimmer, target, torques, bent, render_mode)
+
+
+def muscle_octopus(
+    cells: int = CELLS, target=MuscleOctopus.target, render_mode: str | None = None
+) -> Environment:
+    """A soft octopus with two muscles in each of eight legs in water, whose center of mass is to go to a target, (3,) m from
+    where it was. An action, 64 numbers, four of the wave along each muscle, lasts 5 ms, an episode 2 s: [Qiao21] Figure
+    4b. Observed: way and velocity of the center of mass, where the tips of the legs are from it, and the phase of the
+    waves. Rewarded as the fish. cells: along a leg.
+    """
+    swimmer = MuscleOctopus(cells)
+    waves = [
+        Steered(muscle, "activation", NUMBERS, _Wave(swimmer, k)) for k, muscle in enumerate(swimmer.muscles)
+    ]
+
+    def posture(now):
+        phase = 2.0 * np.pi * FREQUENCY * now.time
+        return [
+            *(now.positions[swimmer.tips] - swimmer.weights @ now.positions).ravel(),
+            np.sin(phase),
+            np.cos(phase),
+        ]
+
+    return _to_target(swimmer, target, waves, posture, render_mode)
+
+
+def cell_gripper(target=CellGripper.target, render_mode: str | None = None, **changes) -> Environment:
+    """Four arms of 56 pneumatic cells under a drone, to grip a ball on a table and to carry it to a target, (3,) m from
+    where it was. An action, the volumes of all cells and the speed of the drone, lasts 10 ms, an episode 0.5 s: [Qiao21]
+    Figure 4a. Observed: way and velocity of the ball, way of the drone, where the ends of the arms are from the ball.
+    Rewarded: what the ball comes nearer, over its way; where a motion fails, the episode ends with -1. changes: of
+    CellGripper's own arguments.
+    """
+    gripper = CellGripper(**changes)
+    actuators = [
+        Steered(gripper.cells, "volume_ratio", len(gripper.cells.groups), _filled),
+        Steered(gripper.drone, "displacement", 3, _Speed(SPEED * gripper.time_step)),
+    ]
+
+    def grasp(now):
+        ends = now[gripper.arms].positions[gripper.ends].mean(axis=1)
+        middle = gripper.weights @ now[gripper.ball].positions
+        return [*now.action[-3:], *(ends - middle).ravel()]
+
+    return _to_target(gripper, target, actuators, grasp, render_mode, failure_reward=-1.0)
+
+
+class _Wave:
+    """Of one muscle of the octopus: its activations, by the four numbers of its wave. Can be pickled."""
+
+    def __init__(self, octopus: MuscleOctopus, muscle: int):
+        self._octopus, self._muscle = octopus, muscle
+
+    def __call__(self, numbers: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
+        import torch
+
+        controls = torch.from_numpy(numbers).reshape(1, 1, -1)
+        end = np.array([time + self._octopus.time_step])
+        return self._octopus.activations(controls, end, [self._muscle])[0, 0].numpy()
+
+
+class _Speed:
+    """Of a support, in m a step."""
+
+    def __init__(self, most: float):
+        self._most = most
+
+    def __call__(self, numbers: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
+        return before + self._most * numbers
+
+
+def _filled(numbers: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
+    return CellGripper.filled(numbers, before)
+
+
+def _to_target(robot: Robot, target, actuators, further, render_mode, **options) -> Environment:
+    """Way and velocity of the traveller's center of mass are observed, and what `further` returns of a Snapshot."""
     goal = np.array(target, dtype=float)
-    rest = swimmer.flesh.mesh.rest_positions
+    rest = robot.traveller.mesh.rest_positions
+
+    def way(now):
+        return robot.weights @ (now[robot.traveller].positions - rest)
 
     def away(now):
-        return np.linalg.norm(swimmer.weights @ (now.positions - rest) - goal)
+        return np.linalg.norm(way(now) - goal)
 
     def seen(now):
-        way, velocity = (swimmer.weights @ each for each in (now.positions - rest, now.velocities))
-        turned = [(now[joint].angle, now[joint].rate) for joint in swimmer.joints]
-        return np.concatenate([way, velocity, np.ravel(turned)])
+        return np.concatenate(
+            [way(now), robot.weights @ now[robot.traveller].velocities, np.ravel(further(now))]
+        )
 
     return Environment(
-        swimmer.scene,
-        actuators=[
-            Actuator(joint, "torque", lower=-most, upper=most)
-            for joint, most in zip(swimmer.joints, TORQUES, strict=True)
-        ],
+        robot.scene,
+        actuators=actuators,
         observation=seen,
         reward=lambda now: (away(now.before) - away(now)) / np.linalg.norm(goal),
         start=lambda generator: {"velocities": generator.normal(scale=1e-3, size=3)},
-        time_step=TIME_STEP,
-        actions_per_episode=STEPS,
-        simulate={"integrator": ImplicitEuler(), "solver": SOLVER},
+        time_step=robot.time_step,
+        actions_per_episode=robot.steps,
+        simulate={
+            "integrator": ImplicitEuler(),
+            "solver": robot.solver,
+            "stiffness_damping": robot.stiffness_damping,
+        },
         render_mode=render_mode,
+        **options,
     )
 
 
 REGISTERED = {
+    "magshell/CellGripper-v0": cell_gripper,
     "magshell/Fish-v0": fish,
     "magshell/MagneticStrip-v0": magnetic_strip,
+    "magshell/MuscleOctopus-v0": muscle_octopus,
     "magshell/SoftArm-v0": soft_arm,
 }
 

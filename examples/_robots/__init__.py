@@ -1,0 +1,1 @@
+"""What the examples of robots that go to a target share: the search by gradient, from several starts, and its pictures."""

@@ -1,0 +1,59 @@
+"""Values that a function of the action sets."""
+
+import numpy as np
+import pytest
+
+import magshell as ms
+
+pytest.importorskip("gymnasium")
+
+
+def pendulum(steered_by):
+    """An environment of a pendulum whose torque is steered so, its scene and hinge."""
+    bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
+    scene = ms.Scene(ms.Skeleton([bob], [hinge]), gravity=(0, 0, -9.81))
+    one = ms.envs.Environment(
+        scene,
+        actuators=[ms.envs.Steered(hinge, "torque", *steered_by)],
+        observation=lambda now: [now[hinge].angle],
+        reward=lambda now: 0.0,
+        time_step=1e-2,
+        steps_per_action=4,
+        actions_per_episode=3,
+        simulate={"integrator": ms.ImplicitEuler()},
+    )
+    return one, scene, hinge
+
+
+def test_a_value_that_a_function_of_the_action_sets():
+    """A speed instead of a place, and a function of the time: as one motion with the same courses."""
+    one, scene, hinge = pendulum((2, lambda two, time, before: before + two[0] + time * two[1]))
+    assert one.action_space.shape == (2,)
+    assert repr(one.actuators[0]) == "Steered(torque of Revolute, by 2 numbers)"
+    first, _ = one.reset(seed=0)
+    seen = np.array([first, *(one.step(two)[0] for two in ((0.5, 1.0), (0.5, 1.0), (-1.0, 1.0)))])
+    torques = np.repeat([0.5, 0.5 + 0.54, 1.04 - 1.0 + 0.08], 4)
+    whole = ms.simulate(
+        scene, steps=12, time_step=1e-2, values={hinge: {"torque": torques}}, integrator=ms.ImplicitEuler()
+    )
+    np.testing.assert_allclose(seen[:, 0], whole[hinge].angle[::4], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("steered_by", "complaint"),
+    [
+        ((1, 3.0), "value of a Steered must be a function"),
+        ((0, lambda *_: 0.0), "numbers must be an integer"),
+    ],
+)
+def test_bad_steering_is_refused(steered_by, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        pendulum(steered_by)
+
+
+def test_what_is_steered_must_have_its_shape():
+    one, *_ = pendulum((1, lambda share, time, before: share))
+    one.reset(seed=0)
+    with pytest.raises(ValueError, match="what steers torque must be a number"):
+        one.step([1.0])
