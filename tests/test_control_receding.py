@@ -14,12 +14,12 @@ def zeros(*shape):
 
 
 class Stick:
-    """That balances: angle and rate under a push a step. Noise grows by a factor of 1.065 in each."""
+    """That balances: angle and rate under a push a step. Noise grows by a factor of 1.1 in each."""
 
     def moved(self, pushes, state):
         angles, (angle, rate) = [], state
         for each in pushes:
-            rate = rate + 0.02 * (10 * torch.sin(angle) + 20 * each)
+            rate = rate + 0.02 * (25 * torch.sin(angle) + 50 * each)
             angle = angle + 0.02 * rate
             angles.append(angle)
         return torch.stack(angles), (angle, rate)
@@ -37,20 +37,21 @@ def upright(noise):
 
 
 def test_what_noise_overthrows_stays_upright() -> None:
-    """Over 200 steps noise grows 3e5-fold; one search of the whole, with as many steps in all, lets the stick fall."""
+    """Over 160 steps noise grows 4e6-fold; one search of the whole, with as many steps in all, lets the stick fall."""
     stick, start = Stick(), upright(1e-3)
     limits = {"lower": -1.0, "upper": 1.0, "start": start, **QUIET}
-    found = ms.control.receding(stick.objective, stick.advance, zeros(200), horizon=40, stride=20, **limits)
+    found = ms.control.receding(stick.objective, stick.advance, zeros(160), horizon=32, stride=16, **limits)
     angles, end = stick.moved(found.controls, start)
-    assert angles.abs()[40:].max() < 1e-3 and found.reached == 200
+    assert angles.abs()[32:].max() < 1e-3 and found.reached == 160
     assert torch.equal(torch.stack(end), torch.stack(found.state))  # once more, the same
     direct = ms.control.receding(
         stick.objective,
         stick.advance,
-        zeros(200),
-        horizon=200,
-        stride=200,
-        max_iterations=max(1, found.evaluations * 40 // 200),
+        zeros(160),
+        horizon=160,
+        stride=160,
+        max_iterations=found.evaluations * 32 // 160,
+        tolerance=0.0,
         **limits,
     )
     assert stick.moved(direct.controls, start)[0].abs().max() > 0.5

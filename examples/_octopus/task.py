@@ -26,7 +26,7 @@ HORIZON, STRIDE = 400, 200  # steps that are looked at, and that are then done
 TRIALS, ITERATIONS = 8, 2  # of every horizon: plans tried before its search, and steps of the search
 SWING, PERIODS = 12e-3, (100, 400)  # T, of Bx, and steps: the trials' swings
 
-SAMPLES = 12  # points of the path that are drawn
+EVEN, EVEN_FREQUENCY = 6e-3, 4.0  # T and Hz, of the swing that the field found is compared with
 ASIDE = 1.0  # how much a distance from the axis weighs over one along it
 STRENGTH_COST = 5e-3  # m2/T2: 10 mT all the time cost as much as 0.7 mm of distance
 RATE_COST = 3e-6  # m2 s2/T2: 10 mT that swing at 4 Hz cost as much as 0.3 mm, at 15 Hz as 1.2 mm
@@ -129,6 +129,12 @@ class Swim:
 
     def advance(self, field, horizon: ms.control.Horizon, before: ms.Trajectory | None) -> ms.Trajectory:
         return self.move(field.numpy(), before)
+
+    def swing(self) -> np.ndarray:
+        """A field along x that opens and closes the tentacles evenly, to compare with."""
+        return np.stack(
+            [-EVEN * np.sin(2 * np.pi * EVEN_FREQUENCY * self.times), *np.zeros((2, self.steps))], axis=1
+        )
 
     def solve(self, progress: bool = False) -> ms.control.Receding:
         """The field of every step, from none, until the channel is passed."""
