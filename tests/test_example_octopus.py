@@ -1,9 +1,11 @@
-"""The swimming octopus: a short search in a pipe, gradients of its objective, and its picture."""
+"""The swimming octopus: the beginning of its way through a pipe, gradients of its objective, and its picture."""
 
 import numpy as np
 import pytest
 import torch
 from test_examples import load
+
+import magshell as ms
 
 
 @pytest.fixture(scope="module")
@@ -13,8 +15,8 @@ def example():
 
 @pytest.fixture(scope="module")
 def swim(example) -> dict:
-    """The first 0.31 s in the narrow pipe, asked to be 15 mm further by then."""
-    return example.main(channels=("pipe I",), steps=310, iterations=1, goal=12e-3)["pipe I"]
+    """The first 0.25 s in the narrow pipe, asked to be 4 mm further by then, from a start with noise."""
+    return example.main(channels=("pipe I",), steps=250, goal=1.5e-3, noise=1e-12)["pipe I"]
 
 
 def test_the_mesh_is_as_large_as_the_papers(swim) -> None:
@@ -26,17 +28,15 @@ def test_the_mesh_is_as_large_as_the_papers(swim) -> None:
     assert np.ptp(strengths[body.tentacle >= 0]) < 1e-9 * strengths.max()
 
 
-def test_the_search_lowers_the_objective(swim) -> None:
-    first, *_, last = swim["history"]
-    assert last.objective < 0.97 * first.objective
-    assert last.terms["distance"] < 0.97 * first.terms["distance"]
-
-
-def test_it_swims_forward(swim) -> None:
+def test_it_swims_to_where_it_is_asked_to_be_from_no_field(swim) -> None:
     center = swim["found"]["center"]
-    assert center[-1, 0] > center[0, 0] + 1e-3
-    assert center[-1, 0] > swim["guess"]["center"][-1, 0]
-    assert np.abs(center[:, 1:]).max() < 1e-6  # straight on: nothing pushes it aside
+    assert swim["search"].reached == 250 and not swim["search"].failures
+    assert center[-1, 0] > swim["path"][-1] - 1e-3
+    assert np.abs(center[:, 1:]).max() < 1e-4  # straight on
+
+
+def test_one_motion_does_what_the_search_did(swim) -> None:
+    assert np.array_equal(swim["found"]["positions"][-1], swim["search"].state.positions[-1])
 
 
 def test_it_stays_in_the_pipe_and_the_field_in_its_limit(swim) -> None:
@@ -45,21 +45,21 @@ def test_it_stays_in_the_pipe_and_the_field_in_its_limit(swim) -> None:
 
 
 def test_the_gradient_is_that_of_differences(example) -> None:
-    """By values of the field in time that push the octopus aside too, and by what describes the oscillations."""
+    """By values of the field in time that push the octopus aside too."""
     swim = example.Swim.of(example.CHANNELS["pipe I"], 40)
     swim.goal, swim.precision = 5e-3, 1e-11
-    guess = swim.guess()
-    rest = 2e-3 * torch.tensor(np.random.default_rng(1).standard_normal((40, 3)))
-    variables = [each.requires_grad_() for each in guess._replace(rest=rest, sines=5 * guess.sines)]
-    sum(swim.objective(example.Variables(*variables)).values()).backward()
-    for which, index, step in ((0, (5, 0), 1e-4), (0, (20, 1), 1e-4), (1, (1,), 1e-2), (3, (1, 0), 1e-5)):
+    random = np.random.default_rng(1).standard_normal((40, 3))
+    field = torch.tensor(5 * swim.swing() + 2e-3 * random, requires_grad=True)
+    horizon = ms.control.Horizon(0, 40, 40)
+    sum(swim.objective(field, horizon, None).values()).backward()
+    for index in ((5, 0), (20, 1), (33, 2)):
         values = []
         for sign in (1, -1):
-            moved = [each.detach().clone() for each in variables]
-            moved[which][index] += sign * step
-            values.append(float(sum(swim.objective(example.Variables(*moved)).values())))
-        slope = (values[0] - values[1]) / (2 * step)
-        assert variables[which].grad[index].item() == pytest.approx(slope, rel=1e-4)
+            moved = field.detach().clone()
+            moved[index] += sign * 1e-4
+            values.append(float(sum(swim.objective(moved, horizon, None).values())))
+        slope = (values[0] - values[1]) / 2e-4
+        assert field.grad[index].item() == pytest.approx(slope, rel=1e-4)
 
 
 def test_picture_and_summary(example, swim, tmp_path) -> None:

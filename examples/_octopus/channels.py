@@ -17,7 +17,6 @@ class Channel:
     """A tube with mouths. stations, radii: (k,) m, its outline.
 
     end: m, where its narrow part ends: it is passed once all of the octopus is beyond.
-    after: the channel with whose field the search begins, if that was looked for before; else with a guess.
     goal: m, where along x the mass center is asked to be when the time set is over.
     """
 
@@ -26,7 +25,6 @@ class Channel:
     radii: tuple[float, ...]
     end: float
     goal: float
-    after: str | None = None
 
     def outline(self) -> np.ndarray:
         """(2, n) m: x along the tube and its radius there."""
@@ -44,20 +42,19 @@ class Channel:
         return ms.obstacles.Tube(np.stack([x, 0 * x, 0 * x], axis=1), radius, inside=True)
 
 
-def _channel(name: str, outline: dict[float, float], *, end: float, goal: float, after=None) -> Channel:
+def _channel(name: str, outline: dict[float, float], *, end: float, goal: float) -> Channel:
     """From lengths in mm."""
     stations, radii = (tuple(1e-3 * length for length in each) for each in (outline, outline.values()))
-    return Channel(name, stations, radii, 1e-3 * end, 1e-3 * goal, after)
+    return Channel(name, stations, radii, 1e-3 * end, 1e-3 * goal)
 
 
 CHANNELS = {
-    "pipe I": _channel("pipe I", {-40: 21, -5: 21, 14: 13, 24: 13, 44: 21, 100: 21}, end=24, goal=47),
-    "pipe II": _channel("pipe II", {-40: 21, -5: 21, 12: 16, 34: 16, 50: 21, 100: 21}, end=34, goal=57),
+    "pipe I": _channel("pipe I", {-40: 21, -5: 21, 14: 13, 24: 13, 44: 21, 100: 21}, end=24, goal=74),
+    "pipe II": _channel("pipe II", {-40: 21, -5: 21, 12: 16, 34: 16, 50: 21, 100: 21}, end=34, goal=84),
     "tunnel": _channel(
         "tunnel",
         {-40: 21, -5: 21, 11: 13, 21: 17, 32: 12.5, 52: 21, 100: 21},
         end=32,
-        goal=55,
-        after="pipe II",
+        goal=82,
     ),
 }

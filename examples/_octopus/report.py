@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
-FOUND, GUESS, GREY = "#20639b", "#c8442d", "#777777"
+FOUND, SWING, SIDE = "#20639b", "#c8442d", "#3d9970"
 HEAD, TENTACLE, WATER, WALL = "#e8a87c", "#b5485d", "#9cc9e0", "#8a8f98"
-COLORS = {"guess": GUESS, "found": FOUND}
-LABELS = {"guess": "guess", "found": "found"}
+COLORS = {"swing": SWING, "found": FOUND}
+LABELS = {"swing": "even swing", "found": "found"}
 EYE = np.radians(20.0)  # by which the eye is turned about the channel's axis: the outline of a tube stays
 LIGHT = np.array([0.45, -0.7, 0.55])  # along the channel, from the eye to the sheet, up
 BEGIN = -34  # mm, of the pictures
@@ -40,8 +40,8 @@ def draw_swimmer(axes, result: dict, positions: np.ndarray) -> None:
     axes.set_axis_off()
 
 
-def draw_snapshot(axes, result: dict, name: str, time: float) -> None:
-    motion = result[name]
+def draw_snapshot(axes, result: dict, time: float) -> None:
+    motion = result["found"]
     frame = int(np.argmin(np.abs(result["times"] - time)))
     draw_swimmer(axes, result, motion["positions"][frame])
     axes.plot(
@@ -56,7 +56,7 @@ def draw_snapshot(axes, result: dict, name: str, time: float) -> None:
 
 def draw_path(axes, result: dict) -> None:
     """Along the channel: the center of mass beside the sample points, and the last tip beside the channel's end."""
-    for name in ("guess", "found"):
+    for name in COLORS:
         motion = result[name]
         axes.plot(
             result["times"],
@@ -68,9 +68,7 @@ def draw_path(axes, result: dict) -> None:
         axes.plot(
             result["times"], 1e3 * motion["tail"], color=COLORS[name], lw=0.9, ls="--", label="last tip"
         )
-    axes.plot(
-        result["sample_times"], 1e3 * result["samples"][:, 0], "o", color="k", ms=3.5, label="sample points"
-    )
+    axes.plot(result["times"], 1e3 * result["path"], color="k", lw=0.8, label="asked for")
     axes.axhline(1e3 * result["channel"].end, color="k", lw=0.8, ls=":")
     axes.set(xlabel="time [s]", ylabel="x [mm]", xlim=(0, result["times"][-1]))
     axes.legend(frameon=False, fontsize=7)
@@ -78,28 +76,23 @@ def draw_path(axes, result: dict) -> None:
 
 def draw_field(axes, result: dict) -> None:
     times = result["times"][1:]
-    axes.plot(times, 1e3 * result["guess"]["field"][:, 0], color=GUESS, lw=0.7, label="$B_x$, guess")
-    for name, color, k in (("y", "#3d9970", 1), ("z", "#b07aa1", 2), ("x", FOUND, 0)):
+    axes.plot(times, 1e3 * result["swing"]["field"][:, 0], color=SWING, lw=0.7, label="$B_x$, even swing")
+    for name, color, k in (("y", SIDE, 1), ("z", "#b07aa1", 2), ("x", FOUND, 0)):
         axes.plot(times, 1e3 * result["found"]["field"][:, k], color=color, lw=1.0, label=f"$B_{name}$")
     axes.set(xlabel="time [s]", ylabel="B [mT]", xlim=(0, times[-1]))
     axes.legend(frameon=False, fontsize=7, ncols=4, loc="lower left", bbox_to_anchor=(0, 1))
 
 
-def draw_convergence(axes, result: dict) -> None:
-    iterations = [record.iteration for record in result["history"]]
-    axes.semilogy(
-        iterations,
-        [1e6 * record.objective for record in result["history"]],
-        "o-",
-        color="k",
-        ms=3,
-        label="objective",
-    )
-    for name, color in (("distance", FOUND), ("strength", GUESS), ("low frequency", "#3d9970")):
-        values = np.array([1e6 * record.terms[name] for record in result["history"]])
-        axes.semilogy(iterations, np.where(values > 0, values, np.nan), color=color, lw=1.0, label=name)
-    axes.set(xlabel="iteration", ylabel="objective [mm$^2$]")
-    axes.legend(frameon=False, fontsize=7)
+def draw_search(axes, result: dict) -> None:
+    """Every horizon from its first step on: the objective with which its search began and ended."""
+    for part, found in result["search"].searches:
+        first, last = found.history[0].objective, found.objective
+        begin = result["times"][part.first]
+        axes.plot([begin, begin], [1e6 * first, 1e6 * last], "-", color=FOUND, lw=1.0)
+        axes.plot(begin, 1e6 * first, "o", color=SWING, ms=3)
+        axes.plot(begin, 1e6 * last, "o", color=FOUND, ms=3)
+    axes.set_yscale("log")
+    axes.set(xlabel="time at which a horizon begins [s]", ylabel="objective [mm$^2$]")
 
 
 def movie(result: dict, path, fps: int = 25, slower: float = 2.0) -> None:
@@ -110,7 +103,8 @@ def movie(result: dict, path, fps: int = 25, slower: float = 2.0) -> None:
     figure, axes = plt.subplots(figsize=(6, 3.2))
     writer, times, motion = PillowWriter(fps=fps), result["times"], result["found"]
     with writer.saving(figure, str(path), dpi=80):
-        for time in np.arange(0.0, times[-1], 1 / (fps * slower)):
+        last = times[-1] if motion["passed"] is None else motion["passed"] + 0.1
+        for time in np.arange(0.0, last, 1 / (fps * slower)):
             axes.clear()
             frame = int(np.argmin(np.abs(times - time)))
             draw_swimmer(axes, result, motion["positions"][frame])
@@ -131,20 +125,20 @@ def summary(results: dict[str, dict]) -> str:
 
 
 def _about(name: str, result: dict) -> str:
-    steps, iterations = len(result["times"]) - 1, max(result["iterations"], 1)
-    first, last = result["history"][0], result["history"][-1]
-    forward = 1e3 * result["found"]["processor_time"] / steps
-    both = 1e3 * result["processor_time"] / (last.evaluations * steps)
-    theirs, seconds = PAPER[name]
+    steps, search = len(result["times"]) - 1, result["search"]
     end = 1e3 * result["channel"].end
+    with_gradient = sum(
+        found.history[-1].evaluations * (part.end - part.first) for part, found in search.searches
+    )
+    forward = 1e3 * result["found"]["processor_time"] / steps
+    theirs, seconds = PAPER[name]
     return "\n".join(
         (
-            f"{name}: {steps} steps, {result['variables']} variables; passed when all is beyond {end:.0f} mm",
-            *(_about_motion(LABELS[which], result[which]) for which in ("guess", "found")),
-            f"  objective {1e6 * first.objective:.1f} to {1e6 * result['objective']:.1f} mm2 in {result['iterations']} "
-            f"iterations, {last.evaluations} motions ({result['reason']})",
-            f"  {last.seconds / iterations:.1f} s an iteration, {result['processor_time'] / iterations:.1f} s of processor "
-            f"time; a motion {forward:.2f} ms a step, {both:.2f} ms with its gradient",
+            f"{name}: {steps} steps, {search.controls.numel()} unknowns; passed when all is beyond {end:.0f} mm",
+            *(_about_motion(LABELS[which], result[which]) for which in COLORS),
+            f"  searched for {search.reached} steps, in {len(search.searches)} horizons: {search.trials} controls tried, "
+            f"{search.evaluations} gradients over {with_gradient} steps in all",
+            f"  {result['processor_time']:.0f} s of processor time; a motion {forward:.2f} ms a step without gradient",
             f"  [Chen22] Table 1: {theirs} iterations, {seconds / theirs:.0f} s each on six cores",
         )
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -13,6 +12,7 @@ import magshell as ms
 from .body import Octopus, octopus
 from .channels import Channel
 
+NOSE = 0  # the vertex
 TIME_STEP = 1e-3  # s, [Chen22] Table 1
 FIELD_LIMIT = 50e-3  # T, of every component, the same
 CONTACT_STIFFNESS, FRICTION = 1e4, 0.6  # N/m and 1, the same
@@ -22,55 +22,37 @@ SMOOTHING, STICKING_SPEED = (
 )  # m and m/s: with sharper contacts small changes of the field throw it about
 WATER = 1e3  # kg/m3, [Chen22] 6.3: as heavy as the octopus, which therefore floats and needs no gravity
 
-SAMPLES = 12  # points of the path that the mass center is asked for
+HORIZON, STRIDE = 400, 200  # steps that are looked at, and that are then done
+TRIALS, ITERATIONS = 8, 2  # of every horizon: plans tried before its search, and steps of the search
+SWING, PERIODS = 12e-3, (100, 400)  # T, of Bx, and steps: the trials' swings
+
+EVEN, EVEN_FREQUENCY = 6e-3, 4.0  # T and Hz, of the swing that the field found is compared with
+ASIDE = 1.0  # how much a distance from the axis weighs over one along it
 STRENGTH_COST = 5e-3  # m2/T2: 10 mT all the time cost as much as 0.7 mm of distance
-DMP_COST = 1e-2  # m2/T2: a rest of 10 mT costs as much as 1 mm
-FREQUENCIES = 2 * np.pi * np.array([2.0, 4.0, 6.0, 8.0, 12.0])  # rad/s, to begin with; J = 5 as in the paper
-SLOWEST, FASTEST = 2 * np.pi * 0.2, 2 * np.pi * 15.0  # rad/s
-
-GUESS, GUESSED = 6e-3, 1  # T: the field of the start swings so far along x, and with which of the frequencies
-PRECISION = 1e-6  # of a step, relative: the center's path is within 0.1 um of that with 1e-10
-
-
-class Variables(NamedTuple):
-    """The field of every step, written as a sum of five oscillations and what it differs from them by.
-
-    rest: (steps, 3) T. frequencies: (5,) rad/s. cosines, sines: (5, 3) T. The DMP term is the mean square of the rest:
-    as functions of field and oscillations, objective and minimum are the paper's; but here the oscillations take the
-    field along, and a search moves as a whole what it would otherwise have to move step by step.
-    """
-
-    rest: torch.Tensor
-    frequencies: torch.Tensor
-    cosines: torch.Tensor
-    sines: torch.Tensor
-
-    def field(self, times: torch.Tensor) -> torch.Tensor:
-        """(steps, 3) T, held within the limit."""
-        angles = times[:, None] * self.frequencies
-        oscillations = angles.cos() @ self.cosines + angles.sin() @ self.sines
-        return (self.rest + oscillations).clamp(-FIELD_LIMIT, FIELD_LIMIT)
-
-
-SIZES = Variables(20e-3, 2 * np.pi * 0.3, 5e-3, 5e-3)  # of the variables, for the search: T, rad/s, T, T
+RATE_COST = 3e-6  # m2 s2/T2: 10 mT that swing at 4 Hz cost as much as 0.3 mm, at 15 Hz as 1.2 mm
+STEP = 5e-3  # T, of the field, to begin a search with
+PRECISION = 1e-5  # of a step, relative: the center's path is within 0.1 um of that with 1e-10
 
 
 @dataclass
 class Swim:
     """The octopus in a channel, or in open water (None), for so many steps.
 
-    goal: m, where along x the mass center is asked to be at the end; the sample points lead there evenly.
+    goal: m, where along x the mass center is asked to be at the end; its path leads there evenly.
+    noise: m, of every coordinate in the start, drawn with this seed.
     """
 
     body: Octopus
     channel: Channel | None
     steps: int
     goal: float
+    noise: float = 0.0
+    seed: int = 0
     precision: float = PRECISION
 
     @classmethod
-    def of(cls, channel: Channel, steps: int) -> Swim:
-        return cls(octopus(), channel, steps, channel.goal)
+    def of(cls, channel: Channel, steps: int, **options) -> Swim:
+        return cls(octopus(), channel, steps, channel.goal, **options)
 
     def __post_init__(self) -> None:
         contacts = []
@@ -93,17 +75,21 @@ class Swim:
             allow_rigid_motions=True,
         )
 
-    @property
-    def times(self) -> torch.Tensor:
-        """Of the field that acts in each step: its end, (steps,) s."""
-        return TIME_STEP * torch.arange(1, self.steps + 1, dtype=torch.float64)
+        rest = self.body.mesh.rest_positions
+        self.start = rest + self.noise * np.random.default_rng(self.seed).standard_normal(rest.shape)
 
-    def move(self, field) -> ms.Trajectory:
-        """In a field a step, (steps, 3) T, from rest."""
+    @property
+    def times(self) -> np.ndarray:
+        """Of the field that acts in each step: its end, (steps,) s."""
+        return ms.control.step_times(self.steps, TIME_STEP)[1:].numpy()
+
+    def move(self, field, start=None) -> ms.Trajectory:
+        """In a field a step, (steps, 3) T, from rest or from where another motion ended."""
         return ms.simulate(
             self.scene,
-            steps=self.steps,
+            steps=len(field),
             time_step=TIME_STEP,
+            start=self.start if start is None else start,
             remanent_magnetization=self.body.remanent_magnetization,
             applied_flux_density=field,
             integrator=ms.ImplicitEuler(),
@@ -116,51 +102,62 @@ class Swim:
         """Of mass, (n, 3) m; positions (n, n_v, 3) m."""
         return ms.control.track(positions, np.arange(self.body.mesh.n_vertices), self.body.masses)
 
-    def samples(self) -> tuple[np.ndarray, torch.Tensor]:
-        """The frames (k,) and the points (k, 3) m of the path that count there: on the axis, evenly in space and time."""
-        shares = np.arange(1, SAMPLES + 1) / SAMPLES
-        start = self.body.masses @ self.body.mesh.rest_positions
-        points = start + shares[:, None] * (np.array([self.goal, 0.0, 0.0]) - start)
-        return np.rint(shares * self.steps).astype(int), torch.tensor(points)
+    def path(self, steps) -> np.ndarray:
+        """Where along x the center is to be after so many steps [m]: evenly on to the goal."""
+        begin = float(self.body.masses @ self.body.mesh.rest_positions[:, 0])
+        return begin + (self.goal - begin) * np.asarray(steps) / self.steps
 
-    def objective(self, variables: Variables) -> dict[str, torch.Tensor]:
-        """Terms in m2."""
-        field = variables.field(self.times)
-        frames, points = self.samples()
-        center = self.center(self.move(field).positions)
-        signal = variables.frequencies, variables.cosines, variables.sines
-        return {
-            "distance": ms.control.path_following(center[frames], points) / len(frames),
+    def passed(self, positions) -> np.ndarray:
+        """The frames in which all of the octopus is beyond the channel's narrow part."""
+        return np.flatnonzero(positions[:, :, 0].min(axis=1) > self.channel.end)
+
+    def objective(self, field, horizon: ms.control.Horizon, before: ms.Trajectory | None) -> dict:
+        """Terms in m2, of the steps of a horizon: how late the center is, in the later half; how far the center and the
+        nose, which leads, are from the axis; what the field costs."""
+        positions = torch.as_tensor(self.move(field, before).positions)[1:]
+        center, nose = self.center(positions), positions[:, NOSE]
+        path = torch.from_numpy(self.path(np.arange(horizon.first + 1, horizon.end + 1)))
+        late = (path - center[:, 0]).clamp(min=0)[len(field) // 2 :]
+        terms = {
+            "late": (late**2).mean(),
+            "aside": ASIDE * sum((each[:, 1:] ** 2).sum(1).mean() for each in (center, nose)),
             "strength": STRENGTH_COST * ms.control.field_strength(field),
-            "low frequency": DMP_COST * ms.control.dmp(field, self.times, *signal),
         }
+        if len(field) > 1:
+            terms["rate"] = RATE_COST * ms.control.field_rate(field, TIME_STEP)
+        return terms
 
-    def guess(self) -> Variables:
-        """A field along x that opens and closes the tentacles, evenly."""
-        sines = torch.zeros(len(FREQUENCIES), 3, dtype=torch.float64)
-        sines[GUESSED, 0] = -GUESS
-        rest = torch.zeros(self.steps, 3, dtype=torch.float64)
-        return Variables(rest, torch.tensor(FREQUENCIES), torch.zeros_like(sines), sines)
+    def advance(self, field, horizon: ms.control.Horizon, before: ms.Trajectory | None) -> ms.Trajectory:
+        return self.move(field.numpy(), before)
 
-    def solve(
-        self, start: Variables, iterations: int, callback=None, progress: bool = False
-    ) -> tuple[Variables, ms.Minimum]:
-        """What was found, and how."""
-        variables = [each.clone().requires_grad_() for each in start]
-        optimizer = ms.optim.LBFGS(
-            variables,
-            lower=[-FIELD_LIMIT, SLOWEST, -FIELD_LIMIT, -FIELD_LIMIT],
-            upper=[FIELD_LIMIT, FASTEST, FIELD_LIMIT, FIELD_LIMIT],
-            scale=list(SIZES),
-            first_step=0.1,
-            max_evaluations=3,
+    def swing(self) -> np.ndarray:
+        """A field along x that opens and closes the tentacles evenly, to compare with."""
+        return np.stack(
+            [-EVEN * np.sin(2 * np.pi * EVEN_FREQUENCY * self.times), *np.zeros((2, self.steps))], axis=1
         )
-        found = ms.minimize(
-            lambda *variables: self.objective(Variables(*variables)),
-            variables,
-            optimizer,
-            max_iterations=iterations,
-            callback=callback,
+
+    def solve(self, progress: bool = False) -> ms.control.Receding:
+        """The field of every step, from none, until the channel is passed."""
+        return ms.control.receding(
+            self.objective,
+            self.advance,
+            torch.zeros(self.steps, 3, dtype=torch.float64),
+            horizon=HORIZON,
+            stride=STRIDE,
+            lower=-FIELD_LIMIT,
+            upper=FIELD_LIMIT,
+            trials=TRIALS,
+            spread=(SWING, 0.0, 0.0),
+            periods=PERIODS,
+            seed=self.seed,
+            optimizer=_lbfgs,
+            max_iterations=ITERATIONS,
+            until=lambda motion: self.passed(motion.positions).size > 0,
             progress=progress,
         )
-        return Variables(*(each.detach() for each in variables)), found
+
+
+def _lbfgs(parameters, lower, upper):
+    return ms.optim.LBFGS(
+        parameters, lower=lower, upper=upper, scale=[STEP], first_step=0.2, max_evaluations=3
+    )

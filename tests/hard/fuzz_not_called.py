@@ -32,6 +32,8 @@ NOT_CALLED = {
     "Weld": "a result",
     "AppliedField": "abstract",
     "control.Curve": "abstract",
+    "control.Horizon": "a result",
+    "control.Receding": "a result",
     "control.Window": "a result",
     "control.Windows": "a result",
     "obstacles.Obstacle": "abstract",

@@ -146,6 +146,18 @@ def _controls(s: Sample) -> Iterator[Call]:
         lambda **a: control.in_windows(lambda rows, window: ((rows - 0.5) ** 2).sum(), progress=False, **a),
         windows,
     )
+    receding = {"controls": np.zeros((6, 2)), "horizon": 4, "stride": 2, "lower": -1.0, "upper": (1.0, 2.0)}
+    receding |= {"trials": 2, "spread": (0.1, 0.2), "periods": (2, 3), "max_iterations": 2, "tolerance": 1e-3}
+    yield Call(
+        "control.receding",
+        lambda **a: control.receding(
+            lambda rows, part, state: ((rows - 0.5) ** 2).sum(),
+            lambda rows, part, state: None,
+            progress=False,
+            **a,
+        ),
+        {**receding, "seed": 1},
+    )
     yield Call("control.held", control.held, {"values": fields, "steps": 12})
     frames = {
         "positions": np.ones((6, 4, 3)),

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._checks.arrays import index_array
-from .._checks.quantity import real_numbers
 from ._search import row_bound
 
 
@@ -34,7 +33,7 @@ class Trials:
             raise ValueError(
                 f"spread must be finite, not negative and somewhere positive, got {spread!r:.60}"
             )
-        limits = index_array("periods", real_numbers("periods", periods)).tolist()
+        limits = index_array("periods", periods).tolist()
         if np.shape(limits) != (2,) or not 2 <= limits[0] <= limits[1]:
             raise ValueError(
                 f"periods must be two numbers of rows, 2 at least, that rise, got {periods!r:.60}"

@@ -1,0 +1,294 @@
+"""ms.control.receding: unstable motions that one search loses, the same bits again, what is tried, and what goes wrong."""
+
+import numpy as np
+import pytest
+
+import magshell as ms
+
+torch = pytest.importorskip("torch")
+QUIET = {"progress": False}
+
+
+def zeros(*shape):
+    return torch.zeros(*shape, dtype=torch.float64)
+
+
+class Stick:
+    """That balances: angle and rate under a push a step. Noise grows by a factor of 1.1 in each."""
+
+    def moved(self, pushes, state):
+        angles, (angle, rate) = [], state
+        for each in pushes:
+            rate = rate + 0.02 * (25 * torch.sin(angle) + 50 * each)
+            angle = angle + 0.02 * rate
+            angles.append(angle)
+        return torch.stack(angles), (angle, rate)
+
+    def objective(self, pushes, part, state):
+        angles, _ = self.moved(pushes, state)
+        return {"lean": (angles**2).mean(), "cost": 1e-6 * (pushes**2).mean()}
+
+    def advance(self, pushes, part, state):
+        return self.moved(pushes, state)[1]
+
+
+def upright(noise):
+    return torch.tensor([noise, 0.0], dtype=torch.float64)
+
+
+def test_what_noise_overthrows_stays_upright() -> None:
+    """Over 160 steps noise grows 4e6-fold; one search of the whole, with as many steps in all, lets the stick fall."""
+    stick, start = Stick(), upright(1e-3)
+    limits = {"lower": -1.0, "upper": 1.0, "start": start, **QUIET}
+    found = ms.control.receding(stick.objective, stick.advance, zeros(160), horizon=32, stride=16, **limits)
+    angles, end = stick.moved(found.controls, start)
+    assert angles.abs()[32:].max() < 1e-3 and found.reached == 160
+    assert torch.equal(torch.stack(end), torch.stack(found.state))  # once more, the same
+    direct = ms.control.receding(
+        stick.objective,
+        stick.advance,
+        zeros(160),
+        horizon=160,
+        stride=160,
+        max_iterations=found.evaluations * 32 // 160,
+        tolerance=0.0,
+        **limits,
+    )
+    assert stick.moved(direct.controls, start)[0].abs().max() > 0.5
+
+
+def test_parts_begin_where_the_one_before_led() -> None:
+    seen = []
+
+    def objective(rows, part, state):
+        seen.append((part.first, part.settled, part.end, len(rows), state))
+        return (rows.sum() - 1) ** 2
+
+    def advance(rows, part, state):
+        assert len(rows) == part.settled - part.first
+        return (state or 0) + len(rows)
+
+    found = ms.control.receding(objective, advance, zeros(7, 1), horizon=4, stride=3, **QUIET)
+    assert list(dict.fromkeys(seen)) == [(0, 3, 4, 4, None), (3, 6, 7, 4, 3), (6, 7, 7, 1, 6)]
+    assert found.state == 7 and found.evaluations == len(seen) and not found.failures and not found.trials
+    assert [part for part, _ in found.searches] == [
+        ms.control.Horizon(0, 3, 4),
+        ms.control.Horizon(3, 6, 7),
+        ms.control.Horizon(6, 7, 7),
+    ]
+
+
+def compass():
+    """A free magnet in water that points against the field, the most unstable of its places."""
+    mesh = ms.meshes.rectangle(0.02, 0.01, cells=(2, 1))
+    sheet = ms.Shell(
+        mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3, remanent_magnetization=(4e4, 0, 0)
+    )
+    return ms.Scene(sheet, field=ms.UniformField(), water=ms.Water(), allow_rigid_motions=True)
+
+
+def test_a_motion_by_simulate_is_held_and_repeated_with_the_same_bits() -> None:
+    scene, steps = compass(), 240
+    rest = scene.mesh.rest_positions
+    start = rest + 1e-6 * np.random.default_rng(2).standard_normal(rest.shape)
+    left, right = rest[:, 0].argmin(), rest[:, 0].argmax()
+
+    def moved(side, before):
+        field = torch.cat([torch.full((len(side), 1), -5e-3, dtype=torch.float64), side], dim=1)
+        return ms.simulate(
+            scene, steps=len(field), time_step=2e-3, start=before, applied_flux_density=field, **QUIET
+        )
+
+    def turned(positions):
+        way = positions[:, right] - positions[:, left]
+        return (way[:, 1:] ** 2).sum(1) / 0.02**2
+
+    def objective(rows, part, before):
+        return turned(torch.as_tensor(moved(rows, before).positions)[1:]).mean() + 1e-3 * (rows**2).mean()
+
+    found = ms.control.receding(
+        objective,
+        lambda rows, part, before: ms.simulate(
+            scene,
+            steps=len(rows),
+            time_step=2e-3,
+            start=before,
+            applied_flux_density=np.column_stack([np.full(len(rows), -5e-3), rows.numpy()]),
+            **QUIET,
+        ),
+        zeros(steps, 2),
+        horizon=40,
+        stride=20,
+        start=start,
+        lower=-5e-3,
+        upper=5e-3,
+        **QUIET,
+    )
+    again = moved(found.controls.requires_grad_(False), start)
+    assert np.array_equal(detached(again.positions)[-1], found.state.positions[-1])
+    held = float(turned(torch.as_tensor(again.positions)).max())
+    free = float(turned(torch.as_tensor(moved(zeros(steps, 2), start).positions)).max())
+    assert free > 0.5 and held < 0.01
+
+
+def detached(values):
+    return values.detach().numpy() if isinstance(values, torch.Tensor) else values
+
+
+def squared_swim(rows, part=None, state=None):
+    """Nothing to first order: the way is the square of the control's rate."""
+    return -(rows[:, 0].diff() ** 2).sum() + 1e-2 * (rows**2).sum()
+
+
+def test_trials_begin_where_the_gradient_says_nothing() -> None:
+    options = {"horizon": 20, "stride": 10, "lower": -1.0, "upper": 1.0, **QUIET}
+
+    def nothing(rows, part, state):
+        return None
+
+    still = ms.control.receding(squared_swim, nothing, zeros(40, 2), **options)
+    assert not still.controls.any()
+    tried = ms.control.receding(
+        squared_swim, nothing, zeros(40, 2), trials=4, spread=(0.5, 0.0), periods=(4, 8), **options
+    )
+    assert float(squared_swim(tried.controls)) < -1.0 and tried.trials == 4 * 5
+    assert not tried.controls[:, 1].any()  # an entry without a spread, and its gradient is zero too
+    assert tried.controls.abs().max() <= 1.0
+
+
+def test_what_is_tried_is_as_planned_then_swings_or_repeats_within_bounds() -> None:
+    seen = []
+
+    def objective(rows, part, state):
+        if not rows.requires_grad:
+            seen.append((part, rows.clone()))
+        return ((rows - torch.arange(len(rows))[:, None] % 5) ** 2).sum()
+
+    found = ms.control.receding(
+        objective,
+        lambda rows, part, state: None,
+        zeros(60, 1) + 1.0,
+        horizon=20,
+        stride=20,
+        trials=6,
+        spread=0.7,
+        periods=(5, 5),
+        upper=1.5,
+        lower=0.0,
+        **QUIET,
+    )
+    assert all(rows.max() <= 1.5 and rows.min() >= 0.0 for _, rows in seen)
+    last = [rows for part, rows in seen if part.first == 40]
+    planned, others = last[0], last[1:]
+    done = torch.cat([found.controls[:40], planned])
+    repeated = 0
+    for rows in others:
+        differ = torch.nonzero((rows != planned).any(1))
+        begin = int(differ[0]) if len(differ) else len(rows)
+        assert torch.equal(rows[:begin], planned[:begin])
+        whole = torch.cat([done[:40], rows])
+        repeated += begin < 20 and torch.equal(whole[40 + begin :], whole[35 + begin : -5])
+    assert repeated >= 2 and len(others) == 6
+
+
+def test_it_ends_where_it_is_told_and_the_rest_stays_as_given() -> None:
+    found = ms.control.receding(
+        lambda rows, part, state: ((rows - 2) ** 2).sum(),
+        lambda rows, part, state: part.settled,
+        zeros(30, 1),
+        horizon=6,
+        stride=3,
+        until=lambda state: state >= 9,
+        **QUIET,
+    )
+    assert found.reached == found.state == 9 and len(found.searches) == 3
+    assert (found.controls[:12] - 2).abs().max() < 1e-6 and not found.controls[12:].any()
+
+
+def test_a_search_that_fails_is_told_and_the_plan_is_done() -> None:
+    def fragile(rows, part, state):
+        if part.first == 2 and rows.requires_grad:
+            raise ms.DesignRejected("it broke")
+        return ((rows - 1) ** 2).sum()
+
+    found = ms.control.receding(fragile, lambda *_: None, zeros(6, 1), horizon=2, stride=2, **QUIET)
+    [(part, why)] = found.failures
+    assert part.first == 2 and "it broke" in why and found.reached == 6
+    assert found.controls[:, 0].round().tolist() == [1, 1, 0, 0, 1, 1]
+
+
+def test_trials_that_cannot_be_evaluated_are_not_taken() -> None:
+    def fragile(rows, part, state):
+        if not rows.requires_grad and rows.any():
+            raise ms.DesignRejected("too far")
+        return ((rows - 1) ** 2).sum()
+
+    options = {"horizon": 2, "stride": 2, "trials": 3, "spread": 1.0, "periods": (2, 3), **QUIET}
+    found = ms.control.receding(fragile, lambda *_: None, zeros(2, 1), **options)
+    assert (found.controls - 1).abs().max() < 1e-6
+
+
+@pytest.mark.parametrize("where", ["objective", "advance", "until"])
+def test_errors_and_interrupts_hand_back_what_was_settled(where) -> None:
+    def run(error, first):
+        def fails(name):
+            return lambda part_first: name == where and part_first >= first
+
+        def objective(rows, part, state):
+            if fails("objective")(part.first):
+                raise error
+            return ((rows - 1) ** 2).sum()
+
+        def advance(rows, part, state):
+            if fails("advance")(part.first):
+                raise error
+            return part.settled
+
+        def until(state):
+            if fails("until")(state):
+                raise error
+            return False
+
+        return ms.control.receding(objective, advance, zeros(6, 1), horizon=2, stride=2, until=until, **QUIET)
+
+    with pytest.raises(ms.Interrupted, match="of 6 rows") as caught:
+        run(KeyboardInterrupt(), 2)
+    assert caught.value.last_good.reached == 2
+    with pytest.raises(ms.ObjectiveFailed, match="no such thing") as caught:
+        run(TypeError("no such thing"), 2)
+    assert caught.value.last_good.reached == 2 and isinstance(caught.value.__cause__, TypeError)
+    assert (caught.value.last_good.controls[:2] - 1).abs().max() < 1e-6
+    if where != "until":
+        with pytest.raises(TypeError, match="no such thing"):
+            run(TypeError("no such thing"), 0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"horizon": 0}, "horizon must be an integer"),
+        ({"stride": 5}, "stride must be no more than the horizon"),
+        ({"trials": 2}, "2 trials need a spread and periods"),
+        ({"trials": 2, "spread": 0.0, "periods": (2, 3)}, "spread must be finite, not negative"),
+        ({"trials": 2, "spread": -1.0, "periods": (2, 3)}, "spread must be finite, not negative"),
+        ({"trials": 2, "spread": 1.0, "periods": (3, 2)}, "periods must be two numbers of rows"),
+        ({"trials": 2, "spread": 1.0, "periods": (2.5, 3.5)}, "periods must hold integer"),
+        ({"trials": -1}, "trials must be an integer"),
+        ({"lower": np.nan}, "lower must be numbers"),
+        ({"upper": (1.0, 2.0)}, "upper must be a number or have the shape of a row"),
+        ({"controls": [1.0, np.nan]}, "controls must be finite"),
+        ({"max_iterations": 0}, "max_iterations must be an integer"),
+        ({"tolerance": -1.0}, "tolerance must not be negative"),
+        ({"seed": -1}, "seed must be an integer"),
+        ({"advance": None}, "advance must be a function"),
+        ({"until": 3}, "until must be a function"),
+        ({"progress": 1}, "progress must be True or False"),
+    ],
+)
+def test_bad_input(changes, complaint) -> None:
+    def unasked(*_):
+        raise AssertionError("work began")
+
+    given = {"objective": unasked, "advance": unasked, "controls": zeros(8, 1), "horizon": 4, "stride": 2}
+    with pytest.raises(ValueError, match=complaint):
+        ms.control.receding(**{**given, **QUIET, **changes})
