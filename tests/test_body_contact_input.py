@@ -1,5 +1,7 @@
 """Contacts of bodies that cannot be: each is told before any work starts."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,47 @@ def test_a_minimal_distance_larger_than_that_of_two_faces():
     scene = scene_of(lower, upper, contacts=[touch])
     with pytest.raises(ValueError, match=r"are 0.002 m apart, but must be farther than 0.003 m"):
         simulated(scene, values={touch: {"minimal_distance": 3e-3}})
+
+
+def fine(thickness=1e-3) -> ms.Shell:
+    """Edges of 0.5 mm."""
+    mesh = ms.meshes.rectangle(4e-3, 2e-3, cells=(8, 4))
+    return ms.Shell(mesh, thickness=thickness, young_modulus=1e6, mass_density=1e3)
+
+
+def test_a_minimal_distance_larger_than_that_of_neighbours_at_rest():
+    sheet = fine(thickness=1e-4)
+    too_far = ms.SelfContact(sheet, minimal_distance=1e-3)
+    told = r"0.001 m, is larger .* face \d+ of body 0 and face \d+ of body 0 are (0.000\d+) m apart. Give it at most \1 m"
+    with pytest.raises(ValueError, match=told) as raised:
+        scene_of(sheet, contacts=[too_far])
+    largest = float(str(raised.value).split("at most ")[1].split(" m")[0])
+    assert largest == pytest.approx(5e-4 / 2**0.5, rel=1e-5)  # from a vertex to the diagonal beside its faces
+    touch = ms.SelfContact(sheet, minimal_distance=0.99 * largest)
+    scene = scene_of(sheet, contacts=[touch])
+    simulated(scene)
+    with pytest.raises(ValueError, match=told):
+        simulated(scene, values={touch: {"minimal_distance": 1e-3}})
+    tied = [fine(1e-4), ms.Shell(fine().mesh.transformed(translation=(4e-3, 0.0, 0.0)), **SHEET)]
+    with pytest.raises(ValueError, match=r"of a Contact, .* face \d+ of body 1 and face \d+ of body 0 are"):
+        ms.Scene(
+            tied,
+            ties=[ms.Tie(*tied)],
+            contacts=[ms.Contact(*tied, minimal_distance=1e-3)],
+            allow_rigid_motions=True,
+        )
+
+
+def test_a_thickness_larger_than_the_distance_of_neighbours_at_rest_is_told():
+    sheet = fine()
+    touch = ms.SelfContact(sheet)
+    with pytest.warns(
+        ms.MeshQualityWarning, match=r"SelfContact, 0.001 m, is larger .* keep 0.00016\d+ m of it"
+    ):
+        scene = scene_of(sheet, contacts=[touch])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # once a scene is enough
+        simulated(scene)
 
 
 def test_what_touches_twice():

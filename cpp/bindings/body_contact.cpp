@@ -69,9 +69,22 @@ py::dict touching_pairs(Model& model, const VectorXd& q, const VectorXd& v) {
     return found;
 }
 
+std::pair<double, std::string> nearest_neighbours(Model& model, Index contact) {
+    const std::lock_guard lock(model.in_use());
+    if (!model.has_body_contact() || contact < 0 ||
+        contact >= static_cast<Index>(model.body_contact()->n_contacts()))
+        throw InvalidInput("the scene has no such contact of bodies");
+    return model.body_contact()->nearest_neighbours(contact);
+}
+
 }  // namespace
 
 void register_body_contact(py::module_& module) {
+    module.def(
+        "nearest_neighbours", &nearest_neighbours, py::arg("model"), py::arg("contact"),
+        "Of a contact of bodies, by its number, the neighbours along a surface that are nearest each other "
+        "at rest, if "
+        "that is nearer than twice its reach and minimal distance: how far [m], and their faces in words.");
     module.def(
         "touching_pairs", &touching_pairs, py::arg("model"), py::arg("q"), py::arg("v"),
         "Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) "

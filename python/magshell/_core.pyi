@@ -52,6 +52,7 @@ __all__: list[str] = [
     "first_order_change",
     "follow_path",
     "lane_logarithms",
+    "nearest_neighbours",
     "num_threads",
     "pair_energies",
     "pair_energies_by_law",
@@ -960,6 +961,11 @@ def follow_path(
 def lane_logarithms(numbers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
     """
     ln of an array's numbers as the element kernels take it, to be tested.
+    """
+
+def nearest_neighbours(model: Model, contact: typing.SupportsInt | typing.SupportsIndex) -> tuple[float, str]:
+    """
+    Of a contact of bodies, by its number, the neighbours along a surface that are nearest each other at rest, if that is nearer than twice its reach and minimal distance: how far [m], and their faces in words.
     """
 
 def num_threads() -> int: ...

@@ -24,7 +24,10 @@ class ContactLayer {
     bool couples(const Group& group) const;
     /// Couples these groups from now on, and those that it couples already, as long as they are not too many more.
     void couple(std::vector<Group> groups);
-    /// How often that has changed its pattern; at first it couples nothing.
+    /// Whether the scene's matrix is to have it, from the next assembly on; at first not.
+    void use(bool used) { used_ = used; }
+    bool used() const { return used_; }
+    /// How often its pattern has changed; at first it couples nothing.
     std::int64_t version() const { return version_; }
 
     /// Adds the lower blocks (i, j), i >= j, of a group that it couples: block(i, j) is a Mat3.
@@ -47,6 +50,7 @@ class ContactLayer {
     SystemMatrix matrix_;
     std::vector<Group> groups_;  // sorted, each once
     std::int64_t version_ = 0;
+    bool used_ = false;
 };
 
 /// The lower triangle of the sum of two matrices, of the first alone where there is no second.

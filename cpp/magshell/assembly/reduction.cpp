@@ -76,7 +76,9 @@ void Reduction::set_pattern(const SystemMatrix& matrix, const SystemMatrix* laye
         carried_->append_columns(pattern);
         carried_->find_places(matrices, reduced, pattern);
     }
-    pattern_ = std::make_shared<const SparsePattern>(std::move(pattern));
+    std::shared_ptr<const SparsePattern>& last = layer ? coupled_ : alone_;
+    if (!last || *last != pattern) last = std::make_shared<const SparsePattern>(std::move(pattern));
+    pattern_ = last;
 }
 
 // What carriers are linearized at before anything was evaluated.

@@ -50,7 +50,8 @@ class Reduction {
 
     Index size() const { return pattern_->size; }
     const std::shared_ptr<const SparsePattern>& pattern() const { return pattern_; }
-    /// From now on the matrix is the sum of two: nodes that the first does not couple, the other one may.
+    /// From now on the matrix is the sum of two: nodes that the first does not couple, the other one may. The last pattern
+    /// with another one, and that without, come back as the same objects.
     void set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer);
 
     /// Where the supports want their nodes, less where they are: zero elsewhere.
@@ -156,7 +157,8 @@ class Reduction {
     std::vector<Index> frame_of_;       // per node: index into held_ where turned, else -1; empty if none is
     std::vector<Index> held_at_;        // per node: index into held_, else -1
     std::vector<Index> free_unknowns_;  // reduced -> full, ascending
-    std::shared_ptr<const SparsePattern> pattern_;
+    std::shared_ptr<const SparsePattern> pattern_, alone_,
+        coupled_;  // now; the last without and with a layer
     // What is left of the full matrix, in pieces without a gap: supports take little away.
     struct Pieces {
         struct Piece {

@@ -32,7 +32,10 @@ bool has(const Nodes& nodes, Index node) {
 }  // namespace
 
 BroadPhase::BroadPhase(std::vector<ContactSurface> surfaces, std::vector<SurfacePair> contacts)
-    : surfaces_(std::move(surfaces)), contacts_(std::move(contacts)), rooms_(contacts_.size()) {
+    : surfaces_(std::move(surfaces)),
+      contacts_(std::move(contacts)),
+      rooms_(contacts_.size()),
+      nearest_(contacts_.size()) {
     boxes_.reserve(surfaces_.size());
     for (const ContactSurface& surface : surfaces_) boxes_.emplace_back(surface);
 }
@@ -155,6 +158,7 @@ std::vector<NearPair> BroadPhase::near_on_the_way(const double* q, const double*
 
 void BroadPhase::make_room(const std::vector<Vec3>& rest, const std::vector<double>& near_at_rest) {
     rooms_.assign(contacts_.size(), {});
+    nearest_.assign(contacts_.size(), {});
     Rows3 places(rest.size(), 3);
     for (std::size_t k = 0; k < rest.size(); ++k) places.row(k) = rest[k].transpose();
     const NodeWays ways(places.data());
@@ -167,8 +171,10 @@ void BroadPhase::make_room(const std::vector<Vec3>& rest, const std::vector<doub
             for (Key key : keys.of[sort]) {
                 const NearPair near = pair_of(contact, static_cast<Sort>(sort), key);
                 const double distance = pair_distance(near.pair.kind, places_of(near.pair, places.data()));
-                if (distance < near_at_rest[contact] && neighbours.are(near.pair, distance))
-                    rooms_[contact].of[sort].push_back({key, 0.5 * distance});
+                if (distance >= near_at_rest[contact] || !neighbours.are(near.pair, distance)) continue;
+                rooms_[contact].of[sort].push_back({key, 0.5 * distance});
+                if (!nearest_[contact] || distance < nearest_[contact]->distance)
+                    nearest_[contact] = {distance, near};
             }
     }
 }

@@ -14,6 +14,8 @@
 // of the smaller one's, so that a coarse edge across many fine ones counts no more than it covers.
 #pragma once
 
+#include <optional>
+
 #include "magshell/contact/face_boxes.h"
 #include "magshell/contact/near_pair.h"
 
@@ -33,6 +35,14 @@ class BroadPhase {
     /// Gives half their rest distance as their room to the pairs that are nearer at rest than `near_at_rest` (one a
     /// contact, [m]: twice reach and thickness), because they are neighbours on a surface. rest: where nodes are at rest.
     void make_room(const std::vector<Vec3>& rest, const std::vector<double>& near_at_rest);
+
+    /// Two neighbours, and how far they are from each other at rest [m].
+    struct Neighboured {
+        double distance;
+        NearPair near;
+    };
+    /// Of a contact, those that are nearest each other of all to which it gave room; empty: to none.
+    const std::optional<Neighboured>& nearest_neighbours(Index contact) const { return nearest_[contact]; }
 
     const std::vector<ContactSurface>& surfaces() const { return surfaces_; }
 
@@ -70,6 +80,7 @@ class BroadPhase {
     std::vector<SurfacePair> contacts_;
     std::vector<FaceBoxes> boxes_;  // of each surface
     std::vector<Rooms> rooms_;      // of each contact
+    std::vector<std::optional<Neighboured>> nearest_;
 };
 
 }  // namespace magshell

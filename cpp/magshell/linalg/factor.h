@@ -21,6 +21,8 @@ namespace magshell {
 struct SparsePattern {
     Index size = 0;
     std::vector<Index> column_starts, rows;
+
+    bool operator==(const SparsePattern&) const = default;
 };
 
 /// A x, from the values of the lower triangle of A.

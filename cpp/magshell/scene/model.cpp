@@ -183,22 +183,16 @@ const ElasticTerm& Model::elastic_term(Index sheet, std::string_view name) const
 }
 
 std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
-    if (spare_ && spare_->pattern() == reduction_.pattern()) return std::exchange(spare_, nullptr);
-    spare_ = nullptr;
-    if (!analysed_ || analysed_->pattern() != reduction_.pattern()) {
-        analysed_ = analyze(reduction_.pattern(), {.points = free_points(), .watch = watch});
-        if (!borders_.empty()) analysed_ = std::make_unique<LowRankFactor>(std::move(analysed_));
-        ++analyses_;
-    }
-    return analysed_->sibling();
+    return factors_.get(reduction_.pattern(), [&] {
+        std::unique_ptr<Factor> analysed =
+            analyze(reduction_.pattern(), {.points = free_points(), .watch = watch});
+        if (!borders_.empty()) analysed = std::make_unique<LowRankFactor>(std::move(analysed));
+        return analysed;
+    });
 }
 
 void Model::keep_spare(std::shared_ptr<Factor> factor) {
-    constexpr std::size_t large = std::size_t{1} << 28;
-    if (!factor || factor.use_count() > 1 || factor->bytes() > large) return;
-    if (factor->pattern() != reduction_.pattern()) return;
-    factor->forget();
-    spare_ = std::move(factor);
+    factors_.keep(std::move(factor));
 }
 
 double Model::energy(const VectorXd& q, const Controls& controls) const {
@@ -255,9 +249,9 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
         term->be_cautious(cautious);
         term->prepare_assembly(q.data(), controls);
     }
-    if (layer_ && layer_->version() != coupled_) {
-        reduction_.set_pattern(matrix_, &layer_->matrix());
-        coupled_ = layer_->version();
+    if (const std::int64_t coupled = layer_ && layer_->used() ? layer_->version() : 0; coupled != coupled_) {
+        reduction_.set_pattern(matrix_, coupled > 0 ? &layer_->matrix() : nullptr);
+        coupled_ = coupled;
     }
     schedule_.scatter([&](const Chunk& chunk) {
         clear(chunk.number);

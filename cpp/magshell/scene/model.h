@@ -15,7 +15,7 @@
 #include "magshell/assembly/low_rank.h"
 #include "magshell/assembly/reduction.h"
 #include "magshell/body/membrane_faces.h"
-#include "magshell/linalg/factor.h"
+#include "magshell/linalg/factor_store.h"
 #include "magshell/scene/bodies.h"
 #include "magshell/scene/varying.h"
 #include "magshell/term/field_sources.h"
@@ -174,7 +174,7 @@ class Model {
     /// back to the system.
     void keep_spare(std::shared_ptr<Factor> factor);
     /// How often the pattern was analysed.
-    int analyses() const { return analyses_; }
+    int analyses() const { return factors_.analyses(); }
 
     /// The terms' angles with full turns, which depend on the way there. None at all are those of the rest state.
     using Turns = std::vector<std::vector<double>>;
@@ -227,7 +227,7 @@ class Model {
     bool follows_ = false, unsymmetric_ = false;
     BodyContactTerm* body_contact_ = nullptr;
     std::unique_ptr<ContactLayer> layer_;  // nullptr: no bodies touch each other
-    std::int64_t coupled_ = 0;             // the version of it that the reduced pattern has
+    std::int64_t coupled_ = 0;             // the version of it that the reduced pattern has; 0: it has none
     // By chunk: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
     std::vector<std::vector<Index>> first_nodes_, first_rotations_;
     Values values_;
@@ -237,9 +237,8 @@ class Model {
     Remainder remainder_;
     LowRank low_rank_;
     std::vector<BorderTerm*> borders_;  // those that it is of
-    std::unique_ptr<Factor> analysed_;
-    std::shared_ptr<Factor> spare_;
-    int analyses_ = 0, values_version_ = 0;
+    FactorStore factors_;
+    int values_version_ = 0;
     double length_scale_ = 0.0;
     Residual residual_;
     VectorXd metric_;

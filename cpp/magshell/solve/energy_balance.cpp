@@ -20,6 +20,14 @@ double EnergyBalance::energy(const VectorXd& q, const Model::Turns& turns, const
     return model_.energy(q, controls);
 }
 
+EnergyBalance::Standing EnergyBalance::standing(const MotionState& state, const Controls& controls) {
+    if (end_.q.size() == state.q.size() && end_.q == state.q && end_.turns == state.turns &&
+        end_.controls == controls)
+        return end_;
+    const double all = energy(state.q, state.turns, controls);
+    return {state.q, state.turns, controls, all, model_.body_contact()->energy(state.q.data(), controls)};
+}
+
 bool EnergyBalance::touches(const StepAlgebra& step, const SubstepRecord& record) const {
     const BodyContactTerm& contact = *model_.body_contact();
     for (const StageState& stage : record.stages)
@@ -32,8 +40,10 @@ bool EnergyBalance::gains(const StepAlgebra& step, const SubstepRecord& record, 
     if (!touches(step, record)) return false;
     const MotionState& begin = record.begin;
     const Controls &first = controls.front(), &last = controls.back();
-    const double at_begin = energy(begin.q, begin.turns, first), at_end = energy(end.q, end.turns, last);
-    const double moving = kinetic(begin), kept = model_.body_contact()->energy(begin.q.data(), first);
+    const Standing at_first = standing(begin, first);
+    end_ = standing(end, last);
+    const double at_begin = at_first.energy, at_end = end_.energy;
+    const double moving = kinetic(begin), kept = at_first.of_contact;
     const double gain = at_end + kinetic(end) - at_begin - moving - tolerated * (moving + kept) -
                         round_off * (std::abs(at_begin) + std::abs(at_end));
     if (!(gain > 0.0)) return false;

@@ -28,12 +28,21 @@ class EnergyBalance {
   private:
     double kinetic(const MotionState& state) const { return 0.5 * state.v.dot(mass_.cwiseProduct(state.v)); }
     double energy(const VectorXd& q, const Model::Turns& turns, const Controls& controls);
+    /// What there is at one end of a step, but its motion.
+    struct Standing {
+        VectorXd q;
+        Model::Turns turns;
+        Controls controls;
+        double energy, of_contact;  // [J] of all terms, of bodies that touch
+    };
+    Standing standing(const MotionState& state, const Controls& controls);
     bool touches(const StepAlgebra& step, const SubstepRecord& record) const;
     /// What forces without an energy do over the step, and supports [J].
     double work(const StepAlgebra& step, const SubstepRecord& record, std::span<const Controls> controls);
 
     Model& model_;
     const VectorXd& mass_;
+    Standing end_;  // of the last step
 };
 
 }  // namespace magshell

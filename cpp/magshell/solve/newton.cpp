@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-
 namespace magshell {
 namespace {
 
@@ -272,10 +271,11 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         double share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
         if (from.size() > 0) {
-            const double less = part_into_contact(from, step, share, force.dot(step));
-            if (less < 1.0) {
-                share *= less;
-                step *= less;
+            double part = part_into_contact(from, step, share, force.dot(step));
+            if (part > 1.0) part = std::max(1.0, part * model_.share_of_step(from, part * step));
+            if (part != 1.0) {
+                share *= part;
+                step *= part;
                 q = from;
                 model_.reduction().advance(q, step);
             }

@@ -133,7 +133,8 @@ class Newton {
     /// What is left of a motion that supports and motors prescribe after a share of it.
     VectorXd left_of(const VectorXd& move, double share, const VectorXd& q, const Controls& controls) const;
     /// Of a step, which is a share of a whole one, the part up to which bodies that touch do not push back by more than it
-    /// expects. It has the energy fall at `slope` [J] at its beginning, the last evaluated state.
+    /// expects, more than 1 where they go on pushing as before. It has the energy fall at `slope` [J] at its beginning, the
+    /// last evaluated state.
     double part_into_contact(const VectorXd& q, const VectorXd& step, double share, double slope) const;
     /// The reason of a report, and what touched.
     void tell_contact(NewtonReport& report) const;

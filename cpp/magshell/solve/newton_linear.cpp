@@ -1,6 +1,7 @@
 // What Newton does with its matrix: factorize it, and solve with it.
 #include <chrono>
 #include <limits>
+#include <utility>
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/newton.h"
@@ -27,8 +28,10 @@ class Stopwatch {
 }  // namespace
 
 FactorReport Newton::factorize_assembled(const VectorXd& q, const Anchor& anchor) {
-    if (!factor_ || factor_->pattern() != model_.reduction().pattern())
+    if (!factor_ || factor_->pattern() != model_.reduction().pattern()) {
+        model_.keep_spare(std::exchange(factor_, nullptr));
         factor_ = model_.new_factor([this] { watch(watched_); });
+    }
     model_.reduce_matrix(*factor_);
     LargeVector<double>& values = factor_->values();
     if (anchor.weights) model_.reduction().add_weights(*anchor.weights, values);

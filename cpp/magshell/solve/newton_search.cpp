@@ -34,11 +34,12 @@ double Newton::advance(VectorXd& q, VectorXd& step, double shortest, NewtonRepor
 }
 
 // The energy is expected to fall ever slower along the step, and at the end of the whole one no more. What bodies that
-// touch add to that, they tell alone: at the step's end and, where that is too much, by secants between too far and not
-// far enough.
+// touch add to that, they tell alone: at the step's end, where it still falls fast (they were nearer than they will stay)
+// beyond it, and, where that is too much, by secants between too far and not far enough.
 double Newton::part_into_contact(const VectorXd& q, const VectorXd& step, double share, double slope) const {
     constexpr double rising = 0.5, falling = 0.5;  // of the slope at the beginning
     constexpr int most_trials = 6;
+    constexpr double longest = 8.0, left = 0.2;  // steps; of the slope: less is not worth a longer one
     if (!(slope > 0.0)) return 1.0;
     const BodyContactTerm& contact = *model_.body_contact();
     const auto pushed_back = [&](double part) {
@@ -46,19 +47,23 @@ double Newton::part_into_contact(const VectorXd& q, const VectorXd& step, double
         model_.reduction().advance(there, part * step);
         return contact.slope(there.data(), step.data());
     };
-    const double at_end = pushed_back(1.0);
-    if (at_end <= rising * slope) return 1.0;
-    const double at_begin = pushed_back(0.0), stiffness = contact.curvature(step.data());
-    const auto slope_of = [&](double part, double push) {
-        return (share * part - 1.0) * slope + push - at_begin - part * stiffness;
+    const double at_begin = contact.slope(step.data()), stiffness = contact.curvature(step.data());
+    const auto slope_at = [&](double part) {
+        return (share * part - 1.0) * slope + pushed_back(part) - at_begin - part * stiffness;
     };
-    double near = 0.0, far = 1.0, at_near = -slope, at_far = slope_of(1.0, at_end);
-    if (at_far <= rising * slope) return 1.0;
+    double near = 0.0, far = 1.0, at_near = -slope, at_far = slope_at(1.0);
+    while (share == 1.0 && at_far < -left * slope && far < longest) {
+        near = far;
+        at_near = at_far;
+        far *= 2.0;
+        at_far = slope_at(far);
+    }
+    if (at_far <= rising * slope) return far;
     for (int trial = 0; trial < most_trials; ++trial) {
         // The contact's push rises ever faster: a secant falls short. Illinois' rule halves the end that stays.
         const double part = std::clamp(near + (far - near) * at_near / (at_near - at_far),
                                        near + 0.1 * (far - near), far - 0.1 * (far - near));
-        const double there = slope_of(part, pushed_back(part));
+        const double there = slope_at(part);
         if (there > rising * slope) {
             far = part;
             at_far = there;

@@ -1,6 +1,7 @@
 #include "magshell/term/body_contact_term.h"
 
 #include <algorithm>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -51,17 +52,21 @@ bool BodyContactTerm::set_values(const Values& values) {
         distances.push_back(law.reach + law.thickness);
     }
     candidates_.set_distances(distances);
-    found_at_.resize(0);
+    found_.clear();
     return false;  // none of its forces cancel in add_cancelling_forces
 }
 
 BodyContactTerm::Touches BodyContactTerm::found(const double* q) const {
+    constexpr std::size_t most_found = 4;  // a step's two ends, and trials between them
     VectorXd at = candidates_.places(q);
-    if (found_at_.size() > 0 && at == found_at_) return found_;
+    for (const FoundAt& each : found_)
+        if (each.at == at) return each.touches;
     const std::vector<NearPair>& near = candidates_.near(q);
     const Index count = static_cast<Index>(near.size());
-    std::vector<std::vector<Touch>> parts((count + block_length - 1) / block_length);
-    parallel_for(static_cast<int>(parts.size()), [&](int block) {
+    const int blocks = static_cast<int>((count + block_length - 1) / block_length);
+    if (parts_.size() < static_cast<std::size_t>(blocks)) parts_.resize(blocks);
+    parallel_for(blocks, [&](int block) {
+        parts_[block].clear();
         const Index first = block * block_length, last = std::min(count, first + block_length);
         for (Index k = first; k < last; ++k) {
             if (!candidates_.may_touch(k)) continue;
@@ -70,22 +75,26 @@ BodyContactTerm::Touches BodyContactTerm::found(const double* q) const {
             if (!pair.acts()) continue;
             double far = 0.0;
             for (int i = 0; i < pair.count(); ++i) far = std::max(far, x[i].lpNorm<Eigen::Infinity>());
-            parts[block].push_back({near[k], pair, far});
+            parts_[block].push_back({near[k], pair, far});
         }
     });
-    std::size_t size = 0;
-    for (const std::vector<Touch>& part : parts) size += part.size();
-    std::vector<Touch> all;
-    all.reserve(size);
-    for (const std::vector<Touch>& part : parts) all.insert(all.end(), part.begin(), part.end());
-    found_ = std::make_shared<const std::vector<Touch>>(std::move(all));
-    found_at_ = std::move(at);
-    return found_;
+    // Fresh memory costs page faults: that of what was found long ago will do.
+    std::shared_ptr<std::vector<Touch>> all;
+    if (found_.size() == most_found) {
+        if (found_.back().touches.use_count() == 1) all = std::move(found_.back().touches);
+        found_.pop_back();
+    }
+    if (!all) all = std::make_shared<std::vector<Touch>>();
+    all->clear();
+    for (int block = 0; block < blocks; ++block)
+        all->insert(all->end(), parts_[block].begin(), parts_[block].end());
+    found_.push_front({std::move(at), std::move(all)});
+    return found_.front().touches;
 }
 
-double BodyContactTerm::slope(const double* q, const double* p) const {
+double BodyContactTerm::slope(const std::vector<Touch>& touches, const double* p) {
     double sum = 0.0;
-    for (const Touch& touch : *found(q)) {
+    for (const Touch& touch : touches) {
         const PairVectors gradient = touch.at.gradient();
         for (int k = 0; k < touch.at.count(); ++k)
             sum += gradient[k].dot(Eigen::Map<const Vec3>(p + 3 * touch.near.pair.nodes[k]));
@@ -116,6 +125,12 @@ std::string BodyContactTerm::hardest() const {
     return most ? candidates_.names(most->near) + " push each other hardest" : std::string();
 }
 
+std::pair<double, std::string> BodyContactTerm::nearest_neighbours(Index contact) const {
+    const auto& nearest = candidates_.nearest_neighbours(contact);
+    if (!nearest) return {std::numeric_limits<double>::infinity(), {}};
+    return {nearest->distance, candidates_.names(nearest->near)};
+}
+
 double BodyContactTerm::energy(const double* q, const Controls&) const {
     double total = 0.0;
     for (const Touch& touch : *found(q)) total += touch.at.energy();
@@ -138,17 +153,29 @@ void BodyContactTerm::keep_coupled(const std::vector<Touch>& touches) {
 }
 
 void BodyContactTerm::prepare_assembly(const double* q, const Controls&) {
+    // Without it, as long as nothing touches: it more than doubles the work of a factorization.
+    constexpr int soon = 4;  // assemblies, after which it may touch again
+    untouched_ = touching().empty() && kept_.empty() ? untouched_ + 1 : 0;
+    layer_.matrix().clear();
+    layer_.use(untouched_ == 0 || (layer_.used() && untouched_ <= soon));
+    if (untouched_ > 0) return;
+    ++assembled_;
+    const std::vector<NearPair>& near = candidates_.near(q);
     const bool coupled =
-        std::all_of(touching().begin(), touching().end(),
-                    [&](const Touch& touch) { return layer_.couples(touch.near.pair.nodes); }) &&
+        (candidates_.only_those_before(soon_) ||
+         std::all_of(touching().begin(), touching().end(),
+                     [&](const Touch& touch) { return layer_.couples(touch.near.pair.nodes); })) &&
         std::all_of(kept_.begin(), kept_.end(),
                     [&](const ContactLayer::Group& group) { return layer_.couples(group); });
     if (!coupled) {
+        if (assembled_ <= often) ahead_ = std::min(2.0 * ahead_, 1.0);
+        assembled_ = 0;
         std::vector<ContactLayer::Group> groups = kept_;
-        for (const NearPair& each : candidates_.near(q)) groups.push_back(each.pair.nodes);
+        soon_ = candidates_.soon(ahead_);
+        for (std::size_t k = 0; k < near.size(); ++k)
+            if (candidates_.may_touch(k, soon_)) groups.push_back(near[k].pair.nodes);
         layer_.couple(std::move(groups));
     }
-    layer_.matrix().clear();
 }
 
 void BodyContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix&) const {
@@ -225,8 +252,10 @@ std::string BodyContactTerm::refusal(const double* q) const {
     }
     const NearPair* worst = nullptr;
     double gap = 0.0, distance = 0.0, least = 0.0;
-    for (const NearPair& each : candidates_.near(q)) {
-        const double at = pair_distance(each.pair.kind, places_of(each.pair, q)),
+    const Touches touches = found(q);  // pairs that are too near touch
+    for (const Touch& touch : *touches) {
+        const NearPair& each = touch.near;
+        const double at = touch.at.near().distance,
                      may_be = each.pair.share(laws_[each.contact]) * least_[each.contact];
         if (at - may_be > gap || (worst && at - may_be == gap)) continue;
         worst = &each;
@@ -242,7 +271,10 @@ std::string BodyContactTerm::refusal(const double* q) const {
 }
 
 std::size_t BodyContactTerm::bytes() const {
-    return candidates_.bytes() + layer_.bytes() + touching().capacity() * sizeof(Touch);
+    std::size_t touches = 0;
+    for (const FoundAt& each : found_) touches += each.touches->capacity();
+    for (const std::vector<Touch>& part : parts_) touches += part.capacity();
+    return candidates_.bytes() + layer_.bytes() + touches * sizeof(Touch);
 }
 
 }  // namespace magshell

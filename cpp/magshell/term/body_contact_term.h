@@ -6,8 +6,10 @@
 // Where a pair has no gap there is no energy: the term refuses such states, and steps that lead through them.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "magshell/assembly/contact_layer.h"
@@ -36,11 +38,17 @@ class BodyContactTerm final : public Term {
     const std::vector<Touch>& touching() const { return *touching_; }
     /// Whether any pair touches at q.
     bool acts(const double* q) const { return !found(q)->empty(); }
-    /// How the energy at q changes along p [J], and how fast that changes, but for what turns, at the last evaluated state.
-    double slope(const double* q, const double* p) const;
+    /// How the energy at q changes along p [J]; how it does at the last evaluated state, and how fast that changes, but
+    /// for what turns.
+    double slope(const double* q, const double* p) const { return slope(*found(q), p); }
+    double slope(const double* p) const { return slope(touching(), p); }
     double curvature(const double* p) const;
     /// The faces that push each other hardest at the last evaluated state, in words; empty: none touch.
     std::string hardest() const;
+    /// The neighbours along a surface that a contact has nearest each other at rest: [m], and in words; endlessly far and
+    /// without a name where their mesh puts none nearer than they push each other.
+    std::pair<double, std::string> nearest_neighbours(Index contact) const;
+    std::size_t n_contacts() const { return laws_.size(); }
     const FrictionLaw& friction(const Touch& touch) const { return friction_[touch.near.contact]; }
 
     /// Which faces are in the way of a step p from q, in words.
@@ -56,8 +64,13 @@ class BodyContactTerm final : public Term {
     /// From now on as if no state had been looked at: a solve has the same bits whatever came before it.
     void forget() const {
         candidates_.forget();
-        found_at_.resize(0);
+        found_.clear();
         layer_.couple({});
+        layer_.use(false);
+        untouched_ = 0;
+        assembled_ = often;
+        ahead_ = least_ahead;
+        soon_ = {};
     }
     /// The layer couples these as well, whether they still touch or not, until others take their place.
     void keep_coupled(const std::vector<Touch>& touches);
@@ -83,8 +96,18 @@ class BodyContactTerm final : public Term {
 
     using Touches = std::shared_ptr<const std::vector<Touch>>;
 
+    /// Where touching nodes are, and what touches there.
+    struct FoundAt {
+        VectorXd at;
+        std::shared_ptr<std::vector<Touch>> touches;
+    };
+
+    static constexpr double least_ahead = 0.25;
+    static constexpr int often = 32;  // assemblies, after which it is coupled anew
+
     /// Those that touch at q; asked again at the same place, the same.
     Touches found(const double* q) const;
+    static double slope(const std::vector<Touch>& touches, const double* p);
     /// Calls found(pair, share) where a pair lets a step go less far than all before it; nullptr: its length does.
     template <class Found>
     void each_limit(const double* q, const double* p, const Found& found) const;
@@ -95,11 +118,16 @@ class BodyContactTerm final : public Term {
     std::vector<double> least_;  // of each contact, what no distance goes below [m]
     mutable ContactCandidates candidates_;
     ContactLayer& layer_;
-    mutable VectorXd found_at_;  // where those that were found last are; empty: nowhere
-    mutable Touches found_;
+    mutable std::deque<FoundAt> found_;              // the last few
+    mutable std::vector<std::vector<Touch>> parts_;  // room for what tasks find
     Touches touching_ = std::make_shared<const std::vector<Touch>>();
     std::vector<ContactLayer::Group> kept_;
     bool cautious_ = false;
+    // Assemblies since anything touched, and since the layer couples what it couples; what it has coupled ahead of its
+    // touching then, as a share of the margin: little, as it fills the factorization, but more where pairs change fast.
+    mutable int untouched_ = 0, assembled_ = often;
+    mutable double ahead_ = least_ahead;
+    mutable ContactCandidates::Soon soon_;  // what it coupled then
 };
 
 }  // namespace magshell

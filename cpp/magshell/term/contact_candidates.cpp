@@ -70,6 +70,7 @@ const std::vector<NearPair>& ContactCandidates::near(const double* q) {
         }
     }
     looked_at_ = places(q);
+    ++looks_;
     near_ = phase_.near(q, distances_);
     slack_.resize(near_.size());
     for (std::size_t k = 0; k < near_.size(); ++k)

@@ -4,6 +4,7 @@
 // touch. Which pairs touch, and in which order, does not depend on when they were looked for.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,16 @@ class ContactCandidates {
     /// Those that touch at q, and others; and whether one of them, by its number, may be among those that touch.
     const std::vector<NearPair>& near(const double* q);
     bool may_touch(std::size_t k) const { return slack_[k] <= come_nearer_; }
+    /// What may touch if nodes come nearer by a share of the margin; and whether nothing else may now.
+    struct Soon {
+        std::int64_t looks = -1;
+        double nearer = 0.0;  // [m]
+    };
+    Soon soon(double share) const { return {looks_, come_nearer_ + share * margin_}; }
+    bool may_touch(std::size_t k, const Soon& soon) const { return slack_[k] <= soon.nearer; }
+    bool only_those_before(const Soon& soon) const {
+        return soon.looks == looks_ && come_nearer_ <= soon.nearer;
+    }
     void forget() { looked_at_.resize(0); }
     /// Where all that can touch is.
     VectorXd places(const double* q) const;
@@ -34,6 +45,10 @@ class ContactCandidates {
                                      const std::vector<double>& distances);
     /// The longest of what p moves them by [m].
     double longest_move(const double* p) const;
+    /// See BroadPhase.
+    const std::optional<BroadPhase::Neighboured>& nearest_neighbours(Index contact) const {
+        return phase_.nearest_neighbours(contact);
+    }
     /// Faces that pass through each other at q.
     std::vector<NearPair> crossings(const double* q) { return phase_.crossings(q); }
 
@@ -60,6 +75,7 @@ class ContactCandidates {
     VectorXd looked_at_;         // where those nodes were; empty: nowhere
     std::vector<double> slack_;  // by how much a pair was farther apart then than where it touches [m]
     double round_off_ = 0.0;     // of distances [m]
+    std::int64_t looks_ = 0;     // how often it looked
     double come_nearer_ = 0.0;   // by how much any pair may have come nearer since [m]
 };
 

@@ -30,6 +30,7 @@ from ..surroundings.constraints import free_rigid_motions, gather
 from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import (
     body_contact_inputs,
+    check_neighbours,
     contact_inputs,
     obstacles_of,
     shapes_that_touch,
@@ -208,6 +209,7 @@ class Scene:
         # What the core holds now: a solve with other values puts its own there.
         self._values = self._in_core = Values(self)
         self._model.set_values(self._values.numbers)
+        check_neighbours(self, warns=True)
 
     def _held_by_joints(self) -> np.ndarray:
         """The vertices of links that joints hold to the world."""

@@ -124,6 +124,7 @@ class BodyContact(Owner):
         def number(name, unit, default, check=positive):
             return default if given[name] is None else check(name, unit, given[name])
 
+        self.distance_given = given["minimal_distance"] is not None
         self.minimal_distance = number("minimal_distance", "m", self._distance(bodies), not_negative)
         self.reach = number("reach", "m", self._reach(bodies))
         stiffness = min(map(_modulus, bodies))
@@ -206,8 +207,9 @@ class SelfContact(BodyContact):
 
     a: a Shell or a Solid. The others are as in BodyContact, which ms.Contact(a, b, ...) makes, but that by default a sheet
     keeps its whole thickness from itself. Neighbours along the surface that are nearer at rest than twice minimal distance
-    and reach keep half of what they have there, in the proportion of the two. A mesh that passes through itself at rest is
-    refused.
+    and reach keep half of what they have there, in the proportion of the two. Where that is less than the minimal distance
+    itself, a scene refuses one that was given, naming faces and the largest possible, and warns of a thickness
+    (ms.MeshQualityWarning). A mesh that passes through itself at rest is refused.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))

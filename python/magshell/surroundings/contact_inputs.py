@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
+from .. import _core
 from .._checks.selections import indices
+from .._machine.callers import callers_level
 from ..bodies.rigid import Rigid
 from ..bodies.solid import Solid
+from ..errors import MeshQualityWarning
 from .body_contact import BodyContact, side_of, touches_with_shape
 
 
@@ -81,8 +86,34 @@ def _surface(side, bodies) -> dict:
     }
 
 
+def check_neighbours(scene, warns: bool = False) -> None:
+    """Neighbours along a surface cannot keep more from each other than they have at rest: a minimal distance that was asked
+    for is refused where they do not, and one that a thickness gave is told, if it warns."""
+    for k, contact in enumerate(scene._body_contacts):
+        wanted = scene._in_core.current(contact).minimal_distance
+        nearest, faces = _core.nearest_neighbours(scene._model, k)
+        if wanted <= nearest:
+            continue
+        kind = type(contact).__name__.removeprefix("Body")
+        told = (
+            f"the minimal_distance of a {kind}, {wanted:g} m, is larger than what neighbours along a surface have at rest: "
+            f"{faces} are {nearest:g} m apart"
+        )
+        if contact.distance_given or wanted != contact.minimal_distance:
+            raise ValueError(f"{told}. Give it at most {nearest:g} m, or a mesh with longer edges")
+        if warns:
+            kept = 0.5 * nearest * wanted / (wanted + contact.reach)
+            warnings.warn(
+                f"{told}, and keep {kept:g} m of it. All that are not neighbours keep it. A mesh with edges longer than the "
+                "thickness needs no such exception, nor does a smaller minimal_distance=",
+                MeshQualityWarning,
+                stacklevel=callers_level(),
+            )
+
+
 def check_apart(scene, state: np.ndarray) -> None:
     """Bodies in contact that intersect, or are nearer than they may be, cannot start so."""
+    check_neighbours(scene)
     if scene._body_contacts and (reason := scene._model.refusal(state)):
         raise ValueError(f"the start cannot be: {reason}")
 
