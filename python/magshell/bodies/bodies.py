@@ -11,7 +11,7 @@ from .._checks.checked_list import checked_list
 from ..mesh.quality import MeshQuality
 from ..mesh.triangle_mesh import TriangleMesh
 from .joined_mesh import JoinedMesh
-from .joints import Joint
+from .joint import Joint
 from .no_mesh import NoMesh
 from .rigid import Rigid
 from .shell import Shell
