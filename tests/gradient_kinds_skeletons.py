@@ -55,8 +55,13 @@ def _carried_skeleton(free: bool):
         bob,
         arm,
         origin=np.add(base, (0.03, 0, 0.01)),
+        axis=(1, 0.2, 0.3),
         spring_stiffness=2e-3,
+        target_rotation=(0.02, -0.01, 0.03),
+        servo_stiffness=1e-3,
+        torque_limit=1e-4,
         upper_limit=1.1e-3,
+        cone_limit=1e-3,
         limit_stiffness=1e-3,
         limit_smoothing=1e-2,
     )
@@ -125,9 +130,18 @@ def _driven_skeleton(moves: bool):
         spring_stiffness=1e-3,
         **damped(2e-5),
     )
+    eye, tail = link(0.02, 0.03, 0.04), link(0.03, 0.03, 0.05)
+    gimbal = ms.Ball(
+        eye,
+        wheel,
+        origin=np.add(base, (0.02, 0.02, 0.04)),
+        motor_rotation=(0.0, 0.0, 0.0) if moves else (0.2, -0.1, 0.3),
+    )
+    fin = ms.Ball(tail, eye, origin=np.add(base, (0.02, 0.03, 0.05)), spring_stiffness=1e-3)
+    links, joints = [root, arm, sled, bob, wheel, eye, tail], [crane, rail, socket, axle, gimbal, fin]
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     return ms.Scene(
-        [sheet, ms.Skeleton([root, arm, sled, bob, wheel], [crane, rail, socket, axle])],
+        [sheet, ms.Skeleton(links, joints)],
         supports=[ms.Clamp(MESH.edges_at(x=0.0))],
         field=[ms.UniformField(), DIPOLES],
         gravity=(0.1, 0.2, -9.81),
@@ -135,8 +149,11 @@ def _driven_skeleton(moves: bool):
     )
 
 
+_REACH = {**REACH, "motor_rotation": 0.3}
+
+
 def driven_skeleton_at_rest() -> Kind:
-    return Kind(_driven_skeleton(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=REACH)
+    return Kind(_driven_skeleton(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=_REACH)
 
 
 def driven_skeleton_in_motion(integrator, **options) -> Kind:
@@ -144,7 +161,9 @@ def driven_skeleton_in_motion(integrator, **options) -> Kind:
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     in_time = {"in_time": STEPS} if "keep" in options else {}
     step = 3e-4 if in_time else 1e-5
-    return Kind(_driven_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time)
+    return Kind(
+        _driven_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=_REACH, **in_time
+    )
 
 
 def skeleton_at_rest() -> Kind:

@@ -128,7 +128,7 @@ def test_all_inputs_together(name):
 
 
 # Nothing depends on these.
-WITHOUT_EFFECT = {(ms.obstacles.Sphere, "rotation")}
+WITHOUT_EFFECT = {(ms.obstacles.Sphere, "rotation"), (ms.Prismatic, "origin"), (ms.Fixed, "origin")}
 
 
 def test_no_input_is_forgotten_and_each_matters_somewhere():

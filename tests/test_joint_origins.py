@@ -104,15 +104,6 @@ def test_gradient_in_flesh_over_200_steps():
     assert along == pytest.approx(difference, rel=1e-5)
 
 
-def test_places_without_gradients_are_refused():
-    rod = ms.Link(mass=1.0, inertia=0.01, center=(0, 0, 0))
-    slide = ms.Prismatic(rod, origin=(0, 0, 0), axis=(0, 0, 1), spring_stiffness=10.0)
-    scene = ms.Scene(ms.Skeleton([rod], [slide]), gravity=(0, 0, -9.81))
-    for name in ("origin", "axis"):
-        with pytest.raises(ValueError, match=name):
-            ms.equilibrium(scene, values={slide: {name: (0.1, 0.0, 0.0)}})
-
-
 def test_a_motion_does_not_go_on_from_other_joints():
     scene, hinge = _flap()
     rest = ms.equilibrium(scene, values={hinge: {"origin": (0.05, 0.0, 0.01)}})

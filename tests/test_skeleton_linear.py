@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import magshell as ms
+from magshell.linear.rest import RestStiffness, forces_at_rest
+from magshell.scene.inputs import plain_inputs
 
 G = 9.81
 
@@ -91,3 +93,32 @@ def _two(bar, first, second):
     a, b = (ms.Link(vertices=np.flatnonzero(each), body=bar) for each in (first, second))
     joints = [ms.Fixed(a), ms.Revolute(b, a, origin=(0.2, 0, 0), axis=(0, 1, 0))]
     return ms.Scene([bar, ms.Skeleton([a, b], joints)])
+
+
+@pytest.mark.parametrize(
+    "pull",
+    [
+        {"spring_stiffness": 30.0, "torque": 1e-3},
+        {"spring_stiffness": 30.0, "rest_angle": 1e-4},
+        {"target_angle": 1e-4, "servo_stiffness": 20.0},
+        {"lower_limit": 1e-4, "limit_stiffness": 30.0, "limit_smoothing": 1e-5},
+        {"motor_angle": 1e-4},
+    ],
+    ids=lambda law: next(iter(reversed(law))),
+)
+def test_linear_theory_feels_what_acts_in_joints(pull):
+    """So little of it that the equilibrium is linear."""
+    scene, joints = double_pendulum(True, spring_stiffness=30.0, second=pull)
+    solved = ms.equilibrium(scene, gravity_factor=0.0, solver=ms.MixedNewton(tolerance=1e-13))
+    inputs = plain_inputs(scene, None, None, None, gravity_factor=0.0)
+    at_rest = forces_at_rest(inputs)
+    with inputs.in_core():
+        linear = RestStiffness(inputs).response(inputs, at_rest)
+    change = solved._state - scene._model.rest_state()
+    assert np.abs(change).max() > 1e-5
+    assert float(solved[joints[1]].angle) == pytest.approx(
+        1e-3 / 30.0 if "torque" in pull else 1e-4, rel=1e-1
+    )
+    np.testing.assert_allclose(linear, change, atol=1e-3 * np.abs(change).max())
+    with pytest.raises(ValueError, match=r"acts whatever they are"):
+        ms.linear_buckling(scene)

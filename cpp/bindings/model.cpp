@@ -190,6 +190,14 @@ void register_model(py::module_& module) {
             "state that was "
             "evaluated last.")
         .def(
+            "driven_increment",
+            [](const Model& m, const VectorXd& q, const Controls& controls) {
+                return m.reduction().prescribed_increment(q, controls);
+            },
+            py::arg("q"), py::arg("controls"),
+            "How far from a state what motors and supports prescribe at these controls is, of all unknowns, (n,); zero "
+            "elsewhere.")
+        .def(
             "prescribed_rate",
             [](const Model& m, const Controls& controls) { return m.reduction().prescribed_rate(controls); },
             "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")

@@ -143,7 +143,8 @@ std::vector<SkeletonInput> skeletons_of(const py::list& given) {
             skeleton.joints.push_back({joint_kind(joint["kind"].cast<std::string>()),
                                        joint["parent"].cast<Index>(), to_vec3(joint["origin"]),
                                        to_vec3(joint["axis"]), joint["driven"].cast<bool>(),
-                                       joint["damped"].cast<bool>(), joint["twisted"].cast<bool>()});
+                                       joint["damped"].cast<bool>(), joint["twisted"].cast<bool>(),
+                                       joint["served"].cast<bool>(), joint["coned"].cast<bool>()});
     }
     return skeletons;
 }

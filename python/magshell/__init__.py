@@ -8,8 +8,9 @@ from ._core import __version__
 from ._machine.threads import num_threads, set_num_threads, show_config
 from .bodies.body_result import BodyResult
 from .bodies.fibres import Fibres, fibres_along
+from .bodies.joint import Joint
 from .bodies.joint_result import JointResult
-from .bodies.joints import Ball, Closure, Fixed, Joint, Prismatic, Revolute
+from .bodies.joints import Ball, Closure, Fixed, Prismatic, Revolute
 from .bodies.link import Link
 from .bodies.materials import Corotated, Guccione, NeoHookean, Projective, StableNeoHookean, StVenantKirchhoff
 from .bodies.muscle import Muscle

@@ -457,6 +457,14 @@ class Model:
     def positions(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    def driven_increment(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        How far from a state what motors and supports prescribe at these controls is, of all unknowns, (n,); zero elsewhere.
+        """
     def prescribed_rate(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:

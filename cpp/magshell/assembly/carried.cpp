@@ -254,7 +254,7 @@ void Carried::vjp(const VectorXd& by_state, const VectorXd& lambda, const Vector
         if (m == 0) continue;
         VectorXd by_driven = driven_of(chunk, carrier.gather(by_state));
         if (n > 0) by_driven += carrier.curvature(at_, gradient).bottomLeftCorner(m, n) * z.head(n);
-        carrier.driven_vjp(by_driven, out);
+        carrier.driven_vjp(at_, by_driven, out);
     }
 }
 

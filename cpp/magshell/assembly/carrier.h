@@ -39,7 +39,7 @@ class Carrier {
     virtual void set_values(const Values&) {}
     virtual VectorXd driven_increment(const VectorXd& /*q*/) const { return {}; }
     virtual VectorXd driven_units() const { return {}; }
-    virtual void driven_vjp(const VectorXd& /*by_driven*/, Gradient& /*out*/) const {}
+    virtual void driven_vjp(const VectorXd& /*q*/, const VectorXd& /*by_driven*/, Gradient& /*out*/) const {}
 
     /// Whether values say where its joints are; and adds the gradients by these, at q, of a number with this gradient by
     /// all nodes, with what they do to sum g . B z at the rates z of all coordinates under a gradient g.

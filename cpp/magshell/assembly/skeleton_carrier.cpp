@@ -47,7 +47,7 @@ SkeletonCarrier::SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Join
                                  std::vector<Slots> slots)
     : Carrier(nodes_of(links)), links_(std::move(links)), joints_(std::move(joints)) {
     slots.resize(links_.size());
-    for (const Slots& each : slots) origins_.push_back(each.origin);
+    slots_ = std::move(slots);
     Index row = 0;
     bool vertices = false;
     for (Index k = 0; k < n_links(); ++k) {
@@ -56,7 +56,9 @@ SkeletonCarrier::SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Join
         row_.push_back(row);
         row += links_[k].size();
         vertices |= links_[k].has_vertices();
-        if (joints_[k].driven) driven_.push_back({k, slots[k].motor});
+        if (!joints_[k].driven) continue;
+        driven_.push_back({k, slots_[k].motor, n_driven_});
+        n_driven_ += joints_[k].freedom();
     }
     Index free = 0, held = coordinates();
     for (const Joint& joint : joints_)
@@ -79,6 +81,11 @@ std::vector<SkeletonCarrier::Pose> SkeletonCarrier::poses(const VectorXd& q) con
     return all;
 }
 
+Mat3 SkeletonCarrier::frame(Index link, const std::vector<Pose>& poses) const {
+    const Index parent = joints_[link].parent;
+    return parent < 0 ? Mat3::Identity() : poses[parent].rotation;
+}
+
 Vec3 SkeletonCarrier::joint_place(Index link, const std::vector<Pose>& poses) const {
     const Joint& joint = joints_[link];
     if (joint.parent < 0) return joint.origin;
@@ -91,7 +98,7 @@ std::vector<SkeletonCarrier::Column> SkeletonCarrier::columns(const std::vector<
     for (Index k = 0; k < n_links(); ++k) {
         const Joint& joint = joints_[k];
         const double radians = 1.0 / links_[k].length();
-        const Mat3 frame = joint.parent < 0 ? Mat3::Identity() : poses[joint.parent].rotation;
+        const Mat3 frame = this->frame(k, poses);
         const Vec3 place = joint.kind == JointKind::free ? poses[k].center : joint_place(k, poses);
         if (joint.kind == JointKind::free)
             for (int c = 0; c < 3; ++c) all.push_back({false, Vec3::Unit(c), place, 1.0});
@@ -180,7 +187,7 @@ MatrixXd SkeletonCarrier::curvature(const VectorXd& q, const VectorXd& gradient)
 
 double SkeletonCarrier::coordinate(Index link, const std::vector<Pose>& poses) const {
     const Joint& joint = joints_[link];
-    const Mat3 frame = joint.parent < 0 ? Mat3(Mat3::Identity()) : poses[joint.parent].rotation;
+    const Mat3 frame = this->frame(link, poses);
     if (joint.kind == JointKind::revolute)
         return angle_about(joint.axis, frame.transpose() * poses[link].rotation);
     const Vec3 own = poses[link].center - poses[link].rotation * (links_[link].middle() - joint.origin);
@@ -188,83 +195,61 @@ double SkeletonCarrier::coordinate(Index link, const std::vector<Pose>& poses) c
 }
 
 void SkeletonCarrier::set_values(const Values& values) {
-    for (Motor& motor : driven_) motor.target = values.number(motor.slot);
-    for (Index k = 0; k < n_links(); ++k)
-        if (origins_[k].size() > 0) joints_[k].origin = values.vector(origins_[k]);
+    for (Motor& motor : driven_)
+        for (Index c = 0; c < motor.slot.size(); ++c) motor.target[c] = values[motor.slot][c];
+    for (Index k = 0; k < n_links(); ++k) {
+        if (slots_[k].origin.size() > 0) joints_[k].origin = values.vector(slots_[k].origin);
+        if (slots_[k].axis.size() > 0) joints_[k].axis = values.vector(slots_[k].axis);
+    }
 }
 
 // By the shorter way round.
 VectorXd SkeletonCarrier::driven_increment(const VectorXd& q) const {
     if (driven_.empty()) return {};
     const std::vector<Pose> poses = this->poses(q);
-    VectorXd increment(driven());
-    for (Index m = 0; m < driven(); ++m) {
-        const Index link = driven_[m].link;
+    VectorXd increment = VectorXd::Zero(driven());
+    for (const Motor& motor : driven_) {
+        const Index link = motor.link, n = joints_[link].freedom();
         const double length = links_[link].length(),
                      reach = poses[link].center.cwiseAbs().maxCoeff() + length;
-        const bool turns = joints_[link].kind == JointKind::revolute;
-        double off = driven_[m].target - coordinate(link, poses),
-               rounds = reach + std::abs(driven_[m].target);
-        if (turns) {
-            off = length * std::remainder(off, 2.0 * std::numbers::pi);
-            rounds = reach + length * std::abs(driven_[m].target);
+        Vec3 off = Vec3::Zero();
+        double rounds = reach + length * motor.target.norm();
+        if (joints_[link].kind == JointKind::ball) {
+            const Eigen::AngleAxisd turn(
+                orthonormal(frame(link, poses) * rotation(motor.target) * poses[link].rotation.transpose()));
+            off = length * turn.angle() * turn.axis();
+        } else {
+            off[0] = motor.target[0] - coordinate(link, poses);
+            if (joints_[link].kind == JointKind::revolute)
+                off[0] = length * std::remainder(off[0], 2.0 * std::numbers::pi);
+            else
+                rounds = reach + std::abs(motor.target[0]);
         }
-        increment[m] = std::abs(off) > rounding * rounds ? off : 0.0;
+        if (off.norm() > rounding * rounds) increment.segment(motor.first, n) = off.head(n);
     }
     return increment;
 }
 
 VectorXd SkeletonCarrier::driven_units() const {
     VectorXd units(driven());
-    for (Index m = 0; m < driven(); ++m) {
-        const Index link = driven_[m].link;
-        units[m] = joints_[link].kind == JointKind::revolute ? links_[link].length() : 1.0;
+    for (const Motor& motor : driven_) {
+        const Joint& joint = joints_[motor.link];
+        units.segment(motor.first, joint.freedom())
+            .setConstant(joint.kind == JointKind::prismatic ? 1.0 : links_[motor.link].length());
     }
     return units;
 }
 
-void SkeletonCarrier::driven_vjp(const VectorXd& by_driven, Gradient& out) const {
-    const VectorXd units = driven_units();
-    for (Index m = 0; m < driven(); ++m) out.values[driven_[m].slot.first] += units[m] * by_driven[m];
-}
-
-bool SkeletonCarrier::placed() const {
-    return std::ranges::any_of(origins_, [](const Slot& slot) { return slot.size() > 0; });
-}
-
-// Links keep their places at rest as an origin o moves; later, at the same angles, all that the joint carries slides:
-//
-//   dx/do = R_p - R_k,        d(B z)/do = [w_p]x R_p - [w_k]x R_k
-//
-// with the turns R of its two links and the rates w at which z turns them.
-void SkeletonCarrier::places_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
-                                 const VectorXd& gradient, Gradient& out) const {
-    if (!placed()) return;
+void SkeletonCarrier::driven_vjp(const VectorXd& q, const VectorXd& by_driven, Gradient& out) const {
+    const VectorXd by_units = driven_units().cwiseProduct(by_driven);
     const std::vector<Pose> poses = this->poses(q);
-    const std::vector<Column> columns = this->columns(poses);
-    std::vector<Vec3> rates(n_links(), Vec3::Zero()), by_slide = rates, forces = rates;
-    for (Index k = 0; k < n_links(); ++k) {
-        if (joints_[k].parent >= 0) rates[k] = rates[joints_[k].parent];
-        for (Index j = first_[k]; j < first_[k] + joints_[k].freedom(); ++j)
-            if (columns[j].turns) rates[k] += columns[j].share * z[place_[j]] * columns[j].axis;
-    }
-    for (Index k = n_links() - 1; k >= 0; --k) {
-        for (const Index node : links_[k].nodes()) {
-            by_slide[k] += by_state.segment<3>(3 * node);
-            forces[k] += gradient.segment<3>(3 * node);
+    for (const Motor& motor : driven_) {
+        if (joints_[motor.link].kind != JointKind::ball) {
+            out.values[motor.slot.first] += by_units[motor.first];
+            continue;
         }
-        const Index parent = joints_[k].parent;
-        if (parent >= 0) {
-            by_slide[parent] += by_slide[k];
-            forces[parent] += forces[k];
-        }
-        if (origins_[k].size() == 0) continue;
-        const auto by_point = [&](const Mat3& turn, const Vec3& rate) -> Vec3 {
-            return turn.transpose() * (by_slide[k] + forces[k].cross(rate));
-        };
-        out.values.segment<3>(origins_[k].first) +=
-            (parent < 0 ? by_slide[k] : by_point(poses[parent].rotation, rates[parent])) -
-            by_point(poses[k].rotation, rates[k]);
+        const Vec3 moment = frame(motor.link, poses).transpose() * by_units.segment<3>(motor.first);
+        out.values.segment<3>(motor.slot.first) += transposed_jacobian_times(motor.target, moment);
     }
 }
 

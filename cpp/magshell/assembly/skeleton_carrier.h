@@ -18,19 +18,19 @@ namespace magshell {
 
 class SkeletonCarrier final : public Carrier {
   public:
-    /// Where values of a joint stand, empty where there are none: what its motor prescribes, and its origin.
+    /// Where values of a joint stand, empty where there are none: what its motor prescribes, its origin and its axis.
     struct Slots {
-        Slot motor, origin;
+        Slot motor, origin, axis;
     };
     /// joints[k] leads to links[k]; parents come first.
     SkeletonCarrier(std::vector<RigidNodes> links, std::vector<Joint> joints, std::vector<Slots> slots = {});
 
     Index coordinates() const override { return coordinates_ - driven(); }
-    Index driven() const override { return static_cast<Index>(driven_.size()); }
+    Index driven() const override { return n_driven_; }
     void set_values(const Values& values) override;
     VectorXd driven_increment(const VectorXd& q) const override;
     VectorXd driven_units() const override;
-    void driven_vjp(const VectorXd& by_driven, Gradient& out) const override;
+    void driven_vjp(const VectorXd& q, const VectorXd& by_driven, Gradient& out) const override;
     bool placed() const override;
     void places_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z, const VectorXd& gradient,
                     Gradient& out) const override;
@@ -55,10 +55,27 @@ class SkeletonCarrier final : public Carrier {
     /// Of all coordinates, joint by joint.
     std::vector<Column> columns(const std::vector<Pose>& poses) const;
     Vec3 joint_place(Index link, const std::vector<Pose>& poses) const;
+    /// How the parent of a link is turned.
+    Mat3 frame(Index link, const std::vector<Pose>& poses) const;
     /// The angle or displacement of a joint with an axis.
     double coordinate(Index link, const std::vector<Pose>& poses) const;
     /// Where a link comes to, its parent being there already, as its own coordinates change by z.
     Pose moved(Index link, const std::vector<Pose>& from, const std::vector<Pose>& to, const double* z) const;
+    /// What the links beyond a joint get of forces and of by_state, as places_vjp takes them.
+    struct Beyond {
+        Vec3 slide = Vec3::Zero(), force = Vec3::Zero();  // sums of by_state, of gradient
+        Vec3 twist = Vec3::Zero(),
+             moment = Vec3::Zero();  // (x - c) x by_state + B z x gradient, (x - c) x gradient
+        Vec3 center, velocity;       // c, the place about which those are, and how it moves
+        Vec3 rate = Vec3::Zero();    // at which B z turns the link
+
+        void take(const Beyond& later);
+    };
+    std::vector<Beyond> beyond(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
+                               const VectorXd& gradient, const std::vector<Pose>& poses,
+                               const std::vector<Column>& columns) const;
+    Vec3 axis_gradient(Index link, const Beyond& of, const Vec3& parent_rate, const VectorXd& z,
+                       const std::vector<Pose>& poses, const std::vector<Column>& columns) const;
     /// sum_i g_i d2x_i/dz2, where columns of turns of one joint do not turn with it.
     Eigen::MatrixXd second_derivative(const VectorXd& q, const VectorXd& gradient) const;
     void move_on(VectorXd& q, std::vector<Pose> from, const VectorXd& z) const;
@@ -75,10 +92,12 @@ class SkeletonCarrier final : public Carrier {
     struct Motor {
         Index link;
         Slot slot;
-        double target = 0.0;
+        Index first;                 // of what is driven
+        Vec3 target = Vec3::Zero();  // of a ball joint a rotation vector, else one number
     };
     std::vector<Motor> driven_;
-    std::vector<Slot> origins_;   // of each joint
+    Index n_driven_ = 0;
+    std::vector<Slots> slots_;    // of each joint
     std::vector<Index> leading_;  // nodes, among all
     Index coordinates_ = 0;
     std::shared_ptr<const LinkPaths> paths_;

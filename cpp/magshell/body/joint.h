@@ -13,14 +13,17 @@ enum class JointKind {
     ball        // turns about the origin
 };
 
-/// Origin and axis as the world has them at rest; the axis is a unit vector, zero where there is none.
+/// Origin and axis as the world has them at rest; the axis is a unit vector, zero where there is none. A ball joint may have
+/// one: that of a cone.
 struct Joint {
     JointKind kind = JointKind::free;
     Index parent = -1;  // a link of the same skeleton, before this one; negative: the world
     Vec3 origin = Vec3::Zero(), axis = Vec3::Zero();
-    bool driven = false;   // a motor prescribes its coordinate
+    bool driven = false;   // a motor prescribes its coordinate, or its rotation
     bool damped = false;   // a damper acts in it
     bool twisted = false;  // a ball joint with a moment in it
+    bool served = false;   // a ball joint with a servo
+    bool coned = false;    // a ball joint whose axis has to stay in a cone
 
     bool has_axis() const { return kind == JointKind::revolute || kind == JointKind::prismatic; }
     /// How many coordinates it has.

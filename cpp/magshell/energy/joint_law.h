@@ -20,8 +20,8 @@ struct JointLaw {
 
     static constexpr int size = 10;
     using Names = std::array<const char*, size>;
-    /// What a turn about an axis calls them, a slide along it, and a ball joint, whose coordinate is the angle of its
-    /// rotation and which has no others.
+    /// What a turn about an axis calls them, a slide along it, and a ball joint: of the angle of its rotation, of the angle
+    /// from there to the rotation that its servo wants, and of the angle that its axis is off.
     static constexpr Names of_turns = {"spring_stiffness", "rest_angle",     "torque",      "target_angle",
                                        "servo_stiffness",  "torque_limit",   "lower_limit", "upper_limit",
                                        "limit_stiffness",  "limit_smoothing"};
@@ -31,12 +31,23 @@ struct JointLaw {
     static constexpr Names of_balls = {
         "spring_stiffness", nullptr,           nullptr,          nullptr, nullptr, nullptr, nullptr,
         "upper_limit",      "limit_stiffness", "limit_smoothing"};
+    static constexpr Names of_ball_servos = {nullptr,        nullptr, nullptr, nullptr, "servo_stiffness",
+                                             "torque_limit", nullptr, nullptr, nullptr, nullptr};
+    static constexpr Names of_cones = {nullptr, nullptr, nullptr,      nullptr,           nullptr,
+                                       nullptr, nullptr, "cone_limit", "limit_stiffness", "limit_smoothing"};
 };
 
 /// Energy, dE/ds, d2E/ds2, and by the law the derivative of dE/ds.
 struct JointEnergy {
     double energy, force, stiffness;
     std::array<double, JointLaw::size> force_by{};
+
+    /// (stiffness - force/s)/s^2 of a law whose spring and servo want 0, within its limits; it stays finite at s = 0.
+    static double softening(const JointLaw& law, double s) {
+        if (!(law.servo_stiffness > 0.0)) return 0.0;
+        const double by_limit = law.servo_stiffness / law.torque_limit, root = std::hypot(1.0, by_limit * s);
+        return -law.servo_stiffness * by_limit * by_limit / (root * root * root);
+    }
 
     JointEnergy(const JointLaw& law, double s) {
         const double off = s - law.rest_coordinate, e = s - law.target;

@@ -6,7 +6,8 @@
 //   liquid      E = K/2 (V - V_t)^2 / V_0                                      V_t [m3], K [Pa] bulk modulus
 //   cell        E = V_0 K/2 (V / V_0 - a)^2                                    a, K [Pa]                         [Qiao21] 5
 //
-// - dE/dV is the pressure inside, over that outside.
+// - dE/dV is the pressure inside, over that outside. A load factor f scales pressures, and with them E; what wants a volume
+// wants one on the way from that at rest, V_0 + f (V_t - V_0) or 1 + f (a - 1), at its full stiffness: so it is filled.
 #pragma once
 
 #include <array>
@@ -36,10 +37,32 @@ inline VolumeNames names_of(VolumeLaw law) {
     return {{"volume_ratio", "stiffness"}, {"1", "Pa"}};
 }
 
+/// Whether its first number is a volume that it wants, and the value which that has at rest.
+inline bool wants_volume(VolumeLaw law) {
+    return law == VolumeLaw::liquid || law == VolumeLaw::cell;
+}
+inline double target_at_rest(VolumeLaw law, double rest) {
+    return law == VolumeLaw::liquid ? rest : 1.0;
+}
+
 /// Energy, dE/dV, d2E/dV2, and dE/dV by its numbers; `magnitude`: of what cancels in dE/dV.
 struct VolumeEnergy {
     double energy, slope, curvature = 0.0, magnitude = 0.0;
     std::array<double, 2> slope_by{};
+    double slope_by_factor = 0.0;
+
+    /// Under a load factor.
+    VolumeEnergy(VolumeLaw law, std::array<double, 2> numbers, double rest, double volume, double factor)
+        : VolumeEnergy(law, loaded(law, numbers, rest, factor), rest, volume) {
+        if (wants_volume(law)) {
+            slope_by_factor = slope_by[0] * (numbers[0] - target_at_rest(law, rest));
+            slope_by[0] *= factor;
+            return;
+        }
+        slope_by_factor = slope;
+        energy = factor == 0.0 ? 0.0 : factor * energy;  // not 0 times infinity
+        for (double* each : {&slope, &curvature, &magnitude, &slope_by[0], &slope_by[1]}) *each *= factor;
+    }
 
     VolumeEnergy(VolumeLaw law, const std::array<double, 2>& numbers, double rest, double volume) {
         const auto [a, b] = numbers;
@@ -76,6 +99,14 @@ struct VolumeEnergy {
                 slope_by = {-b, ratio - a};
                 return;
         }
+    }
+
+  private:
+    static std::array<double, 2> loaded(VolumeLaw law, std::array<double, 2> numbers, double rest,
+                                        double factor) {
+        const double at_rest = target_at_rest(law, rest);
+        if (wants_volume(law)) numbers[0] = at_rest + factor * (numbers[0] - at_rest);
+        return numbers;
     }
 };
 

@@ -39,12 +39,16 @@ Carriers carriers_of(const Bodies& bodies, const std::vector<SkeletonInput>& ske
         std::vector<SkeletonCarrier::Slots> slots(skeleton.joints.size());
         for (std::size_t k = 0; k < slots.size(); ++k) {
             const Joint& joint = skeleton.joints[k];
-            const bool hinge = joint.kind == JointKind::revolute;
+            const auto add = [&](const char* name, const char* unit, Index width) {
+                return registry.values.add(skeleton.labels[k], name, unit, 1, width);
+            };
+            if (joint.kind == JointKind::free) continue;
             if (joint.driven)
-                slots[k].motor = registry.values.add(
-                    skeleton.owners[k], hinge ? "motor_angle" : "motor_displacement", "SI", 1, 1);
-            if (hinge || joint.kind == JointKind::ball)
-                slots[k].origin = registry.values.add(skeleton.labels[k], "origin", "m", 1, 3);
+                slots[k].motor = joint.kind == JointKind::ball       ? add("motor_rotation", "rad", 3)
+                                 : joint.kind == JointKind::revolute ? add("motor_angle", "SI", 1)
+                                                                     : add("motor_displacement", "SI", 1);
+            slots[k].origin = add("origin", "m", 3);
+            if (joint.has_axis()) slots[k].axis = add("axis", "1", 3);
         }
         carriers.push_back(
             std::make_unique<SkeletonCarrier>(std::move(links), skeleton.joints, std::move(slots)));

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "magshell/scene/model.h"
+#include "magshell/strain/fold_angle.h"
 #include "magshell/strain/fold_six.h"
 #include "magshell/term/ball_torque_term.h"
 #include "magshell/term/bending_six_term.h"
@@ -206,12 +207,16 @@ void Model::add_joints(const SceneInput& input) {
             const Index *parent = corners(joint.parent < 0 ? -1 : skeleton.links[joint.parent]),
                         *child = corners(skeleton.links[k]);
             joints.push_back({skeleton.owners[k], joint, parent, child});
+            if (joint.served)
+                joints.push_back({skeleton.owners[k], joint, parent, child, JointTerm::Act::ball_servo});
+            if (joint.coned)
+                joints.push_back({skeleton.owners[k], joint, parent, child, JointTerm::Act::cone});
             if (joint.damped) damped.push_back({skeleton.owners[k], joint, parent, child});
             if (joint.twisted) twisted.push_back({skeleton.owners[k], parent, child});
         }
     for (const ClosureInput& closure : input.closures)
         joints.push_back({closure.owner, Joint{JointKind::ball, -1, closure.place, Vec3::Zero()},
-                          corners(closure.parent), corners(closure.child), true});
+                          corners(closure.parent), corners(closure.child), JointTerm::Act::closure});
     if (!joints.empty())
         terms_.push_back(std::make_unique<JointTerm>(joints, nodes().rest, matrix_, registry_));
     if (!damped.empty()) {

@@ -87,8 +87,8 @@ class Stepper {
 
   private:
     /// What motors do at the end of a step, once its last stage is solved and `last` holds its rates.
-    VectorXd driving(const MotionState& begin, double dt, const VectorXd& q, const Anchor& anchor,
-                     const StageRates& last) const;
+    VectorXd driving(const MotionState& begin, double dt, const VectorXd& q, const Controls& controls,
+                     const Anchor& anchor, const StageRates& last);
     /// A stage, by other means where the first fail.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor);
 

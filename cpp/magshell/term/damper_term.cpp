@@ -13,16 +13,18 @@ DamperTerm::DamperTerm(const std::vector<Input>& joints, const std::vector<Vec3>
         const Slot slot = registry.values.add(input.owner, "damping", "SI", 1, 1);
         const bool length = input.joint.kind == JointKind::prismatic;
         const double reach = length ? links.reach() : 1.0 + links.reach() / links.length();
+        const Slot axis =
+            input.joint.has_axis() ? registry.values.add(input.owner, "axis", "1", 1, 3) : Slot{};
         const auto add = [&](const JointForm& form, double share) {
-            each_.push_back(
-                {links, form, share, slot, length, form.at(links.rest()).first.cwiseAbs(), reach});
+            each_.push_back({links, form, share, slot, axis, input.joint, length,
+                             form.at(links.rest()).first.cwiseAbs(), reach});
         };
         if (input.joint.kind != JointKind::ball) {
             add(JointForm(input.joint, links), 1.0);
             continue;
         }
         for (int a = 0; a < 3; ++a)
-            for (int b = 0; b < 3; ++b) add(JointForm::product(links, Vec3::Unit(a), Vec3::Unit(b)), 0.5);
+            for (int b = 0; b < 3; ++b) add(JointForm::product(links, Vec3(Vec3::Unit(a)), Vec3(Vec3::Unit(b))), 0.5);
     }
     last_turn_.assign(each_.size(), 0.0);
     now_.resize(each_.size());
@@ -33,6 +35,11 @@ bool DamperTerm::set_values(const Values& values) {
     for (Each& each : each_) {
         changed |= values.changed(each.slot);
         each.damping = each.share * values.number(each.slot);
+        if (each.axis.size() == 0 || !values.changed(each.axis)) continue;
+        each.joint.axis = values.vector(each.axis);
+        each.form = JointForm(each.joint, each.links);
+        each.at_rest = each.form.at(each.links.rest()).first.cwiseAbs();
+        changed = true;
     }
     return changed;
 }

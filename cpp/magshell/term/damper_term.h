@@ -60,6 +60,8 @@ class DamperTerm final : public ElasticTerm {
         JointForm form;
         double share;  // of the joint's damping
         Slot slot;
+        Slot axis;  // of a joint that has one
+        Joint joint;
         bool length;
         JointForm::Corners at_rest;  // |ds/dx|
         double reach, damping = 0.0;

@@ -38,6 +38,13 @@ JointForm JointForm::product(const LinkPair& links, const Vec3& of_parent, const
     return form;
 }
 
+JointForm JointForm::product(const LinkPair& links, const Mat3& of_parent, const Mat3& of_child) {
+    JointForm form;
+    for (int c = 0; c < 3; ++c)
+        form.form_.add(links.vector(false, of_parent.col(c)), links.vector(true, of_child.col(c)));
+    return form;
+}
+
 double JointForm::value(const Corners& at) const {
     return angle_ ? std::atan2(sine_.value(at), form_.value(at)) : form_.value(at);
 }

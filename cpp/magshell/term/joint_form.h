@@ -35,8 +35,9 @@ class JointForm {
     JointForm() = default;
     /// That of a joint.
     JointForm(const Joint& joint, const LinkPair& links);
-    /// a_p . b_c of two vectors at rest.
+    /// a_p . b_c of two vectors at rest; and the sum of those of three, the columns.
     static JointForm product(const LinkPair& links, const Vec3& of_parent, const Vec3& of_child);
+    static JointForm product(const LinkPair& links, const Mat3& of_parent, const Mat3& of_child);
 
     bool angle() const { return angle_; }
     /// An angle from -pi to pi.

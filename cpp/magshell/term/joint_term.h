@@ -1,7 +1,8 @@
 // What acts in the joints of skeletons: springs, torques, servos, limits; and closures of loops.
 //
-// The coordinate of a joint is read off the corners of its two links, as joint_form.h says; of a ball joint it is the angle
-// of the rotation.
+// The coordinate s of a joint is read off the corners of its two links, as joint_form.h says. Of a ball joint there are three,
+// all angles by their cosine, form = top - c (1 - cos s): that of the rotation, that from the rotation which a servo wants to
+// it, and that by which an axis is off, which a cone limits.
 // A closure pulls a point of one link to a point of another: k/2 |o_c - o_p|^2.
 #pragma once
 
@@ -16,12 +17,13 @@ namespace magshell {
 
 class JointTerm final : public Term {
   public:
+    enum class Act { coordinate, ball_servo, cone, closure };
     struct Input {
         std::string owner;
         Joint joint;
         const Index* parent;  // four corners, or nullptr: the world
         const Index* child;
-        bool closure = false;  // of a loop: reads its stiffness alone
+        Act act = Act::coordinate;
     };
 
     JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest, const SystemMatrix& matrix,
@@ -41,16 +43,22 @@ class JointTerm final : public Term {
 
   private:
     struct Each {
-        JointKind kind;
-        bool closure;
+        Act act;
+        Joint joint;
         LinkPair links;
-        JointForm form;               // of a ball joint, not its angle yet
+        JointForm form;
         CornerSum gap;                // of a closure
-        CornerForm::Corners at_rest;  // |d(coordinate)/dx|
+        CornerForm::Corners at_rest;  // |d(form)/dx|, of a closure |d(gap)/dx|
         double reach;  // what rounds at rest: a length, in lengths of a link where the coordinate is an angle
-        std::vector<Slot> slots;  // of the law; of a closure, its stiffness
+        double top = 0.0, cosine = 0.0;  // c; zero where the form is the coordinate
+        std::vector<Slot> slots;         // of the law; of a closure, its stiffness
+        Slot place;  // what the form depends on: axis, origin of a closure, what a servo wants
+        Vec3 wanted = Vec3::Zero();  // the rotation vector
         JointLaw law;
         double stiffness = 0.0;  // of a closure
+
+        void find_form();
+        bool length() const { return act == Act::closure || joint.kind == JointKind::prismatic; }
     };
     /// What of a joint a state tells: E' and E'' by its form.
     struct State {
@@ -63,6 +71,10 @@ class JointTerm final : public Term {
     State state(std::size_t k, const double* q) const;
     Vec3 gap(const Each& joint, const CornerForm::Corners& at) const;
     static JointEnergy law_at(const Each& joint, double coordinate) { return {joint.law, coordinate}; }
+    void closure_vjp(const Each& joint, const double* q, const CornerForm::Corners& rate,
+                     Gradient& out) const;
+    void place_vjp(const Each& joint, const State& now, const double* q, const CornerForm::Corners& rate,
+                   Gradient& out) const;
 
     std::vector<Each> each_;
     std::vector<double> last_turn_;

@@ -171,24 +171,25 @@ std::string VolumeTerm::refusal(const double* q) const {
 double VolumeTerm::energy(const double* q, const Controls& controls) const {
     double sum = 0.0;
     for (const Volume& each : volumes_)
-        sum += VolumeEnergy(each.law, each.numbers, each.rest, each.volume_at(each.at(q))).energy;
-    return controls[factor_.first] == 0.0 ? 0.0 : controls[factor_.first] * sum;
+        sum += VolumeEnergy(each.law, each.numbers, each.rest, each.volume_at(each.at(q)),
+                            controls[factor_.first])
+                   .energy;
+    return sum;
 }
 
 void VolumeTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
-    factor_now_ = controls[factor_.first];
     for (Volume& each : volumes_) {
         const std::vector<Vec3> x = each.at(q);
         each.volume = each.volume_at(x);
         each.slopes.assign(x.size(), Vec3::Zero());
         each.add_slopes(x, each.slopes);
-        const VolumeEnergy law(each.law, each.numbers, each.rest, each.volume);
+        const VolumeEnergy law(each.law, each.numbers, each.rest, each.volume, controls[factor_.first]);
         each.slope = each.extrapolated = law.slope;
         each.curvature = law.curvature;
         each.magnitude = law.magnitude;
         for (std::size_t k = 0; k < x.size(); ++k)
             for (int axis = 0; axis < 3; ++axis)
-                out.add(3 * each.nodes[k] + axis, factor_now_ * law.slope * each.slopes[k][axis]);
+                out.add(3 * each.nodes[k] + axis, law.slope * each.slopes[k][axis]);
     }
 }
 
@@ -196,14 +197,12 @@ void VolumeTerm::extrapolate(const double* p) {
     for (Volume& each : volumes_) each.extrapolated = each.slope + each.curvature * each.along(p);
 }
 
-void VolumeTerm::finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const {
-    const double factor = controls[factor_.first];
-    if (factor == 0.0) return;
+void VolumeTerm::finish_assembly(const double* q, const Controls&, SystemMatrix& out) const {
     for (const Volume& each : volumes_) {
         const std::vector<Vec3> x = each.at(q);
-        const bool stiff = each.law == VolumeLaw::liquid || each.law == VolumeLaw::cell;
-        const double own = cautious_ && stiff && each.pairs.empty() ? 0.0 : each.slope;
-        const double slope = factor * (extrapolated_ ? each.extrapolated : own);
+        const double own = cautious_ && wants_volume(each.law) && each.pairs.empty() ? 0.0 : each.slope;
+        const double slope = extrapolated_ ? each.extrapolated : own;
+        if (slope == 0.0 && each.curvature == 0.0) continue;
         const auto add_faces = [&]<int N>(const std::vector<Face<N>>& faces) {
             for (const Face<N>& face : faces) {
                 Pack33 blocks[N * (N + 1) / 2]{};
@@ -215,7 +214,7 @@ void VolumeTerm::finish_assembly(const double* q, const Controls& controls, Syst
         };
         add_faces(each.triangles);
         add_faces(each.curved);
-        if (!each.pairs.empty()) add_outer_product(each, factor * each.curvature, out);
+        if (!each.pairs.empty()) add_outer_product(each, each.curvature, out);
     }
 }
 
@@ -232,27 +231,24 @@ void VolumeTerm::add_outer_product(const Volume& volume, double stiffness, Syste
     }
 }
 
-void VolumeTerm::add_low_rank(const Controls& controls, LowRank& out) const {
+void VolumeTerm::add_low_rank(const Controls&, LowRank& out) const {
     for (const Volume& each : volumes_)
-        if (each.pairs.empty()) out.add(each.nodes, each.slopes, controls[factor_.first] * each.curvature);
+        if (each.pairs.empty()) out.add(each.nodes, each.slopes, each.curvature);
 }
 
 void VolumeTerm::add_cancelling_here(VectorXd& out) const {
     for (const Volume& each : volumes_)
         for (std::size_t k = 0; k < each.nodes.size(); ++k)
-            out.segment<3>(3 * each.nodes[k]) +=
-                std::abs(factor_now_) * each.magnitude * each.slopes[k].cwiseAbs();
+            out.segment<3>(3 * each.nodes[k]) += std::abs(each.magnitude) * each.slopes[k].cwiseAbs();
 }
 
 void VolumeTerm::vjp(const double*, const Controls& controls, const double* lambda, Gradient& out) {
-    const double factor = controls[factor_.first];
     for (const Volume& each : volumes_) {
         const double along = each.along(lambda);
-        const VolumeEnergy law(each.law, each.numbers, each.rest, each.volume);
+        const VolumeEnergy law(each.law, each.numbers, each.rest, each.volume, controls[factor_.first]);
         for (int k = 0; k < 2; ++k)
-            if (each.slots[k].entry >= 0)
-                out.values[each.slots[k].at(each.row)] += factor * law.slope_by[k] * along;
-        out.controls[factor_.first] += law.slope * along;
+            if (each.slots[k].entry >= 0) out.values[each.slots[k].at(each.row)] += law.slope_by[k] * along;
+        out.controls[factor_.first] += law.slope_by_factor * along;
     }
 }
 

@@ -88,7 +88,6 @@ class VolumeTerm final : public BorderTerm {
 
     Slot factor_;
     std::vector<Volume> volumes_;
-    double factor_now_ = 0.0;  // at the last evaluated state
 };
 
 }  // namespace magshell

@@ -12,7 +12,7 @@ from ..mesh.quality import MeshQuality
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from .joined_mesh import JoinedMesh
-from .joints import Joint
+from .joint import Joint
 from .no_mesh import NoMesh
 from .rigid import Rigid
 from .shell import Shell

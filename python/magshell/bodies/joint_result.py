@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .joints import Joint
+from .joint import Joint
 from .rigid_result import RigidResult, _cross
-from .skeleton_input import motors
+from .skeleton_input import motor_rows
 
 
 class JointResult:
@@ -30,10 +30,10 @@ class JointResult:
         if kind == "ball":
             trace = turn[..., 0, 0] + turn[..., 1, 1] + turn[..., 2, 2]
             return 2.0 * xp.arcsin(xp.sqrt(xp.clip(0.25 * (3.0 - trace), 0.0, 1.0)))
-        axis = _like(self.joint.axis, turn)
+        axis = _like(self._axis, turn)
         # R = cos I + sin [a] + (1 - cos) a a^T
         twice_sine = sum(
-            axis[k] * (turn[..., (k + 2) % 3, (k + 1) % 3] - turn[..., (k + 1) % 3, (k + 2) % 3])
+            axis[..., k] * (turn[..., (k + 2) % 3, (k + 1) % 3] - turn[..., (k + 1) % 3, (k + 2) % 3])
             for k in range(3)
         )
         trace = turn[..., 0, 0] + turn[..., 1, 1] + turn[..., 2, 2]
@@ -45,8 +45,9 @@ class JointResult:
         """(...) m, of a Prismatic."""
         if self.joint._kind != "prismatic":
             raise ValueError(f"a {type(self.joint).__name__} has no displacement")
-        axis = _like(self.joint.axis, self._child.center)
-        along = axis if self._parent is None else self._parent.rotation @ axis
+        along = _like(self._axis, self._child.center)
+        if self._parent is not None:
+            along = _turned(self._parent.rotation, along)
         return (along * (self.place - self._place_of(self._parent))).sum(-1)
 
     @property
@@ -59,10 +60,10 @@ class JointResult:
         if kind == "ball":
             turning = self._child.angular_velocity
             return turning if self._parent is None else turning - self._parent.angular_velocity
-        axis, spin = _like(self.joint.axis, self._child.center), 0.0
+        axis, spin = _like(self._axis, self._child.center), 0.0
         velocity = self._velocity_of(self._child) - self._velocity_of(self._parent)
         if self._parent is not None:
-            axis, spin = self._parent.rotation @ axis, self._parent.angular_velocity
+            axis, spin = _turned(self._parent.rotation, axis), self._parent.angular_velocity
         if kind == "revolute":
             return (axis * (self._child.angular_velocity - spin)).sum(-1)
         slid = self.place - self._place_of(self._parent)
@@ -71,8 +72,10 @@ class JointResult:
 
     @property
     def motor_torque(self) -> np.ndarray:
-        """(...) N m, with which the motor of a Revolute turns its child about the axis, against its parent. In a motion NaN
-        in the state that it starts from. It has no gradient."""
+        """(...) N m, with which the motor of a Revolute turns its child about the axis, against its parent; (..., 3) of a
+        Ball, axes of the world. In a motion NaN in the state that it starts from. It has no gradient."""
+        if self.joint._kind == "ball":
+            return self._motor("ball", "motor_rotation")
         return self._motor("revolute", "motor_angle")
 
     @property
@@ -83,8 +86,7 @@ class JointResult:
     def _motor(self, kind: str, value: str) -> np.ndarray:
         if self.joint._kind != kind or not self.joint.driven:
             raise ValueError(f"only a {kind.capitalize()} with a {value} has a motor")
-        number = [id(each) for each in motors(self._result.scene._bodies.skeletons)].index(id(self.joint))
-        return self._result._driving[..., number]
+        return self._result._driving[..., motor_rows(self._result.scene._bodies.skeletons, self.joint)]
 
     @property
     def place(self):
@@ -96,6 +98,15 @@ class JointResult:
         """(...) m, between its place on the child and on the parent: what is left of a Closure, and round-off of others but
         a Prismatic, whose displacement it is. Where a solve has another origin, that of the place as the scene has it."""
         return ((self.place - self._place_of(self._parent)) ** 2).sum(-1) ** 0.5
+
+    @property
+    def _axis(self) -> np.ndarray:
+        """(3,), or (n, 3) of states that have their own, as solves may give it others. What is read off with it feels it
+        only by where the links are: it needs no gradient of its own."""
+        result = self._result
+        if np.ndim(result.positions) == 2 or hasattr(result, "_values"):
+            return result._values_at(0).current(self.joint).axis
+        return np.stack([result._values_at(k).current(self.joint).axis for k in range(len(result.positions))])
 
     @property
     def _relative(self):
@@ -115,6 +126,11 @@ class JointResult:
 
     def __repr__(self) -> str:
         return f"{type(self._result).__name__} of {self.joint!r}"
+
+
+def _turned(turns, vectors):
+    """(..., 3), by matrices (..., 3, 3)."""
+    return (turns * vectors[..., None, :]).sum(-1)
 
 
 def _like(array: np.ndarray, other):

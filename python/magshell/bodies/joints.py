@@ -1,4 +1,4 @@
-"""What joins two links of a skeleton, or a link and the world, and what acts in there."""
+"""The kinds of joints of a skeleton."""
 
 from __future__ import annotations
 
@@ -6,187 +6,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .._checks.owner import Owner
 from .._checks.quantity import quantity
-from .._checks.scalars import not_negative, positive
+from .._checks.scalars import positive
+from .joint import Joint
 from .rigid import Rigid
 
 _FAR = 1e300  # a limit that nothing reaches
 
 
-class Joint(Owner):
-    """Between two links; make one of its subclasses.
-
-    child: the link (Rigid) that it carries. parent: the link that it is fixed to, or None for the world.
-    """
-
-    _kind: ClassVar[str] = ""
-    _defaults: ClassVar[dict[str, Any]] = {}  # by name: where it does not act
-
-    def __init__(self, child: Rigid, parent: Rigid | None, origin, axis=None, rate=None, **law):
-        for name, link in (("child", child), ("parent", parent)):
-            if not isinstance(link, Rigid) and (name == "child" or link is not None):
-                raise ValueError(f"{name} of a {type(self).__name__} must be a Rigid, got {link!r:.60}")
-        if child is parent:
-            raise ValueError(f"child and parent of a {type(self).__name__} must be two links")
-        self.child, self.parent = child, parent
-        self.origin = np.array(quantity("origin", "m", origin, (3,)))
-        self.axis = np.zeros(3)
-        if axis is not None:
-            self.axis = np.array(quantity("axis", "", axis, (3,)))
-            length = np.linalg.norm(self.axis)
-            if not length > 0:
-                raise ValueError("axis must not be zero")
-            self.axis /= length
-        self._given = {name: value for name, value in law.items() if value is not None}
-        for name, value in self._given.items():
-            self._given[name] = self._checked(name, value)
-        self._check_together()
-        self.rate = None if rate is None else self._checked_rate(rate)
-        # What it was made without, a solve cannot give it.
-        self._replaceable = (
-            *self._given,
-            *(() if rate is None else ("rate",)),
-            *(("origin",) if self.has_place else ()),
-        )
-        self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
-
-    def __getattr__(self, name: str):
-        given = self.__dict__.get("_given", {})
-        if name in given:
-            return given[name]
-        if name in self._defaults:
-            return None
-        raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
-
-    def _checked_rate(self, value) -> float | np.ndarray:
-        return float(quantity("rate", f"{self._unit('')}/s", value, ()))
-
-    def _checked(self, name: str, value) -> float | np.ndarray:
-        unit = self._unit(name)
-        if name in ("servo_stiffness", "torque_limit", "force_limit", "limit_stiffness", "limit_smoothing"):
-            return positive(name, unit, value)
-        if name in ("spring_stiffness", "damping"):
-            return not_negative(name, unit, value)
-        return float(quantity(name, unit, value, ()))
-
-    def _unit(self, name: str) -> str:
-        slides = self._kind == "prismatic"
-        if name == "damping":
-            return "N s/m" if slides else "N m s/rad"
-        if name in ("spring_stiffness", "servo_stiffness", "limit_stiffness"):
-            return "N/m" if slides else "N m/rad"
-        if name in ("torque", "torque_limit", "force", "force_limit"):
-            return "N" if slides else "N m"
-        return "m" if slides else "rad"
-
-    def _check_together(self) -> None:
-        given, kind = self._given, type(self).__name__
-        limited = [name for name in ("lower_limit", "upper_limit") if name in given]
-        if limited and not {"limit_stiffness", "limit_smoothing"} <= given.keys():
-            raise ValueError(
-                f"a {kind} with {limited[0]} needs limit_stiffness and limit_smoothing, how stiff it is beyond and how soon"
-            )
-        if len(limited) == 2 and not given["lower_limit"] < given["upper_limit"]:
-            raise ValueError(f"lower_limit of a {kind} must be below its upper_limit")
-        if self.driven:
-            (motor,) = (name for name in given if name.startswith("motor_"))
-            if idle := [name for name in _UNDER_MOTOR if name in given]:
-                raise ValueError(
-                    f"{motor} of a {kind} prescribes where it is: {', '.join(idle)} would do nothing"
-                )
-        target = [name for name in self._defaults if name.startswith("target_")]
-        if target and (target[0] in given) != ("servo_stiffness" in given):
-            raise ValueError(
-                f"a {kind} that is to follow a target needs both {target[0]} and servo_stiffness"
-            )
-
-    @property
-    def driven(self) -> bool:
-        """Whether a motor prescribes its coordinate."""
-        return any(name.startswith("motor_") for name in self._given)
-
-    @property
-    def acts(self) -> bool:
-        """Whether anything but the constraint itself is in it."""
-        return bool(self._given)
-
-    def has(self, name: str) -> bool:
-        """Whether it was made with this."""
-        return name in self._given
-
-    def replaced(self, **values) -> Joint:
-        """The same joint with other numbers of what acts in it."""
-        for name in values:
-            if name not in self._replaceable:
-                raise ValueError(f"the {type(self).__name__} was made without {name}: zero will do")
-        own = {name: getattr(self, name) for name in self._replaceable}
-        return self._again({**own, **values})
-
-    @property
-    def has_place(self) -> bool:
-        """Whether it matters where its origin is, and solves may change it."""
-        return self._kind in ("revolute", "ball")
-
-    def _again(self, law: dict) -> Joint:
-        axis = {"axis": self.axis} if self.axis.any() else {}
-        return type(self)(child=self.child, parent=self.parent, **{"origin": self.origin, **axis, **law})
-
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
-        if self.acts:
-            for name, default in self._defaults.items():
-                numbers[label, name] = self._given.get(name, default)
-        if self.has_place:
-            numbers[label, "origin"] = self.origin
-
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
-        found = {name: gradient.value(label, name)[0] for name in self._given}
-        if self.has_place:
-            found["origin"] = gradient.value(label, "origin")[0]
-        if self.rate is not None:
-            rows = gradient.others.get("own_velocities")
-            found["rate"] = np.zeros(np.shape(self.rate))
-            for place in values.moved_by(self) if rows is not None else ():
-                moved = rows[place.points]
-                found["rate"] = found["rate"] + self._rate_gradient(place.rest, moved)
-                if self.has_place:
-                    found["origin"] = found["origin"] + np.cross(self._turning, moved).sum(axis=0)
-        return found
-
-    def velocities(self, points: np.ndarray) -> np.ndarray:
-        """Of points (n, 3) m of what it carries at rest, as it starts: (n, 3) m/s."""
-        return self.rate * self._directions(points)
-
-    def _rate_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
-        return (by_velocities * self._directions(points)).sum()
-
-    @property
-    def _turning(self) -> np.ndarray:
-        """How fast it turns to start with: (3,) rad/s."""
-        return self.rate * self.axis if self._kind == "revolute" else self.rate
-
-    def _directions(self, points: np.ndarray) -> np.ndarray:
-        """How points move as its coordinate does: (n, 3), m/rad or 1."""
-        if self._kind == "prismatic":
-            return np.broadcast_to(self.axis, points.shape)
-        return np.cross(self.axis, points - self.origin)
-
-    def __repr__(self) -> str:
-        law = "".join(f", {name} {_told(value)}" for name, value in self._given.items())
-        return f"{type(self).__name__}({'to the world' if self.parent is None else 'between two links'}{law})"
-
-
-_UNDER_MOTOR = ("torque", "force", "servo_stiffness", "lower_limit", "upper_limit")
-
-
-def _told(value) -> str:
-    return f"{value:g}" if np.ndim(value) == 0 else f"({', '.join(f'{each:g}' for each in value)})"
-
-
 class Fixed(Joint):
     """Holds a link to its parent, or to the world: they move as one.
 
-    origin: has no meaning here; by default the world's.
+    origin: where it is drawn; nothing depends on it. By default the world's.
 
     child, parent: Link objects; without a parent, the world.
 
@@ -199,6 +30,7 @@ class Fixed(Joint):
     """
 
     _kind = "fixed"
+    _replaceable = ("origin",)
 
     def __init__(self, child: Rigid, parent: Rigid | None = None, origin=(0.0, 0.0, 0.0)):
         super().__init__(child, parent, origin)
@@ -220,8 +52,9 @@ class Revolute(Joint):
         servo and limits. How fast it is to start with, `rate` says.
     rate: rad/s, at the start of a motion from rest positions, in a tree without vertices.
 
-    Solves take another origin too, with the same links at rest. All but the rate and the places may change in ms.simulate,
-    one value a step or at the ends of steps.
+    Solves take another origin and axis too, with the same links at rest. An axis may have any length, which changes
+    nothing, so that a gradient by it is across the axis. All but the rate and the places may change in ms.simulate, one
+    value a step or at the ends of steps.
 
     >>> import numpy as np
     >>> import magshell as ms
@@ -249,7 +82,7 @@ class Revolute(Joint):
         "limit_smoothing": 1.0,
     }
     _in_time = tuple(_defaults)
-    _replaceable = (*_in_time, "rate", "origin")
+    _replaceable = (*_in_time, "rate", "origin", "axis")
 
     def __init__(
         self,
@@ -277,7 +110,7 @@ class Revolute(Joint):
 
 
 class Prismatic(Joint):
-    """Slides a link along an axis. Its displacement [m] is zero at rest.
+    """Slides a link along an axis. Its displacement [m] is zero at rest; nothing depends on where its origin is.
 
     As Revolute, with lengths for angles and forces [N] for torques: spring_stiffness N/m, rest_displacement m, damping
     N s/m, force N, motor_displacement m (`result[slide].motor_force`), target_displacement m, servo_stiffness N/m,
@@ -308,7 +141,7 @@ class Prismatic(Joint):
         "limit_smoothing": 1.0,
     }
     _in_time = tuple(_defaults)
-    _replaceable = (*_in_time, "rate")
+    _replaceable = (*_in_time, "rate", "origin", "axis")
 
     def __init__(
         self,
@@ -338,11 +171,20 @@ class Prismatic(Joint):
 class Ball(Joint):
     """Turns a link about a point, any way.
 
+    origin: (3,) m, that point, in the world at rest and riding on the parent.
     spring_stiffness: N m/rad, pulls the rotation, as one angle, back to none.
     damping: N m s/rad, a torque against the rate at which the link turns to its parent, in motions.
     torque: (3,) N m, a moment on the child, and against it on the parent, its axes those of the world: it keeps its
         direction as they turn. It has no potential, as a following pressure has none.
-    upper_limit, limit_stiffness, limit_smoothing: rad, N m/rad, rad: of that angle, below pi.
+    motor_rotation: (3,) rad, prescribes the rotation from the parent to the child as a rotation vector, whose axes are those
+        of the world at rest and ride on the parent: a motor, reached by the shorter way round.
+        `result[ball].motor_torque` is the moment (3,) that it takes, as in Revolute.
+    target_rotation, servo_stiffness, torque_limit: (3,) rad likewise, N m/rad, N m: a servo that turns to the target along
+        one axis, with a torque that stays below the limit (none by default). A target half a turn away has no such axis.
+    upper_limit: rad, of the angle of the rotation, from 1e-3 to below pi.
+    axis, cone_limit: (3,), a direction in the world at rest, and rad, from 1e-3 to below pi: how far the direction may be
+        off on the child from where it is on the parent: the swing, whatever the twist about it.
+    limit_stiffness, limit_smoothing: N m/rad, rad: of these two limits, as in Revolute.
     rate: (3,) rad/s, how the child turns to its parent at the start of a motion, as in Revolute; axes of the world.
 
     >>> import magshell as ms
@@ -356,12 +198,18 @@ class Ball(Joint):
         "spring_stiffness": 0.0,
         "damping": 0.0,
         "torque": np.zeros(3),
+        "motor_rotation": np.zeros(3),
+        "target_rotation": np.zeros(3),
+        "servo_stiffness": 0.0,
+        "torque_limit": _FAR,
         "upper_limit": _FAR,
+        "cone_limit": _FAR,
         "limit_stiffness": 0.0,
         "limit_smoothing": 1.0,
     }
+    _vectors: ClassVar[dict[str, str]] = {"torque": "N m", "motor_rotation": "rad", "target_rotation": "rad"}
     _in_time = tuple(_defaults)
-    _replaceable = (*_in_time, "rate", "origin")
+    _replaceable = (*_in_time, "rate", "origin", "axis")
 
     def __init__(
         self,
@@ -369,23 +217,30 @@ class Ball(Joint):
         parent: Rigid | None = None,
         *,
         origin,
+        axis=None,
         spring_stiffness=None,
         damping=None,
         torque=None,
+        motor_rotation=None,
+        target_rotation=None,
+        servo_stiffness=None,
+        torque_limit=None,
         upper_limit=None,
+        cone_limit=None,
         limit_stiffness=None,
         limit_smoothing=None,
         rate=None,
     ):
         law = {name: value for name, value in locals().items() if name in self._defaults}
-        super().__init__(child, parent, origin, rate=rate, **law)
-        if upper_limit is not None and not 1e-3 <= float(upper_limit) < np.pi:
-            raise ValueError(f"upper_limit [rad] of a Ball must be from 1e-3 to pi, got {upper_limit:g}")
+        super().__init__(child, parent, origin, axis, rate, **law)
+        if (axis is None) != (cone_limit is None):
+            raise ValueError("a Ball that is to stay in a cone needs both axis and cone_limit")
 
     def _checked(self, name: str, value) -> float | np.ndarray:
-        if name == "torque":
-            return np.array(quantity(name, "N m", value, (3,)))
-        return super()._checked(name, value)
+        checked = super()._checked(name, value)
+        if name in ("upper_limit", "cone_limit") and not 1e-3 <= checked < np.pi:
+            raise ValueError(f"{name} [rad] of a Ball must be from 1e-3 to pi, got {checked:g}")
+        return checked
 
     def _checked_rate(self, value) -> np.ndarray:
         return np.array(quantity("rate", "rad/s", value, (3,)))
@@ -400,7 +255,8 @@ class Ball(Joint):
 class Closure(Joint):
     """Closes a loop: pulls a point of one link, and the same place on another or in the world, together.
 
-    origin: (3,) m, the place at rest. stiffness: N/m; the gap is the force over it, and `result[closure].gap` says it.
+    origin: (3,) m, the place at rest, which solves may change. stiffness: N/m; the gap is the force over it, and
+        `result[closure].gap` says it.
 
     child, parent: the two links; without a parent, the world.
 
@@ -413,7 +269,7 @@ class Closure(Joint):
 
     _kind = "closure"
     _defaults: ClassVar[dict[str, float]] = {"stiffness": 0.0}
-    _replaceable = tuple(_defaults)
+    _replaceable = (*_defaults, "origin")
 
     def __init__(self, child: Rigid, parent: Rigid | None = None, *, origin, stiffness):
         super().__init__(child, parent, origin, stiffness=positive("stiffness", "N/m", stiffness))

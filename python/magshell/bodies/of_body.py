@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from .body_result import BodyResult
+from .joint import Joint
 from .joint_result import JointResult
-from .joints import Joint
 from .muscle import Muscle
 from .muscle_result import MuscleResult
 from .rigid import Rigid

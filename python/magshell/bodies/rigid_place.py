@@ -199,30 +199,39 @@ def _not_from(start, what: str) -> ValueError:
 
 
 def check_joints(inputs, points: np.ndarray) -> None:
-    """Raises ValueError where a motion goes on from points (n, 3) m whose joints had other origins.
+    """Raises ValueError where a motion goes on from points (n, 3) m whose joints had other origins or axes.
 
     points: as the core has them, those of rigid parts last.
     """
     scene, first = inputs.scene, inputs.scene.mesh.n_vertices
+    size = max(scene.mesh.size if first else 0.0, float(np.abs(points).max()))
 
-    def at(link, place: np.ndarray) -> np.ndarray:
+    def pose(link) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if link is None:
-            return place
+            return np.zeros(3), np.zeros(3), np.eye(3)
         k = scene._bodies.rigid_number(link)
         rigid, rows = scene._rigid[k], points[first + 10 * k :][:4]
-        middle = rows.mean(axis=0)
-        turn = (rows - middle).T @ (rigid.rest[:4] - rigid.rest[:4].mean(axis=0)) / (4.0 * rigid.length**2)
-        return middle + turn @ (place - rigid.rest[:4].mean(axis=0))
+        middle, at_rest = rows.mean(axis=0), rigid.rest[:4].mean(axis=0)
+        return at_rest, middle, (rows - middle).T @ (rigid.rest[:4] - at_rest) / (4.0 * rigid.length**2)
 
     for own in scene.joints:
-        if not own.has_place:
+        if own._kind not in ("revolute", "prismatic", "ball"):
             continue
-        origin = inputs.values.current(own).origin
-        gap = float(np.linalg.norm(at(own.child, origin) - at(own.parent, origin)))
-        if gap > _OPEN * max(scene.mesh.size if first else 0.0, float(np.abs(points).max())):
+        joint = inputs.values.current(own)
+        (rest, middle, turn), (parent_rest, parent_middle, parent_turn) = pose(own.child), pose(own.parent)
+        gap = (
+            middle + turn @ (joint.origin - rest) - parent_middle - parent_turn @ (joint.origin - parent_rest)
+        )
+        along, tilt = parent_turn @ joint.axis, 0.0
+        if own._kind == "prismatic":
+            gap = gap - along * (along @ gap)
+        elif own._kind == "revolute":
+            tilt = float(np.linalg.norm(turn @ joint.axis - along))
+        if np.linalg.norm(gap) > _OPEN * size or tilt > _OPEN:
             raise ValueError(
-                f"start had another origin of {own!r:.60}: links would be {gap:.3g} m apart there; give origin the value "
-                "of that solve, or start at rest positions"
+                f"start had another {'origin or axis' if joint.has_axis else 'origin'} of {own!r:.60}: there links would "
+                f"be {np.linalg.norm(gap):.3g} m and {tilt:.3g} rad off; give it the value of that solve, or start at rest "
+                "positions"
             )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.checked_list import checked_list
-from .joints import Closure, Joint
+from .joint import Joint
+from .joints import Closure
 from .rigid import Rigid
 
 
@@ -19,7 +20,7 @@ class Skeleton:
     Soft material around a link rides on it by its vertices, Link(vertices=..., body=solid). Joints hold to round-off, also
     over many steps. Values of joints go by the joint, values={hinge: {"torque": ...}}, and may change in time;
     `result[hinge].angle` and `result[link]` tell how it moves. ms.simulate takes it by TRBDF2 or ImplicitEuler.
-    There are gradients by origins of Revolute and Ball joints; by axes, and by the place of a Closure, there are none.
+    Gradients are by all values of joints, their origins and axes too.
 
     >>> import numpy as np
     >>> import magshell as ms

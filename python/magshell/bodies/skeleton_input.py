@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .joints import Closure, Joint
+from .joint import Joint
+from .joints import Closure
 from .skeleton import Skeleton
 
 
@@ -41,7 +42,7 @@ def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -
 
 def _joint(joint: Joint | None, place: dict[int, int]) -> dict:
     if joint is None:
-        still = dict.fromkeys(("driven", "damped", "twisted"), False)
+        still = dict.fromkeys(("driven", "damped", "twisted", "served", "coned"), False)
         return {"kind": "free", "parent": -1, "origin": np.zeros(3), "axis": np.zeros(3), **still}
     return {
         "kind": joint._kind,
@@ -51,10 +52,18 @@ def _joint(joint: Joint | None, place: dict[int, int]) -> dict:
         "driven": joint.driven,
         "damped": joint.has("damping"),
         "twisted": joint._kind == "ball" and joint.has("torque"),
+        "served": joint._kind == "ball" and joint.has("servo_stiffness"),
+        "coned": joint.has("cone_limit"),
     }
 
 
-def motors(skeletons) -> list[Joint]:
-    """In the core's order."""
+def motor_rows(skeletons, joint: Joint) -> int | slice:
+    """Where the numbers of a joint's motor stand among those of all, in the core's order: one, or of a Ball three."""
     leading = [skeleton.joint_to(link) for skeleton in skeletons for link in skeleton.in_order]
-    return [joint for joint in leading if joint is not None and joint.driven]
+    first = 0
+    for each in leading:
+        if each is joint:
+            break
+        if each is not None and each.driven:
+            first += 3 if each._kind == "ball" else 1
+    return slice(first, first + 3) if joint._kind == "ball" else first

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .joints import Fixed, Joint, Prismatic, Revolute
+from .joint import Joint
+from .joints import Fixed, Prismatic, Revolute
 from .link import Link
 
 

@@ -14,7 +14,7 @@ from ..errors import NotConverged
 from ..scene.inputs import Inputs, plain_inputs
 from ..scene.scene import Scene
 from .mode_shapes import mode_shapes
-from .rest import RestStiffness
+from .rest import RestStiffness, pulling_joints
 
 _LARGEST_CHANGE = 1e100  # over the stiffness itself: its square still is a number
 _ROUND_OFF = 1e-14  # of a length: what moves no more does not move
@@ -70,7 +70,7 @@ def linear_buckling(
     modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
         the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
-    Bodies in contact are refused: a contact bears in one direction only, so that a mode and its opposite have different
+    Joints that pull at rest, or have motors, are refused, as they are no controls. Bodies in contact are refused: a contact bears in one direction only, so that a mode and its opposite have different
     factors, and none of them is linear; ms.follow passes where contacts open and close.
 
     Raises ValueError on bad input, in a scene with contact of bodies, where the supports leave the sheet a motion without
@@ -100,6 +100,11 @@ def linear_buckling(
         raise ValueError(
             "the scene has contact of bodies, which holds in one direction only, so that no linear mode buckles: ms.follow "
             "follows it as it opens and closes, or leave it out"
+        )
+    driven = [joint for joint in map(inputs.values.current, scene.joints) if joint.driven]
+    if acting := [*pulling_joints(inputs), *driven]:
+        raise ValueError(
+            f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow has it"
         )
     began = time.perf_counter()
     model = scene._model

@@ -12,7 +12,7 @@ from .._checks.tensors import like
 from .._machine.entry import solve_entry
 from ..scene.inputs import plain_inputs
 from ..scene.scene import Scene
-from .rest import RestStiffness
+from .rest import RestStiffness, forces_at_rest
 
 
 @dataclass(frozen=True, repr=False)
@@ -57,8 +57,8 @@ def linear_response(
     """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
 
     The stiffness is that of the unloaded sheet: loads and fields act as the forces they are at rest, without
-    the stiffness they add; supports that move do so at the rate they start with. Controls and values as in
-    ms.equilibrium.
+    the stiffness they add; supports that move do so at the rate they start with. Torques, springs, servos and limits that
+    pull in joints at rest are loads too, and motors move. Controls and values as in ms.equilibrium.
 
     Raises ValueError on bad input, and where the supports leave the sheet a motion without stiffness; Interrupted.
 
@@ -86,8 +86,9 @@ def linear_response(
     )
     began = time.perf_counter()
     model = scene._model
+    at_rest = forces_at_rest(inputs)
     with inputs.in_core():
-        change = RestStiffness(inputs).response(inputs)
+        change = RestStiffness(inputs).response(inputs, at_rest)
     return LinearResponse(
         scene=scene,
         displacements=like(model.positions(change), *inputs.given),

@@ -63,15 +63,33 @@ class RestStiffness:
         residual = forces - self.matrix.astype(np.longdouble) @ solution.astype(np.longdouble)
         return solution + self._factor.solve(residual.astype(np.float64))
 
-    def response(self, inputs: Inputs) -> np.ndarray:
-        """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports move."""
+    def response(self, inputs: Inputs, at_rest: np.ndarray | None = None) -> np.ndarray:
+        """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports and motors move.
+
+        at_rest: g(0) by `forces_at_rest`; by default with all that joints do, which is no load then.
+        """
         model, layout = self._model, inputs.scene._control_layout
         unloaded = layout.zeros()
         moved = model.prescribed_rate(unloaded) * layout.of(inputs.controls, "scene", "motion_factor")
-        forces = model.gradient(self.rest, unloaded) - model.gradient(self.rest, inputs.controls)
+        moved = moved + model.driven_increment(self.rest, unloaded)
+        at_rest = model.gradient(self.rest, unloaded) if at_rest is None else at_rest
+        forces = at_rest - model.gradient(self.rest, inputs.controls)
         if moved.any():
             forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved
         return moved + model.expand(self.solve(model.reduce(forces)))
+
+
+def pulling_joints(inputs: Inputs) -> dict:
+    """{joint of the scene: itself without what pulls at rest} of those in which something does."""
+    joints = {own: inputs.values.current(own) for own in inputs.scene.joints}
+    return {own: joint.resting for own, joint in joints.items() if joint.resting is not joint}
+
+
+def forces_at_rest(inputs: Inputs) -> np.ndarray:
+    """g(0) of all unknowns at the rest shape, without what pulls in joints: so that this is a load."""
+    scene = inputs.scene
+    with inputs.values.with_objects(pulling_joints(inputs)).in_core():
+        return scene._model.gradient(scene._model.rest_state(), scene._control_layout.zeros())
 
 
 def refuse_what_acts(inputs: Inputs) -> None:

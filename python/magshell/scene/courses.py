@@ -10,7 +10,7 @@ import numpy as np
 from .._checks.quantity import shape_of
 from .._machine.keywords import nearest_first
 from ..bodies.actuator import Actuator
-from ..bodies.joints import Joint
+from ..bodies.joint import Joint
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
 

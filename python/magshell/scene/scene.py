@@ -15,7 +15,7 @@ from .._checks.quantity import quantity
 from ..bodies.actuator import Actuator
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
-from ..bodies.joints import Joint
+from ..bodies.joint import Joint
 from ..bodies.rigid import Rigid
 from ..bodies.rigid_place import places
 from ..bodies.shell import Shell

@@ -19,11 +19,11 @@ class ActuatorResult:
         self._result, self.actuator = result, actuator
 
     def _by_law(self, law, states):
-        """law(the actuator as it was, what it is about), of all states, times the load factors that they were under."""
+        """law(the actuator as it was, what it is about, the load factor that it was under), of all states."""
         factors = self._result._load_factors
         if np.ndim(factors) == 0:
-            return float(factors) * law(self._at(0), states)
-        return stacked([float(factor) * law(self._at(k), states[k]) for k, factor in enumerate(factors)])
+            return law(self._at(0), states, float(factors))
+        return stacked([law(self._at(k), states[k], float(factor)) for k, factor in enumerate(factors)])
 
     def _at(self, k: int):
         """The actuator as it was in a state."""
@@ -43,9 +43,11 @@ class CavityResult(ActuatorResult):
 
     @property
     def pressure(self):
-        """(...) Pa, over that outside, as it acts: times the load factor."""
+        """(...) Pa, over that outside, as it acts under the load factor."""
         rest = float(self._surface.volume(self._result.scene.mesh.rest_positions))
-        return self._by_law(lambda cavity, volume: cavity.pressure_at(volume, rest), self.volume)
+        return self._by_law(
+            lambda cavity, volume, factor: cavity.pressure_at(volume, rest, factor), self.volume
+        )
 
     @property
     def _surface(self):
@@ -69,8 +71,8 @@ class CellsResult(ActuatorResult):
 
     @property
     def pressures(self):
-        """(..., k) Pa: K (a - J), times the load factor."""
-        return self._by_law(lambda cells, ratios: cells.pressure_at(ratios), self.volume_ratios)
+        """(..., k) Pa: K (a - J), a as the load factor has it."""
+        return self._by_law(lambda cells, ratios, factor: cells.pressure_at(ratios, factor), self.volume_ratios)
 
 
 class TendonResult(ActuatorResult):
@@ -104,7 +106,7 @@ class TendonResult(ActuatorResult):
     def tension(self):
         """(...) N; of a tendon that does not slide, one a segment, (..., segments). Times the load factor."""
         return self._by_law(
-            lambda tendon, length: tendon.tension_at(length),
+            lambda tendon, length, factor: factor * tendon.tension_at(length),
             self.length if self.actuator.sliding else self.lengths,
         )
 

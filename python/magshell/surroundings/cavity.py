@@ -37,8 +37,7 @@ class Cavity(Actuator):
         outside_pressure: Pa, that of the surroundings, by default one atmosphere.
     volume: m3, of a liquid. Its pressure is what that takes: that of a bulk modulus (Pa, by default water's) and no
         multiplier, so it takes bulk_modulus / pressure digits of what a double has; solves treat it as a constraint.
-        A volume far from that at rest is reached bit by bit, by ms.WarmStart: the load steps of one solve scale what the
-        liquid does, not how much of it there is.
+        A load factor says how much of what is missing at rest is filled in: load steps fill a volume far from that.
 
     cap_rims: close what is open by lids without stiffness, fans of triangles from one vertex of each rim, flat where the rim
         is. The pressure on them pulls at the rim.
@@ -133,13 +132,14 @@ class Cavity(Actuator):
         """m3, in a scene that has it."""
         return float(self.surface(scene._bodies).volume(scene.mesh.rest_positions))
 
-    def pressure_at(self, volume, rest_volume: float):
+    def pressure_at(self, volume, rest_volume: float, load_factor: float):
         """Pa, over that outside, at a volume (m3)."""
         if self.law == "pressure":
-            return self.pressure + 0.0 * volume
+            return load_factor * self.pressure + 0.0 * volume
         if self.law == "gas":
-            return self.filling_pressure * rest_volume / volume - self.outside_pressure
-        return -self.bulk_modulus * (volume - self.volume) / rest_volume
+            return load_factor * (self.filling_pressure * rest_volume / volume - self.outside_pressure)
+        target = rest_volume + load_factor * (self.volume - rest_volume)
+        return -self.bulk_modulus * (volume - target) / rest_volume
 
     def _core_input(self, label: str, bodies: Bodies) -> dict:
         return {

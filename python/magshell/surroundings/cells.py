@@ -26,8 +26,8 @@ class Cells(Actuator):
     groups: what each tetrahedron belongs to, (n_t,) integers from 0 up, -1 for none; or a list of arrays of tetrahedra,
         one a cell. By default each tetrahedron is a cell. Of a group only the volume of all of it counts.
     stiffness: K, Pa, of all cells, or one a cell, (k,).
-    volume_ratio: a, 1 by default; of all cells, or one a cell, (k,). Both may change in time, (steps + 1, k), and have
-        gradients.
+    volume_ratio: a, 1 by default; of all cells, or one a cell, (k,). A load factor takes it from 1 to there. Both may
+        change in time, (steps + 1, k), and have gradients.
 
     What a result says: `result[cells].volume_ratios` (..., k) and `.pressures` (..., k) Pa, K (a - J).
 
@@ -68,11 +68,12 @@ class Cells(Actuator):
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cells(self.body, self._groups, **now))
 
-    def pressure_at(self, ratios):
+    def pressure_at(self, ratios, load_factor: float):
         """(k,) Pa, at volume ratios (k,)."""
+        target = 1.0 + load_factor * (self.volume_ratio - 1.0)
         if isinstance(ratios, np.ndarray):
-            return self.stiffness * (self.volume_ratio - ratios)
-        return ratios.new_tensor(self.stiffness) * (ratios.new_tensor(self.volume_ratio) - ratios)
+            return self.stiffness * (target - ratios)
+        return ratios.new_tensor(self.stiffness) * (ratios.new_tensor(target) - ratios)
 
     def _core_input(self, label: str, bodies: Bodies) -> dict:
         of_scene = bodies.original[bodies.of(self).vertices]
