@@ -1,7 +1,7 @@
 """Faces and edges of a mesh with the shapes of its elements.
 
-A side of ten-node tetrahedra, and a six-node triangle, is shown as four flat triangles, but what acts on one of them is shared
-out over all six nodes.
+A side of ten-node tetrahedra, and a six-node triangle, is shown as four flat triangles, but what acts on one of them is
+shared out over all six nodes.
 """
 
 from __future__ import annotations
