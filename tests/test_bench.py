@@ -62,14 +62,14 @@ def test_quick_run_of_some_cases(tmp_path, capsys) -> None:
     assert written["part"] == "accuracy" and written["setting"]["threads"] == 1
     assert {"processor", "python", "numpy", "magshell"} <= written["setting"].keys()
     cases = written["results"]["cases"]
-    assert list(cases) == ["A1", "C4"] and cases["A1"].keys() == {"midedge", "hinge"}
+    assert list(cases) == ["A1", "C4"] and cases["A1"].keys() == {"midedge", "midedge2", "hinge"}
     deflection = cases["A1"]["midedge"]["comparisons"][0]
     assert len(deflection["computed"]) == 20 and deflection["error"] < 0.01
     assert cases["A1"]["midedge"]["factorizations"] > cases["A1"]["midedge"]["solves"]
     points = written["results"]["error against time"]
     assert {point["case"] for point in points} == {"A1", "C4"}
     assert {(point["bending"], point["solver"], point["irregular"]) for point in points} == set(
-        product(("midedge", "hinge"), ("mixed", "plain"), (False, True))
+        product(("midedge", "midedge2", "hinge"), ("mixed", "plain"), (False, True))
     )
     assert all(0 < point["error"] < 0.2 and point["time"] > 0 and point["faces"] > 0 for point in points)
 

@@ -2,44 +2,15 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 import magshell as ms
-from magshell.bench.cases import cylinder_roof, hemisphere, magnetic_strip, plates, shear_strip
+from magshell.bench.cases import cylinder_roof, hemisphere, magnetic_strip, plates
 from magshell.bench.cases.buckling_loads import columns
 from magshell.bench.cases.linear_cylinders import pinched_cylinder, scordelis_lo
 from magshell.bench.cases.rolled_strip import end_moment
+from magshell.bench.convergence import REQUIRED_ORDER, STUDIES, converge
 
-EXACT = ms.MixedNewton(tolerance=1e-13)
 IRREGULAR = 0.25
-SEEDS = (0, 1, 2)
-
-
-def elastica(length, EA, EI, force):
-    """(x, z) of the end of a strip that stretches: bending EI/2 (s theta')^2 and membrane EA/8 (s^2 - 1)^2 a rest length, s
-    its stretch, under a dead end force along z. Both momenta are continuous: m = EI s^2 theta' and, as nothing depends on
-    ds/dS, m^2 / (EI s^3) + EA (s^3 - s) / 2 = P sin(theta)."""
-
-    def stretch(angle, m):
-        s = 1.0
-        for _ in range(20):
-            value = m * m / (EI * s**3) + EA * (s**3 - s) / 2 - force * np.sin(angle)
-            s -= value / (EA * (3 * s**2 - 1) / 2 - 3 * m * m / (EI * s**4))
-        return s
-
-    def rates(_, y):
-        angle, m = y[:2]
-        s = stretch(angle, m)
-        return [m / (EI * s**2), -force * s * np.cos(angle), s * np.cos(angle), s * np.sin(angle)]
-
-    def end(m):
-        start = [0.0, m, 0.0, 0.0]
-        return solve_ivp(rates, (0, length), start, rtol=1e-12, atol=1e-14, method="DOP853").y[:, -1]
-
-    largest = np.sqrt(2 * force * EI)
-    m = brentq(lambda m: end(m)[1], 0.5 * largest, 0.999999 * largest, xtol=1e-15 * largest)
-    return end(m)[2:]
 
 
 def last(outcome):
@@ -50,55 +21,12 @@ def order(cells, errors) -> float:
     return float(-np.polyfit(np.log(cells), np.log(errors), 1)[0])
 
 
-STRIPS = ((10, 1), (20, 2), (40, 4))
-
-
-def test_order_of_the_sheared_strip():
-    """A1 on irregular meshes."""
-    x, z = elastica(10.0, 1.2e5, 100.0, 4.0)
-    errors = [
-        np.mean(
-            [
-                np.linalg.norm(
-                    last(
-                        shear_strip.end_shear(
-                            cells, "midedge2", irregular=IRREGULAR, seed=seed, loads=(1.0,), solver=EXACT
-                        )
-                    )
-                    - (z, 10.0 - x)
-                )
-                for seed in SEEDS
-            ]
-        )
-        for cells in STRIPS
-    ]
-    assert order([cells[0] for cells in STRIPS], errors) >= 3.7
-    assert errors[-1] < 1e-7 * 10.0
-
-
-def test_order_of_the_magnetic_strip():
-    """C1-90 at beta = 20 on irregular meshes: for a field across it a magnetized strip is one under a dead end force."""
-    length, thickness = magnetic_strip.LENGTH, magnetic_strip.THICKNESS
-    EI = magnetic_strip.YOUNG_MODULUS * thickness**3 / 12
-    x, y = elastica(length, magnetic_strip.YOUNG_MODULUS * thickness, EI, 20.0 * EI / length**2)
-    errors = [
-        np.mean(
-            [
-                np.linalg.norm(
-                    last(
-                        magnetic_strip.field_across(
-                            cells, "midedge2", irregular=IRREGULAR, seed=seed, betas=(20.0,), solver=EXACT
-                        )
-                    )
-                    - np.array((x, y)) / length
-                )
-                for seed in SEEDS
-            ]
-        )
-        for cells in STRIPS
-    ]
-    assert order([cells[0] for cells in STRIPS], errors) >= 3.7
-    assert errors[-1] < 1e-6
+@pytest.mark.parametrize("study", STUDIES)
+def test_order_of_convergence_of_strips(study):
+    """A1 at full load and C1-90 at beta = 20, three irregular meshes of each fineness, against an elastica that stretches."""
+    found = converge(study, "midedge2")
+    assert found.order >= REQUIRED_ORDER["midedge2"]
+    assert found.mean_errors[-1] < 1e-6
 
 
 @pytest.fixture(scope="module")

@@ -75,14 +75,16 @@ def _outcome(case: Case, bending: str, quick: bool) -> Outcome | str:
 def _print_cases(cases: list[Case], outcomes: dict) -> None:
     rows, compared, within = [], 0, 0
     for case in cases:
-        midedge, hinge = (outcomes[case.name][bending] for bending in BENDINGS)
+        midedge, *others = (outcomes[case.name][bending] for bending in BENDINGS)
         if isinstance(midedge, str):
-            rows.append([case.name, case.title, "", "failed", "", "", "", *_cost(midedge), *_cost(hinge)])
+            costs = [each for run in (midedge, *others) for each in _cost(run)]
+            rows.append([case.name, case.title, "", "failed", *[""] * len(others), "", "", *costs])
             compared += 1
             continue
         for k, comparison in enumerate(midedge.comparisons):
-            other = None if isinstance(hinge, str) else hinge.comparisons[k]
+            errors = ["failed" if isinstance(run, str) else _percent(run.comparisons[k].error) for run in others]
             first = k == 0
+            costs = [each for run in (midedge, *others) for each in (_cost(run) if first else ("", ""))]
             rows.append(
                 [
                     case.name if first else "",
@@ -90,17 +92,16 @@ def _print_cases(cases: list[Case], outcomes: dict) -> None:
                     midedge.mesh if first else "",
                     f"{comparison.reference[comparison.worst]:.6g}",
                     _percent(comparison.error) + _noted(case, comparison),
-                    "failed" if other is None else _percent(other.error),
+                    *errors,
                     _percent(comparison.allowed),
-                    *(_cost(midedge) if first else ("", "")),
-                    *(_cost(hinge) if first else ("", "")),
+                    *costs,
                 ]
             )
             if comparison.allowed is not None:  # the others are there for information
                 compared += 1
                 within += comparison.passes
-    headings = ["case", "quantity", "mesh", "reference", "midedge", "hinge", "allowed"]
-    headings += ["time", "factorizations", "time (hinge)", "factorizations (hinge)"]
+    headings = ["case", "quantity", "mesh", "reference", *BENDINGS, "allowed"]
+    headings += [f"{what} ({bending})" for bending in BENDINGS for what in ("time", "factorizations")]
     print_table(
         "Errors, the largest of each row; time and factorizations of all solves of a case", headings, rows
     )
@@ -145,7 +146,7 @@ def _single_solves() -> dict:
 def _print_orders(studies: dict[tuple[str, str], Convergence]) -> list[dict]:
     rows, plain = [], []
     for (name, bending), study in studies.items():
-        required = REQUIRED_ORDER if bending == "midedge" else None
+        required = REQUIRED_ORDER.get(bending)
         missed = ""
         if required is not None:
             missed = note("error", f"{name}: order of convergence", study.order, at_least=required)

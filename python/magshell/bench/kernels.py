@@ -12,6 +12,7 @@ import numpy as np
 import magshell as ms
 from magshell.scene.values import Values
 
+from .cases.outcome import order_of
 from .contact_kernels import contacts
 from .ratios import note
 from .report import add_rounds, chosen, print_table
@@ -38,6 +39,8 @@ SHEETS = (
     Sheet("midedge, magnetic in its plane", magnetization=(1e3, 2e2, 0.0)),
     Sheet("midedge, gravity", gravity=True),
     Sheet("midedge"),
+    Sheet("midedge2, magnetic", "midedge2", magnetization=(1e3, 2e2, 1e2)),
+    Sheet("midedge2", "midedge2"),
     Sheet("hinge, magnetic", "hinge", magnetization=(1e3, 2e2, 1e2)),
     Sheet("hinge", "hinge"),
 )
@@ -120,7 +123,8 @@ def two_threads(sheet: Sheet, faces: int, rounds: int) -> float:
 def _near_rest(sheet: Sheet, faces: int):
     """The core's model, a state, controls, how many faces there are, and how long the scene took to build, s."""
     cells = max(1, round((faces / 2) ** 0.5))
-    mesh = ms.meshes.rectangle(1.0, 1.0, cells=(cells, cells), irregular=0.2)
+    order = order_of(sheet.bending)
+    mesh = ms.meshes.rectangle(1.0, 1.0, cells=(cells, cells), irregular=0.2, order=order)
     shell = ms.Shell(
         mesh,
         thickness=1e-2,
@@ -139,7 +143,7 @@ def _near_rest(sheet: Sheet, faces: int):
     build = time.perf_counter() - began
     model = scene._model
     if sheet.magnetization is not None:
-        magnetization = np.tile(sheet.magnetization, (mesh.n_faces, 1))
+        magnetization = np.tile(sheet.magnetization, (mesh.n_elements, 1))
         model.set_values(Values(scene, magnetization=magnetization).numbers)
     state = model.rest_state()
     state += 1e-3 / cells * np.random.default_rng(0).standard_normal(state.size)
@@ -147,7 +151,7 @@ def _near_rest(sheet: Sheet, faces: int):
         {("scene", "applied_flux_density"): (0.0, 0.01, 0.02), ("scene", "gravity_factor"): 1.0},
         scene._control_layout.zeros(),
     )
-    return model, state, controls, mesh.n_faces, build
+    return model, state, controls, mesh.n_elements, build
 
 
 def _rows(name: str, costs: list[Cost]) -> list[list[str]]:

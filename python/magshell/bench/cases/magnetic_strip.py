@@ -9,6 +9,7 @@ import numpy as np
 import magshell as ms
 
 from . import shear_strip
+from .elastica import end_of_strip
 from .outcome import Comparison, Outcome, mesh_name, order_of, outcome, sweep, tip
 
 LENGTH, WIDTH, YOUNG_MODULUS, MAGNETIZATION = 0.1, 0.01, 1e6, 1e5
@@ -51,6 +52,13 @@ def scene(mesh: ms.TriangleMesh, bending: str) -> ms.Scene:
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=0.0, bending=bending
     )
     return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+
+
+def stretched_end(beta: float) -> np.ndarray:
+    """(x, y) / L of the end in a field across, of a strip that stretches: as under a dead force M B A there."""
+    stiffness = YOUNG_MODULUS * WIDTH * THICKNESS
+    bending = stiffness * THICKNESS**2 / 12.0
+    return end_of_strip(LENGTH, stiffness, bending, beta * bending / LENGTH**2) / LENGTH
 
 
 def _strip(cells, bending: str, irregular: float | None, seed: int) -> ms.TriangleMesh | ms.SixNodeMesh:

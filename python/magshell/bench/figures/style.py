@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 BLUE, SKY, VERMILION, ORANGE, GREEN, PURPLE = "#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73", "#AA4499"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE)
 INK, FAINT, SHADE = "#333333", "#8A8A8A", "#EDEDED"
-BENDING_COLOURS = {"midedge": BLUE, "hinge": VERMILION}
+BENDING_COLOURS = {"midedge": BLUE, "midedge2": GREEN, "hinge": VERMILION}
 
 
 def new_figure(width: float, height: float) -> Figure:
