@@ -23,7 +23,7 @@ def order(cells, errors) -> float:
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_order_of_convergence_of_strips(study):
-    """A1 at full load and C1-90 at beta = 20, three irregular meshes of each fineness, against an elastica that stretches."""
+    """A1 at full load and C1-90 at beta = 20, three irregular meshes of each fineness; the elastica stretches."""
     found = converge(study, "midedge2")
     assert found.order >= REQUIRED_ORDER["midedge2"]
     assert found.mean_errors[-1] < 1e-6

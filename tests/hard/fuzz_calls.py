@@ -62,12 +62,6 @@ def calls(s: Sample) -> Iterator[Call]:
 def _meshes(s: Sample) -> Iterator[Call]:
     mesh, cells = s.mesh, (3, 2)
     grid = {"cells": cells, "diagonals": "alternating", "irregular": 0.1, "seed": 0}
-    six = ms.SixNodeMesh.of(mesh)
-    yield Call(
-        "SixNodeMesh", ms.SixNodeMesh, {"rest_positions": six.rest_positions, "elements": six.elements}
-    )
-    yield Call("SixNodeMesh.of", ms.SixNodeMesh.of, {"mesh": mesh, "place": lambda points: points})
-    yield Call("SixNodeMesh.transformed", six.transformed, {"rotation": np.eye(3), "translation": (1, 0, 0)})
     yield Call("TriangleMesh", ms.TriangleMesh, {"rest_positions": mesh.rest_positions, "faces": mesh.faces})
     yield Call("meshes.rectangle", ms.meshes.rectangle, {"length": 1.0, "width": 0.5, **grid})
     yield Call(

@@ -23,6 +23,13 @@ def solid_calls(s: Sample) -> Iterator[Call]:
     parts = np.arange(block.n_tetrahedra) % 2
     given = {"rest_positions": block.rest_positions, "tetrahedra": block.tetrahedra, "parts": parts}
     given["part_names"] = {"odd": 1}
+    flat = ms.meshes.rectangle(0.1, 0.05, cells=(3, 2))
+    six = ms.SixNodeMesh.of(flat)
+    yield Call(
+        "SixNodeMesh", ms.SixNodeMesh, {"rest_positions": six.rest_positions, "elements": six.elements}
+    )
+    yield Call("SixNodeMesh.of", ms.SixNodeMesh.of, {"mesh": flat, "place": lambda points: points})
+    yield Call("SixNodeMesh.transformed", six.transformed, {"rotation": np.eye(3), "translation": (1, 0, 0)})
     yield Call("TetMesh", ms.TetMesh, given)
     ten = block.second_order()
     yield Call(

@@ -75,6 +75,7 @@ class TriangleMesh(MeshBase):
 
     @property
     def n_elements(self) -> int:
+        """How many faces there are."""
         return self.n_faces
 
     @cached_property

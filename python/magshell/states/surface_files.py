@@ -11,6 +11,7 @@ from .._machine.files import replace_file
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from ..mesh.obj import write_obj
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.stl import write_stl
 from ..mesh.tet_mesh import TetMesh
 from ..mesh.thickened import thickened
@@ -75,7 +76,8 @@ def _surface(state: State, thickness: np.ndarray | None) -> tuple[np.ndarray, np
             used = mesh.surface_vertices
             parts.append((there[used], np.searchsorted(used, mesh.faces)))
         else:
-            parts.append((there, mesh.faces) if thickness is None else thickened(mesh, there, thickness[own]))
+            flat = mesh.surface if isinstance(mesh, SixNodeMesh) else mesh
+            parts.append((there, mesh.faces) if thickness is None else thickened(flat, there, thickness[own]))
     first = np.cumsum([0, *(len(points) for points, _ in parts)])
     numbered = [faces + before for (_, faces), before in zip(parts, first, strict=False)]
     return np.concatenate([points for points, _ in parts]), np.concatenate(numbered)
@@ -95,7 +97,7 @@ def _thickness(what, state: State, given, index: int) -> np.ndarray | None:
         return np.broadcast_to(values, (n_f,))
     if given != "own":
         raise ValueError(f'thickness must be None, "own", or m, got {given!r}')
-    if isinstance(what, TriangleMesh | TetMesh):
+    if isinstance(what, TriangleMesh | SixNodeMesh | TetMesh):
         raise ValueError('thickness="own" is that of a Shell, and a mesh has none: give a number, m')
     if isinstance(what, Shell | Solid):
         bodies = [what]
@@ -105,5 +107,5 @@ def _thickness(what, state: State, given, index: int) -> np.ndarray | None:
         bodies = what._values_at(index).sheets
     else:
         raise ValueError('thickness="own" needs a result, a Scene or a Shell: give a number, m')
-    rows = [each.thickness if isinstance(each, Shell) else np.zeros(each.mesh.n_faces) for each in bodies]
+    rows = [each.face_thickness if isinstance(each, Shell) else np.zeros(each.mesh.n_faces) for each in bodies]
     return np.concatenate(rows) if rows else np.zeros(0)
