@@ -115,8 +115,7 @@ def test_a_movie_frames_the_sheet_as_well():
     states = states_of(MESH, obstacles=floor)
     view, unit = view_of(states, (30, -85)), LengthUnit("mm", 1e-3)
     bare, floored = (
-        Scenery([replace(states[0], obstacles=each)], None, view, LengthUnit("mm", 1e-3), Options())
-        for each in ((), (floor,))
+        Scenery([replace(states[0], obstacles=each)], None, view, unit, Options()) for each in ((), (floor,))
     )
     wide = [np.ptp(view.project(each._hold)[:, 0]) for each in (bare, floored)]
     assert wide[0] < wide[1] < 1.6 * wide[0]

@@ -75,6 +75,7 @@ class TriangleMesh(MeshBase):
 
     @property
     def n_elements(self) -> int:
+        """The faces, as those are its elements."""
         return self.n_faces
 
     @cached_property
