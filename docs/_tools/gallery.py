@@ -46,7 +46,8 @@ def make(app) -> None:
     )
     for name in names:
         picture = MADE / f"{name}.png"
-        if name in SMALL and not _is_new(picture, name):
+        wanted = os.environ.get("MAGSHELL_GALLERY") != "none"
+        if wanted and name in SMALL and not _is_new(picture, name):
             _draw(name, picture)
         _write(MADE / f"{name}.md", _page(name, picture))
     _write(MADE / "index.md", _index(names))
