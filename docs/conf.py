@@ -17,7 +17,7 @@ version = release = magshell.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_heading_anchors = 3
-exclude_patterns = ["_build", "_tools", "_gallery/*.txt"]
+exclude_patterns = ["_build", "_tools", "ruff.toml", "_gallery/*.txt"]
 suppress_warnings = ["myst.header"]
 
 html_theme = "furo"

@@ -9,8 +9,12 @@ pytest.importorskip("matplotlib")
 
 import magshell as ms
 from magshell import obstacles as ob
+from magshell.plotting.frames import Scenery
+from magshell.plotting.panels import Options
 from magshell.plotting.surroundings import REACH, obstacle_solids
+from magshell.plotting.view import view_of
 from magshell.states.state import states_of
+from magshell.states.units import LengthUnit
 
 MESH = ms.meshes.rectangle(0.1, 0.04, cells=(10, 4))
 
@@ -93,3 +97,39 @@ def test_a_movie_moves_them(tmp_path):
 def test_things_that_are_no_obstacles_are_named():
     with pytest.raises(ValueError, match=r"obstacles must be obstacles of ms\.obstacles, got a TriangleMesh"):
         ms.plot(MESH, obstacles=[MESH], backend="matplotlib")
+
+
+def test_a_floor_does_not_shrink_the_sheet():
+    """Issue: on a floor of half a metre a robot of 2 cm was a speck."""
+    values = np.linspace(0, 1, MESH.n_faces)
+    floor = ob.Box((5.0, 5.0, 0.02), center=(0, 0, -0.03))
+    bare, floored = (
+        image(color=values, view=(30, -85), obstacles=each) for each in ((), floor)
+    )  # as wide in pixels
+    counted = [(np.ptp(each[: each.shape[0] // 2], axis=2) > 0.3).sum() for each in (bare, floored)]
+    assert counted[1] > 0.4 * counted[0] > 100
+
+
+def test_a_movie_frames_the_sheet_as_well():
+    floor = ob.Box((5.0, 5.0, 0.02), center=(0, 0, -0.03))
+    states = states_of(MESH, obstacles=floor)
+    view, unit = view_of(states, (30, -85)), LengthUnit("mm", 1e-3)
+    bare, floored = (
+        Scenery([replace(states[0], obstacles=each)], None, view, unit, Options()) for each in ((), (floor,))
+    )
+    wide = [np.ptp(view.project(each._hold)[:, 0]) for each in (bare, floored)]
+    assert wide[0] < wide[1] < 1.6 * wide[0]
+
+
+@pytest.mark.parametrize("width", [400, 600, 1600])
+def test_what_the_legend_says_stays_clear_of_the_colour_bar(width):
+    turning = np.linspace(0, 2 * np.pi, MESH.n_faces)
+    magnetization = 4e4 * np.stack([np.cos(turning), 0 * turning, np.sin(turning)], axis=1)
+    picture = ms.plot(MESH, remanent_magnetization=magnetization, width=width, backend="matplotlib")
+    picture.figure.canvas.draw()
+    strip = picture.figure.axes[-1]
+    bar = strip.images[0].get_window_extent()
+    boxes = {text.get_text(): text.get_window_extent() for text in strip.texts if text.get_text()}
+    key = next(box for text, box in boxes.items() if "up to" in text)
+    assert key.x1 <= bar.x0
+    assert all(0 <= box.x0 and box.x1 <= width for box in boxes.values())

@@ -19,5 +19,15 @@ def test_quick_start(tmp_path, monkeypatch) -> None:
     )
     assert names["rest"].positions[:, 2].max() == pytest.approx(risen, abs=5e-5)
     assert names["best"].objective ** 0.5 == pytest.approx(distance, abs=0.05)  # mm
-    assert names["move"].steps_done == 200
     assert (tmp_path / "strip.png").stat().st_size > 10_000
+
+
+def test_links_lead_somewhere() -> None:
+    targets = re.findall(r"\]\(([^)#]+)\)", README.read_text())
+    missing = [target for target in targets if "://" not in target and not (README.parent / target).exists()]
+    assert len(targets) > 15 and missing == []
+
+
+def test_two_screens() -> None:
+    """What is longer belongs into the manual."""
+    assert len(README.read_text().splitlines()) < 170

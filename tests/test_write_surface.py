@@ -47,6 +47,16 @@ def test_a_flat_sheet_is_a_box_to_round_off(tmp_path):
     assert set(np.round(box.rest_positions[:, 2], 12)) == {-1.0, 1.0}
 
 
+def test_a_second_order_sheet_is_closed_too(tmp_path):
+    curved = ms.meshes.disk(0.01, cells=4, order=2)
+    elements = curved.n_elements
+    sheet = ms.Shell(curved, thickness=np.linspace(0.5e-3, 1e-3, elements), young_modulus=1e6)
+    ms.write_surface(tmp_path / "disk.stl", sheet, thickness="own")
+    solid = ms.read_mesh(tmp_path / "disk.stl")
+    areas = area(curved.rest_positions, curved.faces).reshape(elements, 4).sum(axis=1)
+    assert closed(solid) and volume(solid) == pytest.approx((areas * sheet.thickness).sum(), rel=5e-3)
+
+
 def test_the_thickness_of_the_solve_is_that_of_the_file(tmp_path):
     scene = bent().scene
     rest = ms.equilibrium(scene, **FIELD, thickness=2e-3)

@@ -2,7 +2,9 @@
 
 import re
 
-_FIELD = re.compile(r"^((?:\*{0,2}[A-Za-z_][\w.]*(?:\([^)]*\))?)(?:, \*{0,2}[A-Za-z_][\w.]*)*): (.*)$")
+_FIELD = re.compile(
+    r"^((?:\*{0,2}[A-Za-z_][\w.]*(?:\([^)]*\))?)(?:, \*{0,2}[A-Za-z_][\w.]*)*): (.*)$"
+)
 _SECTION = re.compile(r"^(Args|Raises|Returns):$")
 # Of classes, for those who extend them; a user calls none of these.
 _INNER = {
@@ -64,7 +66,10 @@ def _converted(block: list[str]) -> list[str]:
         ):
             found.append(f"  {_escaped(text)}")
         else:
-            found += [*([""] if found and found[-1].startswith(("- ", "  ")) else []), _escaped(text)]
+            found += [
+                *([""] if found and found[-1].startswith(("- ", "  ")) else []),
+                _escaped(text),
+            ]
     return found
 
 
@@ -73,7 +78,10 @@ def _escaped(text: str) -> str:
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return _plain(text)
-    return "".join(f"``{part}``" if k % 2 and part else _plain(part) for k, part in enumerate(parts))
+    return "".join(
+        f"``{part}``" if k % 2 and part else _plain(part)
+        for k, part in enumerate(parts)
+    )
 
 
 def _plain(text: str) -> str:

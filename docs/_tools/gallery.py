@@ -41,23 +41,39 @@ drawn.save({picture!r}, **({{}} if not hasattr(drawn.figure, "savefig") else {{"
 def make(app) -> None:
     """Writes docs/_gallery/*.md with the pictures that are there."""
     MADE.mkdir(exist_ok=True)
-    names = sorted(path.stem for path in EXAMPLES.glob("*.py") if not path.stem.startswith("_"))
+    names = sorted(
+        path.stem for path in EXAMPLES.glob("*.py") if not path.stem.startswith("_")
+    )
     for name in names:
         picture = MADE / f"{name}.png"
-        if name in SMALL and not _is_new(picture, name):
+        wanted = os.environ.get("MAGSHELL_GALLERY") != "none"
+        if wanted and name in SMALL and not _is_new(picture, name):
             _draw(name, picture)
         _write(MADE / f"{name}.md", _page(name, picture))
     _write(MADE / "index.md", _index(names))
 
 
 def _draw(name: str, picture: Path) -> None:
-    script = _SCRIPT.format(examples=str(EXAMPLES), name=name, arguments=SMALL[name], picture=str(picture))
-    paths = [str(Path(sys.modules["magshell"].__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
-    environment = {**os.environ, "MPLBACKEND": "Agg", "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    script = _SCRIPT.format(
+        examples=str(EXAMPLES), name=name, arguments=SMALL[name], picture=str(picture)
+    )
+    paths = [
+        str(Path(sys.modules["magshell"].__file__).parents[1]),
+        os.environ.get("PYTHONPATH", ""),
+    ]
+    environment = {
+        **os.environ,
+        "MPLBACKEND": "Agg",
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+    }
     run = [sys.executable, "-c", script]
-    found = subprocess.run(run, cwd=MADE, env=environment, capture_output=True, text=True, timeout=240)
+    found = subprocess.run(
+        run, cwd=MADE, env=environment, capture_output=True, text=True, timeout=240
+    )
     if found.returncode:
-        raise RuntimeError(f"the example {name} failed for the gallery:\n{found.stderr[-3000:]}")
+        raise RuntimeError(
+            f"the example {name} failed for the gallery:\n{found.stderr[-3000:]}"
+        )
     picture.with_suffix(".txt").write_text(_digest(name))
 
 
@@ -95,7 +111,11 @@ def _words(name: str) -> list[str]:
 
 
 def _image(name: str, picture: Path) -> str:
-    return f"```{{image}} {name}.png\n:alt: {_title(name)}\n:width: 100%\n```\n\n" if picture.exists() else ""
+    return (
+        f"```{{image}} {name}.png\n:alt: {_title(name)}\n:width: 100%\n```\n\n"
+        if picture.exists()
+        else ""
+    )
 
 
 def _page(name: str, picture: Path) -> str:
@@ -106,13 +126,16 @@ def _page(name: str, picture: Path) -> str:
         else ""
     )
     code = f"## The code\n\n```{{literalinclude}} ../../examples/{name}.py\n:language: python\n```\n"
-    return (
-        f"# {_title(name)}\n\n{_image(name, picture)}{small}{_markdown(first)}\n\n{_markdown(rest)}\n\n{code}"
-    )
+    return f"# {_title(name)}\n\n{_image(name, picture)}{small}{_markdown(first)}\n\n{_markdown(rest)}\n\n{code}"
 
 
 def _markdown(text: str) -> str:
-    return text.replace("*", "\\*").replace("[", "\\[").replace("<", "\\<").replace("$", "\\$")
+    return (
+        text.replace("*", "\\*")
+        .replace("[", "\\[")
+        .replace("<", "\\<")
+        .replace("$", "\\$")
+    )
 
 
 def _index(names: list[str]) -> str:
@@ -122,7 +145,9 @@ def _index(names: list[str]) -> str:
         for name in drawn
     ]
     others = [
-        f"- [{_title(name)}]({name}.md): {_markdown(_words(name)[0])}" for name in names if name not in drawn
+        f"- [{_title(name)}]({name}.md): {_markdown(_words(name)[0])}"
+        for name in names
+        if name not in drawn
     ]
     listed = "\n".join(names)
     return (

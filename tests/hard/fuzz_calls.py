@@ -392,6 +392,3 @@ def _files(s: Sample) -> Iterator[Call]:
         },
         cost=60,
     )
-    s.state.save(s.folder / "saved.npz")
-    yield Call("MotionState.load", ms.MotionState.load, {"path": s.folder / "saved.npz"})
-    yield Call("MotionState.save", s.state.save, {"path": s.folder / "state.npz"})

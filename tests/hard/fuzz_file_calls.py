@@ -21,3 +21,6 @@ def file_calls(s: Sample) -> Iterator[Call]:
     table.write_text("\n".join(f"{x} {y} {z} 0 0 {x}" for x in range(3) for y in range(3) for z in range(2)))
     units = {"length_unit": "mm", "flux_density_unit": "mT", "columns": (0, 1, 2, 3, 4, 5)}
     yield Call("SampledField.from_table", ms.SampledField.from_table, {"path": table, **units})
+    s.state.save(s.folder / "saved.npz")
+    yield Call("MotionState.load", ms.MotionState.load, {"path": s.folder / "saved.npz"})
+    yield Call("MotionState.save", s.state.save, {"path": s.folder / "state.npz"})

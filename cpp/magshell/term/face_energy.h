@@ -1,5 +1,5 @@
 // Energies of single faces that need no more than their corners and some numbers a face: the kernel is all there
-// is to write. See docs/adding-an-energy.md.
+// is to write. See docs/adding/energy.md.
 #pragma once
 
 #include <memory>

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from .._checks.arrays import count
 from .._checks.quantity import quantity
@@ -77,6 +76,8 @@ def fit_spline(
         )
     if limit is None:
         return torch.tensor(np.linalg.lstsq(weights, values, rcond=None)[0])
+    from scipy.optimize import lsq_linear  # when needed, as loading it takes long
+
     bound = float(positive_number("limit", "T", limit))
     columns = [lsq_linear(weights, column / bound, (-1.0, 1.0), method="bvls").x for column in values.T]
     return torch.tensor(bound * np.stack(columns, axis=1))

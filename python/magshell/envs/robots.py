@@ -137,6 +137,12 @@ def muscle_octopus(
     where it was. An action, 64 numbers, four of the wave along each muscle, lasts 5 ms, an episode 2 s: [Qiao21] Figure
     4b. Observed: way and velocity of the center of mass, where the tips of the legs are from it, and the phase of the
     waves. Rewarded as the fish. cells: along a leg.
+
+    target: (3,) m. render_mode: as in Environment.
+
+    >>> import magshell as ms
+    >>> ms.envs.robots.muscle_octopus(cells=2).action_space.shape
+    (64,)
     """
     swimmer = MuscleOctopus(cells)
     waves = [
@@ -160,6 +166,12 @@ def cell_gripper(target=CellGripper.target, render_mode: str | None = None, **ch
     Figure 4a. Observed: way and velocity of the ball, way of the drone, where the ends of the arms are from the ball.
     Rewarded: what the ball comes nearer, over its way; where a motion fails, the episode ends with -1. changes: of
     CellGripper's own arguments.
+
+    target: (3,) m. render_mode: as in Environment.
+
+    >>> import magshell as ms
+    >>> ms.envs.robots.cell_gripper().action_space.shape
+    (59,)
     """
     gripper = CellGripper(**changes)
     actuators = [

@@ -37,6 +37,7 @@ class Steered(Actuator):
 
     @property
     def size(self) -> int:
+        """How many numbers of an action it takes."""
         return self._numbers
 
     def value(self, action: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:

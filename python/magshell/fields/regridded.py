@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import RBFInterpolator
 from scipy.spatial import Delaunay
 
 _SAME = 1e-6  # of the extent along an axis: as many digits as tables have
@@ -82,6 +81,8 @@ def interpolated(points: np.ndarray, values: np.ndarray, lower, upper, counts) -
 
 
 def _between(points: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    from scipy.interpolate import RBFInterpolator  # when needed, as loading it takes long
+
     return RBFInterpolator(points, values, neighbors=_NEIGHBORS, kernel="cubic")(wanted)
 
 

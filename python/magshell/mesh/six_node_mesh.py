@@ -118,7 +118,7 @@ class SixNodeMesh(MeshBase):
 
     @property
     def n_elements(self) -> int:
-        """How many elements there are."""
+        """How many triangles of six nodes there are."""
         return len(self._elements)
 
     @property

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from scipy.ndimage import label
 
 from .._machine.callers import callers_level
 from ..errors import MeshQualityWarning
@@ -34,6 +33,8 @@ def warn_of_loss(mesh: TetMesh, distance: Distance, low, high, spacing: float, w
         said.append(
             f"it has {volume / there:.0%} of the shape's volume, {volume:.3g} m3 where samples find {there:.3g} m3"
         )
+    from scipy.ndimage import label  # when needed, as loading it takes long
+
     middles = (distance(low + (corners + 0.5) * cell) < 0).reshape(counts)
     _, parts = label(middles, np.ones((3, 3, 3)))
     if mesh.n_components != parts and pitch <= 0.5 * spacing:

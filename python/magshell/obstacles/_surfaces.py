@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from .. import meshes
@@ -52,6 +51,8 @@ def swept_surface(points: np.ndarray, radii: np.ndarray, closed: bool) -> tuple[
     A ball of the curve c and the radius r touches it where the normal n has n . c' = - r'. The radius of an open one
     levels off towards its ends.
     """
+    from scipy.interpolate import CubicSpline  # when needed, as loading it takes long
+
     knots, beyond = np.arange(len(points)), 0 if closed else 3
     curve = CubicSpline(knots, points)
     radius = CubicSpline(np.arange(-beyond, len(points) + beyond), np.pad(radii, beyond, mode="edge"))

@@ -24,7 +24,7 @@ from .panels import (
 from .picture import paint, paint_panel, screen_of
 from .playing import SAMPLES, spread
 from .solids import arrows
-from .surroundings import obstacle_solids, reach
+from .surroundings import box_of, obstacle_solids
 from .view import View
 
 DPI = 140
@@ -76,9 +76,8 @@ class Scenery:
         points += [s.positions for state in spread(states, SAMPLES) for s in self._magnetization(state)]
         points += [states[0].mesh.rest_positions] if self.options.rest else []
         points += [self._points] if len(self._points) else []
-        points += reach(spread(states, SAMPLES), self.size)
-        seen = [self.view.project(each) for each in points]
-        return np.min([x.min(axis=0) for x in seen], axis=0), np.max([x.max(axis=0) for x in seen], axis=0)
+        around = [each.positions for each in obstacle_solids(spread(states, SAMPLES), self.size)]
+        return box_of(*([self.view.project(each) for each in some] for some in (points, around)))
 
     def _prepare_uniform_field(self, states: list[State], low: np.ndarray, high: np.ndarray) -> None:
         """A place for the uniform field's arrow to the left of the box, which then holds it."""

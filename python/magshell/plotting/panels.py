@@ -14,7 +14,7 @@ from . import colors, glyphs
 from .colors import Scalar, rgb
 from .cuts import Cut, Section, cut_edges, opened, section_solid
 from .solids import Solid, arrows, ribbons, sheet
-from .surroundings import obstacle_solids
+from .surroundings import box_of, obstacle_solids
 from .view import View
 
 CREASE = np.cos(np.radians(40.0))  # rest edges that turn by more are drawn as lines
@@ -61,14 +61,13 @@ class Drawing:
 
     @property
     def window(self) -> np.ndarray:
-        """(left, right, bottom, top), m, on the screen: holds every panel."""
+        """(left, right, bottom, top), m, on the screen: holds the bodies of every panel, and of what is around them as much
+        as leaves them large."""
         held = [] if self.hold is None else [self.hold]
-        held += [solid.positions for panel in self.panels for solid in panel.solids]
-        points = [self.view.project(each)[:, :2] for each in held]
-        low, high = (
-            np.min([p.min(axis=0) for p in points], axis=0),
-            np.max([p.max(axis=0) for p in points], axis=0),
-        )
+        solids = [solid for panel in self.panels for solid in panel.solids]
+        held += [solid.positions for solid in solids if not solid.around]
+        around = [] if self.hold is not None else [solid.positions for solid in solids if solid.around]
+        low, high = box_of(*([self.view.project(each)[:, :2] for each in some] for some in (held, around)))
         margin = 0.03 * (high - low).max()
         return np.array([low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin])
 

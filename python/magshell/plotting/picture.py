@@ -22,6 +22,7 @@ LEGEND, TITLE, MARGIN = 0.72, 0.26, 0.08  # inches
 FLATTEST, TALLEST = 0.16, 1.1  # of a panel's height to its width
 TEXT = 8.0  # points
 NARROWEST = 0.8  # inches, of a colour bar
+ENOUGH, NARROW = 6.2, 3.4  # inches that a legend with everything takes, and one without arrows or colours
 _WITHOUT_WINDOWS = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}  # of matplotlib's backends
 
 
@@ -193,17 +194,20 @@ def _best_columns(count: int, window: np.ndarray) -> int:
 
 
 def _legend(axes, drawing: Drawing, inches: float, inches_per_meter: float) -> None:
-    """In inches: the axes' triad, the scale bar, the meaning of the arrows, the colour bar."""
+    """In inches: the axes' triad, the scale bar, the meaning of the arrows, the colour bar. All of it is smaller where the
+    picture is too narrow for them."""
+    full = drawing.arrows and drawing.scalar is not None
+    shrunk = min(1.0, inches / (ENOUGH if full else NARROW))
+    inches, inches_per_meter, text_size = inches / shrunk, inches_per_meter / shrunk, TEXT * shrunk
     axes.set_axis_off()
-    axes.set_xlim(0.0, inches)
-    axes.set_ylim(0.0, LEGEND)
-    _triad(axes, drawing, np.array([0.36, 0.32]))
+    _set_inches(axes, inches, shrunk)
+    _triad(axes, drawing, np.array([0.36, 0.32]), text_size)
     bar = round_below(min(1.2, 0.2 * inches) / inches_per_meter)
     x = 0.85
     end = x + bar * inches_per_meter
     axes.plot([x, end], [0.36, 0.36], color=colors.OUTLINE, linewidth=2.0, solid_capstyle="butt")
     text = f"{round(bar / drawing.unit.meters, 9):g} {drawing.unit.name}"
-    axes.text((x + end) / 2, 0.28, text, ha="center", va="top", fontsize=TEXT, color=colors.OUTLINE)
+    axes.text((x + end) / 2, 0.28, text, ha="center", va="top", fontsize=text_size, color=colors.OUTLINE)
     x = max(end, x + 0.5) + 0.35
     for row, (text, color) in enumerate(drawing.arrows):
         y = 0.36 + (0.11 - 0.22 * row if len(drawing.arrows) > 1 else 0.0)
@@ -213,13 +217,20 @@ def _legend(axes, drawing: Drawing, inches: float, inches_per_meter: float) -> N
             (x, y),
             arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0},
         )
-        written = axes.text(x + 0.38, y, text, ha="left", va="center", fontsize=TEXT, color=colors.OUTLINE)
-        end = max(end, written.get_window_extent().x1 / axes.figure.dpi)
+        written = axes.text(
+            x + 0.38, y, text, ha="left", va="center", fontsize=text_size, color=colors.OUTLINE
+        )
+        end = max(end, written.get_window_extent().x1 / axes.figure.dpi / shrunk)
     if drawing.scalar is not None:
-        _color_bar(axes, drawing.scalar, inches, room=inches - end - 0.6)
+        _color_bar(axes, drawing.scalar, inches, inches - end - 0.45, text_size, shrunk)
 
 
-def _triad(axes, drawing: Drawing, origin: np.ndarray) -> None:
+def _set_inches(axes, inches: float, shrunk: float) -> None:
+    axes.set_xlim(0.0, inches)
+    axes.set_ylim(0.0, LEGEND / shrunk)
+
+
+def _triad(axes, drawing: Drawing, origin: np.ndarray, text_size: float) -> None:
     for name, tip in zip("xyz", 0.24 * drawing.view.axes[:2].T, strict=True):
         if np.linalg.norm(tip) < 0.03:  # it points at the eye
             continue
@@ -237,10 +248,10 @@ def _triad(axes, drawing: Drawing, origin: np.ndarray) -> None:
             },
         )
         place = origin + tip * (1 + 0.07 / np.linalg.norm(tip))
-        axes.text(*place, name, ha="center", va="center", fontsize=TEXT - 1, color=colors.OUTLINE)
+        axes.text(*place, name, ha="center", va="center", fontsize=text_size - 1, color=colors.OUTLINE)
 
 
-def _color_bar(axes, scalar: Scalar, inches: float, room: float) -> None:
+def _color_bar(axes, scalar: Scalar, inches: float, room: float, text_size: float, shrunk: float) -> None:
     """At the right end; room: inches that nothing else has, of which it takes what it needs to be read at least."""
     from matplotlib.ticker import MaxNLocator
 
@@ -249,8 +260,7 @@ def _color_bar(axes, scalar: Scalar, inches: float, room: float) -> None:
     left, right = inches - width - 0.3, inches - 0.3
     shades = scale_colors(scalar.scale, np.linspace(low, high, 256), (low, high))
     axes.imshow(shades[None], extent=(left, right, 0.30, 0.42), aspect="auto", interpolation="bilinear")
-    axes.set_xlim(0.0, inches)
-    axes.set_ylim(0.0, LEGEND)
+    _set_inches(axes, inches, shrunk)
     ticks = [0, 90, 180, 270, 360] if scalar.scale == "cyclic" else MaxNLocator(4).tick_values(low, high)
     for tick in ticks:
         if low - 1e-9 * (high - low) <= tick <= high + 1e-9 * (high - low):
@@ -262,9 +272,17 @@ def _color_bar(axes, scalar: Scalar, inches: float, room: float) -> None:
                 f"{round(tick, 12):g}",
                 ha="center",
                 va="top",
-                fontsize=TEXT - 1,
+                fontsize=text_size - 1,
                 color=colors.OUTLINE,
             )
-    axes.text(
-        (left + right) / 2, 0.47, scalar.label, ha="center", va="bottom", fontsize=TEXT, color=colors.OUTLINE
+    label = axes.text(
+        (left + right) / 2,
+        0.47,
+        scalar.label,
+        ha="center",
+        va="bottom",
+        fontsize=text_size,
+        color=colors.OUTLINE,
     )
+    if label.get_window_extent().x1 / axes.figure.dpi / shrunk > inches - 0.05:  # it is longer than the bar
+        label.set(x=inches - 0.05, ha="right")

@@ -19,6 +19,7 @@ class Solid:
     smooth: shade with the normals averaged at the vertices. lit: shade at all.
     lift: m, towards the eye, which hides less of it and moves nothing in a parallel projection.
     opacity: 0 to 1; less than 1 lets what is behind shine through.
+    around: it is what bodies are in, which the window need not hold all of.
     """
 
     positions: np.ndarray
@@ -29,6 +30,7 @@ class Solid:
     lit: bool = True
     lift: float = 0.0
     opacity: float = 1.0
+    around: bool = False
 
 
 def sheet(positions: np.ndarray, faces: np.ndarray, colors: np.ndarray) -> Solid:

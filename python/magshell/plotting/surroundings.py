@@ -12,6 +12,8 @@ from .solids import Solid, sheet
 
 OPACITY = 0.35
 REACH = 1.6  # the side of the square that stands for a plane, in sizes of the drawing
+LARGE = 2.0  # extents of the bodies, beyond which an obstacle is not shown whole
+ROOM = 0.15  # extents of the bodies: how far around them it is shown then
 
 
 def obstacle_solids(states: list[State], size: float) -> list[Solid]:
@@ -28,10 +30,18 @@ def obstacle_solids(states: list[State], size: float) -> list[Solid]:
                 middle = state.positions.mean(axis=0)
                 vertices, faces = obstacle.surface(time, extent=REACH * size, around=middle)
                 surface = sheet(vertices, faces, colors.rgb(colors.OBSTACLE))
-                shown[key] = replace(surface, opacity=OPACITY)
+                shown[key] = replace(surface, opacity=OPACITY, around=True)
     return list(shown.values())
 
 
-def reach(states: list[State], size: float) -> list[np.ndarray]:
-    """Points (n, 3) m of all the obstacles in the states, for the window."""
-    return [solid.positions for solid in obstacle_solids(states, size)]
+def box_of(bodies: list[np.ndarray], around: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Two corners of the box, on the screen, around points (n, 2 or 3) of bodies, and of each of what is around them: all of
+    it where it is not much larger than they are, else no more than is close to them."""
+    low, high = (end([end(each, axis=0) for each in bodies], axis=0) for end in (np.min, np.max))
+    extent = float((high - low)[:2].max())
+    ends = [low, high]
+    for points in around:
+        if np.ptp(points[:, :2], axis=0).max() > LARGE * extent:
+            points = np.clip(points, low - ROOM * extent, high + ROOM * extent)
+        ends += [points.min(axis=0), points.max(axis=0)]
+    return np.min(ends, axis=0), np.max(ends, axis=0)

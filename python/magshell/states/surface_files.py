@@ -75,9 +75,11 @@ def _surface(state: State, thickness: np.ndarray | None) -> tuple[np.ndarray, np
         if isinstance(mesh, TetMesh):
             used = mesh.surface_vertices
             parts.append((there[used], np.searchsorted(used, mesh.faces)))
+        elif thickness is None:
+            parts.append((there, mesh.faces))
         else:
-            flat = mesh.surface if isinstance(mesh, SixNodeMesh) else mesh
-            parts.append((there, mesh.faces) if thickness is None else thickened(flat, there, thickness[own]))
+            sheet = mesh.surface if isinstance(mesh, SixNodeMesh) else mesh
+            parts.append(thickened(sheet, there, thickness[own]))
     first = np.cumsum([0, *(len(points) for points, _ in parts)])
     numbered = [faces + before for (_, faces), before in zip(parts, first, strict=False)]
     return np.concatenate([points for points, _ in parts]), np.concatenate(numbered)
@@ -107,5 +109,11 @@ def _thickness(what, state: State, given, index: int) -> np.ndarray | None:
         bodies = what._values_at(index).sheets
     else:
         raise ValueError('thickness="own" needs a result, a Scene or a Shell: give a number, m')
-    rows = [each.face_thickness if isinstance(each, Shell) else np.zeros(each.mesh.n_faces) for each in bodies]
-    return np.concatenate(rows) if rows else np.zeros(0)
+    return np.concatenate([np.zeros(0), *map(_of_faces, bodies)])
+
+
+def _of_faces(body: Shell | Solid) -> np.ndarray:
+    """(n_f,) m, of a shell; of a solid's faces nobody asks."""
+    if isinstance(body, Solid):
+        return np.zeros(body.mesh.n_faces)
+    return body.face_thickness

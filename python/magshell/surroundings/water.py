@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from .. import _core
 from .._checks.owner import Owner
@@ -176,6 +175,8 @@ def _table(name: str, table) -> tuple[np.ndarray, ...] | None:
 def _curve(table: tuple[np.ndarray, ...] | None) -> _core.AttackCurve:
     if table is None:
         return _core.AttackCurve()
+    from scipy.interpolate import CubicSpline  # when needed, as loading it takes long
+
     angles, values, *slopes = table
     ends = [(1, slope) for slope in slopes[0]] if slopes else "not-a-knot"
     return _core.AttackCurve(angles, CubicSpline(angles, values, bc_type=ends).c.T)
