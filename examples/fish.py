@@ -78,7 +78,7 @@ def summary(result: dict) -> str:
 def write(result: dict, out: Path) -> None:
     ms.Picture(plot(result)).save(out / "fish.png", dpi=160)
     report.picture(result["motion"], VIEW).save(out / "fish_swims.png")
-    report.movie(result["motion"], out / "fish.gif", VIEW)
+    report.movie(result["motion"], out / "fish.gif", VIEW, speed=1.0, fps=25.0, width=500)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ import magshell as ms
 from magshell.bench.__main__ import main
 from magshell.bench.baselines import methods
 from magshell.bench.baselines.counted import BudgetSpent, Counted
-from magshell.bench.baselines.tasks import StripTask, Task
+from magshell.bench.baselines.tasks import RobotTask, StripTask, Task
+from magshell.bench.experiments import beside_ours
 
 pytest.importorskip("gymnasium")
 torch = pytest.importorskip("torch")
@@ -69,6 +70,72 @@ def test_episodes_and_the_motion_with_a_gradient_are_the_same() -> None:
     assert float(value) == pytest.approx(task.objective(actions), rel=1e-12)
 
 
+class Hop:
+    """A robot of two steps: its way is what its controls say, or it fails."""
+
+    steps, numbers = 2, 3
+    fails = False
+
+    def motion(self, controls):
+        if self.fails:
+            raise ms.NotConverged("too wild")
+        return controls.sum(0)
+
+    @staticmethod
+    def miss(motion):
+        return ((motion - 0.5) ** 2).sum() ** 0.5
+
+    @staticmethod
+    def first_controls(steps):
+        return np.zeros((steps, 3))
+
+
+def test_a_robots_miss_and_its_failures() -> None:
+    task = RobotTask("hop", Hop(), "magnetic_strip")
+    assert task.unknowns == 6 and task.objective(np.full(6, 0.25)) == 0.0
+    assert float(task.differentiable(torch.zeros(6))) == pytest.approx(0.75**0.5)
+    assert task.lost(0.75) == 0.25
+    task._robot.fails = True
+    assert task.objective(np.zeros(6)) == 2.0
+
+
+def test_a_robots_episode_loses_its_miss() -> None:
+    """What a learner sees of an episode is the objective of the same actions."""
+    from magshell.envs.cell_gripper import CellGripper
+    from magshell.envs.robots import cell_gripper
+
+    class Short(CellGripper):
+        steps = 4
+
+    task = RobotTask("gripper", Short(levels=9, ball_cells=2), "cell_gripper")
+    one = cell_gripper(levels=9, ball_cells=2, disturbed=False)
+    one.reset(seed=0)
+    actions = task.middle.reshape(4, -1)
+    rewarded = sum(one.step(action)[1] for action in actions)
+    assert task.lost(rewarded) == pytest.approx(task.objective(task.middle), abs=1e-9)
+
+
+def results(ours, theirs, goal):
+    runs = {name: {"runs": [{"best": best}]} for name, best in (("L-BFGS", ours), ("CMA-ES", theirs))}
+    return {"goal": goal, "methods": runs}
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "goal", "verdict"),
+    [
+        ([1.0, 0.2], [0.9] * 19 + [0.1, 0.05], None, "BETTER: 0.1 for 0.2"),
+        ([1.0, 0.2], [0.9] * 20 + [0.1], None, "worse: 0.9 for 0.2"),
+        ([1.0, 0.2], [0.9] * 15, None, "worse: 0.9 for 0.2, seen until 15 of 20"),
+        ([1.0, 0.008], [0.9] * 10 + [0.009], 0.01, "as good: 0.009 for 0.008"),
+        ([1.0, 0.2], [0.9] * 10 + [0.009], 0.01, "BETTER: 0.009 for 0.2"),
+    ],
+)
+def test_baselines_beside_ours_at_ten_times_the_simulations(ours, theirs, goal, verdict) -> None:
+    task = results(ours, theirs, goal)
+    assert beside_ours("CMA-ES", task) == verdict
+    assert beside_ours("L-BFGS", task) == "ours"
+
+
 def test_quick_run_draws_a_figure(tmp_path, capsys) -> None:
     pytest.importorskip("cma")
     pytest.importorskip("matplotlib")
@@ -102,3 +169,5 @@ def test_a_library_that_is_not_there_is_a_row(monkeypatch, capsys) -> None:
 def test_impossible_budgets() -> None:
     with pytest.raises(SystemExit, match="--budget must be at least 1, got 0"):
         main(["experiments", "--budget", "0"])
+    with pytest.raises(SystemExit, match="--quick or --full, not both"):
+        main(["experiments", "--quick", "--full"])

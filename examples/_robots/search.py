@@ -90,10 +90,10 @@ def found_by_gradient(
     return Found(robot, start, best[1], np.array(misses), np.array(seconds))
 
 
-def gradient_at(robot: Robot, controls: np.ndarray) -> np.ndarray:
+def gradient_at(robot: Robot, controls: np.ndarray, target=None) -> np.ndarray:
     """Of the squared miss by all controls, of steps solved to round-off."""
     x = torch.tensor(controls, requires_grad=True)
-    return torch.autograd.grad(robot.miss(robot.motion(x, ms.MixedNewton())) ** 2, x)[0].numpy()
+    return torch.autograd.grad(robot.miss(robot.motion(x, ms.MixedNewton()), target) ** 2, x)[0].numpy()
 
 
 def slope_error(robot: Robot, controls: np.ndarray, step: float) -> float:

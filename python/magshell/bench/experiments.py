@@ -3,24 +3,41 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
+from typing import NamedTuple
 
 from .baselines import methods
 from .baselines.learned import LEARNERS
-from .baselines.tasks import BridgeTask, StripTask
+from .baselines.tasks import BridgeTask, StripTask, robot_task
 from .memory_of_bridge import measure as measure_memory
 from .paper import examples_folder, on_path
 from .report import bar, chosen, print_table
 
-BUDGET, QUICK_BUDGET = 100, 6  # simulations a run: more than 10 times what the gradient needs for the bridges
-SEEDS, QUICK_SEEDS = 5, 1
+QUICK_BUDGET = 6
+SEEDS, USUAL_SEEDS = 5, 1
+TIMES = 10  # as many simulations as ours: where a baseline is compared
+
+
+class Experiment(NamedTuple):
+    """usual, full: simulations a run; full ones are TIMES what the gradient needs, or more."""
+
+    task: Callable
+    usual: int
+    full: int
+
+
 TASKS = {
-    "suspension": lambda: BridgeTask("suspension"),
-    "arch": lambda: BridgeTask("arch"),
-    "strip": StripTask,
+    "suspension": Experiment(lambda: BridgeTask("suspension"), 60, 100),
+    "arch": Experiment(lambda: BridgeTask("arch"), 40, 100),
+    "strip": Experiment(StripTask, 60, 100),
+    "fish": Experiment(lambda: robot_task("fish"), 60, 150),
+    "octopus": Experiment(lambda: robot_task("octopus"), 30, 200),
+    "gripper": Experiment(lambda: robot_task("gripper"), 60, 100),
 }
 PARTS = (*TASKS, "memory")
+OURS = "L-BFGS"
 LIBRARIES = {
     "cma": "cma",
     "nlopt": "nlopt",
@@ -31,8 +48,15 @@ LIBRARIES = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", nargs="+", choices=PARTS, help=f"some of {', '.join(PARTS)}")
-    parser.add_argument("--budget", type=int, help=f"simulations a run (default {BUDGET})")
-    parser.add_argument("--seeds", type=int, help=f"runs of each method (default {SEEDS})")
+    parser.add_argument(
+        "--full",
+        action="store_true",
+        help=f"{SEEDS} runs of each method, of {TIMES} times our simulations: many hours",
+    )
+    parser.add_argument("--budget", type=int, help="simulations a run (by default a number for each task)")
+    parser.add_argument(
+        "--seeds", type=int, help=f"runs of each method (default {USUAL_SEEDS}, with --full {SEEDS})"
+    )
     known = [*methods.SEARCHES, *LEARNERS]
     parser.add_argument(
         "--methods", nargs="+", choices=known, metavar="METHOD", help=f"some of {', '.join(known)}"
@@ -47,30 +71,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict:
     """Prints the tables, returns their numbers."""
-    budget = chosen(options.budget, options.quick, QUICK_BUDGET, BUDGET)
-    seeds = chosen(options.seeds, options.quick, QUICK_SEEDS, SEEDS)
-    for name, value in (("budget", budget), ("seeds", seeds)):
-        if value < 1:
+    if options.quick and options.full:
+        raise SystemExit("--quick or --full, not both")
+    seeds = chosen(options.seeds, options.full, SEEDS, USUAL_SEEDS)
+    for name, value in (("budget", options.budget), ("seeds", seeds)):
+        if value is not None and value < 1:
             raise SystemExit(f"--{name} must be at least 1, got {value}")
     import torch  # before any work
 
     torch.set_num_threads(1)
     wanted = [each for each in PARTS if options.only is None or each in options.only]
     folder = examples_folder(options.examples)
-    results: dict = {"budget": budget, "seeds": seeds, "tasks": {}}
+    results: dict = {"seeds": seeds, "tasks": {}}
     with on_path(folder):
         for name in wanted:
             if name != "memory":
-                results["tasks"][name] = _compared(TASKS[name](), budget, seeds, options.methods)
-                _print_task(name, results["tasks"][name], budget, seeds)
+                usual = TASKS[name].full if options.full else TASKS[name].usual
+                budget = chosen(options.budget, options.quick, QUICK_BUDGET, usual)
+                results["tasks"][name] = _compared(TASKS[name].task(), budget, seeds, options.methods)
+                _print_task(name, results["tasks"][name])
     if "memory" in wanted:
         results["memory"] = measure_memory(folder, options.quick)
     return results
 
 
 def _compared(task, budget: int, seeds: int, only) -> dict:
-    """{"unknowns", "goal", "methods": {name: {"runs": [...]} or {"missing": library}}}."""
-    searches = {**methods.SEARCHES, **(LEARNERS if task.learned else {})}
+    """{"unknowns", "goal", "budget", "seeds", "methods": {name: {"runs": [...]} or {"missing": library}}}."""
+    known = methods.SEARCHES
+    if task.searches is not None:
+        known = {name: each for name, each in known.items() if name in task.searches}
+    searches = {**known, **(LEARNERS if task.learned else {})}
     searches = {name: each for name, each in searches.items() if only is None or name in only}
     found: dict = {}
     with bar(task.name, len(searches) * seeds) as shown:
@@ -86,17 +116,19 @@ def _compared(task, budget: int, seeds: int, only) -> dict:
                 if library not in LIBRARIES:
                     raise
                 found[name] = {"missing": LIBRARIES[library]}
-    return {"unknowns": task.unknowns, "goal": task.goal, "methods": found}
+    setting = {"unknowns": task.unknowns, "goal": task.goal, "budget": budget, "seeds": seeds}
+    return {**setting, "methods": found}
 
 
-def _print_task(name: str, task: dict, budget: int, seeds: int) -> None:
-    goal = task["goal"]
+def _print_task(name: str, task: dict) -> None:
+    goal, budget, seeds = (task[each] for each in ("goal", "budget", "seeds"))
     headings = ["method", "", "start", "best of 10", f"best of {budget}", "lowest", "highest"]
     headings += ["simulations until the goal" if goal else "simulations", "seconds"]
+    headings += [f"beside ours, at {TIMES} times its simulations"]
     rows = []
     for method, found in task["methods"].items():
         if "missing" in found:
-            rows.append([method, f"not installed: pip install {found['missing']}", *[""] * 7])
+            rows.append([method, f"not installed: pip install {found['missing']}", *[""] * 8])
             continue
         runs = found["runs"]
         ends = [each["best"][-1] for each in runs]
@@ -116,10 +148,27 @@ def _print_task(name: str, task: dict, budget: int, seeds: int) -> None:
                 _number(max(ends)),
                 shown,
                 _number(median(each["seconds"][-1] for each in runs)),
+                beside_ours(method, task),
             ]
         )
     told = f", goal {goal:g}" if goal else ""
     print_table(f"{name}: {task['unknowns']} unknowns, medians of {seeds} runs{told}", headings, rows)
+
+
+def beside_ours(method: str, task: dict) -> str:
+    """Whether a baseline is better or worse than ours, given TIMES as many simulations: medians of all runs."""
+    ours = task["methods"].get(OURS, {}).get("runs")
+    if method == OURS or not ours:
+        return "ours" if method == OURS else ""
+    reached = median(each["best"][-1] for each in ours)
+    given = TIMES * round(median(len(each["best"]) for each in ours))
+    runs = task["methods"][method]["runs"]
+    theirs = median(each["best"][:given][-1] for each in runs)
+    ended = task["goal"] is not None and theirs <= task["goal"]  # runs end there
+    verdict = "as good" if ended and reached <= task["goal"] else "BETTER" if theirs < reached else "worse"
+    until = max(len(each["best"]) for each in runs)
+    seen = "" if until >= given or ended else f", seen until {until} of {given}"
+    return f"{verdict}: {_number(theirs)} for {_number(reached)}{seen}"
 
 
 def _number(value: float) -> str:

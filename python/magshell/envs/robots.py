@@ -106,11 +106,13 @@ def soft_arm(target: float = 0.6, render_mode: str | None = None) -> Environment
     )
 
 
-def fish(n_tetrahedra: int = TETRAHEDRA, target=TARGET, render_mode: str | None = None) -> Environment:
+def fish(
+    n_tetrahedra: int = TETRAHEDRA, target=TARGET, render_mode: str | None = None, disturbed: bool = True
+) -> Environment:
     """A soft fish with six bones in water; torques in its neck, back, tail and two fins are to take its center of mass to a
     target, (3,) m from where it was. An action lasts 20 ms, an episode 2 s: [Qiao21] Figure 4c. Observed: way and velocity
     of the center of mass, angles and rates of the joints. Rewarded: what an action comes nearer, over the way there.
-    n_tetrahedra: about how many.
+    n_tetrahedra: about how many. disturbed: whether it starts with a small velocity.
 
     render_mode: as in Environment.
 
@@ -127,16 +129,19 @@ def fish(n_tetrahedra: int = TETRAHEDRA, target=TARGET, render_mode: str | None 
     def bent(now):
         return [(now[joint].angle, now[joint].rate) for joint in swimmer.joints]
 
-    return _to_target(swimmer, target, torques, bent, render_mode)
+    return _to_target(swimmer, target, torques, bent, render_mode, disturbed)
 
 
 def muscle_octopus(
-    cells: int = CELLS, target=MuscleOctopus.target, render_mode: str | None = None
+    cells: int = CELLS,
+    target=MuscleOctopus.target,
+    render_mode: str | None = None,
+    disturbed: bool = True,
 ) -> Environment:
     """A soft octopus with two muscles in each of eight legs in water, whose center of mass is to go to a target, (3,) m from
     where it was. An action, 64 numbers, four of the wave along each muscle, lasts 5 ms, an episode 2 s: [Qiao21] Figure
     4b. Observed: way and velocity of the center of mass, where the tips of the legs are from it, and the phase of the
-    waves. Rewarded as the fish. cells: along a leg.
+    waves. Rewarded and disturbed as the fish. cells: along a leg.
 
     target: (3,) m. render_mode: as in Environment.
 
@@ -157,15 +162,17 @@ def muscle_octopus(
             np.cos(phase),
         ]
 
-    return _to_target(swimmer, target, waves, posture, render_mode)
+    return _to_target(swimmer, target, waves, posture, render_mode, disturbed)
 
 
-def cell_gripper(target=CellGripper.target, render_mode: str | None = None, **changes) -> Environment:
+def cell_gripper(
+    target=CellGripper.target, render_mode: str | None = None, disturbed: bool = True, **changes
+) -> Environment:
     """Four arms of 56 pneumatic cells under a drone, to grip a ball on a table and to carry it to a target, (3,) m from
     where it was. An action, the volumes of all cells and the speed of the drone, lasts 10 ms, an episode 0.5 s: [Qiao21]
     Figure 4a. Observed: way and velocity of the ball, way of the drone, where the ends of the arms are from the ball.
-    Rewarded: what the ball comes nearer, over its way; where a motion fails, the episode ends with -1. changes: of
-    CellGripper's own arguments.
+    Rewarded: what the ball comes nearer, over its way; where a motion fails, the episode ends with -1. Disturbed as the
+    fish. changes: of CellGripper's own arguments.
 
     target: (3,) m. render_mode: as in Environment.
 
@@ -184,7 +191,7 @@ def cell_gripper(target=CellGripper.target, render_mode: str | None = None, **ch
         middle = gripper.weights @ now[gripper.ball].positions
         return [*now.action[-3:], *(ends - middle).ravel()]
 
-    return _to_target(gripper, target, actuators, grasp, render_mode, failure_reward=-1.0)
+    return _to_target(gripper, target, actuators, grasp, render_mode, disturbed, failure_reward=-1.0)
 
 
 class _Wave:
@@ -215,7 +222,9 @@ def _filled(numbers: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
     return CellGripper.filled(numbers, before)
 
 
-def _to_target(robot: Robot, target, actuators, further, render_mode, **options) -> Environment:
+def _to_target(
+    robot: Robot, target, actuators, further, render_mode, disturbed: bool, **options
+) -> Environment:
     """Way and velocity of the traveller's center of mass are observed, and what `further` returns of a Snapshot."""
     goal = np.array(target, dtype=float)
     rest = robot.traveller.mesh.rest_positions
@@ -236,7 +245,7 @@ def _to_target(robot: Robot, target, actuators, further, render_mode, **options)
         actuators=actuators,
         observation=seen,
         reward=lambda now: (away(now.before) - away(now)) / np.linalg.norm(goal),
-        start=lambda generator: {"velocities": generator.normal(scale=1e-3, size=3)},
+        start=(lambda generator: {"velocities": generator.normal(scale=1e-3, size=3)}) if disturbed else None,
         time_step=robot.time_step,
         actions_per_episode=robot.steps,
         simulate={

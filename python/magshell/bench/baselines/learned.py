@@ -1,4 +1,8 @@
-"""Reinforcement learning by stable-baselines3 on the environment of a task: SAC and PPO."""
+"""Reinforcement learning by stable-baselines3 on the environment of a task: SAC and PPO.
+
+[Qiao21] has soft Q-learning too. No implementation that is kept takes continuous actions: its authors' needs TensorFlow 1,
+coax's is for discrete ones. SAC is what its authors made of it.
+"""
 
 from __future__ import annotations
 
@@ -27,20 +31,20 @@ def ppo(task, counted: Counted, seed: int) -> None:
 
 
 def _learn(make, task, counted: Counted) -> None:
-    """An episode is a simulation, its mean loss the value."""
+    """An episode is a simulation, and what it lost the value. Policies begin anew, not at the task's start."""
     from gymnasium import Wrapper
 
     class Episodes(Wrapper):
         def reset(self, **named):
-            self.lost = 0.0
+            self.rewarded = 0.0
             counted.begin()
             return super().reset(**named)
 
         def step(self, action):
             observation, reward, terminated, truncated, info = super().step(action)
-            self.lost -= reward / task.actions
+            self.rewarded += float(reward)
             if terminated or truncated:
-                counted.counted(self.lost)
+                counted.counted(task.lost(self.rewarded))
             return observation, reward, terminated, truncated, info
 
     make(Episodes(task.environment())).learn(total_timesteps=10 * counted.budget * task.actions)

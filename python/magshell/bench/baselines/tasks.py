@@ -1,4 +1,4 @@
-"""What is searched for: moduli of the bridges, and the field that lifts a strip."""
+"""What is searched for: moduli of bridges, the field that lifts a strip, what robots have to do to reach a target."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ class Task:
     name: str
     unknowns: int
     goal: float | None = None
-    learned = False  # whether it is an environment too
+    learned = (
+        False  # whether it is an environment too: then with `actions` an episode, `environment` and `lost`
+    )
+    searches: tuple[str, ...] | None = None  # names of those that are tried; None: all
 
     def start(self, seed: int) -> np.ndarray:
         """(unknowns,): the same for every method."""
@@ -80,6 +83,10 @@ class StripTask(Task):
         rewards = [self._environment.step(action)[1] for action in unknowns.reshape(self.actions, 3)]
         return -sum(rewards) / self.actions
 
+    def lost(self, rewarded: float) -> float:
+        """The value of an episode, of all its rewards."""
+        return -rewarded / self.actions
+
     def differentiable(self, unknowns):
         from magshell.envs.robots import STRIP_LENGTH, STRIP_TARGET
 
@@ -100,3 +107,52 @@ class StripTask(Task):
         tip = np.array(one.scene.mesh.vertices_at(x=STRIP_LENGTH))
         heights = motion.positions[each::each, tip, 2].mean(1)
         return (heights - STRIP_TARGET).abs().mean() / STRIP_LENGTH
+
+
+class RobotTask(Task):
+    """[Qiao21] Figure 4: controls of a robot in every step; how far from the target it ends, over the way there."""
+
+    learned, goal = True, 0.01
+    searches = ("L-BFGS", "CMA-ES")  # as [Qiao21]'s; some others would need n + 1 motions before they begin
+
+    _FAILED = 2.0  # the miss where a motion fails: as an episode that ends where it began, and is fined
+
+    def __init__(self, name: str, robot, environment: str):
+        self.name, self._robot, self._environment = name, robot, environment
+        self.actions = robot.steps
+        self.unknowns = robot.steps * robot.numbers
+
+    @property
+    def middle(self) -> np.ndarray:
+        return self._robot.first_controls(self._robot.steps).ravel()
+
+    def environment(self):
+        from magshell.envs import robots
+
+        return getattr(robots, self._environment)(disturbed=False)
+
+    def lost(self, rewarded: float) -> float:
+        return 1.0 - rewarded
+
+    def objective(self, unknowns) -> float:
+        try:
+            return float(self.differentiable(unknowns))
+        except ms.NotConverged:
+            return self._FAILED
+
+    def differentiable(self, unknowns):
+        return self._robot.miss(self._robot.motion(unknowns.reshape(self.actions, -1)))
+
+
+def robot_task(name: str) -> RobotTask:
+    """name: fish, octopus or gripper."""
+    from magshell.envs.cell_gripper import CellGripper
+    from magshell.envs.fish import Fish
+    from magshell.envs.muscle_octopus import MuscleOctopus
+
+    kind, environment = {
+        "fish": (Fish, "fish"),
+        "octopus": (MuscleOctopus, "muscle_octopus"),
+        "gripper": (CellGripper, "cell_gripper"),
+    }[name]
+    return RobotTask(name, kind(), environment)

@@ -10,33 +10,44 @@ from .style import COLOURS, FAINT, INK, machine, new_figure, note, panel_title, 
 _BY_GRADIENT = ("L-BFGS", "MMA", "Adam")
 
 
+_ROW = 3  # tasks; where there are more, only what they need of simulations is drawn
+
+
 def draw(results: dict, setting: dict) -> Figure:
     tasks, memory = results["tasks"], results.get("memory")
-    columns = len(tasks) + bool(memory)
-    figure = new_figure(3.6 * max(columns, 1), 6.0 if tasks else 3.2)
-    axes = figure.subplots(2 if tasks else 1, max(columns, 1), squeeze=False)
+    panels = len(tasks) + bool(memory)
+    both = len(tasks) <= _ROW
+    columns = max(panels, 1) if both else _ROW
+    rows = (2 if tasks else 1) if both else -(-panels // _ROW)
+    figure = new_figure(3.6 * columns, 3.0 * rows if rows > 1 else 3.2)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    places = axes[0] if both else axes.ravel()
     looks = _looks(tasks)
-    for column, (name, task) in enumerate(tasks.items()):
-        for row, of_what in enumerate(("simulations", "seconds")):
-            _curves(axes[row, column], task, looks, of_what)
-        panel_title(
-            axes[0, column], name, f"{task['unknowns']} unknowns, median and range of {results['seeds']}"
-        )
+    for k, (name, task) in enumerate(tasks.items()):
+        _curves(places[k], task, looks, "simulations")
+        if both:
+            _curves(axes[1, k], task, looks, "seconds")
+        runs = f"mean and range of {task['seeds']} runs" if task["seeds"] > 1 else "one run"
+        panel_title(places[k], name, f"{task['unknowns']} unknowns, {runs}")
     if memory:
-        _memory(axes[0, -1], memory)
-        for each in axes[1:, -1]:
-            each.set_visible(False)
+        _memory(places[len(tasks)], memory)
+    for each in axes[1:, -1] if memory and both else places[panels:]:
+        each.set_visible(False)
     for each in axes.ravel():
         tidy(each)
     if tasks:
-        handles, labels = axes[0, 0].get_legend_handles_labels()
-        for other in axes[0, 1 : len(tasks)]:
-            for handle, label in zip(*other.get_legend_handles_labels(), strict=True):
-                if label not in labels:
-                    handles.append(handle)
-                    labels.append(label)
+        shown: dict = {}
+        for each in places[: len(tasks)]:
+            shown |= {label: handle for handle, label in zip(*each.get_legend_handles_labels(), strict=True)}
+        labels = [name for name in looks if name in shown]
         figure.legend(
-            handles, labels, frameon=False, fontsize=8, labelcolor=INK, ncols=5, loc="outside upper center"
+            [shown[label] for label in labels],
+            labels,
+            frameon=False,
+            fontsize=8,
+            labelcolor=INK,
+            ncols=5,
+            loc="outside upper center",
         )
     note(figure, f"lowest objective so far; {machine(setting)}")
     return figure
@@ -61,7 +72,7 @@ def _curves(axes, task: dict, looks: dict, of_what: str) -> None:
         along = np.arange(1, length + 1)
         if of_what == "seconds":
             along = np.median([_filled(each["seconds"], length) for each in runs], axis=0)
-        axes.plot(along, np.median(best, axis=0), label=name, **looks[name])
+        axes.plot(along, best.mean(axis=0), label=name, **looks[name])
         axes.fill_between(
             along, best.min(axis=0), best.max(axis=0), color=looks[name]["color"], alpha=0.15, lw=0
         )

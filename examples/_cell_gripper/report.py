@@ -1,0 +1,40 @@
+"""Volumes of the cells and the ways of drone and ball; what the gripper is looked at from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from _robots import report
+from _robots.report import COLORS
+
+VIEW = (108, -90)  # from above: y is up
+
+
+def draw_controls(axes, result: dict) -> None:
+    gripper, motion = result["found"][0].robot, result["motion"]
+    values = gripper.values(result["found"][0].controls)
+    times = motion.times
+    axes.plot(times, values[gripper.drone]["displacement"][:, 1], color=COLORS[0], label="drone, up [m]")
+    way = (motion[gripper.ball].displacements * gripper.weights[:, None]).sum(axis=1)
+    axes.plot(times, way[:, 1], color=COLORS[2], label="ball, up [m]")
+    volumes = values[gripper.cells]["volume_ratio"] - 1.0
+    axes.plot(times[1:], volumes.mean(axis=1), color=COLORS[1], label="cells, more volume, mean and range")
+    axes.fill_between(times[1:], volumes.min(axis=1), volumes.max(axis=1), color=COLORS[1], alpha=0.2, lw=0)
+    axes.set(xlabel="time [s]")
+    axes.legend(frameon=False, fontsize=7)
+
+
+def _which(result: dict) -> np.ndarray:
+    gripper = result["found"][0].robot
+    return np.repeat([0.0, 1.0], [gripper.arms.mesh.n_vertices, gripper.ball.mesh.n_vertices])
+
+
+def picture(result: dict):
+    shown = {"color": [_which(result)] * 4, "color_label": "arms 0, ball 1", "obstacles": []}
+    return report.picture(result["motion"], VIEW, **shown)
+
+
+def movie(result: dict, path: Path, **options) -> Path:
+    shown = {"obstacles": [], "speed": 0.2, "fps": 25.0, "width": 500, **options}
+    return report.movie(result["motion"], path, VIEW, **shown)
