@@ -49,12 +49,12 @@ def _channel(name: str, outline: dict[float, float], *, end: float, goal: float)
 
 
 CHANNELS = {
-    "pipe I": _channel("pipe I", {-40: 21, -5: 21, 14: 13, 24: 13, 44: 21, 100: 21}, end=24, goal=74),
-    "pipe II": _channel("pipe II", {-40: 21, -5: 21, 12: 16, 34: 16, 50: 21, 100: 21}, end=34, goal=84),
+    "pipe I": _channel("pipe I", {-40: 21, -5: 21, 14: 13, 24: 13, 44: 21, 100: 21}, end=24, goal=100),
+    "pipe II": _channel("pipe II", {-40: 21, -5: 21, 12: 16, 34: 16, 50: 21, 100: 21}, end=34, goal=110),
     "tunnel": _channel(
         "tunnel",
         {-40: 21, -5: 21, 11: 13, 21: 17, 32: 12.5, 52: 21, 100: 21},
         end=32,
-        goal=82,
+        goal=108,
     ),
 }

@@ -36,7 +36,7 @@ def draw_swimmer(axes, result: dict, positions: np.ndarray) -> None:
     for side in (-1, 1):
         axes.fill_between(x, side * radius, side * top, color=WALL, lw=0, zorder=4)
     axes.axvline(1e3 * result["channel"].end, color="k", lw=0.8, ls=":", zorder=5)
-    axes.set(xlim=(BEGIN, 1e3 * result["channel"].goal + 25), ylim=(-top, top), aspect="equal")
+    axes.set(xlim=(BEGIN, x[-1]), ylim=(-top, top), aspect="equal")
     axes.set_axis_off()
 
 
