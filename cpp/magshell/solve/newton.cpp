@@ -128,8 +128,11 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
     NewtonReport report = iterate(q, controls, anchor, max_iterations, options_.mixed);
     if (report.converged || !report.touched) return report;
     const int iterations = report.iterations;
-    q = from;
-    model_.set_turns(turns);
+    // Short steps behind what was in the way would be taken again; others may have led anywhere.
+    if (report.blocked.empty()) {
+        q = from;
+        model_.set_turns(turns);
+    }
     report = solve_searching(q, controls, anchor, searched * max_iterations);
     report.iterations += iterations;
     if (!report.converged) tell_contact(report);
