@@ -142,7 +142,9 @@ def contact_inputs(contacts, bodies) -> list[dict]:
     for contact in contacts:
         vertices, weights = bodies.contact_points(contact)
         if not len(vertices):
-            raise ValueError(f"{contact!r} is about nothing: the scene has no vertices that obstacles could keep out")
+            raise ValueError(
+                f"{contact!r} is about nothing: the scene has no vertices that obstacles could keep out"
+            )
         inputs.append(
             {
                 "obstacles": [numbers[id(each)] for each in contact.obstacles],
