@@ -287,3 +287,26 @@ def test_gradients_at_rest_to_1e_6():
         long, short = differences(lambda x, loss=loss: float(loss(x)), at, along, 1e-3)
         exact = float((value.grad.numpy() * along).sum())
         assert (4.0 * short - long) / 3.0 == pytest.approx(exact, rel=1e-6), name
+
+
+def test_a_contact_with_obstacles_that_the_shape_of_a_free_part_would_pass_through():
+    surface = ms.meshes.box((0.02, 0.02, 0.02), cells=(1, 1, 1)).surface
+    block = ms.Rigid.of(surface, 1e3)
+    mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    floor = ms.obstacles.Plane(center=(0, 0, -1e-3))
+
+    def scene(*bodies, **about):
+        contacts = [ms.Contact(floor, **about)]
+        return ms.Scene(list(bodies), contacts=contacts, gravity=(0, 0, -9.81), allow_rigid_motions=True)
+
+    for bodies in ((block,), (sheet, block)):
+        with pytest.raises(
+            ValueError, match=r"let the shape of rigid part 0 through.* Contact\(..., body=...\)"
+        ):
+            scene(*bodies)
+    scene(sheet, block, body=sheet)
+    riding = ms.Rigid([0, 1, 3], shape=surface)
+    scene(sheet, riding)  # its vertices touch
+    with pytest.raises(ValueError, match="is about nothing"):
+        scene(ms.Rigid(mass=1.0, inertia=1.0))

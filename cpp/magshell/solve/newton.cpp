@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "magshell/solve/landing.h"
 namespace magshell {
 namespace {
 
@@ -29,6 +30,9 @@ constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
 // A residual that shrinks less makes the next step a cautious one.
 constexpr double contracting = 0.5;
+
+// What is left of the forces where obstacles have changed the matrix since its factorization.
+constexpr double small_change = 0.1;
 
 // A shorter share of a step than that leads nowhere.
 constexpr double shortest_share = 1e-4;
@@ -124,8 +128,11 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
     NewtonReport report = iterate(q, controls, anchor, max_iterations, options_.mixed);
     if (report.converged || !report.touched) return report;
     const int iterations = report.iterations;
-    q = from;
-    model_.set_turns(turns);
+    // Short steps behind what was in the way would be taken again; others may have led anywhere.
+    if (report.blocked.empty()) {
+        q = from;
+        model_.set_turns(turns);
+    }
     report = solve_searching(q, controls, anchor, searched * max_iterations);
     report.iterations += iterations;
     if (!report.converged) tell_contact(report);
@@ -209,6 +216,22 @@ bool Newton::factor_serves(double contraction, double residual, double last_step
     return each < 0.1 && std::log(options_.tolerance / residual) >= worth * std::log(each);
 }
 
+double Newton::obstacles_change(const VectorXd& step) const {
+    if (!model_.has_contact()) return 0.0;
+    const ContactTerm& contact = *model_.contact();
+    VectorXd forces = VectorXd::Zero(step.size());
+    const auto add = [&](const std::vector<ContactTerm::Touch>& touching, double sign) {
+        for (const ContactTerm::Touch& touch : touching) {
+            const Vec3& n = touch.at.normal;
+            const double pushed = touch.stiffness * n.dot(contact.at_point(touch, step.data()));
+            contact.spread(touch, Vec3(sign * pushed * n), forces);
+        }
+    };
+    add(contact.touching(), 1.0);
+    add(touched_, -1.0);
+    return forces.norm();
+}
+
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                              bool mixed) {
     NewtonReport report;
@@ -243,30 +266,43 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         Eigen::MatrixXd pull = move;
         const double contraction = report.residual / last_residual;
         last_residual = report.residual;
-        if (report.iterations == 0 || !factor_serves(contraction, report.residual, last_step)) {
+        // False where there is no matrix to go on with, and the report says why.
+        const auto renew = [&] {
             // Before the first step a liquid's pressure is that of a volume that it is not to have.
             const bool begins =
                 mixed && !extrapolated && model_.n_muscles() == 0 && !model_.has_body_contact();
             const bool cautious = begins || contraction > contracting;
             report.factor = factorize(q, controls, mixed && extrapolated, anchor, pull, cautious);
-            if (!report.factor.succeeded) return fail(report.factor.reason);
+            report.reason = report.factor.reason;
+            if (!report.factor.succeeded) return false;
             const Index negative_pivots = report.factor.negative_pivots;
             if (report.iterations == 0) first_negative_pivots = negative_pivots;
             report.lost = model_.bodies().solids().empty() &&
                           negative_pivots > first_negative_pivots + most_new_negative_pivots;
-            if (mixed && report.lost) return fail("the iteration lost its way");
+            if (mixed && report.lost) report.reason = "the iteration lost its way";
+            if (mixed && report.lost) return false;
             // Of a matrix that leaves out what is negative, no pivot tells whether a state is stable.
             const bool exact = !cautious || (model_.n_muscles() == 0 && !model_.has_body_contact() &&
                                              model_.low_rank().empty());
             moved = exact && last_step <= small_move * model_.length_scale()
                         ? 0.0
                         : std::numeric_limits<double>::infinity();
-        }
+            return true;
+        };
+        const bool kept = report.iterations > 0 && factor_serves(contraction, report.residual, last_step);
+        if (!kept && !renew()) return report;
         // Loads at rest leave a remainder of few nodes, which takes few vectors: no digit is given away.
         const VectorXd force = -gradient(q, anchor) - pull.col(0);
-        VectorXd step =
-            move + (anchor.motion ? solve_with_factor(force, deserved(report.residual, options_.tolerance))
-                                  : solve_with_factor(force));
+        const auto solved = [&]() -> VectorXd {
+            return move + (anchor.motion
+                               ? solve_with_factor(force, deserved(report.residual, options_.tolerance))
+                               : solve_with_factor(force));
+        };
+        VectorXd step = solved();
+        if (kept && in_place && obstacles_change(step) > small_change * force.norm()) {
+            if (!renew()) return report;
+            step = solved();
+        }
         const VectorXd from = model_.has_body_contact() && in_place ? q : VectorXd();
         double share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
@@ -280,6 +316,12 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
                 model_.reduction().advance(q, step);
             }
         }
+        if (anchor.motion && model_.has_contact())
+            if (const VectorXd more = landing(model_, q, controls, *anchor.weights, after_step(model_, step));
+                more.size() > 0) {
+                model_.reduction().advance(q, more);
+                step += more;
+            }
         move = left_of(move, share, q, controls);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&

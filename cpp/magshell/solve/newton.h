@@ -16,6 +16,7 @@
 #include "magshell/linalg/factor.h"
 #include "magshell/linalg/gmres.h"
 #include "magshell/scene/model.h"
+#include "magshell/term/contact_term.h"
 
 namespace magshell {
 
@@ -146,6 +147,9 @@ class Newton {
                   bool cautious = false);
     /// Whether steps with the last factorization will do, which are as good as free.
     bool factor_serves(double contraction, double residual, double last_step) const;
+    /// The norm of the forces [N] by which a step from the last evaluated state differs, for the normal forces of obstacles,
+    /// from what the last factorization has of them.
+    double obstacles_change(const VectorXd& step) const;
     FactorReport factorize_assembled(const VectorXd& q, const Anchor& anchor);
 
     Model& model_;
@@ -153,7 +157,8 @@ class Newton {
     Watch watch_;
     mutable double watched_ = 1.0;  // the residual that the watch was told last
     std::shared_ptr<Factor> factor_;
-    bool unsymmetric_ = false;  // whether what was assembled last is
+    std::vector<ContactTerm::Touch> touched_;  // what touched obstacles where that was factorized
+    bool unsymmetric_ = false;                 // whether what was assembled last is
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     mutable double linear_time_ = 0.0;
 };

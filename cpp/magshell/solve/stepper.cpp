@@ -3,6 +3,8 @@
 #include <limits>
 #include <utility>
 
+#include "magshell/solve/landing.h"
+
 namespace magshell {
 
 StepAlgebra::StepAlgebra(const Tableau& tableau, const Inertia& inertia, double dt)
@@ -144,6 +146,11 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<co
         // As fast as until now; what has no velocity begins where it was.
         q.head(coordinates) = x_hat.head(coordinates) +
                               step.stage_time() * (i == 0 ? state.v : rates.back().v).head(coordinates);
+        if (model.has_contact() && !projective_)
+            if (const VectorXd move = landing(model, q, controls[i + 1], step.weights(),
+                                              model.contact()->touches(state.q.data(), controls.front()));
+                move.size() > 0)
+                model.reduction().advance(q, move);
         if (model.reduction().carries() || model.has_body_contact()) {
             VectorXd ahead = q - state.q;
             ahead.tail(q.size() - coordinates).setZero();

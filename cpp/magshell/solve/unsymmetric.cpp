@@ -9,12 +9,21 @@ namespace magshell {
 GmresReport solve_unsymmetric(const Model& model, const Factor& factor, bool transposed,
                               const GmresOptions& options, VectorXd& reduced) {
     const Reduction& reduction = model.reduction();
+    // What is preconditioned comes back from the symmetric part as it went in, to round-off of the factorization: only
+    // where that counts the product is made.
+    constexpr double coarse = 1e-10;
+    const bool known = options.tolerance > coarse;
+    VectorXd before;
     const auto assembled = [&](const VectorXd& x) {
         VectorXd rest = VectorXd::Zero(model.size());
         model.remainder().add_product(reduction.expand(x), transposed, rest);
-        return VectorXd(factor.image(x) + reduction.vector(rest));
+        return VectorXd((known ? before : factor.image(x)) + reduction.vector(rest));
     };
-    return gmres(assembled, [&](VectorXd& x) { factor.solve(x); }, reduced, options);
+    const auto precondition = [&](VectorXd& x) {
+        if (known) before = x;
+        factor.solve(x);
+    };
+    return gmres(assembled, precondition, reduced, options);
 }
 
 void solve_at_equilibrium(const Model& model, const Factor& factor, bool transposed, VectorXd& reduced) {

@@ -31,6 +31,7 @@ from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import (
     body_contact_inputs,
     check_neighbours,
+    check_shapes,
     contact_inputs,
     obstacles_of,
     shapes_that_touch,
@@ -153,6 +154,7 @@ class Scene:
         self._couple_directions = _couple_directions(bodies, edges)
         constraints = gather(bodies, self.supports, self._couple_directions)
         self._rigid = places(bodies)
+        check_shapes(self._obstacle_contacts, self.rigid_parts, self._rigid)
         for k, part in enumerate(self.rigid_parts):
             if part.magnetic_moment is not None and not self.fields:
                 raise ValueError(

@@ -118,12 +118,33 @@ def check_apart(scene, state: np.ndarray) -> None:
         raise ValueError(f"the start cannot be: {reason}")
 
 
+def check_shapes(contacts, parts, places) -> None:
+    """Obstacles keep out vertices of sheets and solids: a contact that would seem to be about the shape of a rigid part
+    that has none of these has to say what it is about."""
+    bare = [
+        k
+        for k, (part, place) in enumerate(zip(parts, places, strict=True))
+        if part.shape is not None and not len(place.vertices)
+    ]
+    for contact in contacts:
+        if bare and contact.body is None and contact.vertices is None:
+            raise ValueError(
+                f"{contact!r} would let the shape of rigid part {bare[0]} through, as obstacles keep out vertices of sheets "
+                "and solids only: say which body it is about, Contact(..., body=...), and have a held Shell in the "
+                "obstacle's place for the rigid part, ms.Contact(rigid, shell)"
+            )
+
+
 def contact_inputs(contacts, bodies) -> list[dict]:
     """What of the contacts no solve can change."""
     numbers = {id(each): k for k, each in enumerate(obstacles_of(contacts))}
     inputs = []
     for contact in contacts:
         vertices, weights = bodies.contact_points(contact)
+        if not len(vertices):
+            raise ValueError(
+                f"{contact!r} is about nothing: the scene has no vertices that obstacles could keep out"
+            )
         inputs.append(
             {
                 "obstacles": [numbers[id(each)] for each in contact.obstacles],

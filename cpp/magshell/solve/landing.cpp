@@ -1,0 +1,54 @@
+#include "magshell/solve/landing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace magshell {
+namespace {
+
+constexpr double too_hard = 2.0;  // times what will be
+
+/// At which w depth + k S'(depth) is `pull`, for a law of S' = d^2/(2 e) up to e and d - e/2 from there on.
+double depth_at(double pull, double w, const ContactLaw& law) {
+    const double k = law.stiffness, e = law.smoothing;
+    if (pull >= (w + 0.5 * k) * e) return (pull + 0.5 * k * e) / (w + k);
+    return 2.0 * pull / (w + std::sqrt(w * w + 2.0 * k / e * pull));
+}
+
+}  // namespace
+
+VectorXd landing(const Model& model, const VectorXd& q, const Controls& controls, const VectorXd& weights,
+                 const std::vector<ContactTerm::Touch>& expected) {
+    const ContactTerm& contact = *model.contact();
+    const auto order = [](const ContactTerm::Touch& touch) {
+        return std::tie(touch.contact, touch.obstacle, touch.point);
+    };
+    VectorXd move;
+    auto same = expected.begin();
+    for (const ContactTerm::Touch& touch : contact.touches(q.data(), controls)) {
+        while (same != expected.end() && order(*same) < order(touch)) ++same;
+        const double force = same != expected.end() && order(*same) == order(touch) ? same->force : 0.0;
+        const ContactPoint& point = contact.point(touch);
+        if (point.nodes[1] >= 0) continue;  // what is on a face is not alone
+        const ContactLaw& law = contact.law(touch);
+        const double w = weights[3 * point.nodes[0]], depth = law.offset - touch.at.value;
+        if (!(w > 0.0)) continue;
+        const double out = depth - depth_at(w * depth + force, w, law);
+        if (touch.force <= too_hard * (w * out + force)) continue;
+        if (move.size() == 0) move = VectorXd::Zero(q.size());
+        move.segment<3>(3 * point.nodes[0]) += out * touch.at.normal;
+    }
+    return move.size() > 0 ? model.reduction().project(move) : move;
+}
+
+std::vector<ContactTerm::Touch> after_step(const Model& model, const VectorXd& p) {
+    const ContactTerm& contact = *model.contact();
+    std::vector<ContactTerm::Touch> all = contact.touching();
+    for (ContactTerm::Touch& touch : all)
+        touch.force = std::max(
+            0.0, touch.force - touch.stiffness * touch.at.normal.dot(contact.at_point(touch, p.data())));
+    return all;
+}
+
+}  // namespace magshell
