@@ -72,7 +72,9 @@ class CellsResult(ActuatorResult):
     @property
     def pressures(self):
         """(..., k) Pa: K (a - J), a as the load factor has it."""
-        return self._by_law(lambda cells, ratios, factor: cells.pressure_at(ratios, factor), self.volume_ratios)
+        return self._by_law(
+            lambda cells, ratios, factor: cells.pressure_at(ratios, factor), self.volume_ratios
+        )
 
 
 class TendonResult(ActuatorResult):
