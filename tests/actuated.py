@@ -41,31 +41,33 @@ def gauge_pressure_of(cavity: ms.Cavity, volume, rest: float):
     return -float(cavity.bulk_modulus) * (volume - float(cavity.volume)) / rest
 
 
-def energy_by_torch(scene: ms.Scene, x: torch.Tensor) -> torch.Tensor:
-    """Of all actuators, at positions (n_v, 3)."""
+def energy_by_torch(scene: ms.Scene, x: torch.Tensor, factor: float = 1.0) -> torch.Tensor:
+    """Of all actuators, at positions (n_v, 3), under a load factor."""
     total = torch.zeros((), dtype=torch.float64)
     for each in scene.actuators:
         if isinstance(each, ms.Cavity):
-            total = total + _of_cavity(scene, each, x)
+            total = total + _of_cavity(scene, each, x, factor)
         elif isinstance(each, ms.Cells):
-            total = total + _of_cells(each, x)
+            total = total + _of_cells(each, x, factor)
         else:
-            total = total + _of_tendon(scene, each, x)
+            total = total + factor * _of_tendon(scene, each, x)
     return total
 
 
-def _of_cavity(scene, cavity, x):
+def _of_cavity(scene, cavity, x, factor):
     surface = cavity.surface(scene._bodies)
     rest, volume = surface.volume(scene.mesh.rest_positions), surface.volume(x)
     if cavity.law == "pressure":
-        return -float(cavity.pressure) * volume
+        return -factor * float(cavity.pressure) * volume
     if cavity.law == "gas":
         gas = float(cavity.filling_pressure) * rest
-        return -gas * torch.log(volume / rest) + float(cavity.outside_pressure) * (volume - rest)
-    return 0.5 * float(cavity.bulk_modulus) * (volume - float(cavity.volume)) ** 2 / rest
+        outside = float(cavity.outside_pressure) * (volume - rest)
+        return factor * (outside - gas * torch.log(volume / rest))
+    wanted = rest + factor * (float(cavity.volume) - rest)
+    return 0.5 * float(cavity.bulk_modulus) * (volume - wanted) ** 2 / rest
 
 
-def _of_cells(cells, x):
+def _of_cells(cells, x, factor):
     total, mesh = 0.0, cells.body.mesh
     for k, group in enumerate(cells.groups):
         surface = of_tetrahedra(mesh.tetrahedra[group])
@@ -73,6 +75,7 @@ def _of_cells(cells, x):
         target, stiffness = (
             np.broadcast_to(v, cells.count)[k] for v in (cells.volume_ratio, cells.stiffness)
         )
+        target = 1.0 + factor * (target - 1.0)
         total = total + 0.5 * rest * stiffness * (surface.volume(x) / rest - target) ** 2
     return total
 

@@ -122,6 +122,23 @@ def test_a_balloon_blown_to_a_hundred_times_its_volume_passes_its_largest_pressu
     assert 0 < top < len(path) - 1 and inside.pressure[-1] < 0.8 * inside.pressure[top]
 
 
+@pytest.mark.parametrize("times", [0.8, 5.0, 100.0])
+def test_a_balloon_is_filled_in_one_call(times):
+    """Far beyond its largest pressure, or emptied: load steps fill in what is missing at rest."""
+    body = hollow_ball()
+    rest = ms.Cavity(body, pressure=0.0).rest_volume(ball_scene(body))
+    liquid = ms.Cavity(body, volume=times * rest, bulk_modulus=1e5)
+    found = ms.equilibrium(ball_scene(body, liquid))
+    assert found.stable
+    assert float(found[liquid].volume) == pytest.approx(times * rest, rel=1e-4)
+    expected = pressure_of_thick_ball(times)
+    assert float(found[liquid].pressure) == pytest.approx(expected, abs=0.06)
+    # Half of it, under half of the load.
+    half = ms.equilibrium(ball_scene(body, liquid), load_factor=0.5)
+    assert float(half[liquid].volume) == pytest.approx((0.5 + 0.5 * times) * rest, rel=1e-4)
+    assert float(half[liquid].pressure) == pytest.approx(pressure_of_thick_ball(0.5 + 0.5 * times), abs=0.06)
+
+
 def test_a_path_by_pressure_turns_round_at_the_largest():
     body = hollow_ball()
     air = ms.Cavity(body, pressure=2.0)

@@ -30,10 +30,17 @@ VectorXd Model::rate_by_varying(const Controls& at, const Controls& rate, const 
 }
 
 VectorXd Model::gradient_rate(const VectorXd& q, const Controls& at, const Controls& rate) {
-    Residual change;
-    change.reset(size());
-    for (const std::unique_ptr<Term>& term : terms_)
-        if (term->driven()) term->evaluate(q.data(), rate, change);
+    // Of what is linear in the controls, but for a constant: that of volumes that are wanted.
+    const Controls none = Controls::Zero(rate.size());
+    Residual change, constant, dropped;
+    for (Residual* each : {&change, &constant, &dropped}) each->reset(size());
+    for (const std::unique_ptr<Term>& term : terms_) {
+        if (!term->driven()) continue;
+        term->evaluate(q.data(), rate, change);
+        term->evaluate(q.data(), none, constant);
+        term->evaluate(q.data(), at, dropped);  // where it is again
+    }
+    change.gradient -= constant.gradient;
     if (varying_.empty()) return change.gradient;
     return change.gradient + rate_by_varying(at, rate, [&](const Controls& there) {
                Residual gradient;

@@ -39,7 +39,7 @@ class Term {
     /// What is wrong with q, in words; empty where nothing is.
     virtual std::string refusal(const double* /*q*/) const { return {}; }
 
-    /// Whether the controls drive it. Every term that they do is linear in them; poses move in time steps only.
+    /// Whether the controls drive it, its gradient linear in them but for a constant; poses move in time steps only.
     virtual bool driven() const { return true; }
     /// Whether values that may vary within a solve act in it.
     virtual bool varies() const { return body() < 0 || driven(); }

@@ -14,8 +14,8 @@ class Actuator(Owner):
     """Works in bodies by numbers that a controller sets: activations, pressures, volumes, tensions. They may change during
     a motion, at once or gradually.
 
-    bodies: those that it works in. is_spring: whether it has a stiffness that the load factor scales, which the one at
-    rest, without controls, leaves out.
+    bodies: those that it works in. is_spring: whether it has a stiffness of its own, which that of the bodies at rest leaves
+    out.
     """
 
     for_all = False
@@ -30,6 +30,10 @@ class Actuator(Owner):
     def body(self):
         """The one body, or None where there are several."""
         return self.bodies[0] if len(self.bodies) == 1 else None
+
+    def filling(self, scene) -> float:
+        """How much of a volume at rest a load factor of 1 adds to it, or takes away."""
+        return 0.0
 
     def _keep_shapes(self, changed: Actuator) -> Actuator:
         for name in self._replaceable:

@@ -48,8 +48,8 @@ class Revolute(Joint):
     lower_limit, upper_limit, limit_stiffness, limit_smoothing: rad, rad, N m/rad, rad: beyond a limit the torque grows by
         a parabola of the length of the smoothing, then at this stiffness.
     motor_angle: rad, prescribes the angle: a motor, reached by the shorter way round; `result[hinge].motor_torque` says
-        what it takes, in motions to second order, to first in loops that a Closure closes. In place of a torque, a
-        servo and limits. How fast it is to start with, `rate` says.
+        what it takes, in motions to second order. In place of a torque, a servo and limits. How fast it is to start with,
+        `rate` says.
     rate: rad/s, at the start of a motion from rest positions, in a tree without vertices.
 
     Solves take another origin and axis too, with the same links at rest. An axis may have any length, which changes

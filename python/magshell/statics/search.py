@@ -69,6 +69,9 @@ def find(
     options = search.options()
     options.start_at_rest = at_rest
     options.keep_factor = keep_factor
+    # A volume is filled by at least as small a share of that at rest as of the way to it.
+    filling = max((each.filling(scene) for each in map(inputs.values.current, scene.actuators)), default=0.0)
+    options.smallest_step /= max(filling, 1.0)
     with inputs.in_core():
         check_apart(scene, state)
     return solve(inputs, state, turns, from_, inputs.controls, options, search.progress)

@@ -132,6 +132,11 @@ class Cavity(Actuator):
         """m3, in a scene that has it."""
         return float(self.surface(scene._bodies).volume(scene.mesh.rest_positions))
 
+    def filling(self, scene) -> float:
+        if self.law != "liquid":
+            return 0.0
+        return abs(self.volume / self.rest_volume(scene) - 1.0)
+
     def pressure_at(self, volume, rest_volume: float, load_factor: float):
         """Pa, over that outside, at a volume (m3)."""
         if self.law == "pressure":

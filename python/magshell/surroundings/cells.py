@@ -68,6 +68,9 @@ class Cells(Actuator):
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cells(self.body, self._groups, **now))
 
+    def filling(self, scene) -> float:
+        return float(np.abs(np.asarray(self.volume_ratio) - 1.0).max(initial=0.0))
+
     def pressure_at(self, ratios, load_factor: float):
         """(k,) Pa, at volume ratios (k,)."""
         target = 1.0 + load_factor * (self.volume_ratio - 1.0)
