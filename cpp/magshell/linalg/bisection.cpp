@@ -5,15 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "magshell/linalg/cuts.h"
+
 namespace magshell {
 namespace {
-
-// Nodes whose coordinate is less than `at` go to the left.
-struct Cut {
-    Index weight = std::numeric_limits<Index>::max();  // of the lighter border
-    bool left_border = true;                           // whether that one is the left side's
-    double at = 0.0;
-};
 
 // The cut at the median. `reach` bounds by how much the coordinates of neighbours differ, so that only nodes
 // near the cut are looked at more closely.
@@ -107,11 +102,25 @@ void find_levels(const NodeGraph& graph, const std::vector<Index>& nodes, CutSta
     }
 }
 
+// Across a direction, or zero: along the ways from a node at an end.
+struct Way {
+    Cut cut;
+    Vec3 direction;
+};
+
+// Whether more cuts are worth trying than those that look best: where eliminating what separates takes long beside it.
+bool worth_trying(Index separator, std::size_t nodes) {
+    constexpr double as_long = 2e4;  // cubes of unknowns, as a cut takes a node
+    return std::pow(static_cast<double>(separator), 3) > as_long * static_cast<double>(nodes);
+}
+
 }  // namespace
 
 CutState::CutState(const NodeGraph& graph)
     : side(graph.size(), Side::left),
       level(graph.size()),
+      coordinate(graph.size()),
+      place(graph.size()),
       beside(graph.size()),
       has_moved(graph.size(), false) {
     if (graph.points.empty()) return;
@@ -125,25 +134,37 @@ CutState::CutState(const NodeGraph& graph)
 
 std::vector<Index> bisect(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state) {
     find_levels(graph, nodes, state);
+    std::vector<Way> ways;
     const auto level = [&](Index node) { return static_cast<double>(state.level[node]); };
-    Cut best = median_cut(graph, nodes, state, level, [](Index) { return 1.0; });
-    Vec3 across = Vec3::Zero();
+    ways.push_back({median_cut(graph, nodes, state, level, [](Index) { return 1.0; }), Vec3::Zero()});
     if (!graph.points.empty()) {
         for (const Vec3& direction : directions(graph.points, nodes)) {
             const auto along = [&](Index node) { return direction.dot(graph.points[node]); };
-            const Cut cut =
-                median_cut(graph, nodes, state, along, [&](Index node) { return state.reach[node]; });
-            if (cut.weight >= best.weight) continue;
-            best = cut;
-            across = direction;
+            const auto reach = [&](Index node) { return state.reach[node]; };
+            ways.push_back({median_cut(graph, nodes, state, along, reach), direction});
         }
     }
-    if (best.weight == std::numeric_limits<Index>::max()) return {};
-    for (const Index node : nodes) {
-        const double at = across.isZero(0.0) ? level(node) : across.dot(graph.points[node]);
-        if (!(at < best.at)) state.side[node] = Side::right;
+    const auto lighter = [](const Way& a, const Way& b) { return a.cut.weight < b.cut.weight; };
+    Way best = *std::min_element(ways.begin(), ways.end(), lighter);
+    if (best.cut.weight == std::numeric_limits<Index>::max()) return {};
+    const auto set_coordinates = [&](const Vec3& direction) {
+        const bool by_level = direction.isZero(0.0);
+        for (const Index node : nodes)
+            state.coordinate[node] = by_level ? level(node) : direction.dot(graph.points[node]);
+    };
+    if (worth_trying(best.cut.weight, nodes.size())) {
+        best.cut.cost = std::numeric_limits<double>::max();
+        for (const Way& way : ways) {
+            set_coordinates(way.direction);
+            const Cut cut = lightest_cut(graph, nodes, state);
+            if (cut.cost < best.cut.cost) best = {cut, way.direction};
+        }
     }
-    const Side thinned = best.left_border ? Side::left : Side::right;
+
+    set_coordinates(best.direction);
+    for (const Index node : nodes)
+        if (!(state.coordinate[node] < best.cut.at)) state.side[node] = Side::right;
+    const Side thinned = best.cut.left_border ? Side::left : Side::right;
     std::vector<Index> separator;
     for (const Index node : nodes) {
         if (state.side[node] != thinned) continue;

@@ -24,13 +24,15 @@ struct CutState {
     std::vector<Side> side;
     std::vector<double> reach;                 // [m] to the farthest neighbour; empty without points
     std::vector<Index> level;                  // room for a search from neighbour to neighbour
+    std::vector<double> coordinate;            // along which a cut is being looked for
+    std::vector<Index> place;                  // among others by that coordinate
     std::vector<std::array<Index, 2>> beside;  // of a separator's nodes: how much of each side they touch
     std::vector<char> has_moved;               // out of a separator
 };
 
 /// Cuts `nodes`, all of them Side::left before, into sides of about the same number, and puts the lighter
 /// border of the two between them: returns it. The cut is that with the lightest border among planes across
-/// the directions in which the nodes extend, and the middle of the ways from a node at an end. Where no cut
+/// the directions in which the nodes extend, and the ways from a node at an end, near the middle of each. Where no cut
 /// can be, all stay on the left.
 std::vector<Index> bisect(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state);
 

@@ -70,7 +70,10 @@ AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, const FactorOpt
     // AMD takes longer than a factorization. It does better than nested dissection where cuts are short
     // beside the whole, on narrow strips above all, and may where nothing is known but the pattern.
     constexpr double few_operations = 5.5e4;  // an unknown
-    if (!options.points.empty() && dissection.flops() > few_operations * pattern.size) return dissection;
+    constexpr Index few_unknowns = 6000;      // that AMD takes no time to speak of
+    if (!options.points.empty() && pattern.size > few_unknowns &&
+        dissection.flops() > few_operations * pattern.size)
+        return dissection;
     options.watch();
     AssemblyTree amd = by_amd();
     return amd.flops() < dissection.flops() ? amd : dissection;

@@ -1,0 +1,64 @@
+#include "magshell/linalg/cuts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "magshell/linalg/bisection.h"
+
+namespace magshell {
+
+// With nodes sorted by their coordinate, a node is on the left side's border of every cut between it and its farthest
+// neighbour to the right, and on the right side's the other way round: all borders' weights are sums of differences.
+Cut lightest_cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state) {
+    constexpr double farthest = 0.2;  // of the whole weight, from the middle
+    constexpr double uneven = 8.0;    // times the square of that makes a border so much heavier
+    const Index count = static_cast<Index>(nodes.size());
+    std::vector<Index> sorted = nodes;
+    std::sort(sorted.begin(), sorted.end(), [&](Index a, Index b) {
+        return std::pair(state.coordinate[a], a) < std::pair(state.coordinate[b], b);
+    });
+    // A node's place is that of the first that has its coordinate.
+    std::vector<Index>& place = state.place;
+    double whole = 0.0;
+    for (Index k = 0; k < count; ++k) {
+        const Index node = sorted[k];
+        const bool alike = k > 0 && state.coordinate[sorted[k - 1]] == state.coordinate[node];
+        place[node] = alike ? place[sorted[k - 1]] : k;
+        whole += graph.weights[node];
+    }
+    std::vector<Index> left(count + 1, 0), right(count + 1, 0);  // how the borders change from cut to cut
+    for (const Index node : sorted) {
+        Index first = place[node], last = first;
+        for (const Index beside : graph.around(node)) {
+            if (state.side[beside] == Side::settled) continue;
+            first = std::min(first, place[beside]);
+            last = std::max(last, place[beside]);
+        }
+        const Index weight = graph.weights[node];
+        left[place[node] + 1] += weight;
+        left[last + 1] -= weight;
+        right[first + 1] += weight;
+        right[place[node] + 1] -= weight;
+    }
+    Cut cut;
+    double below = 0.0;
+    Index borders[2] = {0, 0};
+    for (Index k = 0; k < count; ++k) {
+        borders[0] += left[k];
+        borders[1] += right[k];
+        const double off = std::abs(below / whole - 0.5);
+        below += graph.weights[sorted[k]];
+        if (k == 0 || place[sorted[k]] != k) continue;
+        const Index weight = std::min(borders[0], borders[1]);
+        // Beyond the limit the more even cut counts alone.
+        const double cost = off > farthest ? (1.0 + off) * 2.0 * whole : weight * (1.0 + uneven * off * off);
+        if (cost >= cut.cost) continue;
+        cut = {.weight = weight,
+               .cost = cost,
+               .left_border = borders[0] <= borders[1],
+               .at = state.coordinate[sorted[k]]};
+    }
+    return cut;
+}
+
+}  // namespace magshell
