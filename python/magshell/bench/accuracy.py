@@ -82,7 +82,9 @@ def _print_cases(cases: list[Case], outcomes: dict) -> None:
             compared += 1
             continue
         for k, comparison in enumerate(midedge.comparisons):
-            errors = ["failed" if isinstance(run, str) else _percent(run.comparisons[k].error) for run in others]
+            errors = [
+                "failed" if isinstance(run, str) else _percent(run.comparisons[k].error) for run in others
+            ]
             first = k == 0
             costs = [each for run in (midedge, *others) for each in (_cost(run) if first else ("", ""))]
             rows.append(

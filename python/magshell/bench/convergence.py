@@ -87,7 +87,9 @@ def _against_the_limit(study: str, meshes, seeds) -> Convergence:
     stretches, by a solver that goes on to round-off."""
     run, length = STUDIES[study]
     end = ENDS[study]()
-    outcomes = [[run(cells, "midedge2", seed, ms.MixedNewton(tolerance=1e-13)) for cells in meshes] for seed in seeds]
+    outcomes = [
+        [run(cells, "midedge2", seed, ms.MixedNewton(tolerance=1e-13)) for cells in meshes] for seed in seeds
+    ]
     errors = [
         [np.linalg.norm([c.computed[-1] for c in each.comparisons] - end) / length for each in row]
         for row in outcomes

@@ -71,8 +71,8 @@ def linear_buckling(
         the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
     Joints that pull at rest, or have motors, are refused, as they are no controls. Bodies in contact are refused: a contact
-    bears in one direction only, so that a mode and its opposite have different factors, and none of them is linear; ms.follow
-    passes where contacts open and close.
+    bears in one direction only, so that a mode and its opposite have different factors, and none of them is linear;
+    ms.follow passes where contacts open and close.
 
     Raises ValueError on bad input, in a scene with contact of bodies, where the supports leave the sheet a motion without
     stiffness, where the controls do nothing, and where the sheet does not buckle under them (a column that is pulled);
