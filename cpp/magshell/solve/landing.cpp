@@ -21,14 +21,20 @@ double depth_at(double pull, double w, const ContactLaw& law) {
 VectorXd landing(const Model& model, const VectorXd& q, const Controls& controls, const VectorXd& weights,
                  const std::vector<ContactTerm::Touch>& expected) {
     const ContactTerm& contact = *model.contact();
-    const auto order = [](const ContactTerm::Touch& touch) {
-        return std::tie(touch.contact, touch.obstacle, touch.point);
+    const auto before = [](const ContactTerm::Touch* one, const ContactTerm::Touch* other) {
+        const auto key = [](const ContactTerm::Touch& touch) {
+            return std::tie(touch.contact, touch.obstacle, touch.point);
+        };
+        return key(*one) < key(*other);
     };
+    std::vector<const ContactTerm::Touch*> sorted;
+    for (const ContactTerm::Touch& touch : expected) sorted.push_back(&touch);
+    if (!std::is_sorted(sorted.begin(), sorted.end(), before))
+        std::sort(sorted.begin(), sorted.end(), before);
     VectorXd move;
-    auto same = expected.begin();
     for (const ContactTerm::Touch& touch : contact.touches(q.data(), controls)) {
-        while (same != expected.end() && order(*same) < order(touch)) ++same;
-        const double force = same != expected.end() && order(*same) == order(touch) ? same->force : 0.0;
+        const auto same = std::lower_bound(sorted.begin(), sorted.end(), &touch, before);
+        const double force = same != sorted.end() && !before(&touch, *same) ? (*same)->force : 0.0;
         const ContactPoint& point = contact.point(touch);
         if (point.nodes[1] >= 0) continue;  // what is on a face is not alone
         const ContactLaw& law = contact.law(touch);
@@ -39,7 +45,11 @@ VectorXd landing(const Model& model, const VectorXd& q, const Controls& controls
         if (move.size() == 0) move = VectorXd::Zero(q.size());
         move.segment<3>(3 * point.nodes[0]) += out * touch.at.normal;
     }
-    return move.size() > 0 ? model.reduction().project(move) : move;
+    if (move.size() == 0) return move;
+    move = model.reduction().project(move);
+    // Nothing is to be crossed on the way, nor elements turned inside out.
+    if (const double share = model.share_of_step(q, move); share < 1.0) move *= share;
+    return move;
 }
 
 std::vector<ContactTerm::Touch> after_step(const Model& model, const VectorXd& p) {

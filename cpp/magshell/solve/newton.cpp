@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "magshell/solve/landing.h"
+
 namespace magshell {
 namespace {
 

@@ -52,7 +52,7 @@ def without_contact(scene: ms.Scene, motion: ms.Trajectory) -> dict:
             scene,
             steps=1,
             time_step=TIME_STEP,
-            positions=positions,
+            start=positions,
             velocities=velocities,
             integrator=ms.ImplicitEuler(),
             progress=False,
