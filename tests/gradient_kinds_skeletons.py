@@ -61,7 +61,7 @@ def _carried_skeleton(free: bool):
         servo_stiffness=1e-3,
         torque_limit=1e-4,
         upper_limit=1.1e-3,
-        cone_limit=1e-3,
+        cone_limit=1.2e-3,
         limit_stiffness=1e-3,
         limit_smoothing=1e-2,
     )
