@@ -61,7 +61,7 @@ def _carried_skeleton(free: bool):
         servo_stiffness=1e-3,
         torque_limit=1e-4,
         upper_limit=1.1e-3,
-        cone_limit=1e-3,
+        cone_limit=1.2e-3,
         limit_stiffness=1e-3,
         limit_smoothing=1e-2,
     )
@@ -200,7 +200,9 @@ def thrown_skeleton() -> Kind:
     weight = ms.Link(mass=1e-3, inertia=1e-7, center=(0.0, 0.03, 0.01))
     rail = ms.Prismatic(weight, hand, origin=(0, 0.03, 0), axis=(1, 0, 1), rate=0.05, spring_stiffness=1.0)
     eye = ms.Link(mass=1e-3, inertia=1e-7, center=(0.0, 0.0, 0.01))
-    socket = ms.Ball(eye, arm, origin=(0.01, 0, 0), rate=(1.0, -3.0, 2.0), torque=(1e-6, 2e-6, 0))
+    socket = ms.Ball(
+        eye, arm, origin=(0.01, 0, 0), rate=(1.0, -3.0, 2.0), torque=(1e-6, 2e-6, 0), damping=1e-6
+    )
     ring = ms.Link(mass=1e-4, inertia=1e-9, center=(0.03, 0.025, 0.01))
     field = [ms.UniformField(), DIPOLES]
     scene = ms.Scene(

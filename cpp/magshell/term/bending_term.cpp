@@ -12,6 +12,7 @@ BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks
       sheet_(sheet),
       body_(body),
       chunks_(chunks),
+      nodes_(nodes),
       first_scalar_(nodes.first_scalar()),
       materials_(sheet, registry),
       curvature_scale_(registry.values.add(sheet.owner, "curvature_scale", "1", sheet.n_edges(), 1)),

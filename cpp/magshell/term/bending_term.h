@@ -27,6 +27,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    bool add_surrogate(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     std::size_t bytes() const override;
@@ -57,6 +58,8 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void strain(Index pack, const double* q, Pack d[3]) const { measure(pack, q, &FoldState::turn, d); }
     void rate(Index pack, const double* p, Pack d[3]) const { measure(pack, p, &FoldState::rate, d); }
     const Symmetric3& stiffness(Index pack) const { return stiffness_[pack]; }
+    /// Of each fold at rest, how its angle goes with its nodes along a normal of both of its sides.
+    std::vector<std::array<double, 4>> slopes_at_rest() const;
     double moment(const FoldStencil& fold, const Strains& stress) const;
     void store_folds(const double* q);
     void store_rates(const double* p);
@@ -68,6 +71,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     const Sheet& sheet_;
     const Index body_;
     const ChunkLoop& chunks_;
+    const Nodes& nodes_;
     const Index first_scalar_;
     SheetMaterials materials_;
     Slot curvature_scale_;

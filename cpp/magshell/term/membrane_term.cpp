@@ -37,6 +37,28 @@ bool MembraneTerm::set_values(const Values& values) {
     return true;
 }
 
+// A h w g_k . g_l, with the modulus of waves in a sheet at rest, w = E/(1 - nu^2); of edges opposite to the nodes,
+// g_k . g_l = e_k . e_l / 4 A^2.
+bool MembraneTerm::add_surrogate(NodeMatrix& out) const {
+    for (Index f = 0; f < surface_.n_faces(); ++f) {
+        double modulus = 0.0;
+        for (const MembraneFaces::Share& share : faces_.shares(f)) {
+            const SheetMaterial& material = materials_[share.face];
+            modulus += share.part * material.thickness * material.young_modulus /
+                       (1.0 - material.poisson_ratio * material.poisson_ratio);
+        }
+        const std::array<Vec3, 3> x = faces_.rest_corners(f);
+        const std::array<Vec3, 3> edge{x[2] - x[1], x[0] - x[2], x[1] - x[0]};
+        const double factor = modulus / (2.0 * edge[0].cross(edge[1]).norm());
+        const std::array<Index, 3>& nodes = faces_.corners()[f];
+        for (int k = 0; k < 3; ++k) {
+            out.add_diagonal(nodes[k], factor * edge[k].squaredNorm());
+            for (int l = 0; l < k; ++l) out.add_pair(nodes[k], nodes[l], factor * edge[k].dot(edge[l]));
+        }
+    }
+    return true;
+}
+
 double MembraneTerm::energy(const double* q, const Controls&) const {
     return loop_.sum([&](Index pack) {
         Pack3 x[3];

@@ -20,7 +20,8 @@ class Skeleton:
     Soft material around a link rides on it by its vertices, Link(vertices=..., body=solid). Joints hold to round-off, also
     over many steps. Values of joints go by the joint, values={hinge: {"torque": ...}}, and may change in time;
     `result[hinge].angle` and `result[link]` tell how it moves. ms.simulate takes it by TRBDF2 or ImplicitEuler.
-    Gradients are by all values of joints, their origins and axes too.
+    Gradients are by all values of joints, their origins and axes too. In motions of long chains (200 links) round-off of
+    angles, which are read off places far away, is above the tolerance of solvers: ms.MixedNewton(tolerance=1e-8) will do.
 
     >>> import numpy as np
     >>> import magshell as ms

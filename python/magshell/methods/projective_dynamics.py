@@ -14,10 +14,12 @@ class ProjectiveDynamics:
 
     The matrix is M/dt^2 + L, L a constant in the place of the stiffness, the same along x, y, z: of `ms.Projective` solids
     that of Bouaziz et al. 2014, of other solids with their modulus of waves at rest, 2 mu + lam (Liu, Bouaziz, Kavan 2017),
-    which is slower where they get much stiffer. A round then is a quasi-Newton step on the residual of ms.ImplicitEuler,
-    corrected by the last few steps (L-BFGS); converged, a step is that of ms.ImplicitEuler. A muscle adds w m m^T to L, its
-    stiffness or peak stress along its fibres. Loads, fields, water, cells, cavities, tendons, joints and obstacles act as
-    they do there, without a share in L; what is stiff among them takes more rounds, and a history.
+    which is slower where they get much stiffer; of shells with bending="hinge" that of waves in their plane, and their
+    bending as it is at rest, which takes more rounds the thinner they are. A round then is a quasi-Newton step on the
+    residual of ms.ImplicitEuler, corrected by the last few steps (L-BFGS); converged, a step is that of ms.ImplicitEuler. A
+    muscle adds w m m^T to L, its stiffness or peak stress along its fibres. Loads, fields, water, cells, cavities, tendons,
+    joints and obstacles act as they do there, without a share in L; what is stiff among them takes more rounds, and a
+    history.
 
     iterations: rounds of a step, at most.
     tolerance: of the residual, relative to the forces that cancel in it, as Newton's. A step that does not reach it is taken
@@ -29,7 +31,8 @@ class ProjectiveDynamics:
         where points touch, stick or slip. It takes supports that hold vertices entirely, and no rigid parts.
 
     Gradients are those of the solved step, by the exact Hessian: as of every integrator, and as exact as the tolerance.
-    Shells and contacts between bodies have no constant matrix here: they raise ValueError.
+    Shells with edge rotations ("midedge", "midedge2") and contacts between bodies have no constant matrix here: they raise
+    ValueError.
 
     >>> import magshell as ms
     >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
