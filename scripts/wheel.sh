@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A wheel that other machines install, and the sdist, in dist/; both tried in bare environments.
+# A wheel that other machines install, tried in a bare environment, and the sdist; in dist/.
 #
 #     PYTHON=.venv/bin/python scripts/wheel.sh
 #
@@ -31,16 +31,5 @@ for needed in CMakeLists.txt pyproject.toml LICENSE cpp/bindings/module.cpp pyth
     tar -tzf dist/*.tar.gz | grep -q "/$needed\$" || { say "the sdist lacks $needed"; exit 1; }
 done
 
-# A bare environment, with no compiler in reach and nothing of this folder on its path.
-bare=$(mktemp -d)
-trap 'rm -rf "$bare"' EXIT
-"$python" -m venv "$bare/venv"
-"$bare/venv/bin/pip" install --quiet "$wheel[plot,torch]" pytest
-mkdir "$bare/tests" && cp README.md "$bare/"
-cp tests/conftest.py tests/test_readme.py tests/test_statics.py tests/test_dynamics.py "$bare/tests/"
-find tests -maxdepth 1 -name '*.py' ! -name 'test_*' -exec cp {} "$bare/tests/" \;
-cd "$bare"
-env -i PATH="$bare/venv/bin" HOME="$bare" CXX=none MAGSHELL_NUM_THREADS=1 "$bare/venv/bin/python" -m magshell
-env -i PATH="$bare/venv/bin" HOME="$bare" CXX=none MAGSHELL_NUM_THREADS=1 "$bare/venv/bin/python" -m pytest -q \
-    -p no:cacheprovider tests
+PYTHON=$python scripts/try_wheel.sh "$wheel"
 say "the quick start and the core tests pass in a bare environment"

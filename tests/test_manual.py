@@ -70,6 +70,12 @@ def test_links_and_files(page) -> None:
         assert (DOCS.parent / path).exists(), path
 
 
+def test_every_example_is_told_of() -> None:
+    told = (DOCS / "examples.md").read_text()
+    names = [path.name for path in (DOCS.parent / "examples").glob("[!_]*.py")]
+    assert len(names) > 25 and [name for name in names if f"`{name}`" not in told] == []
+
+
 def test_every_page_is_in_a_table_of_contents() -> None:
     listed = {
         (page.parent / line.strip()).resolve()

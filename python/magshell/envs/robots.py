@@ -143,7 +143,7 @@ def muscle_octopus(
     4b. Observed: way and velocity of the center of mass, where the tips of the legs are from it, and the phase of the
     waves. Rewarded and disturbed as the fish. cells: along a leg.
 
-    target: (3,) m. render_mode: as in Environment.
+    target: (3,) m. render_mode: as in Environment. disturbed: as of fish.
 
     >>> import magshell as ms
     >>> ms.envs.robots.muscle_octopus(cells=2).action_space.shape
@@ -174,7 +174,7 @@ def cell_gripper(
     Rewarded: what the ball comes nearer, over its way; where a motion fails, the episode ends with -1. Disturbed as the
     fish. changes: of CellGripper's own arguments.
 
-    target: (3,) m. render_mode: as in Environment.
+    target: (3,) m. render_mode: as in Environment. disturbed: as of fish.
 
     >>> import magshell as ms
     >>> ms.envs.robots.cell_gripper().action_space.shape

@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Tries a wheel in a bare environment: no compiler in reach, nothing of this folder on its path. `python -m magshell`, the
+# README's quick start and the core tests have to pass.
+#
+#     PYTHON=.venv/bin/python scripts/try_wheel.sh dist/magshell-*.whl
+set -euo pipefail
+wheel=$(realpath "$1")
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+bare=$(mktemp -d)
+trap 'rm -rf "$bare"' EXIT
+
+"${PYTHON:-python3}" -m venv "$bare/venv"
+torch=$(grep -o '"torch==[0-9.]*"' pyproject.toml | tr -d '"')  # the release that `make test` takes, its CPU build if there
+"$bare/venv/bin/pip" install --quiet "$wheel[plot]" "$torch" pytest
+mkdir "$bare/tests" && cp README.md "$bare/" && cp -r docs "$bare/"  # the README's links lead there
+cp {CONTRIBUTING,SECURITY}.md CITATION.cff LICENSE "$bare/"
+cp tests/conftest.py tests/test_{readme,statics,dynamics}.py "$bare/tests/"
+find tests -maxdepth 1 -name '*.py' ! -name 'test_*' -exec cp {} "$bare/tests/" \;
+cd "$bare"
+in_it() { env -i PATH="$bare/venv/bin" HOME="$bare" CXX=none MAGSHELL_NUM_THREADS=1 "$bare/venv/bin/python" "$@"; }
+in_it -m magshell
+in_it -m pytest -q -p no:cacheprovider tests
