@@ -52,7 +52,8 @@ class Statics {
             const Controls controls = interpolate(from_, to_, target);
             VectorXd trial = result_.state;
             NewtonReport report = newton_.solve(trial, controls);
-            if (report.converged && strays(report, target - result_.progress)) {
+            const bool strayed = report.converged && strays(report, target - result_.progress);
+            if (strayed) {
                 report.converged = false;
                 report.reason = "a step ended on another branch, which is not stable";
             }
@@ -69,7 +70,7 @@ class Statics {
             result_.reason = report.reason;
             failed_step = target - result_.progress;
             result_.failed.shortest_step = std::min(result_.failed.shortest_step, failed_step);
-            if (++failures_ == patience && straight_there()) return true;
+            if (!strayed && ++failures_ == patience && straight_there()) return true;
             step = (report.lost ? 0.25 : 0.5) * failed_step;
             if (step >= options_.smallest_step * longest_step && options_.start_at_rest) continue;
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
