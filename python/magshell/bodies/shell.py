@@ -39,7 +39,7 @@ class Shell(Owner):
         percent on irregular meshes).
     remanent_magnetization: (3,) or (n_f, 3) A/m, in a scene with a field, where a solve says nothing else.
 
-    Which one: an element of "midedge2" costs about ten times a face of "midedge", and needs far fewer of them. Where
+    Which one: an element of "midedge2" costs about eight times a face of "midedge", and needs far fewer of them. Where
     deflections and loads are wanted to a percent or better, and where sheets are curved at rest or twist, take "midedge2"
     with a SixNodeMesh; the coarsest mesh that shows the shape will often do. Where the mesh has to be fine anyway, for
     contacts, many small faces of their own magnetization, creases and folds, or where a few percent are enough, take
