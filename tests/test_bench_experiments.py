@@ -107,8 +107,8 @@ def test_a_robots_episode_loses_its_miss() -> None:
     class Short(CellGripper):
         steps = 4
 
-    task = RobotTask("gripper", Short(levels=9, ball_cells=2), "cell_gripper")
-    one = cell_gripper(levels=9, ball_cells=2, disturbed=False)
+    task = RobotTask("gripper", Short(levels=7, ball_cells=2), "cell_gripper")
+    one = cell_gripper(levels=7, ball_cells=2, disturbed=False)
     one.reset(seed=0)
     actions = task.middle.reshape(4, -1)
     rewarded = sum(one.step(action)[1] for action in actions)

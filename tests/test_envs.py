@@ -142,7 +142,7 @@ def test_robots_have_the_same_bits_with_the_same_seed():
     """Made twice; the small ones of the robots that go to a target."""
     for make in (
         partial(robots.muscle_octopus, cells=4),
-        partial(robots.cell_gripper, levels=9, ball_cells=2),
+        partial(robots.cell_gripper, levels=7, ball_cells=2),
     ):
         one, other = make(), make()
         actions = np.random.default_rng(2).uniform(-0.3, 0.3, (3, *one.action_space.shape))

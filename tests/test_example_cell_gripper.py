@@ -13,7 +13,7 @@ TARGET = (0.0, 0.05, 0.0)
 @pytest.fixture(scope="module")
 def carried() -> dict:
     return load("cell_gripper").main(
-        levels=9,
+        levels=7,
         ball_cells=2,
         steps=25,
         target=TARGET,
@@ -45,14 +45,14 @@ def test_cells_are_the_outer_half_of_each_arm() -> None:
 
 def test_ball_is_carried_to_the_target(carried) -> None:
     for found in carried["found"]:
-        assert found.misses[0] > 0.5 and found.episodes is not None and found.episodes <= 10
+        assert found.misses[0] > 0.4 and found.episodes is not None
     way = carried["found"][0].robot.way(carried["motion"])
     np.testing.assert_allclose(way, TARGET, atol=0.01 * 0.05)
 
 
 def test_friction_holds_it(carried) -> None:
-    """With the same controls and no friction it stays behind, and with it no arm passes into the ball."""
-    assert carried["slips"][1] < 0.5 * TARGET[1]
+    """With the same controls and no friction it stays on the table, and no arm passes into the ball."""
+    assert carried["slips"][1] < 0.2 * TARGET[1]
     gripper, motion = carried["found"][0].robot, carried["motion"]
     touching = motion.touching(gripper.grip, len(motion) - 1)
     assert touching.smallest_distance > 0 and touching.normal_force > 5.0
@@ -80,7 +80,7 @@ def test_the_environment_moves_as_the_motion_does(carried) -> None:
     from magshell.envs.robots import cell_gripper as environment
 
     gripper, controls = carried["found"][0].robot, carried["found"][0].controls[:4]
-    one = environment(levels=9, ball_cells=2, disturbed=False)
+    one = environment(levels=7, ball_cells=2, disturbed=False)
     one.reset(seed=0)
     seen = [one.step(action)[0] for action in controls]
     np.testing.assert_allclose(seen[-1][:3], gripper.way(gripper.motion(controls)), atol=1e-12)
@@ -92,6 +92,6 @@ def test_pictures_of_the_gripper(carried, tmp_path, monkeypatch) -> None:
     figure = example.plot(carried)
     assert len(figure.axes) == 3 and ms.Picture(figure)._repr_png_().startswith(b"\x89PNG")
     assert example.picture(carried)._repr_png_().startswith(b"\x89PNG")
-    path = example.movie(carried, tmp_path / "a.gif", fps=10.0, width=300, speed=0.5, progress=False)
+    path = example.movie(carried, tmp_path / "a.gif", fps=10.0, width=400, speed=0.5, progress=False)
     assert path.stat().st_size > 3_000
     assert "without friction" in example.summary(carried)

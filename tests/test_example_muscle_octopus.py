@@ -86,7 +86,7 @@ def test_pictures_of_the_octopus(swum, tmp_path, monkeypatch) -> None:
     figure = example.plot(swum)
     assert len(figure.axes) == 4 and ms.Picture(figure)._repr_png_().startswith(b"\x89PNG")
     assert example.report.picture(swum["motion"], example.VIEW)._repr_png_().startswith(b"\x89PNG")
-    options = {"speed": 0.5, "fps": 10.0, "width": 300, "progress": False}
+    options = {"speed": 0.5, "fps": 10.0, "width": 400, "progress": False}
     path = example.report.movie(swum["motion"], tmp_path / "a.gif", example.VIEW, **options)
     assert path.stat().st_size > 3_000
     assert "depth 0.5" in example.summary(swum)

@@ -15,12 +15,10 @@ from ..surroundings.contact import Contact
 from ..surroundings.supports import Pin
 from .robot import Robot
 
-CUBE = (
-    0.085  # m: of which the gripper is built; 1.1 x 1.3 x 1.1 m in all, [Qiao21]'s scene is 1.1 x 1.5 x 1.1
-)
+CUBE = 0.085  # m: of these it is built; with the ball 1.1 x 1.6 x 1.1 m, [Qiao21]'s is 1.1 x 1.5 x 1.1
 LEVELS = 14  # of an arm, a cell in each: 56 in all
 WIDE, ACROSS = 3, 13  # cubes: an arm, and the whole
-LOW, RADIUS = -0.25, 0.37  # m: where arms end, the ball around the origin
+LOW, RADIUS = 0.0, 0.37  # m: arms end as high as the middle of the ball, so that friction has to hold it
 BALL_CELLS = 3
 YOUNG_MODULUS, POISSON_RATIO, MASS, BALL_MASS = 2e5, 0.4, 10.0, 1.0  # Pa, 1, kg, kg
 STIFFNESS, INFLATED = 5e5, 1.6  # Pa, of a cell; its volume over that at rest, at most
@@ -32,7 +30,7 @@ TARGET = (0.0, 0.3, 0.0)  # m, of the ball
 
 
 class CellGripper(Robot):
-    """levels: of an arm, with a cell in each; the ball needs 8. ball_cells: of its mesh, from its center to its surface.
+    """levels: of an arm, with a cell in each; the ball needs 5. ball_cells: of its mesh, from its center to its surface.
 
     scene: arms and ball, gravity, and a table that the ball lies on. arms, ball: the Solids. cells: 56, from the lowest
     of an arm to the highest, arm by arm. drone: the Pin that holds the arms' upper end, and moves.
