@@ -19,19 +19,23 @@ def draw(results: dict, setting: dict) -> Figure:
     both = len(tasks) <= _ROW
     columns = max(panels, 1) if both else _ROW
     rows = (2 if tasks else 1) if both else -(-panels // _ROW)
+    if panels == 1 and tasks:  # what it needs of simulations and of time beside each other
+        rows, columns = 1, 2
     figure = new_figure(3.6 * columns, 3.0 * rows if rows > 1 else 3.2)
     axes = figure.subplots(rows, columns, squeeze=False)
     places = axes[0] if both else axes.ravel()
+    of_time = axes[-1] if rows > 1 else axes[0, 1:]
     looks = _looks(tasks)
     for k, (name, task) in enumerate(tasks.items()):
         _curves(places[k], task, looks, "simulations")
         if both:
-            _curves(axes[1, k], task, looks, "seconds")
+            _curves(of_time[k], task, looks, "seconds")
         runs = f"mean and range of {task['seeds']} runs" if task["seeds"] > 1 else "one run"
         panel_title(places[k], name, f"{task['unknowns']} unknowns, {runs}")
     if memory:
         _memory(places[len(tasks)], memory)
-    for each in axes[1:, -1] if memory and both else places[panels:]:
+    unused = places[panels:] if not both else axes[1:, -1] if memory and rows > 1 else []
+    for each in unused:
         each.set_visible(False)
     for each in axes.ravel():
         tidy(each)
