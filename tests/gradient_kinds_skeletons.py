@@ -167,7 +167,7 @@ def driven_skeleton_in_motion(integrator, **options) -> Kind:
 
 
 def skeleton_at_rest() -> Kind:
-    return Kind(_carried_skeleton(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=REACH)
+    return Kind(_carried_skeleton(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, step=3e-4, reach=REACH)
 
 
 def skeleton_in_motion(integrator, **options) -> Kind:

@@ -66,12 +66,15 @@ def fails_at_two(start):
     return float(start)
 
 
-def returns_equilibrium(start):
-    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(2, 1))
-    scene = ms.Scene(
-        ms.Shell(mesh, thickness=1e-3, young_modulus=1e6), supports=[ms.Clamp(mesh.edges_at(x=0.0))]
-    )
-    return 0.0, ms.equilibrium(scene)
+class NotSent:
+    """A result of somebody's own that stays where it was made."""
+
+    def __reduce__(self):
+        raise TypeError("positions are kept in a file that is open")
+
+
+def returns_what_is_not_sent(start):
+    return 0.0, NotSent()
 
 
 def kills_itself_at_one(start):

@@ -70,7 +70,7 @@ def test_a_start_that_kills_its_worker_fails_alone():
 
 def test_a_result_that_does_not_pickle_says_so():
     with pytest.raises(ms.MultistartFailed, match=r"what run returned cannot be pickled.*positions"):
-        quiet(runs.returns_equilibrium, [0], workers=1)
+        quiet(runs.returns_what_is_not_sent, [0], workers=1)
 
 
 SCRIPT = """
@@ -241,4 +241,4 @@ def test_dask_takes_local_functions(cluster):
 
 def test_dask_does_not_wait_for_what_cannot_be_sent(cluster):
     with pytest.raises(ms.MultistartFailed, match="what run returned cannot be pickled"):
-        quiet(runs.returns_equilibrium, [0], cluster.get_executor())
+        quiet(runs.returns_what_is_not_sent, [0], cluster.get_executor())

@@ -21,8 +21,8 @@ ALLOWED_RATIO = 1.25  # a Newton iteration over its factorization and back-subst
 
 # Name: a scene of a bending, the controls, how many factorizations it may take from flat in one call.
 CASES: dict[str, tuple[Callable[[str], ms.Scene], dict, int]] = {
-    "A1, full load": (lambda b: shear_strip.scene(shear_strip.strip((40, 4)), b), {}, 12),
-    "A4, full load": (lambda b: hemisphere.scene(hemisphere.quarter((64, 16)), b, 400.0), {}, 25),
+    "A1, full load": (lambda b: shear_strip.scene(shear_strip.strip((40, 4), b), b), {}, 12),
+    "A4, full load": (lambda b: hemisphere.scene(hemisphere.quarter((64, 16), b), b, 400.0), {}, 25),
     "C1-90, beta 20": (
         lambda b: magnetic_strip.scene(
             ms.meshes.rectangle(
@@ -34,6 +34,7 @@ CASES: dict[str, tuple[Callable[[str], ms.Scene], dict, int]] = {
         40,
     ),
 }
+BENDINGS = ("midedge", "hinge")
 SOLVERS = {"mixed": ms.MixedNewton(), "plain": ms.Newton(max_iterations=60)}
 
 
@@ -74,7 +75,7 @@ def strongly_bent(faces: int, bending: str = "midedge") -> tuple[ms.Scene, dict]
 def _from_flat() -> dict:
     rows, results = [], {}
     for name, (build, controls, allowed) in CASES.items():
-        for bending in ("midedge", "hinge"):
+        for bending in BENDINGS:
             for solver_name, solver in SOLVERS.items():
                 try:
                     found = ms.equilibrium(build(bending), solver=solver, require_stable=False, **controls)

@@ -43,8 +43,8 @@ def energies(
         none, which leaves the normals across edges half-way between those of their faces.
     body: of the scene: its elastic energies alone, "membrane" and "bending" of a Shell, "solid" of a Solid.
 
-    The others are as in ms.equilibrium, whose `energies` these are where it found the positions; what supports prescribe is
-    not asked. Energies have no gradients here: those of an equilibrium do.
+    The others are as in ms.equilibrium, whose `energies` these are where it found the positions; of what supports prescribe
+    only the directions of clamps are asked. Energies have no gradients here: those of an equilibrium do.
 
     Raises ValueError on bad input, and where there is no energy: bodies in contact intersect or are nearer than
     they may be, or elements are inside out whose material does not bear it.
@@ -90,6 +90,10 @@ def energies(
         rotations = quantity("edge_rotations", "rad", rotations, (scene._bodies.n_rotations,))
     with inputs.in_core():
         state = model.state(places, rotations)
+        # The directions of clamps are unknowns that no positions tell: they are where the clamps turn them.
+        first = 3 * scene._bodies.n_points
+        directions = slice(first, first + 3 * len(scene._constraints.directions))
+        state[directions] += model.driven_increment(state, inputs.controls)[directions]
         if reason := model.refusal(state):
             raise ValueError(f"there is no energy at these positions: {reason}")
         of_terms = model.term_energies(state, [], inputs.controls)

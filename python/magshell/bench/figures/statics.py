@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from ..statics import CASES, SOLVERS
+from ..statics import BENDINGS, CASES, SOLVERS
 from .style import (
     BENDING_COLOURS,
     COLOURS,
@@ -40,7 +40,7 @@ def draw(results: dict, setting: dict) -> Figure:
 
 
 def _from_flat(axes, found: dict) -> None:
-    ways = [(bending, solver) for bending in BENDING_COLOURS for solver in SOLVERS]
+    ways = [(bending, solver) for bending in BENDINGS for solver in SOLVERS]
     width = 0.8 / len(ways)
     for k, (bending, solver) in enumerate(ways):
         look = {"color": BENDING_COLOURS[bending], "alpha": 1.0 if solver == "mixed" else 0.4}
