@@ -57,14 +57,14 @@ def test_scordelis_lo():
 
 
 def test_pinched_cylinder():
-    """B2: the limit of Kirchhoff-Love theory 1.82842e-5, by NGSolve's shells of order 3 on graded meshes."""
+    """B2: the limit of Kirchhoff-Love theory 1.82842e-5, as the project's issue 18 states it."""
     assert pinched_cylinder((32, 32), "midedge2").comparisons[0].computed[0] == pytest.approx(
         1.82842e-5, rel=1e-4
     )
 
 
 def test_hemisphere_pulled_and_pushed():
-    """A4: the limit of Kirchhoff-Love theory 4.0742 and 8.1495, by NGSolve's shells of order 3."""
+    """A4: the limit of Kirchhoff-Love theory 4.0742 and 8.1495, as the project's issue 18 states it."""
     pulled, pushed = last(hemisphere.large_deflection((64, 16), "midedge2"))
     assert (pulled, pushed) == (pytest.approx(4.0742, rel=2e-3), pytest.approx(8.1495, rel=2e-3))
 
