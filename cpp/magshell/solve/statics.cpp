@@ -11,7 +11,6 @@ namespace magshell {
 namespace {
 
 constexpr int quick_iterations = 8;  // a load step that converged in so many is followed by one twice as long
-constexpr int patience = 2;          // steps that fail before plain ones are tried
 constexpr double longest_turn =
     0.5;                            // [rad] of a support in one load step: full circles must be gone through
 constexpr double forgetting = 1.2;  // of a step that failed, with every one that did not
@@ -20,20 +19,12 @@ class Statics {
   public:
     Statics(Newton& newton, const Controls& from, const Controls& to, const StaticsOptions& options,
             StaticsResult& result)
-        : newton_(newton),
-          from_(from),
-          to_(to),
-          options_(options),
-          result_(result),
-          start_(result.state),
-          start_turns_(result.turns) {}
+        : newton_(newton), from_(from), to_(to), options_(options), result_(result) {}
 
     bool run() {
         result_.reason = newton_.model().refusal(result_.state);
         if (!result_.reason.empty() || !(options_.away_from.empty() ? load() : go_elsewhere())) return false;
-        if (result_.stable || !options_.require_stable) return true;
-        // What wandered there, and is no branch of the way, need not be left: others lead past it.
-        return (wandered_ && straight_there()) || descend(1.0);
+        return result_.stable || !options_.require_stable || descend(1.0);
     }
 
   private:
@@ -52,13 +43,11 @@ class Statics {
             const Controls controls = interpolate(from_, to_, target);
             VectorXd trial = result_.state;
             NewtonReport report = newton_.solve(trial, controls);
-            const bool strayed = report.converged && strays(report, target - result_.progress);
-            if (strayed) {
+            if (report.converged && strays(report, target - result_.progress)) {
                 report.converged = false;
                 report.reason = "a step ended on another branch, which is not stable";
             }
             if (report.converged) {
-                wandered_ = report.iterations > quick_iterations;
                 was_stable_ = report.factor.negative_pivots == 0;
                 accept(trial, controls, target, report.residual);
                 factor = report.in_place ? report.factor : FactorReport();
@@ -70,7 +59,6 @@ class Statics {
             result_.reason = report.reason;
             failed_step = target - result_.progress;
             result_.failed.shortest_step = std::min(result_.failed.shortest_step, failed_step);
-            if (!strayed && ++failures_ == patience && straight_there()) return true;
             step = (report.lost ? 0.25 : 0.5) * failed_step;
             if (step >= options_.smallest_step * longest_step && options_.start_at_rest) continue;
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
@@ -99,38 +87,6 @@ class Statics {
         constexpr double long_step = 0.125;
         return options_.start_at_rest && options_.require_stable && was_stable_ && step > long_step &&
                report.iterations > quick_iterations && report.factor.negative_pivots > 0;
-    }
-
-    // From the start to the end in one go with plain steps, as many as they take: they pass by saddles that mixed ones are
-    // drawn to, and find what lies beyond a snap. Only a stable state will do.
-    bool straight_there() {
-        constexpr int times_longer = 4;
-        if (went_straight_ || !options_.start_at_rest || !options_.require_stable ||
-            !newton_.options().mixed || newton_.model().has_body_contact() ||
-            newton_.model().reduction().largest_turn() > 0.0)
-            return false;
-        went_straight_ = true;
-        newton_.model().set_turns(start_turns_);
-        VectorXd trial = start_;
-        NewtonOptions options = newton_.options();
-        options.mixed = false;
-        options.max_iterations *= times_longer;
-        NewtonReport report;
-        {
-            Newton plain(newton_.model(), options, [this](double residual) { newton_.watch(residual); });
-            report = plain.solve(trial, to_);
-            newton_.count_factorizations(plain.factorizations());
-            for (int k = 0; k < plain.iterations(); ++k) newton_.count_iteration();
-        }
-        if (report.converged) {
-            const FactorReport factor = newton_.factorize_at(trial, to_);
-            if (factor.succeeded && factor.negative_pivots == 0 && factor.perturbed_pivots == 0) {
-                accept(trial, to_, 1.0, report.residual);
-                return judge(factor);
-            }
-        }
-        newton_.model().set_turns(result_.turns);
-        return false;
     }
 
     // A sheet bent far already may be too much for the mixed steps, and not for plain ones.
@@ -199,10 +155,7 @@ class Statics {
     const Controls from_, to_;
     const StaticsOptions& options_;
     StaticsResult& result_;
-    const VectorXd start_;
-    const Model::Turns start_turns_;
-    int failures_ = 0;
-    bool was_stable_ = true, wandered_ = false, went_straight_ = false;
+    bool was_stable_ = true;  // where the last load step ended
 };
 
 }  // namespace
