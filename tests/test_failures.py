@@ -247,7 +247,7 @@ def slide(scene: ms.Scene, **options) -> np.ndarray:
     ).positions
 
 
-@pytest.mark.parametrize("call", [2, 3, 5, 7])
+@pytest.mark.parametrize("call", [1, 2, 3, 4])
 def test_an_interrupted_motion_leaves_nothing_behind(monkeypatch, call):
     """No iterations but damped ones, which hold normal forces meanwhile."""
     scene = slides_into_the_floor()
