@@ -101,8 +101,8 @@ test_solve_is_refused = refused(
         ("stable", lambda: solve(require_stable="no"), "require_stable must be True or False, got 'no'"),
         (
             "progress",
-            lambda: solve(progress=True),
-            r"progress must be a function of \(progress, residual\), got True",
+            lambda: solve(progress="often"),
+            r"progress must be True, False or a function of \(progress, residual\), got 'often'",
         ),
         ("tolerance", lambda: ms.Newton(tolerance=0), r"tolerance must be in \(0, 1\), got 0"),
         ("tolerance nan", lambda: ms.Newton(tolerance=np.nan), "tolerance is nan"),

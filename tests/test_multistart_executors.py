@@ -207,6 +207,36 @@ def test_ctrl_c_with_the_callers_executor_cancels_what_waits():
     assert [one.start for one in caught.value.last_good] == [0] and calls == [0, 1]
 
 
+class PressesCtrlC:
+    """Runs a call at once, but the last only once it is asked to, as Ctrl-C came while that was handed out."""
+
+    def __init__(self, calls):
+        self._left = calls
+
+    def submit(self, function, *arguments):
+        self._left -= 1
+        if not self._left:
+            self.rest = partial(function, *arguments)
+            raise KeyboardInterrupt
+        future = Future()
+        future.set_result(function(*arguments))
+        return future
+
+
+def test_ctrl_c_while_starts_are_handed_out_keeps_what_has_finished():
+    calls = []
+
+    def run(start):
+        calls.append(start)
+        return start
+
+    executor = PressesCtrlC(3)
+    with pytest.raises(ms.Interrupted, match="after 2 of 5 starts") as caught:
+        quiet(run, range(5), executor)
+    assert [one.start for one in caught.value.last_good] == [0, 1]
+    assert executor.rest().failed and calls == [0, 1]  # nobody waits for it any more
+
+
 @pytest.fixture(scope="module")
 def cluster():
     distributed = pytest.importorskip("distributed")

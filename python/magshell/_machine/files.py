@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import secrets
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -78,7 +77,7 @@ def _status(place: Path) -> os.stat_result | None:
 
 
 def _beside(place: Path) -> Path:
-    part = place.with_name(f".{place.stem[:_STEM]}.{secrets.token_hex(4)}{place.suffix}")
+    part = place.with_name(f".{place.stem[:_STEM]}.{os.urandom(4).hex()}{place.suffix}")
     try:
         os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     except OSError as error:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from difflib import SequenceMatcher
-
 FLUX_DENSITY = "applied_flux_density"
 FACTORS = ("load_factor", "gravity_factor", "field_factor", "motion_factor")
 CONTROLS = (FLUX_DENSITY, *FACTORS)
@@ -52,6 +50,8 @@ def as_keywords(scene, named: dict, known) -> dict:
 
 def nearest_first(name, names) -> str:
     """The names that there are, the one most like `name` in front."""
+    from difflib import SequenceMatcher  # for errors alone
+
     return ", ".join(sorted(names, key=lambda each: -SequenceMatcher(None, str(name), each).ratio()))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_banded
+import scipy
 
 from .._checks.quantity import quantity
 
@@ -55,7 +55,7 @@ def core_curve(table: np.ndarray | None) -> tuple[float, float, list[float]] | N
     rows = 6.0 * values
     rows[0] -= values[0]
     rows[-1] -= values[-1]
-    coefficients = solve_banded((1, 1), bands, rows)
+    coefficients = scipy.linalg.solve_banded((1, 1), bands, rows)
     # The curve goes over into its constant ends by one more coefficient on either side.
     around = np.concatenate([[values[0]], coefficients, [values[-1]]])
     step = float((places[-1] - places[0]) / (n - 1))

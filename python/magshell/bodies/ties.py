@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from .._checks.quantity import quantity
 from .._checks.selections import indices, selection
@@ -59,7 +57,7 @@ class Tie:
         if self.vertices is not None:
             of_a = indices("Tie vertices", self.vertices, self.a.mesh.n_vertices)
         places, others = self.a.mesh.rest_positions[of_a], self.b.mesh.rest_positions
-        apart, of_b = cKDTree(others).query(places, distance_upper_bound=np.inf)
+        apart, of_b = scipy.spatial.cKDTree(others).query(places, distance_upper_bound=np.inf)
         near = apart <= reach
         if self.vertices is not None and not near.all():
             far = int(np.argmax(apart))
@@ -102,5 +100,5 @@ def joined_components(components: np.ndarray, welded: np.ndarray) -> np.ndarray:
 
 
 def _groups(count: int, pairs: np.ndarray) -> np.ndarray:
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return connected_components(graph, directed=False)[1]
+    graph = scipy.sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]

@@ -12,9 +12,10 @@ import numpy as np
 from .._checks.arrays import count
 from .._checks.scalars import not_negative
 from .._checks.tensors import detached, require_torch
+from .._machine.log import log
 from .._machine.progress import progress_bar
 from ..design.answer import Answer
-from ..design.minimum import Minimum
+from ..design.minimum import Minimum, effort
 from ..errors import DesignRejected, Interrupted, ObjectiveFailed
 from ._search import check_functions, given_controls, row_bound, search_rows
 from ._trials import Trials
@@ -173,6 +174,9 @@ def receding(
                     failures.append((part, str(failure)))
                 next_state = advance(planned[part.first : part.settled].clone(), part, state)
                 bar.update(part.settled - reached)
+                done = effort(each for _, each in searches)
+                bar.set_postfix_str(done)
+                log.info("receding: %d of %d rows settled, %s", part.settled, steps, done)
                 state, reached, known = next_state, part.settled, part.end
                 if until is not None and until(state):
                     break

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .._checks.tensors import require_torch
+from .._machine.log import log
 from .._machine.progress import progress_bar
 from ..errors import DesignRejected, EquilibriumJumped, Interrupted, ObjectiveFailed
 from .checkpoint import load, save
@@ -117,8 +118,10 @@ def _loop(run: Run, ends: _Ends, bar, checkpoints: _Checkpoints) -> str:
             checkpoints.save(run)
             bar.update()
             bar.set_postfix_str(run.summary())
+            log.info("minimize: iteration %d: %s", run.iteration, run.summary())
             reason = ends.reason(run.history, None if moved else run.standstill)
     checkpoints.save(run, last=True)
+    log.info("minimize: ended: %s", reason)
     return reason
 
 

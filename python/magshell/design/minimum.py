@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from .rejections import in_words
+from .rejections import effort_in_words, in_words, total
 
 
 @dataclass(frozen=True)
@@ -56,3 +57,12 @@ class Minimum:
         rejected = in_words(self.rejections)
         first = f"{reached} after {self.iterations} iterations{evaluations} ({self.reason})"
         return "\n  ".join(filter(None, (first, rejected, self.conflict)))
+
+
+def effort(minima: Iterable[Minimum]) -> str:
+    """What several searches took together; empty where there was none."""
+    found = list(minima)
+    if not found:
+        return ""
+    evaluations = sum(each.history[-1].evaluations for each in found if each.history)
+    return ", ".join(effort_in_words(evaluations, total(each.rejections for each in found)))

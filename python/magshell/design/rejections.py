@@ -37,6 +37,11 @@ def in_words(rejections: Mapping[str, int]) -> str:
     return f"{sum(rejections.values())} rejected ({told})"
 
 
+def effort_in_words(evaluations: int, rejections: Mapping[str, int]) -> list[str]:
+    """What a search has taken so far, for its bar and the log: ["31 evaluations", "2 rejected (jump)"]."""
+    return [f"{evaluations} evaluations", *filter(None, [in_words(rejections)])]
+
+
 def conflict(history: Sequence, lost: Mapping[str, int], stuck: bool) -> str:
     """What is to be said where a run met the same jump in every one of its last iterations and gained little, or ended
     at one; else nothing. That lower designs lie beyond it is likely, and no more than that.

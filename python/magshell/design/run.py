@@ -11,13 +11,14 @@ from dataclasses import asdict, dataclass
 
 from .._checks.arrays import number
 from .._checks.tensors import is_tensor, require_torch
+from .._machine.log import log
 from ..errors import DesignRejected, EquilibriumJumped
 from ..optim.standstill import STANDSTILL
 from .answer import Answer
 from .checkpoint import decoded, encoded
 from .configuration import kept
 from .minimum import Minimum, Record
-from .rejections import conflict, in_words, reason_of, total
+from .rejections import conflict, effort_in_words, reason_of, total
 from .resume import check_objective, check_same
 
 PARTS = (
@@ -99,6 +100,7 @@ class Run:
             answer = Answer.of(self.objective(*self.parameters))
         except DesignRejected as error:
             self.rejections[reason_of(error)] += 1
+            log.debug("minimize: design %d rejected: %s", self._evaluations, error)
             raise
         finally:
             self.watch()
@@ -167,9 +169,7 @@ class Run:
     def summary(self) -> str:
         """The objective, and how many designs were evaluated and rejected so far."""
         parts = [f"objective {self.history[-1].objective:.6g}"] if self.history else []
-        return ", ".join(
-            filter(None, (*parts, f"{self._evaluations} evaluations", in_words(self._all_rejections)))
-        )
+        return ", ".join([*parts, *effort_in_words(self._evaluations, self._all_rejections)])
 
     @property
     def _lost(self) -> dict[str, int]:

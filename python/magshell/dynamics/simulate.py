@@ -9,7 +9,8 @@ import numpy as np
 from .. import _core
 from .._checks.tensors import detached, dtype_like, like
 from .._machine.entry import solve_entry
-from .._machine.progress import progress_bar
+from .._machine.log import log
+from .._machine.progress import SolveBar
 from ..adjoint.dynamic import MotionAdjoint
 from ..bodies.caps import warn_of_caps
 from ..bodies.strains import StrainHistory, warn_if_large
@@ -172,12 +173,22 @@ def simulate(
         motion_factor=motion_factor,
     )
     began = time.perf_counter()
-    with inputs.in_core(), progress_bar("simulate", 1.0, shown=progress, delay=2.0, bar_format=_BAR) as bar:
+    with inputs.in_core(), SolveBar("simulate", progress) as bar:
         check_apart(scene, asked.start.state)
         found = _core.simulate(
             scene._model, asked.core, bool(inputs.leaves), int(memory_budget), asked.keep, _advance(bar)
         )
     result = _trajectory(asked, found, time.perf_counter() - began)
+    log.debug(
+        "simulate: %s, %d of %d steps, %d in parts, %d iterations, %d factorizations, %.3g s",
+        found.outcome.name,
+        found.steps_done,
+        asked.steps,
+        len(result.halved),
+        found.iterations,
+        found.factorizations,
+        result.wall_time,
+    )
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {found.steps_done} of {steps} steps", result)
     if found.outcome == _core.Outcome.failed:
@@ -279,11 +290,8 @@ def _outputs(asked: MotionInputs, found):
     return solved(MotionAdjoint(asked, found), arrays, dtype_like(*inputs.given), inputs.tensors)
 
 
-_BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
-
-
 def _advance(bar):
     def advance(share: float, residual: float) -> None:
-        bar.update(share - bar.n)
+        bar.to(share)
 
     return advance

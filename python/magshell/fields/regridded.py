@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import Delaunay
+import scipy
 
 _SAME = 1e-6  # of the extent along an axis: as many digits as tables have
 _NEIGHBORS = 40  # that a value between scattered points is made from
@@ -90,7 +90,7 @@ def _refuse_beyond(points: np.ndarray, wanted: np.ndarray, grid: np.ndarray, axe
     if len(axes) == 1:
         outside = (wanted[:, 0] < -_SAME) | (wanted[:, 0] > 1.0 + _SAME)
     else:
-        outside = Delaunay(points).find_simplex(wanted, tol=_SAME) < 0
+        outside = scipy.spatial.Delaunay(points).find_simplex(wanted, tol=_SAME) < 0
     if outside.any():
         place = ", ".join(f"{value:.4g}" for value in grid[int(np.argmax(outside))])
         raise ValueError(

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+import scipy
 
 from .._checks.arrays import count
 from .._machine.entry import solve_entry
@@ -167,11 +167,11 @@ def _lowest(
     # eigenvalues.
     negative_change = -stiffness.with_values(change)
     size = negative_change.shape[0]
-    inverse = LinearOperator((size, size), matvec=stiffness.solve, dtype=np.float64)
+    inverse = scipy.sparse.linalg.LinearOperator((size, size), matvec=stiffness.solve, dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(size)  # one that no symmetry is orthogonal to
     pencil = {"A": negative_change, "M": stiffness.matrix, "Minv": inverse, "v0": start}
     try:
-        extreme = abs(eigsh(k=1, which="LM", return_eigenvectors=False, **pencil)[0])
+        extreme = abs(scipy.sparse.linalg.eigsh(k=1, which="LM", return_eigenvectors=False, **pencil)[0])
         # By Sylvester's law, K + lambda dK has as many negative directions as there are factors between 0 and
         # lambda. Looked for no further than theory reaches: beyond are strains of order one, closely spaced
         # and meaningless.
@@ -182,8 +182,8 @@ def _lowest(
                 "the sheet does not buckle under these controls, as far as linear theory reaches; "
                 "under reversed ones it may"
             )
-        inverses, vectors = eigsh(k=min(count, available), which="LA", **pencil)
-    except ArpackError as error:
+        inverses, vectors = scipy.sparse.linalg.eigsh(k=min(count, available), which="LA", **pencil)
+    except scipy.sparse.linalg.ArpackError as error:
         raise NotConverged(f"the buckling modes did not converge: {error}. Ask for fewer modes.") from error
     order = np.argsort(-inverses)
     return 1.0 / inverses[order], vectors[:, order]

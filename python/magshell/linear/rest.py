@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csc_array
+import scipy
 
 from .. import _core
 from ..bodies.muscle_result import FibreStates, muscles_in
@@ -40,11 +40,11 @@ class RestStiffness:
             )
 
     @property
-    def matrix(self) -> csc_array:
+    def matrix(self) -> scipy.sparse.csc_array:
         """K, (n, n)."""
         return self.with_values(self._values)
 
-    def with_values(self, values: np.ndarray) -> csc_array:
+    def with_values(self, values: np.ndarray) -> scipy.sparse.csc_array:
         """The symmetric matrix (n, n) whose lower triangle has K's pattern and these values."""
         return symmetric(*self._pattern, values)
 
@@ -104,10 +104,10 @@ def refuse_what_acts(inputs: Inputs) -> None:
             )
 
 
-def symmetric(size: int, starts: np.ndarray, rows: np.ndarray, values: np.ndarray) -> csc_array:
+def symmetric(size: int, starts: np.ndarray, rows: np.ndarray, values: np.ndarray) -> scipy.sparse.csc_array:
     """Both triangles of a matrix (n, n) whose lower one is given by columns."""
-    lower = csc_array((values, rows, starts), shape=(size, size))
+    lower = scipy.sparse.csc_array((values, rows, starts), shape=(size, size))
     diagonal = lower.diagonal()
     both = lower + lower.T
     both.setdiag(diagonal)
-    return csc_array(both)
+    return scipy.sparse.csc_array(both)

@@ -6,8 +6,7 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import diags_array
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+import scipy
 
 from .. import _core
 from .._machine.entry import solve_entry
@@ -217,13 +216,15 @@ class _Pencil:
             return self._factor.solve(times_root(forces))
 
         size = len(self._moving)
-        inverse = LinearOperator(
+        inverse = scipy.sparse.linalg.LinearOperator(
             (size, size), matvec=lambda y: times_transposed(moved_by(y))[self._moving], dtype=np.float64
         )
         start = np.random.default_rng(seed).standard_normal(size)  # one that no symmetry is orthogonal to
         try:
-            inverses, vectors = eigsh(inverse, count, which="LA", v0=start, ncv=min(space, size))
-        except ArpackError as error:
+            inverses, vectors = scipy.sparse.linalg.eigsh(
+                inverse, count, which="LA", v0=start, ncv=min(space, size)
+            )
+        except scipy.sparse.linalg.ArpackError as error:
             raise NotConverged(f"the vibration modes did not converge: {error}. Ask for fewer.") from error
         order = np.argsort(-inverses)
         modes = np.stack([moved_by(vectors[:, k]) for k in order], axis=1)
@@ -232,10 +233,12 @@ class _Pencil:
     def _search_generalized(self, count: int, seed: int, space: int) -> tuple[np.ndarray, np.ndarray]:
         """K x = w^2 M x with M in the inner product: nearest to the shift are the lowest."""
         size = len(self._masses)
-        inverse = LinearOperator((size, size), matvec=self._factor.solve, dtype=np.float64)
+        inverse = scipy.sparse.linalg.LinearOperator(
+            (size, size), matvec=self._factor.solve, dtype=np.float64
+        )
         start = self._factor.solve(self._consistent @ np.random.default_rng(seed).standard_normal(size))
         try:
-            squares, modes = eigsh(
+            squares, modes = scipy.sparse.linalg.eigsh(
                 inverse,  # K itself is not needed
                 count,
                 M=self._consistent,
@@ -244,7 +247,7 @@ class _Pencil:
                 v0=start,
                 ncv=min(space, len(self._moving)),
             )
-        except ArpackError as error:
+        except scipy.sparse.linalg.ArpackError as error:
             raise NotConverged(f"the vibration modes did not converge: {error}. Ask for fewer.") from error
         order = np.argsort(squares)
         return squares[order], modes[:, order]
@@ -277,7 +280,7 @@ def _root_of(inertia, masses: np.ndarray) -> tuple:
     coupled.setdiag(0.0)
     coupled.eliminate_zeros()
     first = coupled.indices.min(initial=len(masses))
-    root = diags_array(np.sqrt(masses)).tolil()
+    root = scipy.sparse.diags_array(np.sqrt(masses)).tolil()
     if first < len(masses):
         root[first:, first:] = np.linalg.cholesky(inertia[first:, first:].toarray())
     root = root.tocsc()

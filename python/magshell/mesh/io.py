@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from .._checks.arrays import index_array, named_values
 from .._checks.quantity import quantity, shape_of
@@ -262,10 +260,14 @@ def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict] |
 
 def _merge_coincident(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     tolerance = RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
-    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(points), len(points)))
+    pairs = scipy.spatial.cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    graph = scipy.sparse.coo_array(
+        (np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(points), len(points))
+    )
     _, first, vertex = np.unique(
-        connected_components(graph, directed=False)[1], return_index=True, return_inverse=True
+        scipy.sparse.csgraph.connected_components(graph, directed=False)[1],
+        return_index=True,
+        return_inverse=True,
     )
     return points[first], vertex.ravel()[faces]
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.spatial import cKDTree
+import scipy
 
 from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh
@@ -79,7 +78,7 @@ def _places(coarse, fine) -> np.ndarray:
     if len(first) == n_v and np.abs(first - coarse.rest_positions).max() <= tolerance:
         return np.arange(n_v)
     reach = 1e3 * tolerance
-    tree = cKDTree(_told_apart(fine, reach))
+    tree = scipy.spatial.cKDTree(_told_apart(fine, reach))
     vertices = tree.query(_told_apart(coarse, reach))[1]
     off = np.linalg.norm(fine.rest_positions[vertices] - coarse.rest_positions, axis=1)
     return np.where(off <= tolerance, vertices, -1)
@@ -99,9 +98,9 @@ def _far_apart(coarse, fine, vertices: np.ndarray, ratio: int) -> np.ndarray:
     """The edges of the coarse mesh whose ends are more than `ratio` edges apart in the fine one."""
     n = fine.n_vertices
     ends = np.concatenate([fine.edges, fine.edges[:, ::-1]])
-    graph = coo_array((np.ones(len(ends), dtype=np.int32), tuple(ends.T)), shape=(n, n)).tocsr()
+    graph = scipy.sparse.coo_array((np.ones(len(ends), dtype=np.int32), tuple(ends.T)), shape=(n, n)).tocsr()
     shape = (len(vertices), n)
-    reached = coo_array(
+    reached = scipy.sparse.coo_array(
         (np.ones(len(vertices), dtype=np.int32), (np.arange(len(vertices)), vertices)), shape=shape
     ).tocsr()
     for _ in range(ratio):

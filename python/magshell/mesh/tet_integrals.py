@@ -5,6 +5,7 @@ With barycentric coordinates b on a tetrahedron of volume 1/6, the integral of a
 
 from __future__ import annotations
 
+from functools import cache
 from math import factorial
 
 import numpy as np
@@ -44,8 +45,14 @@ def _with_jacobian(polynomial: Polynomial) -> np.ndarray:
     return integrals
 
 
-_INTEGRALS = np.array([_with_jacobian(shape) for shape in _shapes()])
-_PRODUCTS = np.array([[_with_jacobian(_product(a, b)) for b in _shapes()] for a in _shapes()])
+@cache
+def _integrals() -> np.ndarray:
+    return np.array([_with_jacobian(shape) for shape in _shapes()])
+
+
+@cache
+def _products() -> np.ndarray:
+    return np.array([[_with_jacobian(_product(a, b)) for b in _shapes()] for a in _shapes()])
 
 
 def _coefficients(node_positions: np.ndarray) -> np.ndarray:
@@ -59,9 +66,9 @@ def _coefficients(node_positions: np.ndarray) -> np.ndarray:
 def shape_integrals(node_positions: np.ndarray) -> np.ndarray:
     """(n_t, 10), m3: the integrals of the ten shape functions over ten-node tetrahedra (n_t, 10, 3). Of straight ones
     -1/20 of the volume at corners and 1/5 between them."""
-    return _coefficients(node_positions) @ _INTEGRALS.T
+    return _coefficients(node_positions) @ _integrals().T
 
 
 def shape_products(node_positions: np.ndarray) -> np.ndarray:
     """(n_t, 10, 10), m3: the integrals of the products of two of them."""
-    return np.einsum("tj,klj->tkl", _coefficients(node_positions), _PRODUCTS)
+    return np.einsum("tj,klj->tkl", _coefficients(node_positions), _products())

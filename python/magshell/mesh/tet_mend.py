@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from .._checks.arrays import index_array
 from .._checks.quantity import quantity
@@ -86,6 +86,6 @@ def coincident(positions: np.ndarray, tolerance: float) -> np.ndarray:
     tolerance = float(quantity("merge_tolerance", "m", tolerance, ()))
     if tolerance < 0:
         raise ValueError(f"merge_tolerance [m] must not be negative, got {tolerance}")
-    pairs = cKDTree(positions).query_pairs(tolerance, output_type="ndarray")
+    pairs = scipy.spatial.cKDTree(positions).query_pairs(tolerance, output_type="ndarray")
     group = groups(len(positions), pairs)
     return np.unique(group, return_index=True)[1][group]

@@ -9,8 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 EDGES = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
 FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
@@ -95,8 +94,8 @@ def triangles_of(tetrahedra: np.ndarray, outer: np.ndarray) -> tuple[np.ndarray,
 
 def groups(count: int, pairs: np.ndarray) -> np.ndarray:
     """(count,): the number, from 0, of the group that each of `count` things belongs to, joined by pairs (k, 2)."""
-    graph = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(count, count))
-    return connected_components(graph, directed=False)[1]
+    graph = scipy.sparse.coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(count, count))
+    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
 
 def touching_edges(faces: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from .tet_mesh import TetMesh
 from .tet_topology import groups
@@ -35,7 +35,7 @@ def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld
     skins = np.concatenate(
         [mesh.surface_vertices + start for mesh, start in zip(meshes, offsets, strict=False)]
     )
-    pairs = skins[cKDTree(positions[skins]).query_pairs(tolerance, output_type="ndarray")]
+    pairs = skins[scipy.spatial.cKDTree(positions[skins]).query_pairs(tolerance, output_type="ndarray")]
     pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
     group = groups(len(positions), pairs)
     first = np.unique(group, return_index=True)[1]
@@ -111,7 +111,7 @@ def _check_hanging(meshes, joined: TetMesh, maps, tolerance: float) -> None:
     reach = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
     if len(loose) == 0:
         return
-    near = cKDTree(joined.rest_positions[loose]).query_ball_point(center, reach)
+    near = scipy.spatial.cKDTree(joined.rest_positions[loose]).query_ball_point(center, reach)
     for face, (a, b, c), candidates in zip(at_seam, corners, near, strict=True):
         vertices = loose[np.array(candidates, dtype=int)]
         vertices = vertices[from_mesh[vertices] != owner[face]]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from .triangle_mesh import TriangleMesh
 
@@ -52,8 +51,8 @@ def _corner_points(mesh: TriangleMesh) -> np.ndarray:
     ]
     one, other = (np.concatenate([corners[end][side] for end in (0, 1)]) for side in (0, 1))
     size = 3 * mesh.n_faces
-    graph = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(size, size))
-    return connected_components(graph, directed=False)[1]
+    graph = scipy.sparse.coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(size, size))
+    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
 
 def _border(mesh: TriangleMesh, faces: np.ndarray) -> np.ndarray:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from .. import _core
 from .._checks.arrays import index_array
@@ -117,8 +116,8 @@ class TriangleMesh(MeshBase):
     def components(self) -> np.ndarray:
         """(n_v,): the number of the connected part each vertex belongs to, from 0."""
         shape = (self.n_vertices, self.n_vertices)
-        graph = coo_array((np.ones(self.n_edges, dtype=bool), tuple(self.edges.T)), shape=shape)
-        return frozen(connected_components(graph, directed=False)[1])
+        graph = scipy.sparse.coo_array((np.ones(self.n_edges, dtype=bool), tuple(self.edges.T)), shape=shape)
+        return frozen(scipy.sparse.csgraph.connected_components(graph, directed=False)[1])
 
     # Geometry at rest
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from .tet_mesh import TetMesh
 from .tet_weld import TetWeld, weld_solids
@@ -75,12 +73,14 @@ def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
     rims = np.concatenate([mesh.boundary_vertices + offsets[part] for part, mesh in enumerate(meshes)])
     positions = np.concatenate([mesh.rest_positions for mesh in meshes])
 
-    pairs = rims[cKDTree(positions[rims]).query_pairs(tolerance, output_type="ndarray")]
+    pairs = rims[scipy.spatial.cKDTree(positions[rims]).query_pairs(tolerance, output_type="ndarray")]
     pairs = pairs[part_of[pairs[:, 0]] != part_of[pairs[:, 1]]]
     if len(pairs) == 0:
         _refuse_apart(meshes, np.arange(len(meshes)), tolerance)
-    graph = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(part_of), len(part_of)))
-    cluster = connected_components(graph, directed=False)[1]
+    graph = scipy.sparse.coo_array(
+        (np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(part_of), len(part_of))
+    )
+    cluster = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
     # two vertices of one part in a cluster: a slit's two sides against one vertex of another part
     owner = np.stack([cluster, part_of], axis=1)
@@ -131,8 +131,10 @@ def _check_seams(meshes, maps: list[np.ndarray], tolerance: float) -> None:
             f"weld meshes[{part[k + 1]}].flipped() instead"
         )
     shape = (len(meshes), len(meshes))
-    graph = coo_array((np.ones(len(seams), dtype=bool), (part[seams], part[seams + 1])), shape=shape)
-    n_groups, group = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_array(
+        (np.ones(len(seams), dtype=bool), (part[seams], part[seams + 1])), shape=shape
+    )
+    n_groups, group = scipy.sparse.csgraph.connected_components(graph, directed=False)
     if n_groups > 1:
         _refuse_apart(meshes, group, tolerance)
 
@@ -152,7 +154,9 @@ def _check_hanging_vertices(meshes, maps: list[np.ndarray], tolerance: float) ->
             continue
         points = np.array([meshes[other].rest_positions[vertex] for other, vertex in foreign])
         edges = mesh.boundary_edges
-        near = cKDTree(points).query_ball_point(mesh.edge_midpoints[edges], 0.5 * mesh.edge_lengths[edges])
+        near = scipy.spatial.cKDTree(points).query_ball_point(
+            mesh.edge_midpoints[edges], 0.5 * mesh.edge_lengths[edges]
+        )
         for edge, candidates in zip(edges, near, strict=True):
             start, end = mesh.rest_positions[mesh.edges[edge]]
             along = (end - start) / mesh.edge_lengths[edge]
@@ -175,7 +179,7 @@ def _refuse_apart(meshes, group: np.ndarray, tolerance: float) -> None:
     if not rims or not sum(map(len, others)):
         raise ValueError("a closed mesh has no boundary to weld")
     points = np.array([meshes[part].rest_positions[vertex] for part, vertex in rims])
-    distance, _ = cKDTree(np.concatenate(others)).query(points)
+    distance, _ = scipy.spatial.cKDTree(np.concatenate(others)).query(points)
     part, vertex = rims[np.argmin(distance)]
     raise ValueError(
         f"mesh {part} shares no edge with the others: its boundary vertex {vertex} comes closest to theirs, "

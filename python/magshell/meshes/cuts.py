@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from .._checks.arrays import index_array
 from ..mesh.triangle_mesh import TriangleMesh, checked_mesh
@@ -68,8 +67,10 @@ def _corner_vertices(mesh: TriangleMesh, uncut: np.ndarray) -> np.ndarray:
     """(3 n_f,): the new vertex at each face corner. Uncut edges keep the corners at their ends together."""
     pairs = np.concatenate(_corners_at(mesh, uncut))
     n_corners = 3 * mesh.n_faces
-    graph = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(n_corners, n_corners))
-    fan = connected_components(graph, directed=False)[1]
+    graph = scipy.sparse.coo_array(
+        (np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(n_corners, n_corners)
+    )
+    fan = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
     _, first_corner, fan = np.unique(fan, return_index=True, return_inverse=True)
     origin = mesh.faces.ravel()[first_corner]

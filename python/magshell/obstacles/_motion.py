@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from .._checks.quantity import quantity
 
@@ -19,7 +19,7 @@ _RETURNS = "a displacement (3,) [m], or a pair of it and a rotation vector (3,) 
 
 def matrix(rotation_vector: np.ndarray) -> np.ndarray:
     """(3, 3) of a rotation vector (3,) rad."""
-    return Rotation.from_rotvec(np.array(rotation_vector)).as_matrix()
+    return scipy.spatial.transform.Rotation.from_rotvec(np.array(rotation_vector)).as_matrix()
 
 
 def pose(motion: Callable | None, time: float) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from .. import meshes
 
@@ -103,7 +103,9 @@ def _frames(tangents: np.ndarray) -> np.ndarray:
     for before, after in pairwise(tangents):
         axis = np.cross(before, after)
         sine = np.linalg.norm(axis)
-        turn = Rotation.from_rotvec(axis / sine * np.arctan2(sine, before @ after) if sine > 0 else axis)
+        turn = scipy.spatial.transform.Rotation.from_rotvec(
+            axis / sine * np.arctan2(sine, before @ after) if sine > 0 else axis
+        )
         frames.append(turn.apply(frames[-1]))
     return np.array(frames)
 

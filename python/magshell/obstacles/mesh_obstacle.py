@@ -6,7 +6,7 @@ from collections.abc import Callable
 from os import PathLike
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from .. import _core as core
 from ..mesh.io import read_mesh
@@ -91,7 +91,7 @@ def _mesh_of(mesh, faces) -> TriangleMesh:
 
 def _check_closed(mesh: TriangleMesh) -> None:
     x = mesh.rest_positions
-    pairs = cKDTree(x).query_pairs(SAME_PLACE * mesh.size, output_type="ndarray")
+    pairs = scipy.spatial.cKDTree(x).query_pairs(SAME_PLACE * mesh.size, output_type="ndarray")
     same = ""
     if len(pairs):
         a, b = pairs[np.lexsort(pairs.T[::-1])[0]].tolist()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from .._checks.quantity import quantity
+from .._machine.progress import SolveBar
 from ..states.state import State, states_of, with_times
 from ..states.units import length_unit
 from . import backend as backends
@@ -107,11 +107,10 @@ def animate(
         state = state_at(states, moment)
         return scenery.drawing(state, _values(scalar, moment), _caption(title, state, states[-1], speed))
 
-    with Reel(drawing(shown[-1]), width, painter) as reel:
+    with Reel(drawing(shown[-1]), width, painter) as reel, SolveBar("animate", progress) as bar:
         some = spread(shown, PALETTE_FRAMES) if path.suffix.lower() == ".gif" else []
         samples = [reel.image(drawing(moment)) for moment in some]
-        with tqdm(shown, desc="animate", delay=2.0, disable=not progress) as bar:
-            films.write(path, (reel.image(drawing(moment)) for moment in bar), samples, fps)
+        films.write(path, (reel.image(drawing(moment)) for moment in bar.through(shown)), samples, fps)
     return path
 
 

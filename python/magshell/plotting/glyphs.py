@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ..mesh.triangle_mesh import TriangleMesh
 from ..states.state import State
@@ -97,7 +97,7 @@ def halo(states: list[State], size: float) -> np.ndarray:
     axes = [np.linspace(a, b, n) for a, b, n in zip(low, high, counts.tolist(), strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     barycenters = np.concatenate([state.barycenters for state in states])
-    distance, _ = cKDTree(barycenters).query(points)
+    distance, _ = scipy.spatial.cKDTree(barycenters).query(points)
     return points[(distance > 0.55 * spacing) & (distance < 1.4 * spacing)]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ..mesh.triangle_mesh import TriangleMesh
 from ..states.state import State
@@ -332,7 +332,7 @@ def _series_labels(group: list[State], titles: list[str], view: View) -> list[La
     screens = [view.project(state.positions)[:, :2] for state in group]
     for state, screen, title in zip(group, screens, titles, strict=True):
         others = np.concatenate([other for other in screens if other is not screen])
-        distance, nearest = cKDTree(others).query(screen)
+        distance, nearest = scipy.spatial.cKDTree(others).query(screen)
         vertex = int(np.argmax(distance))
         away = (screen[vertex] - others[nearest[vertex]]) / max(distance[vertex], 1e-300)
         if title:

@@ -63,8 +63,22 @@ def attempt_packed(run: bytes, start: bytes) -> bytes:
         return pickle.dumps(_cannot_be_sent(outcome, error))
 
 
-def attempt_sent(run, start, sender: str) -> Outcome:
+class CallOff:
+    """Says to starts that wait in this process that they are not to begin. In others nobody hears it."""
+
+    def __init__(self):
+        self.done = False
+
+    def __reduce__(self):
+        return CallOff, ()
+
+
+def attempt_sent(run, start, sender: str, call_off: CallOff) -> Outcome:
     """`attempt` for executors that send things in a way of their own. Some wait forever for what cannot be sent."""
+    if (
+        call_off.done
+    ):  # its future may be unknown to who wanted to cancel it, if Ctrl-C came as it was handed out
+        return Outcome(error="called off before it began")
     outcome = attempt(run, start)
     if sender == this_process():
         return outcome

@@ -8,14 +8,17 @@ import pickle
 import queue
 import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
+from concurrent import futures
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from pathlib import Path
 
 from .._checks.arrays import number as checked_number
 from .._checks.tensors import is_tensor
+from .._machine.log import log
 from .._machine.progress import progress_bar
+from ..design.minimum import Minimum, effort
 from ..errors import Interrupted, MultistartFailed
-from .attempt import Outcome, attempt_packed, attempt_sent, failure, this_process
+from .attempt import CallOff, Outcome, attempt_packed, attempt_sent, failure, this_process
 from .picklable import packed, refuse_while_importing
 from .start_files import StartFiles
 from .starts import FailedStart, FinishedStart, Multistart
@@ -97,21 +100,34 @@ def multistart(
 
 
 def _drive(state: _State, executor: Executor, task: Callable, bar) -> None:
-    """Has every unfinished start run, and takes the outcomes as they come."""
+    """Has every unfinished start run, and takes the outcomes as they come.
+
+    Ctrl-C comes at any moment, between the end of a start and its outcome being taken too: what has finished is kept.
+    """
     done: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
-    futures: list[Future] = []
+    running: dict[int, Future] = {}
+    call_off = CallOff()
     try:
         for number in state.unfinished:
-            futures.append(executor.submit(*task(number)))
-            futures[-1].add_done_callback(lambda future, number=number: done.put((number, future)))
-        for _ in futures:
+            running[number] = executor.submit(*task(number, call_off))
+            running[number].add_done_callback(lambda future, number=number: done.put((number, future)))
+        for _ in running:
             number, future = done.get()
             state.take(number, _outcome(future))
             bar.update()
             bar.set_postfix_str(state.summary())
     finally:
-        for future in futures:
+        call_off.done = True
+        for future in running.values():
             future.cancel()
+        for number, future in running.items():
+            if (
+                number not in state.outcomes
+                and future.done()
+                and not future.cancelled()
+                and not future.exception()
+            ):
+                state.take(number, _outcome(future))
 
 
 class _State:
@@ -129,6 +145,8 @@ class _State:
 
     def take(self, number: int, outcome: Outcome) -> None:
         self.outcomes[number] = outcome
+        told = outcome.error or f"objective {outcome.objective:.6g}"
+        log.info("multistart: start %d: %s, %.3g s", number, told, outcome.seconds)
         if self._files and not outcome.failed:
             self._files.write(number, outcome)
 
@@ -158,19 +176,20 @@ class _State:
     def summary(self) -> str:
         found = self.result()
         best = f"best {found.best.objective:.6g}" if found else ""
+        done = effort(each.result for each in found if isinstance(each.result, Minimum))
         failed = f"{len(found.failed)} failed" if found.failed else ""
         resumed = f"{len(self.resumed)} from {self._files.folder}" if self.resumed else ""
-        return ", ".join(filter(None, (best, failed, resumed)))
+        return ", ".join(filter(None, (best, done, failed, resumed)))
 
 
-def _tasks(run, starts: list, executor) -> Callable[[int], tuple]:
+def _tasks(run, starts: list, executor) -> Callable[[int, CallOff], tuple]:
     """What is submitted for each start. Whatever cannot go to another process is refused here, before any work."""
-    if executor is not None and not isinstance(executor, ProcessPoolExecutor):
-        return lambda number: (attempt_sent, run, starts[number], this_process())
+    if executor is not None and not isinstance(executor, futures.ProcessPoolExecutor):
+        return lambda number, call_off: (attempt_sent, run, starts[number], this_process(), call_off)
     run = packed("run", run)
     for number, start in enumerate(starts):
         packed(f"start {number}", start)
-    return lambda number: (attempt_packed, run, packed(f"start {number}", starts[number]))
+    return lambda number, _: (attempt_packed, run, packed(f"start {number}", starts[number]))
 
 
 def _outcome(future: Future) -> Outcome:

@@ -7,15 +7,14 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from tqdm import tqdm
 
 from .._checks.arrays import named_values
 from .._checks.quantity import quantity, shape_of
 from .._checks.tensors import detached
 from .._machine.files import replacing
+from .._machine.progress import SolveBar
 from ..mesh.io import check_field_name, write_mesh
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.tet_mesh import TetMesh
@@ -101,8 +100,8 @@ def write_series(
     magnetized = any(state.is_magnetized for state in states)
     digits = len(str(len(states) - 1))
     names = [f"{path.stem}/{path.stem}_{k:0{digits}}.vtu" for k in range(len(states))]
-    with _listed(path, names, states) as done:
-        for k, state in enumerate(tqdm(states, desc="write_series", delay=2.0, disable=not progress)):
+    with _listed(path, names, states) as done, SolveBar("write_series", progress) as bar:
+        for k, state in enumerate(bar.through(states)):
             on_vertices = {"displacement": state.displacements}
             on_vertices |= {name: values[k] for name, values in more["vertex"].items()}
             if (pressures := state.contact_pressures) is not None:
@@ -204,6 +203,8 @@ def _time(states: list[State], number: int) -> float:
 
 
 def _contents(names: list[str], states: list[State], chosen) -> bytes:
+    from xml.sax.saxutils import quoteattr  # late, as it loads all of urllib
+
     rows = [
         f'    <DataSet timestep="{_time(states, k)!r}" part="0" file={quoteattr(names[k])}/>' for k in chosen
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from .._checks.quantity import shape_of
 from .._machine.keywords import FACTORS
@@ -60,6 +61,7 @@ def find_all(scene: Scene, cases: list[dict], starts: Sequence, search: Search) 
     """The equilibrium of each case. An error tells which one failed, and holds those before it and its last state."""
     found: list[Equilibrium] = []
     for k, (arguments, start) in enumerate(zip(cases, starts, strict=True)):
+        search.note(f"load case {k + 1} of {len(cases)}")
         try:
             found.append(find(scene, arguments, start, _part_of(search, k, len(cases))).equilibrium)
         except (NotConverged, Interrupted) as error:
@@ -71,9 +73,6 @@ def _part_of(search: Search, k: int, count: int) -> Search:
     """With the progress of one case as a share of the whole."""
     if search.progress is None:
         return search
-    return Search(
-        search.solver,
-        search.require_stable,
-        lambda progress, residual: search.progress((k + progress) / count, residual),
-        search.at_rest,
+    return replace(
+        search, progress=lambda progress, residual: search.progress((k + progress) / count, residual)
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from .. import _core
 from .._checks.arrays import count
 from .._checks.scalars import flag, positive
 from .._machine.entry import solve_entry
+from .._machine.log import log
+from .._machine.progress import told
 from ..errors import Interrupted, NotConverged
 from ..methods.solvers import MixedNewton, Newton
 from ..scene.scene import Scene
@@ -54,7 +57,7 @@ def equilibria(
     at_rest: bool = False,
     seed: int = 0,
     solver: Newton | None = None,
-    progress: Callable[[float, float], None] | None = None,
+    progress: bool | Callable[[float, float], None] = True,
 ) -> Equilibria:
     """The equilibria of a scene that can be found at the same controls, the lowest energy first: is it bistable?
 
@@ -74,6 +77,7 @@ def equilibria(
     same_within: m, the largest distance between two equilibria that count as one, vertex by vertex; 1e-4 of the scene's
         size by default. Mirror images are two.
     seed: of the random pushes.
+    progress: show a bar once it has taken two seconds; or a function of the share of the attempts made, and a residual.
 
     Raises NotConverged where not even the first is found, Interrupted (on Ctrl-C) with the Equilibria found until then;
     ValueError on bad input. With torch tensors among the inputs gradients go back through each that is stable.
@@ -86,7 +90,6 @@ def equilibria(
     >>> len(found), [bool(each.positions[mesh.nearest_vertex((0.05, 0.01, 0)), 2] > 0) for each in found].count(True)
     (2, 1)
     """
-    search = Search(MixedNewton() if solver is None else solver, True, progress, at_rest)
     flag("unstable", unstable)
     attempts = count("attempts", attempts)
     tolerance = None if same_within is None else positive("same_within", "m", same_within)
@@ -105,19 +108,21 @@ def equilibria(
         "vertex_loads": vertex_loads,
         "values": values,
     }
-    inputs = inputs_of(scene, design, at_rest)
-    starts = _listed(start)
-    for each in starts:
-        starting_point(scene, each, inputs)  # raises before any work
-    hunt = _Hunt(scene, numbers_only(design), search, tolerance, count("seed", seed, least=0))
-    try:
-        hunt.run(starts, attempts)
-        return Equilibria([_again(inputs, each, search) for each in hunt.sorted(unstable)])
-    except Interrupted as error:
-        kept = Equilibria(hunt.sorted(unstable)) if hunt.known else error.last_good
-        raise Interrupted(
-            f"interrupted after {len(hunt.known)} equilibria were found, saddles counted", kept
-        ) from error
+    with told("equilibria", progress) as (advance, note):
+        search = Search(MixedNewton() if solver is None else solver, True, advance, at_rest, note)
+        inputs = inputs_of(scene, design, at_rest)
+        starts = _listed(start)
+        for each in starts:
+            starting_point(scene, each, inputs)  # raises before any work
+        hunt = _Hunt(scene, numbers_only(design), search, tolerance, count("seed", seed, least=0))
+        try:
+            hunt.run(starts, attempts)
+            return Equilibria([_again(inputs, each, search) for each in hunt.sorted(unstable)])
+        except Interrupted as error:
+            kept = Equilibria(hunt.sorted(unstable)) if hunt.known else error.last_good
+            raise Interrupted(
+                f"interrupted after {len(hunt.known)} equilibria were found, saddles counted", kept
+            ) from error
 
 
 class _Hunt:
@@ -131,7 +136,7 @@ class _Hunt:
         self._rest = scene._model.points(scene._model.rest_state())
         self._size = float(np.linalg.norm(np.ptp(self._rest, axis=0)))
         self._tolerance = _SAME * self._size if tolerance is None else tolerance
-        self._share = 0.0
+        self._share, self._failed = 0.0, 0
 
     def run(self, starts: list, attempts: int) -> None:
         found = [self._find(start) for start in starts or [None]]
@@ -142,6 +147,7 @@ class _Hunt:
         while made < attempts:
             for way in list(ways):  # each in its turn; what was found meanwhile has its own in the next round
                 self._share = min(1.0, made / attempts)
+                self._search.note(f"{len(self.known)} found, {made} searches, {self._failed} in vain")
                 new = next(way[1], None)
                 made += 1
                 if new is not None and self._add(new):
@@ -153,7 +159,7 @@ class _Hunt:
         return sorted((each for each in self.known if unstable or each.stable), key=lambda each: each.energy)
 
     def _find(self, start) -> Equilibrium:
-        search = Search(self._search.solver, True, self._progress(), self._search.at_rest)
+        search = replace(self._search, progress=self._progress())
         return find(self._scene, self._design, start, search).equilibrium
 
     def _ways_from(self, known: Equilibrium) -> Iterator[Equilibrium | None]:
@@ -206,13 +212,14 @@ class _Hunt:
         try:
             found = solve(self._inputs, state, known._turns, controls, controls, options, self._progress())
         except NotConverged:
+            self._failed += 1
             return None
         return found.equilibrium
 
     def _progress(self) -> Callable[[float, float], None] | None:
         """Of all attempts, for one search."""
-        told, share = self._search.progress, self._share
-        return None if told is None else lambda _, residual: told(share, residual)
+        advance, share = self._search.progress, self._share
+        return None if advance is None else lambda _, residual: advance(share, residual)
 
     def _displacement(self) -> float:
         """m, the largest of those that are known."""
@@ -226,6 +233,8 @@ class _Hunt:
             if np.linalg.norm(points - self._points(known), axis=1).max() <= self._tolerance:
                 return False
         self.known.append(found)
+        kind = "stable" if found.stable else f"{found.unstable_directions} unstable directions"
+        log.info("equilibria: %d found, %s, energy %.6g J", len(self.known), kind, found.energy)
         return True
 
     def _points(self, found: Equilibrium) -> np.ndarray:

@@ -14,7 +14,8 @@ from .. import _core
 from .._checks.arrays import count, number
 from .._checks.scalars import positive
 from .._machine.entry import solve_entry
-from .._machine.progress import progress_bar
+from .._machine.log import log
+from .._machine.progress import SolveBar
 from ..bodies.body_result import BodyResult
 from ..bodies.caps import warn_of_caps
 from ..bodies.of_body import result_of
@@ -252,7 +253,7 @@ def follow(
     options.locate_critical = locate_critical
 
     began = time.perf_counter()
-    with inputs.in_core(), progress_bar("path", 1.0, shown=progress, delay=2.0, bar_format=_BAR) as bar:
+    with inputs.in_core(), SolveBar("path", progress) as bar:
         found = _core.follow_path(
             scene._model,
             state,
@@ -266,6 +267,7 @@ def follow(
         )
         bending = _bending_energies(scene, found, inputs.controls)
     path = _path(inputs, moving, found, from_, time.perf_counter() - began)
+    log.debug("path: %s, %d points, %.3g s", found.outcome.name, len(path), path.wall_time)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {len(path)} points of the path", path)
     if found.outcome == _core.Outcome.failed:
@@ -291,13 +293,10 @@ def _bending_energies(scene: Scene, found, controls) -> list[float]:
     return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]
 
 
-_BAR = "{desc} {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
-
-
 def _advance(bar):
     def advance(parameter: float, residual: float) -> None:
-        bar.set_postfix_str(f"parameter {parameter:.4g}", refresh=False)
-        bar.update(min(max(parameter, 0.0), 1.0) - bar.n)
+        bar.note(f"parameter {parameter:.4g}")
+        bar.to(parameter)
 
     return advance
 

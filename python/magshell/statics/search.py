@@ -13,6 +13,7 @@ from .. import _core
 from .._checks.scalars import flag
 from .._checks.tensors import dtype_like, is_tensor, like
 from .._machine.keywords import FACTORS
+from .._machine.log import log
 from ..adjoint.static import Adjoint
 from ..bodies.caps import warn_of_caps
 from ..bodies.strains import Largest, largest_of, warn_if_large
@@ -35,14 +36,22 @@ class Solution(NamedTuple):
     inputs: Inputs
 
 
+def _unnoted(text: str) -> None:
+    """Where nobody looks."""
+
+
 @dataclass(frozen=True)
 class Search:
-    """How to look. Raises ValueError where an option is no such thing. at_rest: without forces of motion."""
+    """How to look. Raises ValueError where an option is no such thing.
+
+    progress, note: what is called as it goes on. at_rest: without forces of motion.
+    """
 
     solver: Newton = field(default_factory=MixedNewton)
     require_stable: bool = True
     progress: Callable[[float, float], None] | None = None
     at_rest: bool = False
+    note: Callable[[str], None] = _unnoted
 
     def __post_init__(self):
         if not isinstance(self.solver, Newton):
@@ -50,8 +59,6 @@ class Search:
         if not isinstance(self.require_stable, bool):
             raise ValueError(f"require_stable must be True or False, got {self.require_stable!r}")
         flag("at_rest", self.at_rest)
-        if self.progress is not None and not callable(self.progress):
-            raise ValueError(f"progress must be a function of (progress, residual), got {self.progress!r}")
 
     def options(self) -> _core.StaticsOptions:
         options = self.solver._options()
@@ -108,6 +115,15 @@ def solve(inputs: Inputs, state: np.ndarray, turns: list, from_, to, options, pr
         found = _core.find_equilibrium(scene._model, state, turns, from_, to, options, progress)
         energies = _energies(scene, found)
         result = _result(scene, inputs, found, energies, time.perf_counter() - began)
+    log.debug(
+        "equilibrium: %s, %.4g of the way, %d iterations, %d factorizations, residual %.2g, %.3g s",
+        found.outcome.name,
+        found.progress,
+        found.iterations,
+        found.factorizations,
+        found.residual,
+        result.wall_time,
+    )
     if found.outcome == _core.Outcome.interrupted or energies is None:
         raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
     if found.outcome == _core.Outcome.failed:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .._machine.entry import solve_entry
+from .._machine.progress import told
 from ..methods.solvers import MixedNewton, Newton
 from ..scene.scene import Scene
 from .cases import find_all, split, starts_of
@@ -36,7 +37,7 @@ def equilibrium(
     require_stable: bool = True,
     at_rest: bool = False,
     solver: Newton | None = None,
-    progress: Callable[[float, float], None] | None = None,
+    progress: bool | Callable[[float, float], None] = True,
 ) -> Equilibrium | Equilibria:
     """A stable equilibrium of a scene, or one for each of several load cases.
 
@@ -58,7 +59,8 @@ def equilibrium(
     at_rest: of a scene with friction or water, the equilibrium without them, which act on what moves only. By default such
         a scene is refused: with friction, where it comes to rest depends on how it got there, which ms.simulate tells.
     solver: MixedNewton() by default.
-    progress: called now and then with how far the controls have come (0 to 1) and the residual.
+    progress: show a bar once it has taken two seconds; or a function, called now and then with how far the controls have
+        come (0 to 1, of all load cases) and the residual.
 
     Raises NotConverged and Interrupted (on Ctrl-C), both with the last converged state as `last_good`; ValueError on
     bad input. With torch tensors among the inputs, positions and edge rotations come back as tensors, and gradients go
@@ -75,7 +77,6 @@ def equilibrium(
     >>> rest.stable, bool(rest.positions[:, 2].max() > 0.01)
     (True, True)
     """
-    search = Search(MixedNewton() if solver is None else solver, require_stable, progress, at_rest)
     arguments = {
         "remanent_magnetization": remanent_magnetization,
         "applied_flux_density": applied_flux_density,
@@ -91,7 +92,9 @@ def equilibrium(
         "vertex_loads": vertex_loads,
         "values": values,
     }
-    cases = split(arguments)
-    if cases is None:
-        return find(scene, arguments, start, search).equilibrium
-    return find_all(scene, cases, starts_of(start, len(cases)), search)
+    with told("equilibrium", progress) as (advance, note):
+        search = Search(MixedNewton() if solver is None else solver, require_stable, advance, at_rest, note)
+        cases = split(arguments)
+        if cases is None:
+            return find(scene, arguments, start, search).equilibrium
+        return find_all(scene, cases, starts_of(start, len(cases)), search)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 import magshell as ms
 
@@ -107,7 +107,7 @@ def snap_through(
         solver=solver,
         progress=False,
     )
-    loads = CubicSpline(deflection(path.positions), BEYOND * path.parameters)(deflections)
+    loads = scipy.interpolate.CubicSpline(deflection(path.positions), BEYOND * path.parameters)(deflections)
     at = [f"W = {w:g} mm" for w in deflections]
     comparison = Comparison("P / Pmax", loads, references, at=at, scale=1.0, allowed=0.01)
     return outcome(f"{mesh_name(cells, irregular)} a quarter", mesh, [comparison], [path])

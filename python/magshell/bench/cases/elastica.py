@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+import scipy
 
 
 def end_of_strip(length: float, EA: float, EI: float, force: float) -> np.ndarray:
@@ -30,8 +29,10 @@ def end_of_strip(length: float, EA: float, EI: float, force: float) -> np.ndarra
 
     def end(m: float) -> np.ndarray:
         start = [0.0, m, 0.0, 0.0]
-        return solve_ivp(rates, (0, length), start, rtol=1e-12, atol=1e-14, method="DOP853").y[:, -1]
+        return scipy.integrate.solve_ivp(
+            rates, (0, length), start, rtol=1e-12, atol=1e-14, method="DOP853"
+        ).y[:, -1]
 
     largest = np.sqrt(2 * force * EI)  # of an end that has turned by a right angle
-    m = brentq(lambda m: end(m)[1], 0.5 * largest, 0.999999 * largest, xtol=1e-15 * largest)
+    m = scipy.optimize.brentq(lambda m: end(m)[1], 0.5 * largest, 0.999999 * largest, xtol=1e-15 * largest)
     return end(m)[2:]
