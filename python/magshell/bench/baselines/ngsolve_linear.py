@@ -14,7 +14,7 @@ from typing import NamedTuple
 import ngsolve as ng
 import numpy as np
 
-from .ngsolve_mesh import at_vertices
+from .ngsolve_mesh import at_vertices, by_axis
 
 
 class Material(NamedTuple):
@@ -43,13 +43,13 @@ def on_edges(order: int):
     return {ng.SEGM: ng.IntegrationRule(ng.SEGM, 2 * order - 1)}
 
 
-def shell(
-    mesh: ng.Mesh, order: int, material: Material, fixed: dict[str, str], clamped: str, load
-) -> Solved:
+def shell(mesh: ng.Mesh, order: int, material: Material, fixed: dict[str, str], clamped: str, load) -> Solved:
     """fixed: {"x": names of edges on the border that do not move along x, "a|b"}; clamped: those that do not turn.
     load(v): the work of the loads on displacements v, a sum of integrals; or {vertex: force (3,) N}."""
     t, modulus, nu = material
-    places = ng.VectorH1(mesh, order=order, **{f"dirichlet{axis}_bbnd": names for axis, names in fixed.items()})
+    places = ng.VectorH1(
+        mesh, order=order, **{f"dirichlet{axis}_bbnd": names for axis, names in fixed.items()}
+    )
     space = (
         places
         * ng.HDivDivSurface(mesh, order=order - 1, discontinuous=True)
@@ -110,8 +110,7 @@ def _work(space, places, load, tests):
         work += load(tests)
     work.Assemble()
     if not callable(load):
-        parts = places.components or (places,)
-        starts = np.cumsum([0, *(part.ndof for part in parts)])
+        starts = np.cumsum([0, *(part.ndof for part in by_axis(places))])
         for vertex, force in load.items():
             for start, share in zip(starts, np.atleast_1d(force), strict=False):
                 work.vec[int(start) + vertex] += float(share)

@@ -68,7 +68,12 @@ def onto_cylinder(other: ng.Mesh, radius: float, order: int) -> None:
     other.SetDeformation(bent)
 
 
+def by_axis(of) -> tuple:
+    """The parts along the axes of a function or a space of NGSolve's VectorH1; of H1, which has one, itself."""
+    space = of.space if isinstance(of, ng.GridFunction) else of
+    return tuple(of.components) if isinstance(space, ng.VectorH1) else (of,)
+
+
 def at_vertices(found: ng.GridFunction) -> np.ndarray:
-    """(n_v, components) of a function of NGSolve's H1 or VectorH1, whose first unknowns are those at vertices."""
-    parts = found.components or (found,)
-    return np.stack([np.array(part.vec)[: found.space.mesh.nv] for part in parts], axis=1)
+    """(n_v, axes) of a function of H1 or VectorH1, whose first unknowns are those at vertices."""
+    return np.stack([np.array(part.vec)[: found.space.mesh.nv] for part in by_axis(found)], axis=1)
