@@ -10,7 +10,8 @@ import pytest
 from bench_figures import is_a_picture
 
 import magshell as ms
-from magshell.bench.__main__ import PARTS, main
+from magshell.bench import beside_ngsolve
+from magshell.bench.__main__ import MISSING_LIBRARY, PARTS, main
 from magshell.bench.cases import CASES, SOLID_CASES
 from magshell.bench.cases.solids import pulled_end
 from magshell.bench.ratios import collected
@@ -111,6 +112,28 @@ def test_unknown_case(capsys) -> None:
     with pytest.raises(SystemExit):
         main(["accuracy", "--only", "Z9"])
     assert "invalid choice: 'Z9'" in capsys.readouterr().err
+
+
+def test_ngsolve_is_missed_before_any_work(monkeypatch, capsys) -> None:
+    monkeypatch.setitem(sys.modules, "ngsolve", None)
+    assert main(["accuracy", "--ngsolve"]) == MISSING_LIBRARY
+    told = capsys.readouterr()
+    assert 'pip install "magshell[ngsolve]"' in told.err and not told.out
+
+
+def test_rows_beside_ngsolve(monkeypatch, capsys) -> None:
+    """The table, with numbers in place of NGSolve's: errors that fall as the fourth power, a second a cell."""
+    case = beside_ngsolve.CASES[0]
+    theirs = lambda order: lambda mesh: beside_ngsolve.Tried(mesh, (mesh[0] ** -order,), (float(mesh[0]),))  # noqa: E731
+    monkeypatch.setattr(beside_ngsolve, "_ways", lambda *_: {way: theirs(way or 3) for way in (0, 2, 3, 4)})
+    found = beside_ngsolve.measure([case.name], rounds=1, quick=True)
+    with collected() as notes:
+        beside_ngsolve.print_rows(found["rows"])
+    (row,) = found["rows"]
+    assert (row["mesh"], row["their_order"], row["their_mesh"]) == ((10, 1), 4, (6, 1))
+    assert row["seconds"] == 10.0 and row["their_seconds"] == 6.0
+    assert "10x1" in capsys.readouterr().out and notes[0].value == pytest.approx(10 / 6) and notes[0].missed
+    assert {point["order"] for point in found["points"]} == {2, 3, 4}
 
 
 def test_impossible_number_of_threads() -> None:

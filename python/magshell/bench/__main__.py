@@ -57,7 +57,12 @@ PARTS = {
     ),
     "paper": Part("paper", "paper", "the examples beside Table 1 of Chen et al. 2022"),
 }
-EXTRAS = {"torch": "torch", "gymnasium": "gym", "matplotlib": "plot"}  # library: the extra that brings it
+EXTRAS = {
+    "torch": "torch",
+    "gymnasium": "gym",
+    "matplotlib": "plot",
+    "ngsolve": "ngsolve",
+}  # library: the extra that brings it
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import magshell as ms
 
-from . import solid_accuracy
+from . import beside_ngsolve, solid_accuracy
 from .cases import CASES, SOLID_CASES, Case, Comparison, Outcome
 from .cases.hemisphere import large_deflection
 from .cases.magnetic_strip import field_across
@@ -26,6 +26,9 @@ SINGLE_SOLVES: dict[str, tuple[Callable[[], Outcome], int]] = {
 }
 
 
+ROUNDS_BESIDE = 7  # beside NGSolve: few meshes, and short calls
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = [case.name for case in (*CASES, *SOLID_CASES)]
     parser.add_argument(
@@ -36,13 +39,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="for the cases, whose targets are for these, with --quick too",
     )
+    parser.add_argument(
+        "--ngsolve",
+        action="store_true",
+        help="beside NGSolve's shells of orders 2 to 4, which must be installed: time to an error of 0.1 %%, and points in "
+        "the figure",
+    )
+    parser.add_argument(
+        "--only-curves",
+        action="store_true",
+        help="only errors against time, and NGSolve's: what the figure shows",
+    )
     add_rounds(parser, 3)
 
 
 def run(options: argparse.Namespace) -> dict:
-    """Prints the tables, returns their numbers."""
-    cases = [case for case in CASES if options.only is None or case.name in options.only]
+    """Prints the tables, returns their numbers. Raises ImportError before any work where NGSolve is asked for and not
+    there."""
+    if options.ngsolve:
+        beside_ngsolve.check_ngsolve()
+    results = {} if options.only_curves else _against_references(options)
     curves = [curve for curve in CURVES if options.only is None or curve.name in options.only]
+    points = measure(curves, quick=options.quick, rounds=options.rounds)
+    if points:
+        print_points(points)
+    results["error against time"] = [point._asdict() for point in points]
+    if options.ngsolve:
+        results["beside NGSolve"] = beside_ngsolve.measure(
+            options.only, max(options.rounds, ROUNDS_BESIDE), options.quick
+        )
+        beside_ngsolve.print_rows(results["beside NGSolve"]["rows"])
+    return results
+
+
+def _against_references(options: argparse.Namespace) -> dict:
+    cases = [case for case in CASES if options.only is None or case.name in options.only]
     coarse = options.quick and not options.usual_meshes
     outcomes = {case.name: {b: _outcome(case, b, coarse) for b in BENDINGS} for case in cases}
     if cases:
@@ -57,10 +88,6 @@ def run(options: argparse.Namespace) -> dict:
             (name, bending): converge(name, bending, meshes) for name in STUDIES for bending in BENDINGS
         }
         results["convergence"] = _print_orders(studies)
-    points = measure(curves, quick=options.quick, rounds=options.rounds)
-    if points:
-        print_points(points)
-    results["error against time"] = [point._asdict() for point in points]
     return results
 
 

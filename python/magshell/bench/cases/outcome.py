@@ -55,15 +55,20 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run of a case: mesh, comparisons, and the cost of all its solves together."""
+    """One run of a case: mesh, comparisons, and the cost of all its solves together. times: (solves,) s, of each."""
 
     mesh: str
     comparisons: tuple[Comparison, ...]
     n_faces: int
     solves: int
-    time: float
+    times: tuple[float, ...]
     factorizations: int
     failed_factorizations: int
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return sum(self.times)
 
     @property
     def passes(self) -> bool:
@@ -80,7 +85,7 @@ def outcome(
         comparisons=tuple(comparisons),
         n_faces=mesh.n_elements,
         solves=len(results),
-        time=sum(result.wall_time for result in results),
+        times=tuple(result.wall_time for result in results),
         factorizations=sum(result.factorizations for result in results),
         failed_factorizations=sum(getattr(result, "failed_factorizations", 0) for result in results),
     )

@@ -35,11 +35,16 @@ def square_plate(
     cells: tuple[int, int] = (32, 32), bending: str = "midedge", *, irregular: float | None = None
 ) -> Outcome:
     """The four deflections of a unit square, on crossed and graded cells of a quarter of it."""
+    mesh = _of_order(graded_quarter(cells, irregular), bending)
+    return _quarter(mesh, bending, f"{mesh_name(cells, irregular)} crossed, graded, a quarter", allowed=0.005)
+
+
+def graded_quarter(cells: tuple[int, int], irregular: float | None) -> ms.TriangleMesh:
+    """Of the unit square, its middle at the origin."""
     even = ms.meshes.rectangle(0.5, 0.5, cells, diagonals="crossed", irregular=irregular)
     positions = even.rest_positions.copy()
     positions[:, :2] = 0.5 * (2.0 * positions[:, :2]) ** GRADING
-    mesh = _of_order(ms.TriangleMesh(positions, even.faces), bending)
-    return _quarter(mesh, bending, f"{mesh_name(cells, irregular)} crossed, graded, a quarter", allowed=0.005)
+    return ms.TriangleMesh(positions, even.faces)
 
 
 def even_plate(

@@ -17,6 +17,7 @@ _SMALLEST, _LARGEST = 2e-5, 1.5  # errors that the panels show
 
 def draw(results: dict, setting: dict) -> Figure:
     points = results["error against time"]
+    others = results.get("beside NGSolve", {}).get("points", [])
     studies = [study for study in STUDIES if any(point["case"] == study.name for point in points)]
     columns = min(COLUMNS, len(studies))
     rows = -(-len(studies) // columns)
@@ -24,7 +25,8 @@ def draw(results: dict, setting: dict) -> Figure:
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes, study in zip(grid.flat, studies, strict=False):
         _panel(axes, study, [point for point in points if point["case"] == study.name])
-    _legend(figure)
+        _others(axes, [point for point in others if point["case"] == study.name])
+    _legend(figure, bool(others))
     for axes in list(grid.flat)[len(studies) :]:
         axes.axis("off")
     for k, axes in enumerate(list(grid.flat)[: len(studies)]):
@@ -62,6 +64,25 @@ def _panel(axes, study: Study, points: list[dict]) -> None:
     panel_title(axes, f"{study.name}  {study.title}", study.reference)
 
 
+def _others(axes, points: list[dict]) -> None:
+    """NGSolve's, regular meshes alone: the number of its order at each."""
+    for point in points:
+        if not point["irregular"]:
+            axes.plot(point["time"], max(point["error"], _SMALLEST), **_number(point["order"]))
+
+
+def _number(order) -> dict:
+    return {
+        "color": INK,
+        "linestyle": "none",
+        "marker": f"${order}$",
+        "markersize": 4.5,
+        "markeredgewidth": 0.4,
+        "clip_on": False,
+        "zorder": 4,
+    }
+
+
 def _curve(axes, points: list[dict], colour: str, irregular: bool, plain: bool) -> None:
     if not points:
         return
@@ -86,7 +107,7 @@ def _look(colour: str, irregular: bool, plain: bool) -> dict:
     }
 
 
-def _legend(figure: Figure) -> None:
+def _legend(figure: Figure, others: bool) -> None:
     lines = [
         (f"{bending}, {'irregular' if irregular else 'regular'} mesh", _look(colour, irregular, plain=False))
         for bending, colour in BENDING_COLOURS.items()
@@ -94,6 +115,8 @@ def _legend(figure: Figure) -> None:
     ]
     lines.append(("the same by plain Newton", _look(INK, irregular=False, plain=True)))
     handles = [Line2D([], [], label=label, **look) for label, look in lines]
+    if others:
+        handles.append(Line2D([], [], label="NGSolve, of the order written, regular mesh", **_number(2)))
     handles.append(Patch(color=SHADE, label="below what the reference tells"))
     figure.legend(
         handles=handles, loc="outside upper left", ncols=3, frameon=False, fontsize=8.5, labelcolor=INK

@@ -1,0 +1,79 @@
+"""magshell's meshes of sheets as NGSolve's, flat elements or bent ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import netgen.meshing as netgen
+import ngsolve as ng
+import numpy as np
+
+import magshell as ms
+
+Names = dict[str, Callable[[np.ndarray], bool]]
+
+
+def netgen_mesh(mesh: ms.TriangleMesh | ms.SixNodeMesh, names: Names, dim: int = 3) -> ng.Mesh:
+    """names: {name: of which edges on the border, a function of their middles (3,) m}, the last one for all others.
+
+    Vertices keep their numbers. The bent edges of a SixNodeMesh, whose corners must come first, are a deformation of the
+    mesh: NGSolve integrates over elements of the same shape.
+    """
+    corners = mesh.first_order() if isinstance(mesh, ms.SixNodeMesh) else mesh
+    points = corners.rest_positions
+    made = netgen.Mesh(dim=dim)
+    nodes = [made.Add(netgen.MeshPoint(netgen.Pnt(*map(float, point)))) for point in points]
+    made.Add(netgen.FaceDescriptor(surfnr=1, domin=1, bc=1))
+    for face in corners.faces:
+        made.Add(netgen.Element2D(1, [nodes[k] for k in face]))
+    for edge in corners.boundary_edges:
+        middle = mesh.edge_midpoints[edge]
+        index = next(k for k, chosen in enumerate(names.values()) if chosen(middle))
+        made.Add(netgen.Element1D([nodes[k] for k in corners.edges[edge]], index=index + 1))
+    for k, name in enumerate(names):
+        made.SetBCName(k, name) if dim == 2 else made.SetCD2Name(k + 1, name)
+    if dim == 2:
+        made.SetMaterial(1, "sheet")
+    other = ng.Mesh(made)
+    if isinstance(mesh, ms.SixNodeMesh):
+        _bend(other, mesh)
+    return other
+
+
+def _bend(other: ng.Mesh, mesh: ms.SixNodeMesh) -> None:
+    if not np.array_equal(mesh.corner_vertices, np.arange(mesh.corners.n_vertices)):
+        raise ValueError("the corners of the SixNodeMesh must be its first vertices")
+    bows = mesh.edge_midpoints - mesh.rest_positions[mesh.edges].mean(axis=1)
+    if not bows.any():
+        return
+    number = {tuple(edge): k for k, edge in enumerate(mesh.edges.tolist())}
+    places = ng.VectorH1(other, order=2)
+    bent = ng.GridFunction(places)
+    for edge in other.edges:
+        bow = bows[number[tuple(sorted(vertex.nr for vertex in edge.vertices))]]
+        for axis, space in enumerate(places.components):
+            # its shape on an edge is -s (1 - s) / 2 in lambda's there: -1/8 in the middle
+            bent.components[axis].vec[space.GetDofNrs(edge)[0]] = -8.0 * bow[axis]
+    other.SetDeformation(bent)
+
+
+def onto_cylinder(other: ng.Mesh, radius: float, order: int) -> None:
+    """Bends flat elements, whose corners lie on the cylinder around the axis y, to its polynomials of this order."""
+    if order == 1:
+        return
+    away = ng.sqrt(ng.x**2 + ng.z**2)
+    bent = ng.GridFunction(ng.VectorH1(other, order=order))
+    share = radius / away - 1.0
+    bent.Set(ng.CF((share * ng.x, 0.0, share * ng.z)), definedon=other.Boundaries(".*"), dual=True)
+    other.SetDeformation(bent)
+
+
+def by_axis(of) -> tuple:
+    """The parts along the axes of a function or a space of NGSolve's VectorH1; of H1, which has one, itself."""
+    space = of.space if isinstance(of, ng.GridFunction) else of
+    return tuple(of.components) if isinstance(space, ng.VectorH1) else (of,)
+
+
+def at_vertices(found: ng.GridFunction) -> np.ndarray:
+    """(n_v, axes) of a function of H1 or VectorH1, whose first unknowns are those at vertices."""
+    return np.stack([np.array(part.vec)[: found.space.mesh.nv] for part in by_axis(found)], axis=1)
