@@ -3,8 +3,8 @@
 #
 #     PYTHON=.venv/bin/python scripts/wheel.sh
 #
-# Compiled for x86-64-v3 (AVX2, FMA: Intel since 2013, AMD since 2015) or, elsewhere, for the compiler's own baseline, and
-# without anything that is not under a permissive licence. No BLAS is needed. auditwheel brings it to the manylinux tag that
+# Compiled for x86-64-v3 (AVX2, FMA: Intel since 2013, AMD since 2015), the dense part of factorizations for x86-64-v4 (AVX-512)
+# too, or, elsewhere, for the compiler's own baseline, and without anything that is not under a permissive licence. No BLAS is needed. auditwheel brings it to the manylinux tag that
 # the libc of this machine allows. JOBS: how many compilers run at a time.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -20,15 +20,28 @@ rm -rf dist && mkdir -p dist/raw
 CMAKE_BUILD_PARALLEL_LEVEL=${JOBS:-$(nproc)} "$python" -m build --no-isolation --wheel --outdir dist/raw \
     -C cmake.define.MAGSHELL_NATIVE=OFF -C cmake.define.MAGSHELL_BASELINE="$baseline" \
     -C cmake.define.MAGSHELL_CHOLMOD=OFF -C build-dir=build/wheel .
+# What is compiled for wider processors too shares no function with the rest: the linker would give that the wide one.
+shared=$(find build/wheel -path '*magshell_wide*' -name '*.o' -exec nm -C {} + | grep -E ' [WVu] ' | grep -v 'avx512::' |
+    grep -v ' DW.ref.' || true)
+[ -z "$shared" ] || { say "functions compiled for wide processors alone: $shared"; exit 1; }
+
 PATH="$(dirname "$python"):$PATH" "$python" -m auditwheel repair --wheel-dir dist dist/raw/*.whl
 wheel=$(echo dist/*.whl)
 size=$(($(stat -c %s "$wheel") / 1000000))
 say "$wheel, $size MB"
 [ "$size" -lt "$largest" ] || { say "larger than $largest MB"; exit 1; }
 
+# The wheel holds what the libraries compiled into it ask for, and brings no library of this machine along.
+held=$("$python" -m zipfile -l "$wheel")
+for needed in licenses/NOTICE licenses/LICENSE magshell/py.typed; do
+    grep -qF "$needed " <<<"$held" || { say "the wheel lacks $needed"; exit 1; }
+done
+! grep -q '\.libs/' <<<"$held" || { say "the wheel holds libraries of this machine"; exit 1; }
+
 # The sdist holds what a build needs; that it builds is what `make test` shows of the same files.
+held=$(tar -tzf dist/*.tar.gz)
 for needed in CMakeLists.txt pyproject.toml LICENSE cpp/bindings/module.cpp python/magshell/__init__.py; do
-    tar -tzf dist/*.tar.gz | grep -q "/$needed\$" || { say "the sdist lacks $needed"; exit 1; }
+    grep -q "/$needed\$" <<<"$held" || { say "the sdist lacks $needed"; exit 1; }
 done
 
 PYTHON=$python scripts/try_wheel.sh "$wheel"

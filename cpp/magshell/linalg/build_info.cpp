@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "magshell/linalg/dense_kernels.h"
 #include "magshell/linalg/single_threaded.h"
-#include "magshell/linalg/slab_kernels.h"
 #ifdef MAGSHELL_HAS_CHOLMOD
 #include <cholmod.h>
 #endif
@@ -15,20 +15,6 @@ std::string version(int major, int minor, int patch) {
     return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(patch);
 }
 
-std::string vectors() {
-#if defined(__AVX512F__)
-    return "AVX-512";
-#elif defined(__AVX2__)
-    return "AVX2";
-#elif defined(__AVX__)
-    return "AVX";
-#elif defined(__SSE2__)
-    return "SSE2";
-#else
-    return "the compiler's choice";
-#endif
-}
-
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> linalg_build_info() {
@@ -38,7 +24,9 @@ std::vector<std::pair<std::string, std::string>> linalg_build_info() {
 #elif defined(__GNUC__)
     info.emplace_back("compiler", "GCC " __VERSION__);
 #endif
-    info.emplace_back("vector instructions", vectors());
+    const std::string dense = dense_kernels().vectors;
+    const std::string rest = own_kernels.vectors;
+    info.emplace_back("vector instructions", dense == rest ? rest : rest + ", in factorizations " + dense);
     info.emplace_back("Eigen", version(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION));
 #ifdef MAGSHELL_HAS_CHOLMOD
     info.emplace_back("CHOLMOD", version(CHOLMOD_MAIN_VERSION, CHOLMOD_SUB_VERSION, CHOLMOD_SUBSUB_VERSION));

@@ -1,10 +1,9 @@
-#include "magshell/linalg/front.h"
-
 #include <algorithm>
 #include <cmath>
 #include <mutex>
 
 #include "magshell/core/parallel.h"
+#include "magshell/linalg/dense_kernels.h"
 #include "magshell/linalg/slab_kernels.h"
 
 namespace magshell {
@@ -192,7 +191,23 @@ void for_parts(Range range, Body&& body) {
     });
 }
 
+#if defined(__AVX512F__)
+constexpr const char* vectors = "AVX-512";
+#elif defined(__AVX2__)
+constexpr const char* vectors = "AVX2";
+#elif defined(__AVX__)
+constexpr const char* vectors = "AVX";
+#elif defined(__SSE2__)
+constexpr const char* vectors = "SSE2";
+#else
+constexpr const char* vectors = "the compiler's choice";
+#endif
+
 }  // namespace
+
+inline namespace MAGSHELL_FAMILY {
+
+const DenseKernels own_kernels{vectors, eliminate_pivots, form_update, add_columns};
 
 void eliminate_pivots(const Panel& panel, Index pivots, Index below_slabs, const FrontPivots& out,
                       PivotTally& tally) {
@@ -248,4 +263,5 @@ void form_update(const Panel& panel, Index pivots, Index below_slabs, const Pivo
     });
 }
 
+}  // namespace MAGSHELL_FAMILY
 }  // namespace magshell

@@ -65,6 +65,8 @@ void subtract_outer(PivotBlock& block, Index first, const double* l, const doubl
 
 }  // namespace
 
+inline namespace MAGSHELL_FAMILY {
+
 void PivotBlock::factorize(Pivots pivots, PivotTally& tally) {
     permuted = false;
     for (Index k = 0; k < size; ++k) order[k] = static_cast<std::int8_t>(k);
@@ -120,5 +122,7 @@ void PivotBlock::factorize(Pivots pivots, PivotTally& tally) {
     }
     for (Index k = 1; k < size; ++k) std::fill_n(entries + k * stride, k, 0.0);
 }
+
+}  // namespace MAGSHELL_FAMILY
 
 }  // namespace magshell

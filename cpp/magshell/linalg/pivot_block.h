@@ -45,6 +45,8 @@ struct PivotTally {
 inline constexpr double tiny_pivot = 1e-14;
 inline constexpr double perturbed_pivot = 1e-8;
 
+inline namespace MAGSHELL_FAMILY {
+
 struct PivotBlock {
     static constexpr Index max_size = 32;
     static constexpr Index stride = max_size;
@@ -57,5 +59,7 @@ struct PivotBlock {
 
     void factorize(Pivots pivots, PivotTally& tally);
 };
+
+}  // namespace MAGSHELL_FAMILY
 
 }  // namespace magshell

@@ -4,6 +4,7 @@
 #include "magshell/linalg/slabs.h"
 
 namespace magshell::slabs {
+inline namespace MAGSHELL_FAMILY {
 
 // How many slabs and columns a product handles at once: as many as leave its sums in registers.
 inline constexpr int group = native_bytes == 64 ? 3 : 1;
@@ -81,4 +82,5 @@ template <class Body>
     for (; first < last; ++first) body.template operator()<1>(first);
 }
 
+}  // namespace MAGSHELL_FAMILY
 }  // namespace magshell::slabs

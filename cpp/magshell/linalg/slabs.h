@@ -16,7 +16,18 @@ namespace magshell::slabs {
 
 inline constexpr Index width = 8;  // rows of a slab
 
-// The widest vector of the processor.
+// The widest vector of the processor. What depends on it has the family's name among its own (an inline namespace), as a
+// wheel holds some of it for two families (dense_kernels.h).
+#if defined(__AVX512F__)
+#define MAGSHELL_FAMILY avx512
+#elif defined(__AVX__)
+#define MAGSHELL_FAMILY avx
+#else
+#define MAGSHELL_FAMILY baseline
+#endif
+
+inline namespace MAGSHELL_FAMILY {
+
 #if defined(__AVX512F__)
 inline constexpr int native_bytes = 64;
 #elif defined(__AVX__)
@@ -77,6 +88,8 @@ inline Lanes& lanes(double* at) {
 inline const Lanes& lanes(const double* at) {
     return *reinterpret_cast<const Lanes*>(at);
 }
+
+}  // namespace MAGSHELL_FAMILY
 
 inline constexpr Index count(Index rows) {
     return (rows + width - 1) / width;

@@ -9,8 +9,8 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
+#include "magshell/linalg/dense_kernels.h"
 #include "magshell/linalg/equilibration.h"
-#include "magshell/linalg/front.h"
 #include "magshell/linalg/ordering.h"
 #include "magshell/linalg/transfer.h"
 
@@ -126,10 +126,12 @@ PivotTally SupernodalLdlt::process(Index s, double* from, double* to) {
     const Pivots pivots{diagonal_.data() + shape.first, coupling_.data() + shape.first};
     const Index below_slabs = slabs::count(shape.below);
     PivotTally tally;
-    eliminate_pivots(panel, shape.pivots, below_slabs, {pivots, pivot_order_.data() + shape.first}, tally);
+    const DenseKernels& kernels = dense_kernels();
+    kernels.eliminate_pivots(panel, shape.pivots, below_slabs, {pivots, pivot_order_.data() + shape.first},
+                             tally);
 
     const Triangle update{to + front.update};
-    form_update(panel, shape.pivots, below_slabs, pivots, update);
+    kernels.form_update(panel, shape.pivots, below_slabs, pivots, update);
     for (const Index child : front.children) add_to_update(plan_, child, from, update);
     return tally;
 }

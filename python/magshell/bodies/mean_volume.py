@@ -40,9 +40,10 @@ def warn_of_mean_volume(mesh, isochoric: bool) -> None:
     if thin:
         sizes = f"{sum(map(len, thin))} of {mesh.n_tetrahedra} tetrahedra"
         where = np.round(mesh.tetrahedron_barycenters[thin[0]].mean(axis=0), 9).tolist()
-        regions = "a slender region" if len(thin) == 1 else f"{len(thin)} slender regions, the largest"
+        one = f"a slender region about {where} m is"
+        regions = one if len(thin) == 1 else f"{len(thin)} slender regions, the largest about {where} m, are"
         _warn(
-            f"{regions} about {where} m, is one cell thick ({sizes}), too soft with mean_volume: such bars and plates bend "
+            f"{regions} one cell thick ({sizes}), too soft with mean_volume: such bars and plates bend "
             "14 to 18 % too far. Use two cells or more through every thickness (both sides of a symmetry plane count), or "
             "cells with a vertex inside"
         )
