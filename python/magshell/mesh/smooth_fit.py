@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
+import scipy
 
 from .triangle_mesh import TriangleMesh
 
@@ -28,8 +27,8 @@ class SmoothSurface:
         self._refuse_creases()
         n = fine.n_vertices
         ends = np.concatenate([fine.edges, fine.edges[:, ::-1]])
-        self._around = csr_array((np.ones(len(ends), dtype=bool), tuple(ends.T)), shape=(n, n))
-        self._tree = cKDTree(fine.rest_positions)
+        self._around = scipy.sparse.csr_array((np.ones(len(ends), dtype=bool), tuple(ends.T)), shape=(n, n))
+        self._tree = scipy.spatial.cKDTree(fine.rest_positions)
         self._beside: dict[int, list[int]] = {}
         for a, b in fine.edges[fine.boundary_edges].tolist():
             self._beside.setdefault(a, []).append(b)
