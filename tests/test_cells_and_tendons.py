@@ -172,3 +172,28 @@ def test_scenes_copy_and_print_their_actuators():
         assert np.array_equal(ms.equilibrium(other).positions, ms.equilibrium(scene).positions)
     assert "driven by Cavity(pressure=1000" in repr(scene)
     assert SOFT["young_modulus"] == 1e5
+
+
+def test_a_tendon_rides_on_curved_elements():
+    """Points of the surface that six-node elements are, which flat faces do not reach; beside it they are refused."""
+    mesh = ms.meshes.cylinder(1.0, 2.0, angle=1.0, cells=(3, 4), order=2)
+    sheet = ms.Shell(mesh, thickness=1e-2, young_modulus=1e6)
+    s, t = 0.3, 0.25
+    corner = np.array([1 - s - t, s, t])
+    shares = np.concatenate([corner * (2 * corner - 1), 4 * corner * np.roll(corner, -1)])
+    points = np.array([shares @ mesh.rest_positions[mesh.elements[k]] for k in (0, 7, 20)])
+    off_faces = np.linalg.norm(mesh.surface.rest_positions[:, None] - points, axis=2).min()
+    assert off_faces > 1e-3
+    tendon = ms.Tendon(points, sheet, tension=1.0)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(y=0.0))], actuators=[tendon])
+    assert tendon.riding(scene._bodies, ()) is not None
+    for (vertices, weights), k in zip(tendon.riding(scene._bodies, ()), (0, 7, 20), strict=True):
+        assert dict(zip(vertices, weights, strict=True)) == pytest.approx(
+            dict(zip(mesh.elements[k], shares, strict=True)), abs=1e-9
+        )
+    moved = ms.equilibrium(scene)
+    assert float(moved[tendon].length) < np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    for away in (1e-4 * points[0] * [1, 0, 1], [0.0, -3.0, 0.0]):
+        with pytest.raises(ValueError, match=r"point 0 of the Tendon, .* lies outside every element"):
+            beside = ms.Tendon([points[0] + away, points[1]], sheet, tension=1.0)
+            ms.equilibrium(ms.Scene(sheet, supports=scene.supports, actuators=[beside]))

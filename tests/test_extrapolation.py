@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
-from magshell.bench.cases import linear_cylinders, magnetic_strip
+from magshell.bench.cases import linear_cylinders, magnetic_strip, plates
 
 
 def roof(mesh, bending: str = "midedge") -> float:
@@ -58,6 +58,42 @@ def test_a_magnetic_strip_gains_a_digit():
     assert 2e-4 < plain < 6e-4
     assert gained < 4e-5
     np.testing.assert_allclose(found.error, np.abs(found.values[-1] - exact), rtol=0.2)
+
+
+def second_order_roof(n: int) -> ms.SixNodeMesh:
+    span = (0.0, linear_cylinders.ROOF_HALF_ANGLE)
+    size = linear_cylinders.ROOF_RADIUS, linear_cylinders.ROOF_LENGTH / 2
+    return ms.meshes.cylinder(*size, span, cells=(n, n), order=2)
+
+
+def test_six_node_elements_gain_a_digit():
+    """Two meshes assume the order 4 that three find."""
+    meshes = [second_order_roof(n) for n in (3, 6, 12)]
+    by_two = ms.extrapolated(lambda mesh: roof(mesh, "midedge2"), meshes[1:])
+    by_three = ms.extrapolated(lambda mesh: roof(mesh, "midedge2"), meshes)
+    limit = 0.3006 * (1 - 2.5e-5)  # of finer meshes, NGSolve's of order 4 too
+    assert by_two.order == 4.0 and 3.5 < by_three.order < 4.3
+    for found in (by_two, by_three):
+        plain, gained = (abs(value / limit - 1.0) for value in (found.values[-1], found.value))
+        assert 1e-4 < plain < 4e-4 and gained < 0.25 * plain
+
+
+def test_under_a_point_force_the_order_is_lower():
+    """B5, clamped, a force in the middle."""
+    meshes = [ms.meshes.rectangle(0.5, 0.5, (n, n), diagonals="crossed", order=2) for n in (2, 4, 8)]
+    found = ms.extrapolated(lambda mesh: plates.middle_deflection(mesh, "clamped", "force"), meshes)
+    assert 1.5 < found.order < 3.0
+    assert abs(found.value - plates.SQUARE["clamped", "force"]) < 0.5 * found.error
+
+
+def test_rows_by_vertex_are_those_of_corners():
+    """Also of a cap, whose middle nodes are no corners of the generator's finer mesh."""
+    coarse = ms.meshes.spherical_cap(1.0, 0.3, np.pi / 2, cells=(8, 4), order=2)
+    for fine in (coarse.refined(), ms.meshes.spherical_cap(1.0, 0.3, np.pi / 2, cells=(16, 8), order=2)):
+        found = ms.extrapolated(lambda mesh: mesh.rest_positions, [coarse, fine])
+        assert found.value == pytest.approx(coarse.rest_positions[coarse.corner_vertices], abs=1e-14)
+    with pytest.raises(ValueError, match=r"of one kind, got .* a SixNodeMesh and .* a TriangleMesh"):
+        ms.extrapolated(lambda mesh: 1.0, [coarse, coarse.surface])
 
 
 def test_three_meshes_tell_the_order():
@@ -190,7 +226,7 @@ def irregular(n: int) -> ms.TriangleMesh:
     [
         ([square(2)], "two or three, the coarsest first, got 1"),
         (square(2), "two or three"),
-        ([square(2), 3.0], r"meshes\[1\] must be a TriangleMesh or a TetMesh, got float"),
+        ([square(2), 3.0], r"meshes\[1\] must be a TriangleMesh, a SixNodeMesh or a TetMesh, got float"),
         ([square(4), square(2)], "32 and 8 faces"),
         ([square(2), square(3)], "8 and 18 faces, where the finer one must have 4, 9"),
         ([square(2), square(4), square(12)], "refined alike, got edges divided by 2, then by 3"),

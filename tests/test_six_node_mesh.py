@@ -80,6 +80,56 @@ def test_edges_are_found_with_the_node_between():
         ms.meshes.rectangle(1.0, 1.0, cells=(1, 1), order=2).edges_at(x=0.0, y=0.0)
 
 
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: ms.meshes.rectangle(2.0, 1.0, cells=(2, 1), order=2),
+        lambda: ms.meshes.cylinder(1.0, 1.0, cells=(8, 2), order=2),
+        lambda: ms.meshes.annulus(0.5, 1.0, (2, 8), order=2).flipped(),
+    ],
+)
+def test_refined_elements_are_on_the_same_surface(make):
+    mesh = make()
+    fine = mesh.refined()
+    assert fine.n_vertices == mesh.n_vertices + 2 * mesh.n_edges + 3 * mesh.n_elements
+    assert (fine.rest_positions[: mesh.n_vertices] == mesh.rest_positions).all()
+    assert fine.element_areas.reshape(-1, 4).sum(axis=1) == pytest.approx(mesh.element_areas, rel=1e-3)
+    assert (fine.elements[:, :3] == mesh.faces).all() and (fine.corners.faces.shape == mesh.faces.shape)
+    # a point of the element: three quarters along its first edge
+    edge = mesh.rest_positions[mesh.elements[0, [0, 1, 3]]]
+    at = np.array([-1 / 8, 3 / 8, 3 / 4]) @ edge  # shape functions at 3/4
+    assert np.linalg.norm(fine.rest_positions - at, axis=1).min() < 1e-14
+
+
+def test_refined_onto_a_surface():
+    mesh = ms.meshes.cylinder(1.0, 1.0, cells=(8, 2), order=2)
+    outwards = [1, 0, 1]
+
+    def place(x):
+        return x * [0, 1, 0] + x * outwards / np.linalg.norm(x * outwards, axis=1, keepdims=True)
+
+    radii = np.linalg.norm(mesh.refined(place).rest_positions * outwards, axis=1)
+    assert np.abs(radii - 1).max() < 1e-14
+    assert np.abs(np.linalg.norm(mesh.refined().rest_positions * outwards, axis=1) - 1).max() > 1e-4
+    with pytest.raises(ValueError, match=r"place\(nodes\) \[m\] must have shape \(m, 3\) = "):
+        mesh.refined(lambda x: x[:2])
+
+
+def test_outlines_with_slits():
+    pytest.importorskip("gmsh")
+    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    flat, sheet = (
+        ms.meshes.outline(square, slits=[[(0.3, 0.5), (0.7, 0.5)]], size=0.2, order=order) for order in (1, 2)
+    )
+    assert isinstance(sheet, ms.SixNodeMesh) and sheet.n_elements == flat.n_faces
+    assert sheet.element_areas.sum() == pytest.approx(1.0)
+    # the two sides of the slit have nodes of their own
+    nodes = sheet.rest_positions[sheet.edge_nodes[sheet.boundary_edges]]
+    assert np.count_nonzero(np.abs(nodes[:, 1] - 0.5) + 10 * (np.abs(nodes[:, 0] - 0.5) > 0.2) < 1e-9) >= 4
+    with pytest.raises(ValueError, match="order must be 1"):
+        ms.meshes.outline(square, size=0.2, order=3)
+
+
 def good():
     mesh = ms.meshes.rectangle(2.0, 1.0, cells=(2, 1), order=2)
     return np.array(mesh.rest_positions), np.array(mesh.elements)

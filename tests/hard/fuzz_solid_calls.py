@@ -29,6 +29,8 @@ def solid_calls(s: Sample) -> Iterator[Call]:
         "SixNodeMesh", ms.SixNodeMesh, {"rest_positions": six.rest_positions, "elements": six.elements}
     )
     yield Call("SixNodeMesh.of", ms.SixNodeMesh.of, {"mesh": flat, "place": lambda points: points})
+    yield Call("SixNodeMesh.fitted", ms.SixNodeMesh.fitted, {"mesh": flat, "to": flat})
+    yield Call("SixNodeMesh.refined", six.refined, {"place": lambda points: points})
     yield Call("SixNodeMesh.transformed", six.transformed, {"rotation": np.eye(3), "translation": (1, 0, 0)})
     yield Call("TetMesh", ms.TetMesh, given)
     ten = block.second_order()

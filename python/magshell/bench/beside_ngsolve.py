@@ -230,8 +230,8 @@ def print_rows(rows: list[dict]) -> None:
         )
     print_table(
         f"Time to {100 * BOUND:g} % and on the next finer mesh too: midedge2 beside {NAME}'s best order of {ORDERS}, from "
-        "the rest shape, analysis included, meshes, scenes and forms not; best of some rounds, on the wall's clock, NGSolve's "
-        "on the processor's",
+        "the rest shape, analysis included, meshes, scenes and forms not; best of some rounds, on the wall's clock, "
+        "NGSolve's on the processor's",
         ["case", "mesh", "cells", "error", "ms", "order", "cells", "error", f"{NAME} ms", "ours over theirs"],
         table,
     )

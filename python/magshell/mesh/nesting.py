@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from .six_node_mesh import SixNodeMesh
 from .tet_mesh import TetMesh
-from .triangle_mesh import TriangleMesh
 
 _SAME_PLACE = 1e-6  # of the shortest edge
 _REMEDY = (
@@ -27,7 +27,13 @@ class Nesting(NamedTuple):
 
 def nesting(coarse, fine, names: tuple[str, str]) -> Nesting:
     """Raises ValueError, which names the meshes, unless each cell of the coarse one is a union of fine ones, each edge
-    divided alike. Vertices on a curved surface may lie beside the coarse one's edges."""
+    divided alike. Vertices on a curved surface may lie beside the coarse one's edges. Of six-node elements the corners are
+    compared alone, and other vertices are at -1."""
+    if isinstance(coarse, SixNodeMesh) and isinstance(fine, SixNodeMesh):
+        corners = nesting(coarse.corners, fine.corners, names)
+        vertices = np.full(coarse.n_vertices, -1)
+        vertices[coarse.corner_vertices] = fine.corner_vertices[corners.vertices]
+        return Nesting(corners.ratio, vertices)
     ratio = _ratio(coarse, fine, names)
     vertices = _places(coarse, fine)
     missing = np.flatnonzero(vertices < 0)
@@ -48,12 +54,12 @@ def nesting(coarse, fine, names: tuple[str, str]) -> Nesting:
 
 
 def _ratio(coarse, fine, names) -> int:
-    kind = TetMesh if isinstance(coarse, TetMesh) else TriangleMesh
-    if not isinstance(fine, kind):
+    kind = type(coarse)
+    if type(fine) is not kind:
         raise ValueError(
             f"meshes must be of one kind, got {names[0]} a {type(coarse).__name__} and {names[1]} a {type(fine).__name__}"
         )
-    solid = kind is TetMesh
+    solid = isinstance(coarse, TetMesh)
     if solid and coarse.order != fine.order:
         raise ValueError(
             f"meshes must have tetrahedra of one order: {names[0]} is of order {coarse.order}, {names[1]} of {fine.order}"

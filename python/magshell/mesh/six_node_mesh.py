@@ -14,6 +14,8 @@ from .mesh_base import MeshBase, frozen
 from .selection import _where
 from .six_node_checks import check_elements, check_jacobians, check_middle_nodes
 from .six_node_integrals import area_vectors, edge_lengths, shape_integrals
+from .six_node_refine import divided
+from .smooth_fit import middles_on_fit
 from .tet_topology import FLAT
 from .transforms import moved
 from .triangle_mesh import TriangleMesh, checked_mesh
@@ -81,15 +83,36 @@ class SixNodeMesh(MeshBase):
         mesh = checked_mesh(mesh)
         middles = mesh.edge_midpoints
         if place is not None:
-            middles = quantity("place(midpoints)", "m", place(np.array(middles)), ("n_e", 3))
-            if middles.shape != mesh.edge_midpoints.shape:
-                raise ValueError(
-                    f"place(midpoints) [m] must have shape (n_e, 3) = {mesh.edge_midpoints.shape}, got {middles.shape}"
-                )
+            middles = _placed("place(midpoints)", "n_e", place, middles)
         nodes = mesh.n_vertices + mesh.face_edges[:, [2, 0, 1]]  # edge i is opposite corner i
         return cls(
             np.concatenate([mesh.rest_positions, middles]), np.concatenate([mesh.faces, nodes], axis=1)
         )
+
+    @classmethod
+    def fitted(cls, mesh: TriangleMesh, to: TriangleMesh | None = None) -> SixNodeMesh:
+        """The mesh with six nodes of one with three, its new nodes on a smooth surface through the vertices of a finer one.
+
+        For surfaces of which there is a mesh only, from a scan or a program. Around each edge's middle a polynomial of
+        fourth degree is fitted to some thirty vertices of `to` that hang together, and along borders a curve up to their
+        corners; the middle moves to it across the edge. Vertices stay and keep their numbers, edge k gets node n_v + k.
+
+        to: a mesh of the same sheet, a few times as fine, its faces on the same side; vertices on the border of `mesh` must
+            be some of its border's. By default `mesh` itself.
+
+        Raises ValueError where `to` has creases of more than 40 degrees or is not there, and as `of`.
+
+        >>> import magshell as ms
+        >>> fine = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(16, 16))
+        >>> coarse = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4))
+        >>> radii = np.linalg.norm(ms.SixNodeMesh.fitted(coarse, to=fine).rest_positions[:, [0, 2]], axis=1)
+        >>> bool(abs(radii - 1.0).max() < 1e-6)
+        True
+        """
+        mesh = checked_mesh(mesh)
+        name = "mesh" if to is None else "to"
+        middles = middles_on_fit(mesh, mesh if to is None else checked_mesh(to, "to"), name)
+        return cls.of(mesh, place=lambda _: middles)
 
     def __reduce__(self):  # copies and worker processes rebuild the connectivity, which is cheap
         return SixNodeMesh, (self.rest_positions, self.elements)
@@ -260,6 +283,17 @@ class SixNodeMesh(MeshBase):
         """The flat mesh of the corners alone, numbered as they come: `corners`."""
         return self._corners
 
+    def refined(self, place: Callable[[np.ndarray], np.ndarray] | None = None) -> SixNodeMesh:
+        """Each element divided into four, 4 k to 4 k + 3, in the order of `faces`: on the same curved surface.
+
+        Vertices keep their numbers, those on edges become corners, and new ones come after. place: where the surface is, if
+            it is another than that of these elements: it takes the new nodes, (m, 3) m, to points of the surface.
+        """
+        new, elements = divided(self)
+        if place is not None:
+            new = _placed("place(nodes)", "m", place, new)
+        return SixNodeMesh(np.concatenate([self.rest_positions, new]), elements)
+
     def flipped(self) -> SixNodeMesh:
         """The same surface with its normals on the other side; elements and vertices keep their numbers."""
         return SixNodeMesh(self.rest_positions, self.elements[:, _MIRRORED])
@@ -271,3 +305,12 @@ class SixNodeMesh(MeshBase):
     def scaled(self, factor: float) -> SixNodeMesh:
         """The mesh with all coordinates multiplied by a positive factor."""
         return SixNodeMesh(self.rest_positions * positive("factor", "", factor), self.elements)
+
+
+def _placed(
+    name: str, rows: str, place: Callable[[np.ndarray], np.ndarray], points: np.ndarray
+) -> np.ndarray:
+    moved_points = quantity(name, "m", place(np.array(points)), (rows, 3))
+    if moved_points.shape != points.shape:
+        raise ValueError(f"{name} [m] must have shape ({rows}, 3) = {points.shape}, got {moved_points.shape}")
+    return moved_points

@@ -10,12 +10,17 @@ from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 
 
+def check_order(order) -> None:
+    """Raises ValueError unless it is 1 or 2."""
+    if isinstance(order, bool) or order not in (1, 2):
+        raise ValueError(f"order must be 1 (three nodes) or 2 (six nodes), got {order!r:.60}")
+
+
 def sheet_of_order(
     mesh: TriangleMesh, order: int, place: Callable[[np.ndarray], np.ndarray] | None = None
 ) -> TriangleMesh | SixNodeMesh:
     """The mesh with elements of this order. place: (n, 3) m -> (n, 3) m, from middles of edges onto the surface."""
-    if isinstance(order, bool) or order not in (1, 2):
-        raise ValueError(f"order must be 1 (three nodes) or 2 (six nodes), got {order!r:.60}")
+    check_order(order)
     return mesh if order == 1 else SixNodeMesh.of(mesh, place)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._checks.scalars import positive
+from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._gmsh_session import gmsh_session
 from ._grid import check_size
@@ -20,13 +21,16 @@ from ._polygon import (
     segments,
     sides,
 )
+from ._six_nodes import check_order, sheet_of_order
 from .cuts import cut
 
 _GROWTH = 0.3  # of the mesh size, with the distance from a short side
 _ON_BOUNDARY = 1e-7  # of the outline's extent: a slit that ends this close to the boundary reaches it
 
 
-def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -> TriangleMesh:
+def outline(
+    outer, holes: Sequence = (), slits: Sequence = (), *, size: float, order: int = 1
+) -> TriangleMesh | SixNodeMesh:
     """The sheet inside a polygon in the plane z = 0, its normal along +z. Needs the extra `gmsh`.
 
     Args:
@@ -35,6 +39,7 @@ def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -
         slits: polylines (n, 2), m, cut through the sheet: both sides get vertices of their own. Slits may
             cross and may end on the boundary; an end inside the sheet stays joined.
         size: the longest edge to aim for, m. Short sides of the polygons make the mesh finer around them.
+        order: 1 for three nodes a face; 2 for a SixNodeMesh, whose `elements` the same triangles are.
 
     Raises:
         ValueError: for polygons that intersect themselves or each other, holes or slits outside of the sheet,
@@ -45,6 +50,7 @@ def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -
     >>> len(outline(square, slits=[[(0.3, 0.5), (0.7, 0.5)]], size=0.1).boundary_loops)
     2
     """
+    check_order(order)
     size = positive("size", "m", size)
     outer = checked_polygon("outer", outer)
     holes = [checked_polygon(f"hole {k}", hole) for k, hole in enumerate(holes)]
@@ -66,10 +72,10 @@ def outline(outer, holes: Sequence = (), slits: Sequence = (), *, size: float) -
         raise ValueError(f"gmsh cannot mesh this outline: {error}") from error
     x, y = unit * points.T
     sheet = TriangleMesh(np.stack([x, y, np.zeros_like(x)], axis=1), _upwards(points, faces))
-    if not slits:
-        return sheet
-    _check_slits_open(sheet, slit_sides)
-    return cut(sheet, _edges_of(sheet, np.concatenate(slit_sides)))
+    if slits:
+        _check_slits_open(sheet, slit_sides)
+        sheet = cut(sheet, _edges_of(sheet, np.concatenate(slit_sides)))
+    return sheet_of_order(sheet, order)
 
 
 def _check_holes(outer: np.ndarray, holes: list[np.ndarray]) -> None:

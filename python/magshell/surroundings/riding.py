@@ -7,10 +7,18 @@ import numpy as np
 from ..bodies.bodies import Bodies
 from ..bodies.rigid import Rigid
 from ..bodies.solid import Solid
-from ..mesh.tet_topology import EDGES
+from ..mesh.six_node_integrals import shapes
+from ..mesh.six_node_mesh import SixNodeMesh
+from ..mesh.tet_topology import EDGES, FLAT
 
 _OUTSIDE = 1e-6  # of a body's size: a point farther from every element is outside
 _STEPS = 30  # of Newton's method, into curved elements
+_CANDIDATES = 16  # flat faces, in whose curved elements a point is looked for
+
+# Barycentric coordinates, in an element of six nodes, of the corners of its four flat faces.
+_CORNERS_OF_FACES = np.concatenate([np.eye(3), 0.5 * (np.eye(3) + np.roll(np.eye(3), 1, axis=1))])[
+    np.array(FLAT)
+]
 
 
 def riding_points(points, bodies: Bodies, places) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -95,9 +103,42 @@ def _ten_shapes(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _on_shell(body, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Of the nearest face, and how far from it."""
-    faces = body.mesh.faces
-    a, b, c = np.moveaxis(body.mesh.rest_positions[faces], 1, 0)
+    """Nodes and weights of the nearest face or element, and how far from it the point lies (m)."""
+    weights, gaps = _to_faces(body.mesh, point)
+    if not isinstance(body.mesh, SixNodeMesh):
+        nearest = int(np.argmin(gaps))
+        return body.mesh.faces[nearest], weights[nearest], float(gaps[nearest])
+    best = None
+    for face in np.argsort(gaps)[
+        :_CANDIDATES
+    ]:  # flat faces that stand for curved elements lie a little beside them
+        nodes = body.mesh.elements[face // 4]
+        start = weights[face] @ _CORNERS_OF_FACES[face % 4]
+        shares, gap = _onto_curved(body.mesh.rest_positions[nodes], start, point)
+        if best is None or gap < best[2]:
+            best = (nodes, shares, gap)
+    return best
+
+
+def _onto_curved(positions: np.ndarray, start: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, float]:
+    """Weights (6,) of the place of an element (6, 3) that is nearest to the point, by Gauss and Newton's method from
+    barycentric coordinates (3,), and how far it is. Outside of the element it is what the element's edges reach."""
+    own = start[1:].copy()
+    for _ in range(_STEPS):
+        shares, slopes = (each[0] for each in shapes(own[None]))
+        step = np.linalg.lstsq((slopes @ positions).T, point - shares @ positions, rcond=None)[0]
+        own = own + step
+        if np.abs(step).max() <= 1e-14:
+            break
+    inside = np.maximum([own[0], own[1], 1.0 - own.sum()], 0.0)
+    shares = shapes((inside[:2] / inside.sum())[None])[0][0]
+    return shares, float(np.linalg.norm(point - shares @ positions))
+
+
+def _to_faces(mesh, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n_f, 3) weights of the foot of the point on each flat face, and how far it lies from them, (n_f,) m."""
+    faces = mesh.faces
+    a, b, c = np.moveaxis(mesh.rest_positions[faces], 1, 0)
     u, v, w = b - a, c - a, point - a
     uu, uv, vv = (np.sum(x * y, axis=1) for x, y in ((u, u), (u, v), (v, v)))
     wu, wv = np.sum(w * u, axis=1), np.sum(w * v, axis=1)
@@ -106,5 +147,4 @@ def _on_shell(body, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     weights = np.stack([1.0 - s - t, s, t], axis=1)
     above = np.linalg.norm(w - s[:, None] * u - t[:, None] * v, axis=1)
     gaps = above + np.maximum(-weights.min(axis=1), 0.0) * np.sqrt(np.maximum(uu, vv))
-    nearest = int(np.argmin(gaps))
-    return faces[nearest], weights[nearest], float(gaps[nearest])
+    return weights, gaps

@@ -51,15 +51,17 @@ def large_deflection(
 ) -> Outcome:
     """A4: at the full load of 400, in one call from rest.
 
-    References: Sze, Liu, Lo, Finite Elem. Anal. Des. 40 (2004) 1551, Abaqus S4R: 4.067 outwards, 8.178
-    inwards.
+    References: 4.0742 outwards, 8.1495 inwards, the limit of Kirchhoff-Love theory as this project's issue 18 states it,
+    known to 0.4 % as points of force converge slowly; `midedge2` has 4.0730 and 8.1455 on 128 x 32 cells, and three of its
+    meshes extrapolate to 4.0753 and 8.1495. Abaqus S4R, whose shells shear: 4.067, 8.178 (Sze, Liu, Lo, Finite Elem. Anal.
+    Des. 40 (2004) 1551).
     """
     mesh = quarter(cells, bending, irregular=irregular)
     state = ms.equilibrium(scene(mesh, bending, force=400.0), solver=solver)
     pulled, pushed = radial_displacements(mesh, state.displacements)
     comparisons = [
-        Comparison("U, pulled", pulled, 4.067, allowed=0.015),
-        Comparison("V, pushed", pushed, 8.178, allowed=0.015),
+        Comparison("U, pulled", pulled, 4.0742, allowed=0.015),
+        Comparison("V, pushed", pushed, 8.1495, allowed=0.015),
     ]
     return outcome(mesh_name(cells, irregular), mesh, comparisons, [state])
 

@@ -98,10 +98,23 @@ def _disk(rings: int, irregular: float | None, bending: str) -> ms.TriangleMesh 
     return ms.SixNodeMesh.of(moved, place=onto_the_rim)
 
 
+def middle_deflection(mesh: ms.TriangleMesh | ms.SixNodeMesh, support: str, load: str) -> float:
+    """Of a quarter of the unit square, its middle at the origin."""
+    bending = "midedge" if isinstance(mesh, ms.TriangleMesh) else "midedge2"
+    response = _response(mesh, _rim(mesh), _symmetry(), 4, bending, support, load)
+    return float(response.displacements[mesh.nearest_vertex((0, 0, 0)), 2])
+
+
 def _quarter(mesh: ms.TriangleMesh, bending: str, name: str, allowed: float | None) -> Outcome:
-    rim = mesh.edges_where(lambda midpoints: midpoints[:, :2].max(axis=1) > 0.5 - 1e-9)
-    symmetry = [ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]
-    return _middle_deflections(mesh, rim, symmetry, 4, bending, SQUARE, name, allowed)
+    return _middle_deflections(mesh, _rim(mesh), _symmetry(), 4, bending, SQUARE, name, allowed)
+
+
+def _rim(mesh) -> np.ndarray:
+    return mesh.edges_where(lambda midpoints: midpoints[:, :2].max(axis=1) > 0.5 - 1e-9)
+
+
+def _symmetry() -> list:
+    return [ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]
 
 
 def _middle_deflections(
@@ -115,16 +128,21 @@ def _middle_deflections(
     allowed: float | None,
 ) -> Outcome:
     """`mesh` is one of `parts` equal parts of the plate, its middle at the origin."""
-    sheet = ms.Shell(
-        mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
-    )
     middle = mesh.nearest_vertex((0, 0, 0))
-    held = {"supported": ms.Pin(np.unique(mesh.nodes_of_edges[rim])), "clamped": ms.Clamp(rim)}
-    loads = {"pressure": ms.AreaLoad((0, 0, 1.0)), "force": ms.PointLoad(middle, (0, 0, 1.0 / parts))}
     comparisons, responses = [], []
     for (support, load), reference in references.items():
-        scene = ms.Scene(sheet, supports=[held[support], *symmetry], loads=[loads[load]])
-        responses.append(ms.linear_response(scene))
+        responses.append(_response(mesh, rim, symmetry, parts, bending, support, load))
         deflection = responses[-1].displacements[middle, 2]
         comparisons.append(Comparison(f"{support}, {load}", deflection, reference, allowed=allowed))
     return outcome(name, mesh, comparisons, responses)
+
+
+def _response(mesh, rim, symmetry: list, parts: int, bending: str, support: str, load: str):
+    sheet = ms.Shell(
+        mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
+    )
+    held = ms.Clamp(rim) if support == "clamped" else ms.Pin(np.unique(mesh.nodes_of_edges[rim]))
+    middle = mesh.nearest_vertex((0, 0, 0))
+    force = ms.PointLoad(middle, (0, 0, 1.0 / parts))
+    loads = [ms.AreaLoad((0, 0, 1.0)) if load == "pressure" else force]
+    return ms.linear_response(ms.Scene(sheet, supports=[held, *symmetry], loads=loads))
