@@ -19,4 +19,6 @@ find tests -maxdepth 1 -name '*.py' ! -name 'test_*' -exec cp {} "$bare/tests/" 
 cd "$bare"
 in_it() { env -i PATH="$bare/venv/bin" HOME="$bare" CXX=none MAGSHELL_NUM_THREADS=1 "$bare/venv/bin/python" "$@"; }
 in_it -m magshell
+env -i PATH="$bare/venv/bin" MAGSHELL_VECTORS=baseline "$bare/venv/bin/python" -m magshell >"$bare/plain"  # of any processor
+grep -q "vector instructions: [A-Z0-9]*$" "$bare/plain"
 in_it -m pytest -q -p no:cacheprovider tests

@@ -3,9 +3,10 @@
 #
 #     PYTHON=.venv/bin/python scripts/wheel.sh
 #
-# Compiled for x86-64-v3 (AVX2, FMA: Intel since 2013, AMD since 2015), the dense part of factorizations for x86-64-v4 (AVX-512)
-# too, or, elsewhere, for the compiler's own baseline, and without anything that is not under a permissive licence. No BLAS is needed. auditwheel brings it to the manylinux tag that
-# the libc of this machine allows. JOBS: how many compilers run at a time.
+# Compiled for x86-64-v3 (AVX2, FMA: Intel since 2013, AMD since 2015), the dense part of factorizations for x86-64-v4
+# (AVX-512) too, which is chosen where it runs; elsewhere for the compiler's own baseline. Without anything that is not under
+# a permissive licence. No BLAS is needed. auditwheel brings it to the manylinux tag that the libc of this machine allows.
+# JOBS: how many compilers run at a time.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 python=${PYTHON:-python3}

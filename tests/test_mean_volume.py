@@ -69,7 +69,9 @@ THICK = {
 @pytest.mark.parametrize("name", THIN)
 def test_one_cell_through_a_thickness_is_warned_of(name):
     mesh = THIN[name]()
-    with pytest.warns(ms.MeshQualityWarning, match=r"a slender region about \[[^\]]*\] m is one cell thick \(") as told:
+    with pytest.warns(
+        ms.MeshQualityWarning, match=r"a slender region about \[[^\]]*\] m is one cell thick \("
+    ) as told:
         ms.Solid(mesh, material=SOFT)
     assert told[0].filename == __file__ and len(told) == 1
     with warnings.catch_warnings():  # not where each point has its own volume

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class DesignRejected(RuntimeError):
     """Raised inside an objective: this design cannot be evaluated, its equilibrium was not found or jumped. Go
@@ -10,7 +12,7 @@ class DesignRejected(RuntimeError):
 
     def __init__(self, message: str, last_good=None, load_case: int | None = None):
         super().__init__(message)
-        self.last_good = last_good
+        self.last_good: Any = last_good
         self.load_case = load_case
 
 
@@ -33,7 +35,7 @@ class Interrupted(KeyboardInterrupt):
 
     def __init__(self, message: str, last_good=None):
         super().__init__(message)
-        self.last_good = last_good
+        self.last_good: Any = last_good
 
 
 class ObjectiveFailed(RuntimeError):
@@ -41,7 +43,7 @@ class ObjectiveFailed(RuntimeError):
 
     def __init__(self, message: str, last_good=None):
         super().__init__(message)
-        self.last_good = last_good
+        self.last_good: Any = last_good
 
 
 class MultistartFailed(RuntimeError):
@@ -50,7 +52,7 @@ class MultistartFailed(RuntimeError):
 
     def __init__(self, message: str, last_good=None):
         super().__init__(message)
-        self.last_good = last_good
+        self.last_good: Any = last_good
 
 
 class LargeStrainWarning(UserWarning):
@@ -59,7 +61,7 @@ class LargeStrainWarning(UserWarning):
 
     def __init__(self, message: str, last_good=None):
         super().__init__(message)
-        self.last_good = last_good
+        self.last_good: Any = last_good
 
 
 class NoGradient(RuntimeError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -34,13 +35,13 @@ def simulate(
     time_step,
     remanent_magnetization=None,
     applied_flux_density=None,
-    load_factor=1.0,
-    gravity_factor=1.0,
-    field_factor=1.0,
-    motion_factor=1.0,
-    damping=0.0,
-    stiffness_damping=0.0,
-    maxwell_modulus=0.0,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    motion_factor: Any = 1.0,
+    damping: Any = 0.0,
+    stiffness_damping: Any = 0.0,
+    maxwell_modulus: Any = 0.0,
     maxwell_time=None,
     start=None,
     velocities=None,

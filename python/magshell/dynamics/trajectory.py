@@ -13,13 +13,8 @@ from .._checks.quantity import quantity
 from .._checks.tensors import detached, plain_arrays
 from .._machine.files import replace_file
 from ..bodies.actuator import Actuator
-from ..bodies.body_result import BodyResult
 from ..bodies.of_body import result_of
-from ..bodies.rigid import Rigid
-from ..bodies.rigid_result import RigidResult
-from ..bodies.shell import Shell
-from ..bodies.solid import Solid
-from ..bodies.solid_result import SolidResult, told_strains
+from ..bodies.solid_result import told_strains
 from ..bodies.strains import StrainHistory, Strains, strains_of
 from ..mesh.crossings import told
 from ..methods.clock import Clock, clock_of
@@ -178,7 +173,7 @@ class Trajectory:
             values.move(obstacle, path)
         vars(self).update(kept, _values=values)
 
-    def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
+    def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene."""
         return result_of(self, body)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -35,7 +35,7 @@ class Fields(NamedTuple):
     face: dict[str, np.ndarray]
 
 
-def read_mesh(path, drop_unused: bool = False) -> TriangleMesh | SixNodeMesh | TetMesh:
+def read_mesh(path, drop_unused: bool = False) -> TriangleMesh | Any:
     """The mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`): a TetMesh where a VTU or
     MSH file holds tetrahedra, a SixNodeMesh where it holds triangles of six points (gmsh's second order), else a
     TriangleMesh.

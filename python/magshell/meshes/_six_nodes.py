@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +19,13 @@ def check_order(order) -> None:
 
 def sheet_of_order(
     mesh: TriangleMesh, order: int, place: Callable[[np.ndarray], np.ndarray] | None = None
-) -> TriangleMesh | SixNodeMesh:
+) -> TriangleMesh | Any:
     """The mesh with elements of this order. place: (n, 3) m -> (n, 3) m, from middles of edges onto the surface."""
     check_order(order)
     return mesh if order == 1 else SixNodeMesh.of(mesh, place)
 
 
-def round_sheet(mesh: TriangleMesh, order: int, axes: tuple[int, ...]) -> TriangleMesh | SixNodeMesh:
+def round_sheet(mesh: TriangleMesh, order: int, axes: tuple[int, ...]) -> TriangleMesh | Any:
     """Likewise, with nodes on edges at the mean of their ends' distances from the origin of the given axes: an edge on a
     cylinder around it, or on a sphere, is an arc of it. Of a sheet in the plane of two axes only edges on the border are
     bent: inside, straight ones are exact and bent ones are not, the less the nearer they are to the middle."""

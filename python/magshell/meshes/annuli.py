@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
-from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import angle_span, is_full_turn
 from ._grid import grid
@@ -23,7 +24,7 @@ def annulus(
     seed: int = 0,
     *,
     order: int = 1,
-) -> TriangleMesh | SixNodeMesh:
+) -> TriangleMesh | Any:
     """The ring between two radii [m] around the origin in the plane z = 0, its normal along +z.
 
     Args:
@@ -49,7 +50,7 @@ def sector(
     seed: int = 0,
     *,
     order: int = 1,
-) -> TriangleMesh | SixNodeMesh:
+) -> TriangleMesh | Any:
     """The part of a ring between two angles from the x axis, in the plane z = 0, its normal along +z.
 
     Args:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.scalars import positive
-from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
@@ -23,7 +24,7 @@ def cylinder(
     irregular: float | None = None,
     seed: int = 0,
     order: int = 1,
-) -> TriangleMesh | SixNodeMesh:
+) -> TriangleMesh | Any:
     """A cylinder around the y axis, 0 <= y <= length, its normal outwards.
 
         x = radius sin(phi),   z = radius cos(phi)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.scalars import positive
-from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._grid import check_size
 from ._six_nodes import round_sheet
 
 
-def disk(radius: float, cells: int, *, order: int = 1) -> TriangleMesh | SixNodeMesh:
+def disk(radius: float, cells: int, *, order: int = 1) -> TriangleMesh | Any:
     """The disk of the given radius [m] around the origin in the plane z = 0, its normal along +z.
 
     order: 1 for three nodes a face; 2 for a SixNodeMesh, whose edges on its rims are arcs.

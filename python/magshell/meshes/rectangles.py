@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.scalars import positive
-from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._grid import grid
 from ._six_nodes import sheet_of_order
@@ -20,7 +21,7 @@ def rectangle(
     seed: int = 0,
     *,
     order: int = 1,
-) -> TriangleMesh | SixNodeMesh:
+) -> TriangleMesh | Any:
     """The sheet [0, length] x [0, width] [m] in the plane z = 0, its normal along +z.
 
     Args:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
-from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
@@ -25,7 +26,7 @@ def spherical_cap(
     irregular: float | None = None,
     seed: int = 0,
     order: int = 1,
-) -> TriangleMesh | SixNodeMesh:
+) -> TriangleMesh | Any:
     """The part of the sphere around the origin between two polar angles, its normal outwards.
 
     Args:

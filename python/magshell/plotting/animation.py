@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def animate(
     obstacles=None,
     speed: float | None = None,
     fps: float = 25.0,
-    color="auto",
+    color: Any = "auto",
     color_label: str | None = None,
     color_range=None,
     arrows: bool | int = True,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.arrays import index_array
@@ -31,7 +33,7 @@ def plot(
     field=None,
     obstacles=None,
     states=None,
-    color="auto",
+    color: Any = "auto",
     color_label: str | None = None,
     color_range=None,
     arrows: bool | int = True,

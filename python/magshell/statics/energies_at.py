@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.quantity import quantity
@@ -25,10 +27,10 @@ def energies(
     body: Shell | Solid | None = None,
     remanent_magnetization=None,
     applied_flux_density=None,
-    load_factor=1.0,
-    gravity_factor=1.0,
-    field_factor=1.0,
-    motion_factor=1.0,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    motion_factor: Any = 1.0,
     thickness=None,
     young_modulus=None,
     poisson_ratio=None,

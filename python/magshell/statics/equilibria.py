@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -97,7 +98,7 @@ class Equilibria(Sequence):
     def __len__(self) -> int:
         return len(self._cases)
 
-    def __getitem__(self, index):
+    def __getitem__(self, index) -> Any:
         """A case, some of them, or what all say of one body of the scene."""
         if isinstance(index, BODIES) or hasattr(index, "_result_in"):
             return result_of(self, index)

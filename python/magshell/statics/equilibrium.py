@@ -8,13 +8,8 @@ from typing import Any
 import numpy as np
 
 from .._checks.tensors import detached, plain_arrays
-from ..bodies.body_result import BodyResult
 from ..bodies.of_body import result_of
-from ..bodies.rigid import Rigid
-from ..bodies.rigid_result import RigidResult
-from ..bodies.shell import Shell
-from ..bodies.solid import Solid
-from ..bodies.solid_result import SolidResult, told_strains
+from ..bodies.solid_result import told_strains
 from ..bodies.strains import Largest, Strains, strains_of
 from ..mesh.crossings import told
 from ..scene.reactions import Reaction, reaction_in
@@ -77,7 +72,7 @@ class Equilibrium:
     def __setstate__(self, kept: dict) -> None:
         vars(self).update(kept, _values=Values.again(kept["scene"], kept["_values"]))
 
-    def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
+    def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene."""
         return result_of(self, body)
 

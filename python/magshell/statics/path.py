@@ -16,14 +16,9 @@ from .._checks.scalars import positive
 from .._machine.entry import solve_entry
 from .._machine.log import log
 from .._machine.progress import SolveBar
-from ..bodies.body_result import BodyResult
 from ..bodies.caps import warn_of_caps
 from ..bodies.of_body import result_of
-from ..bodies.rigid import Rigid
-from ..bodies.rigid_result import RigidResult
-from ..bodies.shell import Shell
-from ..bodies.solid import Solid
-from ..bodies.solid_result import SolidResult, told_strains
+from ..bodies.solid_result import told_strains
 from ..bodies.strains import StrainHistory, Strains, strains_of, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..mesh.crossings import told
@@ -97,7 +92,7 @@ class Path:
         """The principal strains of every face at one of the points, by default the last."""
         return strains_of(self.scene, self._state_at(index), self._inputs.values.whole.thickness)
 
-    def __getitem__(self, body: Shell | Solid | Rigid) -> BodyResult | SolidResult | RigidResult:
+    def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene, a row for each point; points themselves: `equilibrium`."""
         return result_of(self, body)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +23,10 @@ def equilibrium(
     *,
     remanent_magnetization=None,
     applied_flux_density=None,
-    load_factor=1.0,
-    gravity_factor=1.0,
-    field_factor=1.0,
-    motion_factor=1.0,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    motion_factor: Any = 1.0,
     thickness=None,
     young_modulus=None,
     poisson_ratio=None,
@@ -38,7 +39,7 @@ def equilibrium(
     at_rest: bool = False,
     solver: Newton | None = None,
     progress: bool | Callable[[float, float], None] = True,
-) -> Equilibrium | Equilibria:
+) -> Equilibrium | Any:  # Equilibria where there are load cases
     """A stable equilibrium of a scene, or one for each of several load cases.
 
     remanent_magnetization: A/m, rest frame, world axes: (n_f, 3), or (3,) on every face. Needed in a scene with a field.

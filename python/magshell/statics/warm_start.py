@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -67,7 +68,7 @@ class WarmStart:
         """Those of the last design."""
         return join([each.equilibrium for each in self._last], self._of_cases) if self._last else None
 
-    def __call__(self, **design) -> Equilibrium | Equilibria:
+    def __call__(self, **design) -> Equilibrium | Any:
         """The equilibrium, or equilibria, of a design: the arguments of ms.equilibrium."""
         design = as_keywords(self.scene, design, CONTROLS)
         cases = split(design)

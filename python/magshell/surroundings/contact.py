@@ -11,6 +11,7 @@ from .._checks.selections import indices, selection
 from ..bodies.bodies import BODIES, checked_body, joined, on_body
 from ..bodies.rigid import Rigid
 from ..bodies.shell import Shell
+from ..bodies.solid import Solid
 from ..mesh.triangle_mesh import TriangleMesh
 from ..obstacles import Obstacle
 from .body_contact import BodyContact
@@ -77,7 +78,7 @@ class Contact(Owner):
         lagged_friction: bool = False,
         vertices=None,
         face_samples: int = 0,
-        body: Shell | None = None,
+        body: Shell | Solid | None = None,
     ):
         self.body = checked_body(body)
         listed = checked_list("obstacles", obstacles, (Obstacle,), "objects of ms.obstacles")

@@ -9,6 +9,7 @@ from .._checks.quantity import quantity, real_numbers
 from .._checks.selections import indices, selection
 from ..bodies.bodies import checked_body
 from ..bodies.shell import Shell
+from ..bodies.solid import Solid
 from ..mesh.face_shapes import edge_shares, shares
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
@@ -22,7 +23,7 @@ class DeadLoad(Owner):
 
     for_all = False  # whether it acts on all bodies where it names none
 
-    def __init__(self, label: str, values, body: Shell | None):
+    def __init__(self, label: str, values, body: Shell | Solid | None):
         """label: the name and unit of the value."""
         self._label, self.body = label, checked_body(body)
         setattr(self, self._replaceable[0], _vectors(*label.rstrip("]").split(" [", 1), values))
@@ -63,7 +64,7 @@ class PointLoad(DeadLoad):
 
     _replaceable = ("force",)
 
-    def __init__(self, vertices, force, body: Shell | None = None):
+    def __init__(self, vertices, force, body: Shell | Solid | None = None):
         self.vertices = selection("PointLoad vertices", vertices)
         super().__init__("force [N]", force, body)
 
@@ -92,7 +93,7 @@ class EdgeLoad(DeadLoad):
 
     _replaceable = ("force_per_length",)
 
-    def __init__(self, edges, force_per_length, body: Shell | None = None):
+    def __init__(self, edges, force_per_length, body: Shell | Solid | None = None):
         self.edges = selection("EdgeLoad edges", edges)
         super().__init__("force_per_length [N/m]", force_per_length, body)
 
@@ -118,7 +119,7 @@ class AreaLoad(DeadLoad):
 
     _replaceable = ("force_per_area",)
 
-    def __init__(self, force_per_area, faces=None, body: Shell | None = None):
+    def __init__(self, force_per_area, faces=None, body: Shell | Solid | None = None):
         self.faces = None if faces is None else selection("AreaLoad faces", faces)
         self.for_all = faces is None
         super().__init__("force_per_area [N/m2]", force_per_area, body)
@@ -155,7 +156,7 @@ class EdgeCouple(Owner):
     _replaceable = ("couple_per_length",)
     for_all = False
 
-    def __init__(self, edges, couple_per_length, body: Shell | None = None):
+    def __init__(self, edges, couple_per_length, body: Shell | Solid | None = None):
         self.body = checked_body(body)
         self.edges = selection("EdgeCouple edges", edges)
         array = real_numbers("couple_per_length [N]", couple_per_length)

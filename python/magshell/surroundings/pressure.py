@@ -9,6 +9,7 @@ from .._checks.quantity import quantity, real_numbers
 from .._checks.selections import indices, selection
 from ..bodies.bodies import Bodies, checked_body, on_body
 from ..bodies.shell import Shell
+from ..bodies.solid import Solid
 from ..mesh.face_shapes import sides
 
 
@@ -44,7 +45,7 @@ class Pressure(Owner):
     _in_time = ("pressure",)
     for_all = False
 
-    def __init__(self, pressure, *, faces=None, body: Shell | None = None):
+    def __init__(self, pressure, *, faces=None, body: Shell | Solid | None = None):
         self.faces = None if faces is None else selection("Pressure faces", faces)
         self.body = checked_body(body)
         array = real_numbers("pressure [Pa]", pressure)

@@ -13,6 +13,7 @@ from .._checks.scalars import not_negative
 from .._checks.selections import indices, selection
 from ..bodies.bodies import checked_body, on_body
 from ..bodies.shell import Shell
+from ..bodies.solid import Solid
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 
@@ -102,7 +103,7 @@ class Pin(Support):
         displacement=None,
         rotation=None,
         center=None,
-        body: Shell | None = None,
+        body: Shell | Solid | None = None,
     ):
         self.body = checked_body(body)
         self.vertices = selection("Pin vertices", vertices)
@@ -151,7 +152,9 @@ class Clamp(Support):
 
     _replaceable = _in_time = ("displacement", "rotation", "center")
 
-    def __init__(self, edges, *, displacement=None, rotation=None, center=None, body: Shell | None = None):
+    def __init__(
+        self, edges, *, displacement=None, rotation=None, center=None, body: Shell | Solid | None = None
+    ):
         self.body = checked_body(body)
         self.edges = selection("Clamp edges", edges)
         self._move = _Move(displacement, rotation, center)
@@ -207,7 +210,7 @@ class SymmetryPlane(Support):
         point=(0.0, 0.0, 0.0),
         *,
         tolerance: float | None = None,
-        body: Shell | None = None,
+        body: Shell | Solid | None = None,
     ):
         self.body = checked_body(body)
         normal = quantity("normal", "1", normal, (3,))
