@@ -4,6 +4,7 @@ import doctest
 import importlib
 import inspect
 import pkgutil
+import pydoc
 import re
 import sys
 import types
@@ -129,3 +130,11 @@ def test_it_runs(test, tmp_path, monkeypatch):
         warnings.simplefilter("ignore")
         failed = doctest.DocTestRunner(verbose=False).run(test, out=told.append).failed
     assert not failed, "".join(told)
+
+
+@pytest.mark.parametrize("name", ["LBFGS", "MMA", "GCMMA"])
+def test_help_of_an_optimizer_is_ours(name):
+    """What torch says of its own methods stands under its own heading, after everything of ours."""
+    told = pydoc.plain(pydoc.render_doc(getattr(ms.optim, name))).split("inherited from torch")[0]
+    assert "load_state_dict" in told and "add_param_group" in told and "step(self, closure" in told
+    assert not re.search(r"lr_scheduler|Args:|:class:|fine tuning|Helper for pickle", told)

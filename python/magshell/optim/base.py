@@ -44,7 +44,12 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         torch.optim.Optimizer.__init__(self, params, defaults)
 
     def step(self, closure: Callable) -> float:
-        """Moves the parameters and returns the objective there."""
+        """Moves the parameters by one step, within their box, and returns the objective there.
+
+        closure: a function without arguments that returns the objective of the parameters as they stand, a scalar tensor,
+        or (objective, constraints), each of which is to be at most zero; it does not call backward. Raises what it raises,
+        with parameters and state as they were; ValueError where its answer is not such.
+        """
         sample = self.evaluate(closure)
         self._check_sample(sample)
         with Restoring(self):
@@ -63,6 +68,10 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         return self._sample.objective
 
     def add_param_group(self, param_group: dict) -> None:
+        """Adds a group, {"params": tensors, "lower": ..., "upper": ..., "scale": ...}, before the first step.
+
+        Raises ValueError after that, and for options that there are not.
+        """
         if self._run:
             raise ValueError("a parameter group cannot join a run that has begun: make a new optimizer")
         unknown = set(param_group) - {"params", "param_names", *self.defaults}
@@ -89,6 +98,10 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         return {**super().state_dict(), "run": {**run, **self._sample_state()}}
 
     def load_state_dict(self, state_dict: dict) -> None:
+        """Goes on where the optimizer was whose `state_dict` this is: the same steps from there, to the bit.
+
+        Raises ValueError for the state of another kind of optimizer, or of other parameters.
+        """
         if "run" not in state_dict:
             raise ValueError(f"this is not a state of {type(self).__name__}: it has no 'run'")
         rest = {name: value for name, value in state_dict.items() if name != "run"}
@@ -107,6 +120,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         return told | group_options(self.param_groups, set(told))
 
     def __getstate__(self) -> dict:
+        """What a copy or pickle takes along; not the closure."""
         kept = {name: getattr(self, name) for name in self._copied}
         return {**super().__getstate__(), **kept, "_closure": None}
 

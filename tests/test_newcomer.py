@@ -1,0 +1,45 @@
+"""The way of somebody who has just installed magshell, by stopwatch: to a picture, and to a design of their own.
+
+The package is the one that is installed here: `make wheel` has the same quick start run from the wheel in an environment
+with nothing else (scripts/try_wheel.sh).
+"""
+
+import os
+import re
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+READING_SPEED = 200  # words a minute, code counted as words
+
+
+def blocks(text: str) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
+def machine_time() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def test_the_first_picture_takes_less_than_a_minute_of_machine_time(tmp_path):
+    code = blocks((ROOT / "README.md").read_text().split("## Quick start")[1])[0]
+    assert ".save(" in code
+    (tmp_path / "first.py").write_text(code)
+    environment = {**os.environ, "MPLBACKEND": "Agg"}
+    began = machine_time()
+    subprocess.run([sys.executable, "first.py"], cwd=tmp_path, env=environment, check=True, timeout=600)
+    assert machine_time() - began < 60.0
+    assert (tmp_path / "strip.png").stat().st_size > 10_000
+
+
+def test_ten_minutes_of_reading_lead_to_a_design():
+    """README to the end of its quick start, and the first hour to the end of its design."""
+    readme = (ROOT / "README.md").read_text().split("\n## The manual")[0]
+    hour = (ROOT / "docs" / "first-hour.md").read_text()
+    sections = re.split(r"(?m)^(?=## )", hour)
+    last = max(k for k, each in enumerate(sections) if "ms.minimize(" in each)
+    words = len((readme + "".join(sections[: last + 1])).split())
+    assert "ms.minimize(" in readme and words < 10 * READING_SPEED, f"{words} words"
