@@ -54,8 +54,9 @@ def main(
     difference: float = 1e-3,
 ) -> dict:
     """{"found": [Found of each start], "motion": with the controls of the first, "forward", "backward": ms of the processor,
-    a step, "slope": error of the slope at the start of the search, over so many steps, "dead": how many of the unknowns
-    have no gradient there}. difference: of the controls, which go from -1 to 1."""
+    a step, "slope": error of the slope at the start of the search, over so many steps, "slope_found": at what
+    the first one found, "dead": how many of the unknowns have no gradient at the start}. difference: of the controls, which
+    go from -1 to 1."""
     octopus = MuscleOctopus(cells)
     result = searched(octopus, steps, target, episodes, starts, slope_steps, difference)
     gradient = gradient_at(octopus, octopus.first_controls(steps, **starts[0]), target)

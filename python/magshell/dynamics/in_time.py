@@ -67,7 +67,8 @@ class InTime:
     def _check_actuator(self, course: Course) -> None:
         """Raises ValueError where the actuator cannot have one of its numbers."""
         at_knots = self.of_actuators[course.owner, course.name]
-        for extreme in (at_knots.min(axis=0), at_knots.max(axis=0)):
+        least, most = at_knots.min(axis=0), at_knots.max(axis=0)
+        for extreme in (least,) if np.array_equal(least, most) else (least, most):
             course.owner.replaced(**{course.name: extreme})
 
     def _add_obstacles(self, courses: list[Course]) -> None:
