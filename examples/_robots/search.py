@@ -99,7 +99,7 @@ def gradient_at(robot: Robot, controls: np.ndarray, target=None) -> np.ndarray:
 
 
 def slope_error(robot: Robot, controls: np.ndarray, step: float, target=None) -> float:
-    """Of the squared miss by all controls: the slope along its gradient against central differences. Controls at their bounds
+    """Of the squared miss by all controls: slope along its gradient against central differences. Controls at their bounds
     stay."""
     gradient = np.where(np.abs(controls) <= 1.0 - step, gradient_at(robot, controls, target), 0.0)
     slope = float(np.linalg.norm(gradient))
