@@ -59,8 +59,8 @@ def main(
     difference: float = 1e-3,
 ) -> dict:
     """{"found": [Found of each start], "motion": with the controls of the first, "forward", "backward": ms of the processor,
-    a step, "slope": error of the slope at the start of the search, over so many steps, "slips": the same motion without
-    friction}. difference: of the controls, which go from -1 to 1."""
+    a step, "slope": error of the slope at the start of the search, over so many steps, "slope_found": at what
+    the first one found, "slips": the same motion without friction}. difference: of the controls, which go from -1 to 1."""
     result = searched(
         CellGripper(levels, ball_cells), steps, target, episodes, starts, slope_steps, difference
     )

@@ -56,8 +56,8 @@ def main(
     difference: float = 1e-4,
 ) -> dict:
     """{"found": [Found of each start], "motion": with the torques of the first, "forward", "backward": ms of the processor,
-    a step, "slope": error of the slope at the start of the search, over so many steps}. difference: of torques, over
-    the largest."""
+    a step, "slope": error of the slope at the start of the search, over so many steps, "slope_found": at what
+    the first one found}. difference: of torques, over the largest."""
     return searched(Fish(n_tetrahedra), steps, target, episodes, starts, slope_steps, difference)
 
 

@@ -54,8 +54,9 @@ def main(
     difference: float = 1e-3,
 ) -> dict:
     """{"found": [Found of each start], "motion": with the controls of the first, "forward", "backward": ms of the processor,
-    a step, "slope": error of the slope at the start of the search, over so many steps, "dead": how many of the unknowns
-    have no gradient there}. difference: of the controls, which go from -1 to 1."""
+    a step, "slope": error of the slope at the start of the search, over so many steps, "slope_found": at what
+    the first one found, "dead": how many of the unknowns have no gradient at the start}. difference: of the controls, which
+    go from -1 to 1."""
     octopus = MuscleOctopus(cells)
     result = searched(octopus, steps, target, episodes, starts, slope_steps, difference)
     gradient = gradient_at(octopus, octopus.first_controls(steps, **starts[0]), target)
@@ -81,8 +82,9 @@ def summary(result: dict) -> str:
 
 def write(result: dict, out: Path) -> None:
     ms.Picture(plot(result)).save(out / "muscle_octopus.png", dpi=160)
-    report.picture(result["motion"], VIEW).save(out / "muscle_octopus_swims.png")
-    report.movie(result["motion"], out / "muscle_octopus.gif", VIEW, speed=1.0, fps=25.0, width=500)
+    active = {"color": "activation", "color_range": (0, 1)}
+    report.picture(result["motion"], VIEW, **active).save(out / "muscle_octopus_swims.png")
+    report.movie(result["motion"], out / "muscle_octopus.gif", VIEW, speed=1.0, fps=25.0, width=500, **active)
 
 
 if __name__ == "__main__":

@@ -153,6 +153,41 @@ def test_quick_run_draws_a_figure(tmp_path, capsys) -> None:
     assert is_a_picture(picture)
 
 
+def test_runs_are_kept_and_gone_on_with(tmp_path, capsys, monkeypatch) -> None:
+    """Stopped in the second run, the first is printed; later only what is missing is run, with the same numbers."""
+    chosen = ["experiments", "--budget", "4", "--only", "suspension", "--methods", "L-BFGS", "--seeds", "2"]
+    path, ran, run = tmp_path / "runs.json", [], methods.run
+
+    def stopped(search, task, budget, seed):
+        if seed == 1 and not ran:
+            raise KeyboardInterrupt
+        ran.append(seed)
+        return run(search, task, budget, seed)
+
+    monkeypatch.setattr(methods, "run", lambda *given: run(*given) if given[3] == 0 else stopped(*given))
+    with pytest.raises(KeyboardInterrupt):
+        main([*chosen, "--runs", str(path)])
+    assert "1 of 2 runs" in capsys.readouterr().out
+    first = json.loads(path.read_text())
+    assert [row["seed"] for row in first] == [0]
+    monkeypatch.setattr(methods, "run", lambda *given: ran.append(given[3]) or run(*given))
+    assert main([*chosen, "--runs", str(path)]) == 0
+    both = json.loads(path.read_text())
+    assert ran == [1] and both[0] == first[0] and len(both) == 2
+    told = capsys.readouterr().out
+    assert main([*chosen, "--runs", str(path), "--known"]) == 0
+    assert ran == [1] and capsys.readouterr().out == told
+
+
+def test_files_of_runs_that_are_none(tmp_path) -> None:
+    path = tmp_path / "runs.json"
+    with pytest.raises(SystemExit, match="name one that is there"):
+        main(["experiments", "--known", "--runs", str(path)])
+    path.write_text('[{"task": "strip"}]')
+    with pytest.raises(SystemExit, match="does not hold runs"):
+        main(["experiments", "--runs", str(path)])
+
+
 def test_memory_in_processes_of_their_own(capsys) -> None:
     assert main(["experiments", "--quick", "--only", "memory"]) == 0
     assert "checkpoints" in capsys.readouterr().out

@@ -156,6 +156,27 @@ def test_trials_begin_where_the_gradient_says_nothing() -> None:
     assert tried.controls.abs().max() <= 1.0
 
 
+def test_without_iterations_the_best_trial_is_done_and_no_gradient_asked_for() -> None:
+    def objective(rows, part, state):
+        assert not rows.requires_grad
+        return squared_swim(rows)
+
+    found = ms.control.receding(
+        objective,
+        lambda *_: None,
+        zeros(40, 1),
+        horizon=20,
+        stride=10,
+        max_iterations=0,
+        trials=8,
+        spread=0.5,
+        periods=(4, 8),
+        **QUIET,
+    )
+    assert float(squared_swim(found.controls)) < 0 and found.trials == 4 * 9
+    assert not found.searches and not found.evaluations and found.reached == 40
+
+
 def test_what_is_tried_is_as_planned_then_swings_or_repeats_within_bounds() -> None:
     seen = []
 
@@ -277,7 +298,8 @@ def test_errors_and_interrupts_hand_back_what_was_settled(where) -> None:
         ({"lower": np.nan}, "lower must be numbers"),
         ({"upper": (1.0, 2.0)}, "upper must be a number or have the shape of a row"),
         ({"controls": [1.0, np.nan]}, "controls must be finite"),
-        ({"max_iterations": 0}, "max_iterations must be an integer"),
+        ({"max_iterations": -1}, "max_iterations must be an integer"),
+        ({"max_iterations": 0}, "max_iterations and trials are both 0"),
         ({"tolerance": -1.0}, "tolerance must not be negative"),
         ({"seed": -1}, "seed must be an integer"),
         ({"advance": None}, "advance must be a function"),

@@ -40,6 +40,69 @@ def test_a_value_that_a_function_of_the_action_sets():
     np.testing.assert_allclose(seen[:, 0], whole[hinge].angle[::4], atol=1e-15)
 
 
+def two_pendulums():
+    bobs = [ms.Link(mass=1.0, center=(x, 0, -1.0), inertia=0.1) for x in (0.0, 3.0)]
+    hinges = [
+        ms.Revolute(bob, origin=(x, 0, 0), axis=(0, 1, 0), torque=0.0)
+        for bob, x in zip(bobs, (0.0, 3.0), strict=True)
+    ]
+    return ms.Scene(ms.Skeleton(bobs, hinges), gravity=(0, 0, -9.81)), hinges
+
+
+def swinging(actuators):
+    scene, hinges = two_pendulums()
+    one = ms.envs.Environment(
+        scene,
+        actuators=actuators(scene, hinges),
+        observation=lambda now: [now[hinge].angle for hinge in hinges],
+        reward=lambda now: 0.0,
+        time_step=1e-2,
+        actions_per_episode=3,
+    )
+    one.reset(seed=0)
+    return one, np.array([one.step(each)[0] for each in ((0.5, 1.0), (0.5, -1.0), (-1.0, 1.0))])
+
+
+def test_several_owners_at_once_move_as_each_by_itself():
+    """And the function is called once an action, with the values of all of them before."""
+    seen = []
+
+    def add(numbers, time, before):
+        seen.append(before)
+        return before + numbers
+
+    each = [lambda share, time, before: before + share[0]]
+    one, together = swinging(lambda _, hinges: [ms.envs.Steered(hinges, "torque", 2, add)])
+    _, apart = swinging(lambda _, hinges: [ms.envs.Steered(hinge, "torque", 1, *each) for hinge in hinges])
+    assert np.array_equal(together, apart) and np.abs(together[-1]).min() > 0
+    np.testing.assert_allclose(seen, [(0, 0), (0.5, 1.0), (1.0, 0.0)], atol=1e-15)
+    assert repr(one.actuators[0]) == "Steered(torque of 2 Revolute, by 2 numbers)"
+
+
+@pytest.mark.parametrize(
+    ("actuators", "complaint"),
+    [
+        (lambda _, hinges: [ms.envs.Steered([], "torque", 2, max)], "at least one"),
+        (lambda scene, hinges: [ms.envs.Steered([hinges[0], scene], "torque", 2, max)], "no value 'torque'"),
+        (
+            lambda _, hinges: [
+                ms.envs.Steered(hinges, "torque", 2, max),
+                ms.envs.Actuator(hinges[1], "torque", lower=-1.0, upper=1.0),
+            ],
+            "two actuators set one value",
+        ),
+        (lambda _, hinges: [ms.envs.Steered([hinges[0]] * 2, "torque", 2, max)], "two actuators set one"),
+        (
+            lambda _, hinges: [ms.envs.Steered(hinges[:1] + two_pendulums()[1][:1], "torque", 2, max)],
+            "neither",
+        ),
+    ],
+)
+def test_bad_owners_are_refused(actuators, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        swinging(actuators)
+
+
 @pytest.mark.parametrize(
     ("steered_by", "complaint"),
     [

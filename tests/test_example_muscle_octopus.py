@@ -50,7 +50,7 @@ def test_waves_are_found_that_take_it_to_the_target(swum) -> None:
 
 def test_every_unknown_has_a_gradient_and_it_is_that_of_differences(swum) -> None:
     assert swum["dead"] == 0
-    assert swum["slope"] < 1e-4
+    assert swum["slope"] < 1e-4 and swum["slope_found"] < 1e-4
 
 
 def test_activations_are_as_the_formula_says() -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 from _robots import report
 from _robots.report import COLORS
 
 VIEW = (108, -90)  # from above: y is up
+LOOK = {"color": "volume_ratio", "color_label": "volume over that at rest", "obstacles": []}
 
 
 def draw_controls(axes, result: dict) -> None:
@@ -25,16 +25,10 @@ def draw_controls(axes, result: dict) -> None:
     axes.legend(frameon=False, fontsize=7)
 
 
-def _which(result: dict) -> np.ndarray:
-    gripper = result["found"][0].robot
-    return np.repeat([0.0, 1.0], [gripper.arms.mesh.n_vertices, gripper.ball.mesh.n_vertices])
-
-
 def picture(result: dict):
-    shown = {"color": [_which(result)] * 4, "color_label": "arms 0, ball 1", "obstacles": []}
-    return report.picture(result["motion"], VIEW, **shown)
+    return report.picture(result["motion"], VIEW, **LOOK)
 
 
 def movie(result: dict, path: Path, **options) -> Path:
-    shown = {"obstacles": [], "speed": 0.2, "fps": 25.0, "width": 500, **options}
-    return report.movie(result["motion"], path, VIEW, **shown)
+    shown = {"speed": 0.2, "fps": 25.0, "width": 500, **options}
+    return report.movie(result["motion"], path, VIEW, **LOOK, **shown)

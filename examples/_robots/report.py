@@ -29,7 +29,8 @@ def summary(result: dict, meshes) -> str:
         f"{nodes} nodes, {tetrahedra} tetrahedra, {first.controls.size} unknowns; way {way} m",
         f"a step {result['forward']:.1f} ms of the processor, backwards {result['backward']:.1f}; "
         f"{motion.iterations / motion.steps_done:.1f} iterations{halved}",
-        f"slope along the gradient over {result['slope_steps']} steps against differences: {result['slope']:.1e}",
+        f"slope along the gradient over {result['slope_steps']} steps against differences: {result['slope']:.1e}, "
+        f"at what was found {result['slope_found']:.1e}",
         "start: episodes to 1 % of the way, seconds, least miss",
         *(
             f"  {label(each)}: {each.episodes or f'not in {len(each.misses)}'}, {each.seconds[-1]:.0f} s, "

@@ -44,7 +44,8 @@ def searched(
     difference: float,
 ) -> dict:
     """{"found": Found of each start, arguments of the robot's first_controls; of the first one "motion" with its
-    controls, and "forward", "backward": ms of the processor, a step; "slope": error at the start, over so many steps}."""
+    controls, and "forward", "backward": ms of the processor, a step; "slope": error at the start, over so many steps;
+    "slope_found": at the controls found, over all steps}."""
     found = [
         found_by_gradient(robot, start, robot.first_controls(steps, **start), target, episodes)
         for start in starts
@@ -60,8 +61,9 @@ def searched(
         "motion": robot.motion(found[0].controls),
         "forward": 1e3 * (there - began) / steps,
         "backward": 1e3 * (back - there) / steps,
-        "slope": slope_error(robot, robot.first_controls(slope_steps, **starts[0]), difference),
+        "slope": slope_error(robot, robot.first_controls(slope_steps, **starts[0]), difference, target),
         "slope_steps": slope_steps,
+        "slope_found": slope_error(robot, found[0].controls, difference, target),
     }
 
 
@@ -96,12 +98,13 @@ def gradient_at(robot: Robot, controls: np.ndarray, target=None) -> np.ndarray:
     return torch.autograd.grad(robot.miss(robot.motion(x, ms.MixedNewton()), target) ** 2, x)[0].numpy()
 
 
-def slope_error(robot: Robot, controls: np.ndarray, step: float) -> float:
-    """Of the squared miss by all controls: the slope along its gradient against central differences."""
-    gradient = gradient_at(robot, controls)
+def slope_error(robot: Robot, controls: np.ndarray, step: float, target=None) -> float:
+    """Of the squared miss by all controls: slope along its gradient against central differences. Controls at their bounds
+    stay."""
+    gradient = np.where(np.abs(controls) <= 1.0 - step, gradient_at(robot, controls, target), 0.0)
     slope = float(np.linalg.norm(gradient))
     there, back = (
-        float(robot.miss(robot.motion(controls + sign * step * gradient / slope, ms.MixedNewton()))) ** 2
-        for sign in (1, -1)
+        float(robot.miss(robot.motion(moved, ms.MixedNewton()), target)) ** 2
+        for moved in (controls + sign * step * gradient / slope for sign in (1, -1))
     )
     return abs((there - back) / (2 * step) - slope) / slope

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
 from .baselines import methods
+from .baselines.kept import Kept
 from .baselines.learned import LEARNERS
 from .baselines.tasks import BridgeTask, StripTask, robot_task
 from .memory_of_bridge import measure as measure_memory
 from .paper import examples_folder, on_path
-from .report import bar, chosen, print_table
+from .report import bar, chosen, print_table, writable_path
 
 QUICK_BUDGET = 6
 SEEDS, USUAL_SEEDS = 5, 1
@@ -62,6 +64,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--methods", nargs="+", choices=known, metavar="METHOD", help=f"some of {', '.join(known)}"
     )
     parser.add_argument(
+        "--runs",
+        type=writable_path,
+        metavar="PATH",
+        help="keep every run there as it ends; those that are there already are taken from it",
+    )
+    parser.add_argument(
+        "--known", action="store_true", help="with --runs: print what is there of these runs, and run nothing"
+    )
+    parser.add_argument(
         "--examples",
         type=Path,
         metavar="FOLDER",
@@ -73,6 +84,8 @@ def run(options: argparse.Namespace) -> dict:
     """Prints the tables, returns their numbers."""
     if options.quick and options.full:
         raise SystemExit("--quick or --full, not both")
+    if options.known and not (options.runs and options.runs.exists()):
+        raise SystemExit("--known prints what a file of --runs holds: name one that is there")
     seeds = chosen(options.seeds, options.full, SEEDS, USUAL_SEEDS)
     for name, value in (("budget", options.budget), ("seeds", seeds)):
         if value is not None and value < 1:
@@ -83,32 +96,46 @@ def run(options: argparse.Namespace) -> dict:
     wanted = [each for each in PARTS if options.only is None or each in options.only]
     folder = examples_folder(options.examples)
     results: dict = {"seeds": seeds, "tasks": {}}
+    kept = Kept(options.runs)
     with on_path(folder):
         for name in wanted:
             if name != "memory":
                 usual = TASKS[name].full if options.full else TASKS[name].usual
                 budget = chosen(options.budget, options.quick, QUICK_BUDGET, usual)
-                results["tasks"][name] = _compared(TASKS[name].task(), budget, seeds, options.methods)
+                task, searches = TASKS[name].task(), options.methods
+                try:
+                    results["tasks"][name] = compared(task, budget, seeds, searches, kept, options.known)
+                except KeyboardInterrupt:  # what was run so far
+                    _print_task(name, compared(task, budget, seeds, searches, kept, known=True))
+                    raise
                 _print_task(name, results["tasks"][name])
-    if "memory" in wanted:
+    if "memory" in wanted and not options.known:
         results["memory"] = measure_memory(folder, options.quick)
     return results
 
 
-def _compared(task, budget: int, seeds: int, only) -> dict:
-    """{"unknowns", "goal", "budget", "seeds", "methods": {name: {"runs": [...]} or {"missing": library}}}."""
-    known = methods.SEARCHES
+def compared(task, budget: int, seeds: int, only, kept: Kept, known: bool = False) -> dict:
+    """{"unknowns", "goal", "budget", "seeds", "methods": {name: {"runs": [...]} or {"missing": library}}}.
+
+    known: only what is kept, nothing is run."""
+    plain = methods.SEARCHES
     if task.searches is not None:
-        known = {name: each for name, each in known.items() if name in task.searches}
-    searches = {**known, **(LEARNERS if task.learned else {})}
+        plain = {name: each for name, each in plain.items() if name in task.searches}
+    searches = {**plain, **(LEARNERS if task.learned else {})}
     searches = {name: each for name, each in searches.items() if only is None or name in only}
     found: dict = {}
     with bar(task.name, len(searches) * seeds) as shown:
         for name, search in searches.items():
+            if known:
+                runs = [kept.known(task.name, name, seed, budget) for seed in range(seeds)]
+                if any(runs):
+                    found[name] = {"runs": [each for each in runs if each]}
+                continue
             try:
                 runs = []
                 for seed in range(seeds):
-                    runs.append(methods.run(search, task, budget, seed))
+                    make = partial(methods.run, search, task, budget, seed)
+                    runs.append(kept.run(task.name, name, seed, budget, make))
                     shown.update()
                 found[name] = {"runs": runs}
             except ImportError as error:
@@ -136,11 +163,11 @@ def _print_task(name: str, task: dict) -> None:
         shown = f"{median(counts):.0f}"
         if goal:
             there = sum(end <= goal for end in ends)
-            shown = f"{shown}, {there} of {seeds}" if there else f"none in {budget}"
+            shown = f"{shown}, {there} of {len(runs)}" if there else f"none in {budget}"
         rows.append(
             [
                 method,
-                "",
+                "" if len(runs) == seeds else f"{len(runs)} of {seeds} runs",
                 _number(median(each["best"][0] for each in runs)),
                 _number(median(each["best"][:10][-1] for each in runs)),
                 _number(median(ends)),

@@ -37,7 +37,8 @@ class Actuator(Owner):
 
     def _check_in_time(self, name: str, rows: np.ndarray) -> None:
         """Raises ValueError where it cannot have one of the numbers (n, ...) over time."""
-        for extreme in (rows.min(axis=0), rows.max(axis=0)):
+        least, most = rows.min(axis=0), rows.max(axis=0)
+        for extreme in (least,) if np.array_equal(least, most) else (least, most):
             self.replaced(**{name: extreme})
 
     def _keep_shapes(self, changed: Actuator) -> Actuator:

@@ -96,7 +96,8 @@ def receding(
     periods: (shortest, longest) of the trials' periods, rows. seed: of their random numbers.
     optimizer: function (parameters, lower, upper) -> optimizer; ms.optim.LBFGS by default, with first_step=0.1 and at most 5
         evaluations in a line search.
-    max_iterations, tolerance: of every search, as in ms.minimize.
+    max_iterations, tolerance: of every search, as in ms.minimize. No iterations: no search, the best of the trials is done;
+        no gradient is asked for then.
     until: function of the state; ends where it returns True.
     progress: show a bar of the rows settled.
 
@@ -129,10 +130,12 @@ def receding(
         raise ValueError(f"stride must be no more than the horizon, got {stride} of {horizon} rows")
     to_try = Trials.of(count("trials", trials, least=0), spread, periods, given)
     options = {
-        "max_iterations": count("max_iterations", max_iterations),
+        "max_iterations": count("max_iterations", max_iterations, least=0),
         "tolerance": not_negative("tolerance", "", tolerance),
         "progress": False,
     }
+    if not (to_try.number or max_iterations):
+        raise ValueError("max_iterations and trials are both 0: there is nothing to search with")
     rng = np.random.default_rng(count("seed", seed, least=0))
     steps, planned, state = len(given), given.clamp(low, high), start
     searches: list[tuple[Horizon, Minimum]] = []
@@ -164,9 +167,11 @@ def receding(
                 def of_part(changed, part=part, state=state):
                     return objective(changed, part, state)
 
-                found, failure = search_rows(
-                    of_part, planned[rows], low[rows], high[rows], optimizer, **options
-                )
+                found, failure = None, None
+                if max_iterations:
+                    found, failure = search_rows(
+                        of_part, planned[rows], low[rows], high[rows], optimizer, **options
+                    )
                 if found is not None:
                     planned[rows] = found.parameters[0].detach()
                     searches.append((part, found))

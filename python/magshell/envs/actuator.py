@@ -59,6 +59,11 @@ class Actuator:
         )
 
     @property
+    def owners(self) -> tuple:
+        """Of what the value is set."""
+        return (self.owner,)
+
+    @property
     def size(self) -> int:
         """How many entries of the action it takes."""
         return int(np.prod(self.shape))
@@ -87,8 +92,12 @@ class Actuator:
         share = 0.5 * (action.reshape(self.shape) + 1.0)
         return self.lower + share * (self.upper - self.lower)
 
-    def course(self, before: np.ndarray, now: np.ndarray, steps: int) -> np.ndarray:
-        """As ms.simulate takes it: (steps, ...) where it changes at once, else (steps + 1, ...) on a straight line."""
+    def courses(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
+        """Of each owner, as ms.simulate takes it: (steps, ...) where it changes at once, else (steps + 1, ...) on a
+        straight line."""
+        return [self._course(before, now, steps)]
+
+    def _course(self, before: np.ndarray, now: np.ndarray, steps: int) -> np.ndarray:
         if self._of_scene or changes_at_once(self.owner):
             return np.broadcast_to(now, (steps, *self.shape))
         shares = np.linspace(0.0, 1.0, steps + 1).reshape(-1, *(1 for _ in self.shape))

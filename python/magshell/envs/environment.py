@@ -93,7 +93,8 @@ class Environment(gymnasium.Env):
             raise ValueError("actuators must hold at least one ms.envs.Actuator")
         for k, each in enumerate(self.actuators):
             each.check_in(scene)
-            if any(each.owner is other.owner and each.name == other.name for other in self.actuators[:k]):
+            others = [one for other in self.actuators[:k] if other.name == each.name for one in other.owners]
+            if len({id(one) for one in (*others, *each.owners)}) < len(others) + len(each.owners):
                 raise ValueError(f"two actuators set one value: {each!r}")
         functions = {"observation": observation, "reward": reward, "start": start, "finished": finished}
         for name, function in functions.items():
@@ -195,7 +196,9 @@ class Environment(gymnasium.Env):
     def _moved(self, where: dict, steps: int, before: list, now: list):
         values: dict = {}
         for actuator, old, new in zip(self.actuators, before, now, strict=True):
-            values.setdefault(actuator.owner, {})[actuator.name] = actuator.course(old, new, steps)
+            courses = actuator.courses(old, new, steps)
+            for owner, course in zip(actuator.owners, courses, strict=True):
+                values.setdefault(owner, {})[actuator.name] = course
         if self.scene.has_uniform_field and FLUX_DENSITY not in self._options:
             values.setdefault(self.scene, {}).setdefault(FLUX_DENSITY, np.zeros(3))
         return simulate_motion(

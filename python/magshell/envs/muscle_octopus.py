@@ -62,11 +62,11 @@ class MuscleOctopus(Robot):
         fibres = fibres_along(around(placed(flat), leg), self.flesh, reach=REACH, elements=elements)
         return Muscle(self.flesh, fibres, peak_stress=PEAK_STRESS, segments=SEGMENTS)
 
-    def activations(self, controls, times, muscles=slice(None)):
-        """(n, k, SEGMENTS), a tensor. controls: (n, k, 4), a tensor, of the muscles among the sixteen; times: (n,) s."""
+    def activations(self, controls, times):
+        """(n, 16, SEGMENTS), a tensor. controls: (n, 16, 4), a tensor; times: (n,) s."""
         strength, depth, delay, waves = controls.unbind(-1)
         along = WAVES[0] + (WAVES[1] - WAVES[0]) * 0.5 * (waves + 1.0)
-        later = delay.new_tensor([0.0, 0.5] * LEGS)[muscles]
+        later = delay.new_tensor([0.0, 0.5] * LEGS)
         mean = 0.25 * (strength + 1.0)
         return wave(
             times,

@@ -150,9 +150,7 @@ def muscle_octopus(
     (64,)
     """
     swimmer = MuscleOctopus(cells)
-    waves = [
-        Steered(muscle, "activation", NUMBERS, _Wave(swimmer, k)) for k, muscle in enumerate(swimmer.muscles)
-    ]
+    waves = Steered(swimmer.muscles, "activation", NUMBERS * len(swimmer.muscles), _Waves(swimmer))
 
     def posture(now):
         phase = 2.0 * np.pi * FREQUENCY * now.time
@@ -162,7 +160,7 @@ def muscle_octopus(
             np.cos(phase),
         ]
 
-    return _to_target(swimmer, target, waves, posture, render_mode, disturbed)
+    return _to_target(swimmer, target, [waves], posture, render_mode, disturbed)
 
 
 def cell_gripper(
@@ -194,18 +192,18 @@ def cell_gripper(
     return _to_target(gripper, target, actuators, grasp, render_mode, disturbed, failure_reward=-1.0)
 
 
-class _Wave:
-    """Of one muscle of the octopus: its activations, by the four numbers of its wave. Can be pickled."""
+class _Waves:
+    """Activations of the octopus's muscles, by the four numbers of each one's wave. Can be pickled."""
 
-    def __init__(self, octopus: MuscleOctopus, muscle: int):
-        self._octopus, self._muscle = octopus, muscle
+    def __init__(self, octopus: MuscleOctopus):
+        self._octopus = octopus
 
     def __call__(self, numbers: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
         import torch
 
-        controls = torch.from_numpy(numbers).reshape(1, 1, -1)
+        controls = torch.from_numpy(numbers).reshape(1, -1, NUMBERS)
         end = np.array([time + self._octopus.time_step])
-        return self._octopus.activations(controls, end, [self._muscle])[0, 0].numpy()
+        return self._octopus.activations(controls, end)[0].numpy()
 
 
 class _Speed:

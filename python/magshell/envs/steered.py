@@ -15,7 +15,8 @@ class Steered(Actuator):
     """An Actuator whose numbers in the action are not the value's own, but what a function makes it of: waves along a
     muscle, the speed of a support instead of its place.
 
-    owner, name: as of Actuator. numbers: how many entries of the action, each from -1 to 1.
+    owner, name: as of Actuator; or a list of several owners whose values have one shape, set at once: their value is then
+        (owners, ...), one after another. numbers: how many entries of the action, each from -1 to 1.
     value: function of these (numbers,), of the time [s] that the action begins, and of the value before it, that returns
         the value, of its own shape.
 
@@ -27,7 +28,18 @@ class Steered(Actuator):
     """
 
     def __init__(self, owner, name: str, numbers: int, value: Callable):
-        super().__init__(owner, name, lower=-1.0, upper=1.0)
+        self._several = isinstance(owner, list | tuple)
+        if self._several and not owner:
+            raise ValueError("owner of a Steered must be one object or a list of at least one")
+        super().__init__(owner[0] if self._several else owner, name, lower=-1.0, upper=1.0)
+        self._further = (
+            [Actuator(each, name, lower=-1.0, upper=1.0) for each in owner[1:]] if self._several else []
+        )
+        for each in self._further:
+            if each.shape != self.shape:
+                raise ValueError(
+                    f"{name} of all owners of a Steered must have one shape, got {self.shape} and {each.shape}"
+                )
         self._numbers = count("numbers", numbers)
         if not callable(value):
             raise ValueError(
@@ -40,9 +52,32 @@ class Steered(Actuator):
         """How many numbers of an action it takes."""
         return self._numbers
 
+    @property
+    def owners(self) -> tuple:
+        return (self.owner, *(each.owner for each in self._further))
+
+    @property
+    def at_start(self) -> np.ndarray:
+        first = super().at_start
+        return np.stack([first, *(each.at_start for each in self._further)]) if self._several else first
+
+    def check_in(self, scene) -> None:
+        super().check_in(scene)
+        for each in self._further:
+            each.check_in(scene)
+
     def value(self, action: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
-        return quantity(f"what steers {self.name}", "", self._function(action, time, before), self.shape)
+        shape = (len(self.owners), *self.shape) if self._several else self.shape
+        return quantity(f"what steers {self.name}", "", self._function(action, time, before), shape)
+
+    def courses(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
+        if not self._several:
+            return super().courses(before, now, steps)
+        return [self._course(old, new, steps) for old, new in zip(before, now, strict=True)]
 
     def __repr__(self) -> str:
         numbers = "1 number" if self.size == 1 else f"{self.size} numbers"
-        return f"Steered({self.name} of {type(self.owner).__name__}, by {numbers})"
+        kind = type(self.owner).__name__
+        return (
+            f"Steered({self.name} of {f'{len(self.owners)} {kind}' if self._several else kind}, by {numbers})"
+        )

@@ -1,0 +1,44 @@
+"""Runs that are kept in a file as they end, so that hours of them may be stopped and gone on with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from magshell._machine.files import replace_file
+
+_KEYS = ("task", "method", "seed", "budget")
+
+
+class Kept:
+    """path: of a JSON file, which may not be there yet; None: nothing is kept."""
+
+    def __init__(self, path: Path | None):
+        self._path = path
+        self._runs = {} if path is None or not path.exists() else _read(path)
+
+    def known(self, task: str, method: str, seed: int, budget: int) -> dict | None:
+        """{"best", "seconds"} of a run, if an earlier one of the same budget was kept."""
+        return self._runs.get((task, method, seed, budget))
+
+    def run(self, task: str, method: str, seed: int, budget: int, make: Callable[[], dict]) -> dict:
+        """The one known, or what `make` returns, which is kept."""
+        key = (task, method, seed, budget)
+        if key not in self._runs:
+            self._runs[key] = make()
+            if self._path is not None:
+                rows = [dict(zip(_KEYS, each, strict=True)) | run for each, run in self._runs.items()]
+                text = "[\n" + ",\n".join(map(json.dumps, rows)) + "\n]\n"
+                replace_file(self._path, lambda file: file.write(text.encode()))
+        return self._runs[key]
+
+
+def _read(path: Path) -> dict:
+    try:
+        rows = json.loads(path.read_text())
+        return {
+            tuple(row[key] for key in _KEYS): {"best": row["best"], "seconds": row["seconds"]} for row in rows
+        }
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise SystemExit(f"{path} does not hold runs that `bench experiments` has kept: {error!r}") from error
