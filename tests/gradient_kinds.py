@@ -18,6 +18,7 @@ from gradient_kinds_bodies import (
     two_sheets_in_motion,
 )
 from gradient_kinds_contact import CONTACT_MAKERS
+from gradient_kinds_growth import GROWTH_MAKERS
 from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
 from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
@@ -254,6 +255,7 @@ MAKERS = {
         ob.Plane, step=1e-4, smoothing=4e-4, offset=5e-4, face_samples=3
     ),
     **CONTACT_MAKERS,
+    **GROWTH_MAKERS,
     "a solid at rest": solid_at_rest,
     "a solid in motion": solid_in_motion,
     "a solid by Projective Dynamics": solid_by_projective_dynamics,

@@ -81,10 +81,8 @@ class Kind:
         if not self.goes(owner, name):
             return value
         rng = np.random.default_rng(len(name))
-        way = (
-            free((owner, name))
-            * self.reach.get(name, 0.1 * np.abs(value).max())
-            * rng.standard_normal(value.shape)
+        way = self.reach.get(name, 0.1 * np.abs(value).max()) * admissible(
+            (owner, name), rng.standard_normal(value.shape)
         )
         share = np.linspace(0.0, 1.0, self.in_time + 1).reshape(-1, *(1 for _ in value.shape))
         return value + 0.3 * share * (0.5 + share) * way
@@ -109,7 +107,7 @@ class Kind:
         """All inputs, each once and a little off what it was made with, so that nothing is left to a default."""
         once = {key: value for key, value in self.entries.items() if self._once(key)}
         rng = np.random.default_rng(23)
-        off = {key: 0.02 * rng.uniform(-1, 1, value.shape) for key, value in once.items()}
+        off = {key: admissible(key, 0.02 * rng.uniform(-1, 1, value.shape)) for key, value in once.items()}
         moved = {
             (owner, name): value + off[owner, name] * self.reach.get(name, value)
             if self.goes(owner, name)
@@ -127,6 +125,14 @@ class Kind:
     @cached_property
     def entries(self) -> dict[tuple, np.ndarray]:
         return {**self.of_solve, **self.of_objects}
+
+
+def admissible(key: tuple, direction: np.ndarray) -> np.ndarray:
+    """A direction that a value may change along: its free components, and symmetric where it is."""
+    direction = free(key) * direction
+    if key[1] in ("growth", "rest_curvature") and direction.shape[-2:] == (3, 3):
+        return 0.5 * (direction + np.swapaxes(direction, -1, -2))
+    return direction
 
 
 def free(key: tuple) -> np.ndarray | float:

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from gradient_kinds import MAKERS, kind
-from gradient_scenes import free, label, subject, subjects
+from gradient_scenes import admissible, label, subject, subjects
 
 import magshell as ms
 
@@ -107,7 +107,7 @@ def test_an_input_alone(name, key):
     by = gradients(name, given)[key]
     assert by.shape == given[key].shape and np.isfinite(by).all()
     steepest = size_of(name, key, given[key]) * np.linalg.norm(by)
-    some = free(key) * np.random.default_rng(5).standard_normal(by.shape)
+    some = admissible(key, np.random.default_rng(5).standard_normal(by.shape))
     for along in (by, some) if by.size > 1 and steepest else (some,):
         check(name, given, key, by, unit(along), steepest)
 
@@ -122,7 +122,7 @@ def differentiated(name):
 def test_all_inputs_together(name):
     given, by = differentiated(name)
     for key, each in by.items():
-        some = free(key) * np.random.default_rng(6).standard_normal(each.shape)
+        some = admissible(key, np.random.default_rng(6).standard_normal(each.shape))
         steepest = size_of(name, key, given[key]) * np.linalg.norm(each)
         check(name, given, key, each, unit(unit(each) + 0.5 * unit(some)), steepest)
 

@@ -65,6 +65,14 @@ std::vector<BodyContactInput> body_contacts_of(const py::list& given) {
     return contacts;
 }
 
+GrowthForm growth_of(const py::handle& sheet) {
+    const auto form = [&](const char* name) {
+        const auto [rows, width] = sheet[name].cast<std::pair<Index, Index>>();
+        return TensorForm{rows, width};
+    };
+    return {form("growth"), form("rest_curvature")};
+}
+
 std::vector<SheetInput> sheets_of(const py::list& given) {
     std::vector<SheetInput> sheets;
     for (const py::handle each : given) {
@@ -73,6 +81,7 @@ std::vector<SheetInput> sheets_of(const py::list& given) {
         sheet.mesh = each["mesh"].cast<std::shared_ptr<TriangleMesh>>();
         sheet.vertices = each["vertices"].cast<std::vector<Index>>();
         sheet.curvature_scale = to_vector(each["curvature_scale"].cast<Array>());
+        sheet.growth = growth_of(each);
         sheet.directors = each["directors"].cast<bool>();
         sheet.magnetic = each["magnetic"].cast<bool>();
         sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
@@ -91,6 +100,7 @@ std::vector<SixNodeSheetInput> six_node_sheets_of(const py::list& given) {
             for (std::array<Index, 6>& nodes = sheet.mesh.faces.emplace_back();
                  const int k : {0, 1, 2, 3, 4, 5})
                 nodes[k] = faces.at(f, k);
+        sheet.growth = growth_of(each);
         sheet.mesh.corners = each["corners"].cast<std::shared_ptr<TriangleMesh>>();
         sheet.mesh.vertices = each["vertices"].cast<std::vector<Index>>();
         sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());

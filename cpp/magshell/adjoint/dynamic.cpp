@@ -106,9 +106,11 @@ class Backward {
         by_v.back() = std::move(g_.velocities);
         if (by_w_.size() > 0) by_w.back() = std::move(by_w_);
         g_.positions = g_.velocities = VectorXd::Zero(model_.size());
+        const std::vector<Controls> controls = controls_of(input_, tableau, step, substep);
         Viscous viscous{
-            {model_, model_.elastic(), input_.viscosity, &StageRates::elastic, algebra, record, by_strains_},
-            {model_, model_.dampers(), damper_law, &StageRates::joints, algebra, record, {}}};
+            {model_, model_.elastic(), input_.viscosity, &StageRates::elastic, algebra, record, controls,
+             by_strains_},
+            {model_, model_.dampers(), damper_law, &StageRates::joints, algebra, record, controls, {}}};
         double by_dt = 0.0;
         for (int i = n - 1; i >= 0; --i) {
             const VectorXd &v = at.all[first + i].v, &w = at.all[first + i].w;
@@ -151,9 +153,14 @@ class Backward {
             by_w_ = std::move(by_w.front());
         }
         if (input_.viscosity.any()) {
+            model_.take(controls.front());
             model_.evaluate(record.begin.q, model_.no_controls());
             ViscousAdjoint& strains = viscous.strains;
             g_.positions += model_.elastic().forces(strains.by_d_begin, model_.size());
+            scene_.controls.setZero();
+            model_.elastic().strains_vjp(strains.by_d_begin, scene_);
+            model_.varying().move_gradient(scene_);
+            add_by_controls(step, substep.begin, scene_.controls);
             by_strains_ = std::move(strains.by_begin);
             by_dt += strains.by_dt;
             g_.viscosity.stiffness_damping += strains.by_law.stiffness_damping;
@@ -204,8 +211,8 @@ class Backward {
         viscous.joints.set_history(i);
         const Anchor anchor{&algebra.weights(), &target, &motion};
         newton_.evaluate(stage.q, controls, anchor);
-        viscous.strains.before_solve(i, by_x);
-        viscous.joints.before_solve(i, by_x);
+        viscous.strains.before_solve(i, by_x, scene_);
+        viscous.joints.before_solve(i, by_x, scene_);
         const VectorXd lambda = solve(stage, controls, anchor, -by_x);
         viscous.strains.after_solve(i, lambda);
         viscous.joints.after_solve(i, lambda);
@@ -244,6 +251,10 @@ class Backward {
         if (input_.viscosity.maxwell() && input_.start.e.empty()) {
             model_.evaluate(q, input_.controls_at(0, 0.0));
             g_.positions += model_.elastic().forces(by_strains_.e, model_.size());
+            scene_.controls.setZero();
+            model_.elastic().strains_vjp(by_strains_.e, scene_);
+            model_.varying().move_gradient(scene_);
+            g_.controls[0] += scene_.controls;
         }
         if (input_.rotations_given) return;
         model_.set_turns(input_.start.turns);

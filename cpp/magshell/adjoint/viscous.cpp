@@ -4,10 +4,11 @@ namespace magshell {
 
 ViscousAdjoint::ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosity& law,
                                ViscousStage::Kind kind, const StepAlgebra& step, const SubstepRecord& substep,
-                               const ViscousGradient& by_end)
+                               std::span<const Controls> controls, const ViscousGradient& by_end)
     : terms_(terms), unknowns_(model.size()), law_(law), kind_(kind), step_(step) {
     if (!law.any() || terms.empty()) return;
     model.set_turns(substep.begin.turns);
+    model.take(controls.front());
     const StrainSet d_begin = terms.strains(substep.begin.q), zero = d_begin.times(0.0);
     rates_ = first_rates(model, step.tableau(), substep.begin);
     first_ = rates_.size();
@@ -15,6 +16,7 @@ ViscousAdjoint::ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosit
         stages_.push_back(ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], rates_, kind,
                                        d_begin, substep.begin.e));
         model.set_turns(substep.stages[i].turns);
+        model.take(controls[i + 1]);
         stages_.back().finish(law, step.stage_time(), terms.strains(substep.stages[i].q),
                               rates_.emplace_back().*kind);
     }
@@ -36,7 +38,7 @@ void ViscousAdjoint::set_history(int i) const {
     if (!idle()) terms_.set_history(law_.scale(step_.stage_time()), &stages_[i].shift);
 }
 
-void ViscousAdjoint::before_solve(int i, VectorXd& by_q) {
+void ViscousAdjoint::before_solve(int i, VectorXd& by_q, Gradient& scene) {
     if (idle()) return;
     const ViscousStage& stage = stages_[i];
     const StrainRates& rates = this->rates(first_ + i);
@@ -55,6 +57,7 @@ void ViscousAdjoint::before_solve(int i, VectorXd& by_q) {
         by_ratio_[i] += (by_e_[i].dot(stage.d) - by_e_[i].dot(stage.e_hat)) / ((1.0 + r) * (1.0 + r));
     }
     by_q += terms_.forces(by_d, unknowns_);
+    terms_.strains_vjp(by_d, scene);
 }
 
 void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {

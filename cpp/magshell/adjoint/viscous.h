@@ -13,14 +13,15 @@ struct ViscousGradient {
 class ViscousAdjoint {
   public:
     /// Finds the strains of the stages again. kind: of the rates, those of `terms`. by_end: what later steps say of the
-    /// end of this one.
+    /// end of this one. controls: at the beginning of the step and at its stages.
     ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosity& law, ViscousStage::Kind kind,
-                   const StepAlgebra& step, const SubstepRecord& substep, const ViscousGradient& by_end);
+                   const StepAlgebra& step, const SubstepRecord& substep, std::span<const Controls> controls,
+                   const ViscousGradient& by_end);
 
     /// The stresses of stage i have their history from now on.
     void set_history(int i) const;
-    /// At the evaluated stage: adds to by_q what later rates say of its strains.
-    void before_solve(int i, VectorXd& by_q);
+    /// At the evaluated stage: adds to by_q, and to the values of `scene`, what later rates say of its strains.
+    void before_solve(int i, VectorXd& by_q, Gradient& scene);
     /// At the evaluated stage: what lambda says of the history and of the law.
     void after_solve(int i, const VectorXd& lambda);
 

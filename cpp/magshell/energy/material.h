@@ -10,6 +10,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 
 #include "magshell/core/types.h"
 
@@ -36,6 +37,15 @@ struct RestFace {
         }
     }
 
+    /// From its edges in axes of its plane.
+    explicit RestFace(const std::array<Eigen::Vector2d, 3>& edge)
+        : area(0.5 * std::abs(edge[0].x() * edge[1].y() - edge[0].y() * edge[1].x())) {
+        for (int i = 0; i < 3; ++i) {
+            turned_edge[i] = {edge[i].y(), -edge[i].x()};
+            edge_length[i] = edge[i].norm();
+        }
+    }
+
     Mat3 membrane_stiffness(const SheetMaterial& m) const { return membrane(m).stiffness(m.poisson_ratio); }
     Mat3 bending_stiffness(const SheetMaterial& m) const { return bending(m).stiffness(m.poisson_ratio); }
 
@@ -47,7 +57,7 @@ struct RestFace {
         return bending(m).by_poisson_ratio(m.poisson_ratio);
     }
 
-    /// S_i and R_i, in axes along edge 0 and, turned to the left, across it.
+    /// S_i and R_i, in axes along edge 0 and, turned to the left, across it; or in those of the edges that it is made from.
     std::array<Eigen::Matrix2d, 3> membrane_measures() const {
         std::array<Eigen::Matrix2d, 3> measure;
         for (int i = 0; i < 3; ++i) {

@@ -20,7 +20,21 @@ Row9 membrane_interpolation(const std::array<double, 3>& at) {
     return rows;
 }
 
-SixNodeFace::SixNodeFace(const std::array<Vec3, 6>& rest) : area(0.0) {
+SixNodeFace::SixNodeFace(const std::array<std::array<Vec3, 3>, 6>& tangents,
+                         const std::array<double, 9>& scale_)
+    : scale(scale_), tangents_(tangents) {
+    measure_area();
+}
+
+void SixNodeFace::measure_area() {
+    for (int p = 0; p < 6; ++p) {
+        const double jacobian = tangents_[p][0].cross(tangents_[p][1]).norm();
+        inverse_jacobian[p] = 1.0 / jacobian;
+        area += 0.5 * six_nodes::inside[p].weight * jacobian;
+    }
+}
+
+SixNodeFace::SixNodeFace(const std::array<Vec3, 6>& rest) {
     for (int p = 0; p < 6; ++p) {
         const six_nodes::Point& point = six_nodes::inside[p];
         for (int i = 0; i < 3; ++i) {
@@ -28,10 +42,8 @@ SixNodeFace::SixNodeFace(const std::array<Vec3, 6>& rest) : area(0.0) {
             const std::array<double, 6> by_node = six_nodes::derivative(i, point.at);
             for (int a = 0; a < 6; ++a) tangents_[p][i] += by_node[a] * rest[a];
         }
-        const double jacobian = tangents_[p][0].cross(tangents_[p][1]).norm();
-        inverse_jacobian[p] = 1.0 / jacobian;
-        area += 0.5 * point.weight * jacobian;
     }
+    measure_area();
     for (int i = 0; i < 3; ++i) {
         const Vec3 &from = rest[(i + 1) % 3], &to = rest[(i + 2) % 3], &middle = rest[six_nodes::middle(i)];
         for (int g = 0; g < 2; ++g) {

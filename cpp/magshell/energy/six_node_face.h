@@ -23,6 +23,8 @@ Eigen::Matrix<double, 3, 9> membrane_interpolation(const std::array<double, 3>& 
 class SixNodeFace {
   public:
     explicit SixNodeFace(const std::array<Vec3, 6>& rest);
+    /// From its tangents at the points inside.
+    SixNodeFace(const std::array<std::array<Vec3, 3>, 6>& tangents, const std::array<double, 9>& scale);
 
     Mat9 membrane_stiffness(const SheetMaterial& m) const;
     Mat9 membrane_by_poisson_ratio(const SheetMaterial& m) const;
@@ -33,7 +35,7 @@ class SixNodeFace {
     std::array<double, 6> inverse_jacobian;
     /// What measure 3 i + k of the bending multiplies its tested curvature by.
     std::array<double, 9> scale;
-    double area;
+    double area = 0.0;
 
     /// What the moments' test functions are at a point, without their directions.
     std::array<double, 9> tests(const std::array<double, 3>& at) const;
@@ -41,6 +43,7 @@ class SixNodeFace {
   private:
     std::array<std::array<Vec3, 3>, 6> tangents_;  // at each point inside, dx/dt_i
 
+    void measure_area();
     template <class Stiffness>
     Mat9 membrane(const Stiffness& at_point) const;
     Mat9 compliance(double factor, double by_products, double by_traces) const;

@@ -187,7 +187,7 @@ class Model {
   private:
     void add_loops(Index body, const VectorXd& curvature_scale);
     void add_terms(const SceneInput& input);
-    void add_six_node_sheet(std::size_t number);
+    void add_six_node_sheet(std::size_t number, const GrowthForm& growth);
     void add_water(const SceneInput& input);
     void add_magnetic_terms(const SceneInput& input);
     void add_moments(const SceneInput& input);

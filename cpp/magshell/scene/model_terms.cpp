@@ -96,19 +96,22 @@ void Model::add_loops(Index body, const VectorXd& curvature_scale) {
 void Model::add_terms(const SceneInput& input) {
     const Index count = static_cast<Index>(bodies_.sheets().size());
     for (Index body = 0; body < count; ++body) {
-        std::unique_ptr<MembraneTerm> term = std::make_unique<MembraneTerm>(
-            *bodies_.sheets()[body], body, *membrane_faces_[body],
-            membrane_loops_[body] ? *membrane_loops_[body] : *loops_[body], nodes(), registry_);
+        std::unique_ptr<MembraneTerm> term =
+            std::make_unique<MembraneTerm>(*bodies_.sheets()[body], body, *membrane_faces_[body],
+                                           membrane_loops_[body] ? *membrane_loops_[body] : *loops_[body],
+                                           input.sheets[body].growth, nodes(), registry_);
         elastic_.add(term.get());
         terms_.push_back(std::move(term));
     }
     for (Index body = 0; body < count; ++body) {
-        std::unique_ptr<BendingTerm> term = std::make_unique<BendingTerm>(
-            *bodies_.sheets()[body], body, schedule_.of(body), nodes(), matrix_, registry_);
+        std::unique_ptr<BendingTerm> term =
+            std::make_unique<BendingTerm>(*bodies_.sheets()[body], body, schedule_.of(body),
+                                          input.sheets[body].growth, nodes(), matrix_, registry_);
         elastic_.add(term.get());
         terms_.push_back(std::move(term));
     }
-    for (std::size_t k = 0; k < input.six_node_sheets.size(); ++k) add_six_node_sheet(k);
+    for (std::size_t k = 0; k < input.six_node_sheets.size(); ++k)
+        add_six_node_sheet(k, input.six_node_sheets[k].growth);
     add_magnetic_terms(input);
     add_solids(input);
     add_muscles(input);
@@ -141,7 +144,7 @@ void Model::add_water(const SceneInput& input) {
                 std::make_unique<WaterTerm>(*faces[k].surface, *loops_[k], *input.water, registry_));
 }
 
-void Model::add_six_node_sheet(std::size_t number) {
+void Model::add_six_node_sheet(std::size_t number, const GrowthForm& growth) {
     const SixNodeSheet& sheet = *bodies_.six_node_sheets()[number];
     const Index body = bodies_.six_node_bodies()[number];
     const auto add = [&](auto term) {
@@ -149,8 +152,8 @@ void Model::add_six_node_sheet(std::size_t number) {
         terms_.push_back(std::move(term));
     };
     const ChunkLoop& chunks = schedule_.of(body);
-    add(std::make_unique<MembraneSixTerm>(sheet, body, chunks, nodes(), matrix_, registry_));
-    add(std::make_unique<BendingSixTerm>(sheet, body, chunks, nodes(), matrix_, registry_));
+    add(std::make_unique<MembraneSixTerm>(sheet, body, chunks, nodes(), growth, matrix_, registry_));
+    add(std::make_unique<BendingSixTerm>(sheet, body, chunks, nodes(), growth, matrix_, registry_));
 }
 
 void Model::add_magnetic_terms(const SceneInput& input) {

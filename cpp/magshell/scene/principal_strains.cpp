@@ -4,6 +4,8 @@
 
 #include "magshell/scene/sheet_loops.h"
 #include "magshell/scene/six_node_stresses.h"
+#include "magshell/term/bending_term.h"
+#include "magshell/term/membrane_term.h"
 
 namespace magshell {
 namespace {
@@ -60,8 +62,13 @@ struct FlatFace {
 };
 
 // The rows of one sheet, whose first face is that row.
-void add_sheet(const Sheet& sheet, const MembraneFaces& membrane, Index first_scalar, const VectorXd& q,
-               const VectorXd& thickness, Index first_row, PrincipalStrains& out) {
+void add_sheet(const Model& model, Index body, const VectorXd& q, const VectorXd& thickness, Index first_row,
+               PrincipalStrains& out) {
+    const Sheet& sheet = *model.bodies().sheets()[body];
+    const MembraneFaces& membrane = model.membrane_faces(body);
+    const Index first_scalar = model.nodes().first_scalar();
+    const MembraneTerm& stretching = dynamic_cast<const MembraneTerm&>(model.elastic_term(body, "membrane"));
+    const BendingTerm& bending = dynamic_cast<const BendingTerm&>(model.elastic_term(body, "bending"));
     const std::vector<double> turns = fold_turns(sheet, q.data());
     const auto turn_of = [&](Index fold) { return turns[fold]; };
     const double* rotations = q.data() + first_scalar;
@@ -71,12 +78,16 @@ void add_sheet(const Sheet& sheet, const MembraneFaces& membrane, Index first_sc
             Pack delta[3], half_thickness;
             for (int lane = 0; lane < Pack::width; ++lane) {
                 const Index f = std::min(first + lane, to - 1);
-                const std::array<Vec3, 3> corners = membrane.rest_corners(f);
+                const std::array<Vec3, 3> corners = stretching.grows() ? stretching.grown(f).corners()
+                                                                       : membrane.rest_corners(f),
+                                          own = bending.grows() ? bending.grown(f).corners()
+                                                                : sheet.rest_corners(f);
+                const Vec3 turned = bending.grown_turns(f);
                 for (int k = 0; k < 3; ++k) {
-                    set_lane(own_rest[k], lane, sheet.rest_corners(f)[k]);
+                    set_lane(own_rest[k], lane, own[k]);
                     set_lane(rest[k], lane, corners[k]);
                     set_lane(x[k], lane, q.data() + 3 * membrane.corners()[f][k]);
-                    delta[k].set(lane, bending_strain(sheet.sides[f][k], turn_of, rotations));
+                    delta[k].set(lane, bending_strain(sheet.sides[f][k], turn_of, rotations) - turned[k]);
                 }
                 half_thickness.set(lane, 0.5 * thickness[first_row + sheet.faces.user[f]]);
             }
@@ -98,10 +109,8 @@ PrincipalStrains principal_strains(const Model& model, const VectorXd& q, const 
     PrincipalStrains out(thickness.size(), 4);
     Index first_row = 0;
     for (Index body = 0; body < static_cast<Index>(model.bodies().sheets().size()); ++body) {
-        const Sheet& sheet = *model.bodies().sheets()[body];
-        add_sheet(sheet, model.membrane_faces(body), model.nodes().first_scalar(), q, thickness, first_row,
-                  out);
-        first_row += sheet.n_faces();
+        add_sheet(model, body, q, thickness, first_row, out);
+        first_row += model.bodies().sheets()[body]->n_faces();
     }
     for (Index sheet = 0; sheet < static_cast<Index>(model.bodies().six_node_sheets().size()); ++sheet)
         for (const auto& [green, curvature] : six_node_strains(model, sheet, q)) {

@@ -13,6 +13,7 @@ namespace magshell {
 ///
 /// each pair with the larger value first. E is the tensor whose squares make the membrane energy, [Chen22]
 /// (18), and K that of the bending energy, (19): the change of curvature, without the curvature scale.
+/// Where a sheet has grown, from its faces as they would be by themselves.
 /// Stretch is measured on the triangles on which the membrane energy measures it (body/membrane_faces.h).
 using PrincipalStrains = Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor>;
 

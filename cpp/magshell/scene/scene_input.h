@@ -17,6 +17,7 @@
 #include "magshell/term/face_energy.h"
 #include "magshell/term/muscle_fibres.h"
 #include "magshell/term/pressure_term.h"
+#include "magshell/term/sheet_growth.h"
 #include "magshell/term/solid_term.h"
 #include "magshell/term/tendon_term.h"
 #include "magshell/term/volume_term.h"
@@ -33,7 +34,8 @@ struct SheetInput {
     std::shared_ptr<const TriangleMesh> mesh;
     std::vector<Index> vertices;  // the scene's vertex of each vertex of the mesh
     VectorXd curvature_scale;     // of each edge, as the scene was made with: where hinges are
-    bool directors = true;        // midedge; false: hinge
+    GrowthForm growth;
+    bool directors = true;  // midedge; false: hinge
     bool magnetic = false;
     std::vector<DirectedEdge> directed_edges;  // directions are rows of SceneInput::directions
 };
@@ -42,6 +44,7 @@ struct SheetInput {
 struct SixNodeSheetInput {
     std::string owner;  // under which its parameters are registered
     SixNodeInput mesh;
+    GrowthForm growth;
     std::vector<DirectedEdge>
         directed_edges;    // of mesh.corners; directions are rows of SceneInput::directions
     SolidSurface surface;  // four flat triangles a face

@@ -5,6 +5,8 @@
 #include "magshell/energy/material.h"
 #include "magshell/scene/sheet_loops.h"
 #include "magshell/scene/six_node_stresses.h"
+#include "magshell/term/bending_term.h"
+#include "magshell/term/membrane_term.h"
 
 namespace magshell {
 namespace {
@@ -12,7 +14,9 @@ namespace {
 /// A face at rest: its tensors in the plane from three numbers, one an edge, and back.
 class Measures {
   public:
-    explicit Measures(const std::array<Vec3, 3>& x) : face_(x.data()) {
+    explicit Measures(const std::array<Vec3, 3>& x) : Measures(x, RestFace(x.data())) {}
+    /// `face`: the same one, grown.
+    Measures(const std::array<Vec3, 3>& x, const RestFace& face) : face_(face) {
         const Vec3 edge = x[2] - x[1], across = edge.cross(x[0] - x[2]);
         axes_.col(0) = edge.normalized();
         axes_.col(1) = across.normalized().cross(axes_.col(0));
@@ -59,20 +63,25 @@ std::vector<FaceStress> sheet_stresses(const Model& model, Index number, const V
     const std::vector<double> turns = sheet_loops::fold_turns(sheet, q.data());
     const auto turn_of = [&](Index fold) { return turns[fold]; };
     const double* rotations = q.data() + model.nodes().first_scalar();
+    const MembraneTerm& stretching =
+        dynamic_cast<const MembraneTerm&>(model.elastic_term(number, "membrane"));
+    const BendingTerm& bending = dynamic_cast<const BendingTerm&>(model.elastic_term(number, "bending"));
 
     Strains stretches(sheet.n_faces()), bends(sheet.n_faces());
     for (Index f = 0; f < sheet.n_faces(); ++f) {
         const std::array<Vec3, 3> rest = membrane.rest_corners(f);
         Vec3 x[3];
         for (int k = 0; k < 3; ++k) x[k] = q.segment<3>(3 * membrane.corners()[f][k]);
-        const Vec3 change = squared_lengths(x) - squared_lengths(rest.data());
+        const Vec3 turned = bending.grown_turns(f);
+        const Vec3 change = squared_lengths(x) - (stretching.grows() ? stretching.grown(f).squared_lengths()
+                                                                     : squared_lengths(rest.data()));
         for (int i = 0; i < 3; ++i) {
             stretches.set(f, i, change[i]);
-            bends.set(f, i, bending_strain(sheet.sides[f][i], turn_of, rotations));
+            bends.set(f, i, bending_strain(sheet.sides[f][i], turn_of, rotations) - turned[i]);
         }
     }
-    const Strains pulls = model.elastic_term(number, "membrane").stresses(stretches);
-    const Strains moments = model.elastic_term(number, "bending").stresses(bends);
+    const Strains pulls = stretching.stresses(stretches);
+    const Strains moments = bending.stresses(bends);
 
     std::vector<FaceStress> out(sheet.n_faces());
     const auto three = [](const Strains& of, Index f) {
@@ -80,7 +89,11 @@ std::vector<FaceStress> sheet_stresses(const Model& model, Index number, const V
     };
     sheet_loops::over_blocks(sheet.n_faces(), [&](Index from, Index to) {
         for (Index f = from; f < to; ++f) {
-            const Measures cut(membrane.rest_corners(f)), own(sheet.rest_corners(f));
+            const auto measures = [f](const auto& term, const std::array<Vec3, 3>& rest) {
+                return term.grows() ? Measures(rest, term.grown(f).face()) : Measures(rest);
+            };
+            const Measures cut = measures(stretching, membrane.rest_corners(f)),
+                           own = measures(bending, sheet.rest_corners(f));
             const auto of_stretch = cut.face().membrane_measures(), of_bend = own.face().bending_measures();
             out[sheet.faces.user[f]] = {
                 cut.tensor(of_stretch, three(stretches, f)), own.tensor(of_bend, three(bends, f)),

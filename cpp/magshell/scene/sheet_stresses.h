@@ -12,6 +12,7 @@ namespace magshell {
 ///   force      N, with A~ N : dE the change of the membrane energy                          [N/m]
 ///   moment     M, with A~ M : dK the change of the bending energy                           [N]
 ///
+/// Where a sheet has grown, all this is since the face was as it would be by itself, and A~ its area then.
 /// E and N are of the triangle on which the membrane energy measures stretch (body/membrane_faces.h).
 struct FaceStress {
     Mat3 green, curvature, force, moment;

@@ -31,10 +31,9 @@ class Tangents {
             const std::array<double, 6> by_node = six_nodes::derivative(i, at);
             for (int a = 0; a < 6; ++a) along_[i] += by_node[a] * rest[a];
         }
-        const Vec3 across = along_[0].cross(along_[1]);
-        jacobian_ = across.norm();
-        normal_ = across / jacobian_;
+        find_normal();
     }
+    explicit Tangents(const std::array<Vec3, 3>& along) : along_(along) { find_normal(); }
 
     Mat3 plane() const { return Mat3::Identity() - normal_ * normal_.transpose(); }
 
@@ -57,7 +56,14 @@ class Tangents {
     }
 
   private:
-    Vec3 along_[3], normal_;
+    void find_normal() {
+        const Vec3 across = along_[0].cross(along_[1]);
+        jacobian_ = across.norm();
+        normal_ = across / jacobian_;
+    }
+
+    std::array<Vec3, 3> along_;
+    Vec3 normal_;
     double jacobian_;
 };
 
@@ -90,7 +96,9 @@ struct Terms {
         for (Index f = 0; f < sheet.n_faces(); ++f) {
             const Numbers stretched = numbers_of(stretches, f);
             for (std::size_t k = 0; k < middles.size(); ++k) {
-                const Tangents tangents(sheet.rest[f], middles[k]);
+                const Tangents tangents = bending.grows()
+                                              ? Tangents(bending.grown(f).grown_tangents(middles[k]))
+                                              : Tangents(sheet.rest[f], middles[k]);
                 take(4 * sheet.faces.user[f] + static_cast<Index>(k), f, tangents, middles[k],
                      tangents.green(membrane_interpolation(middles[k]) * stretched));
             }

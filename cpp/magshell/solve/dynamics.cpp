@@ -14,15 +14,6 @@ namespace {
 
 constexpr double smallest_part = 1.0 / 64.0;  // of a step
 
-// At the beginning of a step or of a part of one, and at its stages.
-std::vector<Controls> controls_of(const MotionInput& input, const Tableau& tableau, Index step,
-                                  const Substep& substep) {
-    std::vector<Controls> controls = {input.controls_at(step, substep.begin)};
-    for (int i = 0; i < tableau.stages; ++i)
-        controls.push_back(input.controls_at(step, substep.begin + tableau.time(i) * substep.share()));
-    return controls;
-}
-
 std::size_t bytes_of(const MotionState& state) {
     return sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() + state.rates.w.size()) +
            state.e.bytes() + state.rates.elastic.d.bytes() + state.rates.elastic.e.bytes();
@@ -209,6 +200,14 @@ std::pair<Index, double> MotionInput::between(Index step, double share) const {
     while (i + 1 < tableau.stages && share > tableau.time(i)) ++i;
     const double begin = i == 0 ? 0.0 : tableau.time(i - 1), end = tableau.time(i);
     return {first + i, (share - begin) / (end - begin)};
+}
+
+std::vector<Controls> controls_of(const MotionInput& input, const Tableau& tableau, Index step,
+                                  const Substep& substep) {
+    std::vector<Controls> controls = {input.controls_at(step, substep.begin)};
+    for (int i = 0; i < tableau.stages; ++i)
+        controls.push_back(input.controls_at(step, substep.begin + tableau.time(i) * substep.share()));
+    return controls;
 }
 
 Controls MotionInput::controls_at(Index step, double share) const {

@@ -49,6 +49,10 @@ struct Substep {
 };
 using Substeps = std::vector<Substep>;
 
+/// At the beginning of a step or of a part of one, and at its stages.
+std::vector<Controls> controls_of(const MotionInput& input, const Tableau& tableau, Index step,
+                                  const Substep& substep);
+
 struct MotionResult {
     Outcome outcome = Outcome::failed;
     std::string reason;

@@ -132,6 +132,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<co
     model.begin_step(state.q, controls.front());
     const ElasticAfterwards elastic_afterwards(model);
     const bool damped = !model.dampers().empty();
+    if (viscosity_.any()) model.take(controls.front());
     const StrainSet at_begin = viscosity_.any() ? model.elastic().strains(state.q) : StrainSet(),
                     joints_at_begin = model.dampers().strains(state.q);
     std::vector<StageRates> rates = first_rates(model, tableau, state);

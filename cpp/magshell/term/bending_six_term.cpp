@@ -22,7 +22,8 @@ constexpr std::array<int, 6> face_order(int i) {
 }  // namespace
 
 BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
-                               const Nodes& nodes, const SystemMatrix& matrix, Registry& registry)
+                               const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
+                               Registry& registry)
     : StrainScaffold(sheet.n_faces()),
       sheet_(sheet),
       body_(body),
@@ -31,6 +32,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
       chunks_(chunks),
       loop_(sheet.own_nodes, chunks, matrix),
       materials_(sheet.owner, sheet.faces, registry),
+      growth_(sheet.owner, sheet.faces, growth, registry),
       rest_(sheet.rest.begin(), sheet.rest.end()),
       elements_(loop_.packs()),
       rest_measures_(loop_.packs()),
@@ -47,6 +49,9 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
         }
         BendingSix(x).measures(elements_[pack], rest_measures_[pack].data());
     }
+    if (growth_.any())
+        for (Index f = 0; f < sheet.n_faces(); ++f)
+            rest_inside_.push_back(lane_of<9>(rest_measures_[f / Pack::width].data(), f % Pack::width));
     for (const SixNodeSheet::Stencil& s : sheet.stencils) {
         FaceSlots& slots = face_slots_.emplace_back();
         slots.nodes = pair_slots<15>(matrix, s.nodes);
@@ -68,13 +73,51 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
 }
 
 bool BendingSixTerm::set_values(const Values& values) {
-    if (!materials_.set_values(values)) return false;
+    const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
+    if (!material_changed && !grew) return false;
+    if (grew) grow();
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = loop_.element(pack, lane);
             set_lane(stiffness_[pack], lane, rest_[f].bending_stiffness(materials_[f]));
         }
     return true;
+}
+
+Vec9 BendingSixTerm::rest_angles(Index face) const {
+    Vec9 angles = Vec9::Zero();
+    for (int i = 0; i < 3; ++i) {
+        const FaceSideSix& side = sheet_.sides[face][i];
+        for (int g = 0; g < 2 && side.fold >= 0; ++g)
+            angles[3 * i + g] = side.weight * sheet_.folds[side.fold].rest_angle[side.point(g)];
+    }
+    return angles;
+}
+
+// Turns of folds are measured from their rest angles already.
+void BendingSixTerm::grow() {
+    for (Index pack = 0; pack < loop_.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const GrownSix face = grown(f);
+            rest_[f] = face.face();
+            for (int p = 0; p < BendingSix::points; ++p)
+                elements_[pack].inverse_jacobian[p].set(lane, rest_[f].inverse_jacobian[p]);
+            const Vec9 angles = rest_angles(f);
+            const Vec9 natural = face.rest().cwiseProduct(rest_inside_[f] + angles) + face.bent() - angles;
+            for (int r = 0; r < 9; ++r) {
+                elements_[pack].scale[r].set(lane, rest_[f].scale[r]);
+                rest_measures_[pack][r].set(lane, natural[r]);
+            }
+        }
+}
+
+// Of by . d in a fixed shape, which inside has `inside`.
+GrownFace::ByNatural BendingSixTerm::strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
+                                                       const Vec9& inside) const {
+    GrownFace::ByNatural found = face.natural_by_growth(-by, rest_inside_[number] + rest_angles(number));
+    found.growth += face.inside_by_growth(by, inside);
+    return found;
 }
 
 FoldSix BendingSixTerm::folds_at(Index first, Index last, int point, const double* q) const {
@@ -371,6 +414,55 @@ void BendingSixTerm::vjp(const double* q, const Controls&, const double* lambda,
     });
     for (Index f = 0; f < sheet_.n_faces(); ++f)
         materials_.add_vjp(f, 3, of_faces[f][0], of_faces[f][1], out);
+    if (!growth_.any()) return;
+    std::vector<GrownFace::ByNatural> by_faces(sheet_.n_faces());
+    each_pack([&](Index pack) {
+        Pack3 x[6], p[6];
+        Pack now[9], along_inside[9], d[9], along[9], stresses[9];
+        SixNodeRows rows;
+        loop_.gather(pack, q, x);
+        loop_.gather(pack, lambda, p);
+        const BendingSix inside(x);
+        inside.measures(elements_[pack], now);
+        inside.rows(elements_[pack], rows);
+        rows.along(p, along_inside);
+        strain(pack, q, d);
+        history_.apply<9>(pack, d);
+        rate(pack, lambda, along);
+        stiffness_[pack].times(along, stresses);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const GrownSix face = grown(f);
+            GrownFace::ByNatural& by = by_faces[f];
+            by = strains_by_growth(face, f, history_.factor() * lane_of<9>(stresses, lane),
+                                   lane_of<9>(now, lane));
+            by.growth +=
+                face.bending_by_growth(materials_[f], lane_of<9>(along, lane), lane_of<9>(d, lane)) +
+                face.inside_by_growth(lane_of<9>(stress_.at(pack), lane), lane_of<9>(along_inside, lane));
+        }
+    });
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const GrownSix face = grown(f);
+        growth_.add_vjp(f, face.in_world(by_faces[f].growth), face.in_world(by_faces[f].curvature), out);
+    }
+}
+
+void BendingSixTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
+    if (!growth_.any()) return;
+    for (Index pack = 0; pack < loop_.packs(); ++pack) {
+        Pack3 x[6];
+        Pack now[9];
+        loop_.gather(pack, state_.data(), x);
+        BendingSix(x).measures(elements_[pack], now);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const GrownSix face = grown(f);
+            Vec9 by;
+            for (int r = 0; r < 9; ++r) by[r] = stresses.number(f, r);
+            const GrownFace::ByNatural found = strains_by_growth(face, f, by, lane_of<9>(now, lane));
+            growth_.add_vjp(f, face.in_world(found.growth), face.in_world(found.curvature), out);
+        }
+    }
 }
 
 // As for triangles of three nodes: angles are exact to a unit of round-off, or as the positions over the heights.
@@ -391,9 +483,9 @@ void BendingSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
 }
 
 std::size_t BendingSixTerm::bytes() const {
-    return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + bytes_of(rest_) +
-           bytes_of(elements_) + bytes_of(rest_measures_) + bytes_of(stiffness_) + bytes_of_stresses() +
-           bytes_of(folds_) + bytes_of(state_) + loop_.bytes();
+    return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + growth_.bytes() +
+           bytes_of(rest_) + bytes_of(rest_inside_) + bytes_of(elements_) + bytes_of(rest_measures_) +
+           bytes_of(stiffness_) + bytes_of_stresses() + bytes_of(folds_) + bytes_of(state_) + loop_.bytes();
 }
 
 }  // namespace magshell

@@ -8,9 +8,11 @@
 #include "magshell/assembly/element_loop.h"
 #include "magshell/body/six_node_sheet.h"
 #include "magshell/energy/bending_six.h"
+#include "magshell/energy/grown_six.h"
 #include "magshell/energy/six_node_face.h"
 #include "magshell/strain/fold_six.h"
 #include "magshell/term/elastic_term.h"
+#include "magshell/term/sheet_growth.h"
 #include "magshell/term/sheet_materials.h"
 
 namespace magshell {
@@ -18,11 +20,12 @@ namespace magshell {
 class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
   public:
     BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
-                   const SystemMatrix& matrix, Registry& registry);
+                   const GrowthForm& growth, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "bending"; }
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
+    bool varies() const override { return growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
@@ -31,11 +34,17 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
+    void strains_vjp(const Strains& stresses, Gradient& out) const override;
     std::size_t bytes() const override;
 
     /// d at a state that is only looked at.
     Strains look(const double* q) const;
     const SixNodeFace& rest(Index face) const { return rest_[face]; }
+    bool grows() const { return growth_.any(); }
+    /// From what strains are measured.
+    GrownSix grown(Index face) const {
+        return {sheet_.rest[face], growth_.growth(face), growth_.curvature(face)};
+    }
 
   private:
     friend class StrainScaffold<BendingSixTerm, 9>;
@@ -63,6 +72,10 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     template <class Turn>
     void measure(Index pack, const double* q, const Turn& turn, Pack d[9]) const;
     void inside(Index pack, const double* q, Pack f[9]) const;
+    Vec9 rest_angles(Index face) const;
+    void grow();
+    GrownFace::ByNatural strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
+                                           const Vec9& inside) const;
     void begin_strains(const double* q) { store_folds(q); }
     void begin_rates(const double* p) { store_rates(p); }
     void strain(Index pack, const double* q, Pack d[9]) const;
@@ -80,9 +93,11 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     const ChunkLoop& chunks_;
     ElementLoop<6> loop_;
     SheetMaterials materials_;
+    SheetGrowth growth_;
     std::vector<SixNodeFace> rest_;
     std::vector<BendingSix::Element> elements_;
     std::vector<std::array<Pack, 9>> rest_measures_;
+    std::vector<Vec9> rest_inside_;  // a face, of the shape at rest, where anything grows
     std::vector<FaceSlots> face_slots_;
     std::vector<PairSlots<9>> fold_slots_;
     std::vector<Symmetric9> stiffness_;

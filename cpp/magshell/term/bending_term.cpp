@@ -6,8 +6,8 @@
 
 namespace magshell {
 
-BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
-                         const SystemMatrix& matrix, Registry& registry)
+BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
+                         const Nodes& nodes, const SystemMatrix& matrix, Registry& registry)
     : StrainScaffold(sheet.n_faces()),
       sheet_(sheet),
       body_(body),
@@ -15,6 +15,7 @@ BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks
       nodes_(nodes),
       first_scalar_(nodes.first_scalar()),
       materials_(sheet, registry),
+      growth_(sheet.owner, sheet.faces, growth, registry),
       curvature_scale_(registry.values.add(sheet.owner, "curvature_scale", "1", sheet.n_edges(), 1)),
       stiffness_(face_packs()),
       folds_(sheet.folds.size()) {
@@ -38,18 +39,83 @@ BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks
 }
 
 bool BendingTerm::set_values(const Values& values) {
-    const bool material_changed = materials_.set_values(values);
-    if (!material_changed && !values.changed(curvature_scale_)) return false;
+    const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
+    if (!material_changed && !grew && !values.changed(curvature_scale_)) return false;
     curvature_scales_ = Eigen::Map<const VectorXd>(values[curvature_scale_], curvature_scale_.size());
     for (Index pack = 0; pack < face_packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = element_of(pack, lane, sheet_.n_faces());
             const Vec3 scale = scales_of(f);
-            const Mat3 stiffness = RestFace(sheet_.rest_corners(f).data()).bending_stiffness(materials_[f]);
+            const Mat3 stiffness = rest_face(f).bending_stiffness(materials_[f]);
             const Mat3 scaled = scale.asDiagonal() * stiffness * scale.asDiagonal();
             set_lane(stiffness_[pack], lane, scaled);
         }
+    if (grew) turn();
     return true;
+}
+
+RestFace BendingTerm::rest_face(Index face) const {
+    return growth_.any() ? grown(face).face() : RestFace(sheet_.rest_corners(face).data());
+}
+
+Vec3 BendingTerm::rest_angles(Index face) const {
+    Vec3 angles = Vec3::Zero();
+    for (int i = 0; i < 3; ++i) {
+        const FaceSide& side = sheet_.sides[face][i];
+        if (side.fold >= 0) angles[i] = side.weight * sheet_.folds[side.fold].rest_angle;
+    }
+    return angles;
+}
+
+void BendingTerm::turn() {
+    std::vector<Vec3> turns(sheet_.n_faces());
+    for (Index f = 0; f < sheet_.n_faces(); ++f) turns[f] = grown(f).turns(rest_angles(f));
+    turned_.resize(face_packs());
+    for (Index pack = 0; pack < face_packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Vec3 of_face = shared(turns, element_of(pack, lane, sheet_.n_faces()));
+            for (int i = 0; i < 3; ++i) turned_[pack][i].set(lane, of_face[i]);
+        }
+}
+
+// With directors each side of an edge bends as its own face would, and at a free edge too. A hinge has one angle, at which
+// both sides have to be at rest, and at a free edge it has none.
+Vec3 BendingTerm::shared(const std::vector<Vec3>& of_faces, Index face) const {
+    Vec3 numbers = of_faces[face];
+    for (int i = 0; i < 3; ++i) {
+        const FaceSide& side = sheet_.sides[face][i];
+        if (side.rotation >= 0) continue;
+        if (side.fold < 0) {
+            numbers[i] = 0.0;
+            continue;
+        }
+        const FoldStencil& fold = sheet_.folds[side.fold];
+        if (!fold.right_is_point) continue;
+        numbers[i] =
+            0.5 * (of_faces[fold.left.face][fold.left.corner] + of_faces[fold.right.face][fold.right.corner]);
+    }
+    return numbers;
+}
+
+Vec3 BendingTerm::grown_turns(Index face) const {
+    if (turned_.empty()) return Vec3::Zero();
+    return lane_of(turned_[face / Pack::width].data(), face % Pack::width);
+}
+
+void BendingTerm::add_turns_vjp(const std::vector<Vec3>& by_turns, Gradient& out) const {
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const GrownFace face = grown(f);
+        const GrownFace::ByNatural by = face.turns_by_natural(rest_angles(f), shared(by_turns, f));
+        growth_.add_vjp(f, face.in_world(by.growth), face.in_world(by.curvature), out);
+    }
+}
+
+void BendingTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
+    if (!growth_.any()) return;
+    std::vector<Vec3> by_turns(sheet_.n_faces());
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        by_turns[f] = {-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)};
+    add_turns_vjp(by_turns, out);
 }
 
 Vec3 BendingTerm::scales_of(Index face) const {
@@ -102,8 +168,10 @@ double BendingTerm::energy(const double* q, const Controls&) const {
     return chunks_.sum([&](const Chunk& chunk) {
         double total = 0.0;
         for (Index f = chunk.first; f < chunk.last; ++f) {
+            const Vec3 turned = grown_turns(f);
             double delta[3];
-            for (int i = 0; i < 3; ++i) delta[i] = bending_strain(sheet_.sides[f][i], turn_of, rotation);
+            for (int i = 0; i < 3; ++i)
+                delta[i] = bending_strain(sheet_.sides[f][i], turn_of, rotation) - turned[i];
             const Symmetric3& stiffness = stiffness_[f / Pack::width];
             const int lane = f % Pack::width;
             for (int i = 0; i < 3; ++i)
@@ -228,7 +296,8 @@ void BendingTerm::store_rates(const double* p) {
 // With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T C + C e_i e_i^T.
 void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
     store_rates(lambda);
-    std::vector<Vec3> by_scale(sheet_.n_faces());
+    std::vector<Vec3> by_scale(sheet_.n_faces()), by_turns(growth_.any() ? sheet_.n_faces() : 0);
+    std::vector<Mat3> by_stiffness(by_turns.size());
     each_pack([&](Index pack) {
         Pack delta[3], along[3], stress_rate[3];
         strain(pack, q, delta);
@@ -239,14 +308,21 @@ void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gr
             const int lane = f % Pack::width;
             const Vec3 d = lane_of(delta, lane), rates = lane_of(along, lane), scale = scales_of(f);
             const Vec3 stress = lane_of(stress_.at(pack), lane);
-            const Mat3 by_poisson_ratio =
-                RestFace(sheet_.rest_corners(f).data()).bending_by_poisson_ratio(materials_[f]);
+            const Mat3 by_poisson_ratio = rest_face(f).bending_by_poisson_ratio(materials_[f]);
             materials_.add_vjp(f, 3, rates.dot(stress),
                                rates.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d)), out);
             by_scale[f] = (rates.cwiseProduct(stress) + d.cwiseProduct(lane_of(stress_rate, lane)))
                               .cwiseQuotient(scale);
+            if (by_turns.empty()) continue;
+            by_turns[f] = -history_.factor() * lane_of(stress_rate, lane);
+            const GrownFace face = grown(f);
+            by_stiffness[f] = face.in_world(face.triangle().bending_by_growth(
+                materials_[f], scale.cwiseProduct(rates), scale.cwiseProduct(d)));
         }
     });
+    for (Index f = 0; f < static_cast<Index>(by_stiffness.size()); ++f)
+        growth_.add_vjp(f, by_stiffness[f], Mat3::Zero(), out);
+    if (growth_.any()) add_turns_vjp(by_turns, out);
     for (Index f = 0; f < sheet_.n_faces(); ++f)
         for (int i = 0; i < 3; ++i) out.values[curvature_scale_.at(sheet_.edges[f][i])] += by_scale[f][i];
 }
@@ -270,8 +346,8 @@ void BendingTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
 }
 
 std::size_t BendingTerm::bytes() const {
-    return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + bytes_of(stiffness_) +
-           bytes_of_stresses() + bytes_of(folds_);
+    return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + growth_.bytes() +
+           bytes_of(stiffness_) + bytes_of(turned_) + bytes_of_stresses() + bytes_of(folds_);
 }
 
 }  // namespace magshell

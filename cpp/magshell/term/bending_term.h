@@ -7,20 +7,23 @@
 #include "magshell/assembly/face_loop.h"
 #include "magshell/body/sheet.h"
 #include "magshell/energy/bending.h"
+#include "magshell/energy/grown_face.h"
 #include "magshell/strain/fold_angle.h"
 #include "magshell/term/elastic_term.h"
+#include "magshell/term/sheet_growth.h"
 #include "magshell/term/sheet_materials.h"
 
 namespace magshell {
 
 class BendingTerm final : public StrainScaffold<BendingTerm> {
   public:
-    BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
-                const SystemMatrix& matrix, Registry& registry);
+    BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
+                const Nodes& nodes, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "bending"; }
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
+    bool varies() const override { return growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
@@ -30,7 +33,15 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     bool add_surrogate(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
+    void strains_vjp(const Strains& stresses, Gradient& out) const override;
     std::size_t bytes() const override;
+
+    bool grows() const { return growth_.any(); }
+    /// From what strains are measured: the face, and the angles of its edges [rad] over those at rest.
+    GrownFace grown(Index face) const {
+        return {sheet_.rest_corners(face), growth_.growth(face), growth_.curvature(face)};
+    }
+    Vec3 grown_turns(Index face) const;
 
   private:
     friend class StrainScaffold<BendingTerm>;
@@ -55,7 +66,11 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void measure(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const;
     void begin_strains(const double* q) { store_folds(q); }
     void begin_rates(const double* p) { store_rates(p); }
-    void strain(Index pack, const double* q, Pack d[3]) const { measure(pack, q, &FoldState::turn, d); }
+    void strain(Index pack, const double* q, Pack d[3]) const {
+        measure(pack, q, &FoldState::turn, d);
+        if (turned_.empty()) return;
+        for (int i = 0; i < 3; ++i) d[i] -= turned_[pack][i];
+    }
     void rate(Index pack, const double* p, Pack d[3]) const { measure(pack, p, &FoldState::rate, d); }
     const Symmetric3& stiffness(Index pack) const { return stiffness_[pack]; }
     /// Of each fold at rest, how its angle goes with its nodes along a normal of both of its sides.
@@ -64,6 +79,12 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void store_folds(const double* q);
     void store_rates(const double* p);
     Vec3 scales_of(Index face) const;
+    RestFace rest_face(Index face) const;
+    Vec3 rest_angles(Index face) const;
+    /// Of a number an edge of each face as its two faces share it; its own transpose.
+    Vec3 shared(const std::vector<Vec3>& of_faces, Index face) const;
+    void turn();
+    void add_turns_vjp(const std::vector<Vec3>& by_turns, Gradient& out) const;
     void assemble_faces(Index pack, SystemMatrix& out) const;
     void assemble_folds(Index first, Index last, const double* q, const Strains& stress,
                         SystemMatrix& out) const;
@@ -74,11 +95,13 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     const Nodes& nodes_;
     const Index first_scalar_;
     SheetMaterials materials_;
+    SheetGrowth growth_;
     Slot curvature_scale_;
     std::vector<FaceSlots> face_slots_;
     std::vector<PairSlots<4>> fold_slots_;
     VectorXd curvature_scales_;  // one an edge, [Chen22] k_cur
     std::vector<Symmetric3> stiffness_;
+    std::vector<std::array<Pack, 3>> turned_;  // grown_turns, where anything grows
     std::vector<FoldState> folds_;
 };
 

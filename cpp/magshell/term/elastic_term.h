@@ -25,6 +25,8 @@ class ElasticTerm : public Term {
     virtual Strains stresses(const Strains& strains) const = 0;
     /// Adds J^T s at the last evaluated state.
     virtual void add_forces(const Strains& stresses, Residual& out) = 0;
+    /// Adds s . dd/dk at the last evaluated state for every value k from which the strains are measured.
+    virtual void strains_vjp(const Strains& /*stresses*/, Gradient& /*out*/) const {}
 
   protected:
     StrainHistory history_;

@@ -5,13 +5,15 @@
 namespace magshell {
 
 MembraneSixTerm::MembraneSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
-                                 const Nodes& nodes, const SystemMatrix& matrix, Registry& registry)
+                                 const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
+                                 Registry& registry)
     : StrainScaffold(sheet.n_faces()),
       sheet_(sheet),
       body_(body),
       nodes_(nodes.n_nodes()),
       loop_(sheet.own_nodes, chunks, matrix),
       materials_(sheet.owner, sheet.faces, registry),
+      growth_(sheet.owner, sheet.faces, growth, registry),
       rest_(sheet.rest.begin(), sheet.rest.end()),
       rest_measures_(loop_.packs()),
       stiffness_(loop_.packs()) {
@@ -24,13 +26,30 @@ MembraneSixTerm::MembraneSixTerm(const SixNodeSheet& sheet, Index body, const Ch
 }
 
 bool MembraneSixTerm::set_values(const Values& values) {
-    if (!materials_.set_values(values)) return false;
+    const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
+    if (!material_changed && !grew) return false;
+    if (grew) grow();
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = loop_.element(pack, lane);
             set_lane(stiffness_[pack], lane, rest_[f].membrane_stiffness(materials_[f]));
         }
     return true;
+}
+
+GrownSix MembraneSixTerm::grown(Index face) const {
+    return {sheet_.rest[face], growth_.growth(face), Mat3::Zero()};
+}
+
+void MembraneSixTerm::grow() {
+    for (Index pack = 0; pack < loop_.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const GrownSix face = grown(f);
+            rest_[f] = face.face();
+            const Vec9 lengths = face.squared_lengths();
+            for (int r = 0; r < 9; ++r) rest_measures_[pack][r].set(lane, lengths[r]);
+        }
 }
 
 double MembraneSixTerm::energy(const double* q, const Controls&) const {
@@ -108,6 +127,33 @@ void MembraneSixTerm::vjp(const double* q, const Controls&, const double* lambda
     });
     for (Index f = 0; f < sheet_.n_faces(); ++f)
         materials_.add_vjp(f, 1, of_faces[f][0], of_faces[f][1], out);
+    if (!growth_.any()) return;
+    std::vector<Mat3> by_growth(sheet_.n_faces());
+    each_pack([&](Index pack) {
+        Pack d[9], along[9], stresses[9];
+        strain(pack, q, d);
+        history_.apply<9>(pack, d);
+        rate(pack, lambda, along);
+        stiffness_[pack].times(along, stresses);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const GrownSix face = grown(f);
+            by_growth[f] = face.in_world(
+                face.membrane_by_growth(materials_[f], lane_of<9>(along, lane), lane_of<9>(d, lane)) -
+                history_.factor() * face.lengths_by_growth(lane_of<9>(stresses, lane)));
+        }
+    });
+    for (Index f = 0; f < sheet_.n_faces(); ++f) growth_.add_vjp(f, by_growth[f], Mat3::Zero(), out);
+}
+
+void MembraneSixTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
+    if (!growth_.any()) return;
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const GrownSix face = grown(f);
+        Vec9 by;
+        for (int r = 0; r < 9; ++r) by[r] = -stresses.number(f, r);
+        growth_.add_vjp(f, face.in_world(face.lengths_by_growth(by)), Mat3::Zero(), out);
+    }
 }
 
 void MembraneSixTerm::add_forces(const Strains& stresses, Residual& out) {
@@ -141,8 +187,8 @@ void MembraneSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const 
 }
 
 std::size_t MembraneSixTerm::bytes() const {
-    return materials_.bytes() + bytes_of(stiffness_) + bytes_of(rest_measures_) + bytes_of(rest_) +
-           bytes_of_stresses() + bytes_of(state_) + loop_.bytes();
+    return materials_.bytes() + growth_.bytes() + bytes_of(stiffness_) + bytes_of(rest_measures_) +
+           bytes_of(rest_) + bytes_of_stresses() + bytes_of(state_) + loop_.bytes();
 }
 
 }  // namespace magshell

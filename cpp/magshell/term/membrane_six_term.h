@@ -3,9 +3,11 @@
 
 #include "magshell/assembly/element_loop.h"
 #include "magshell/body/six_node_sheet.h"
+#include "magshell/energy/grown_six.h"
 #include "magshell/energy/membrane_six.h"
 #include "magshell/energy/six_node_face.h"
 #include "magshell/term/elastic_term.h"
+#include "magshell/term/sheet_growth.h"
 #include "magshell/term/sheet_materials.h"
 
 namespace magshell {
@@ -13,11 +15,12 @@ namespace magshell {
 class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
   public:
     MembraneSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
-                    const SystemMatrix& matrix, Registry& registry);
+                    const GrowthForm& growth, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "membrane"; }
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
+    bool varies() const override { return growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
@@ -26,6 +29,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
+    void strains_vjp(const Strains& stresses, Gradient& out) const override;
     std::size_t bytes() const override;
 
     /// d at a state that is only looked at.
@@ -38,6 +42,8 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     void each_pack(const Body& body) const {
         loop_.each_pack(body);
     }
+    GrownSix grown(Index face) const;
+    void grow();
     void begin_strains(const double*) {}
     void begin_rates(const double*) {}
     void strain(Index pack, const double* q, Pack d[9]) const;
@@ -48,6 +54,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     const Index body_, nodes_;
     ElementLoop<6> loop_;
     SheetMaterials materials_;
+    SheetGrowth growth_;
     std::vector<SixNodeFace> rest_;
     std::vector<std::array<Pack, 9>> rest_measures_;
     std::vector<Symmetric9> stiffness_;

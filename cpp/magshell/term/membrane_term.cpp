@@ -3,7 +3,8 @@
 namespace magshell {
 
 MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces,
-                           const FaceLoop& loop, const Nodes& nodes, Registry& registry)
+                           const FaceLoop& loop, const GrowthForm& growth, const Nodes& nodes,
+                           Registry& registry)
     : StrainScaffold(surface.n_faces()),
       surface_(surface),
       body_(body),
@@ -11,6 +12,7 @@ MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFac
       loop_(loop),
       nodes_(nodes.n_nodes()),
       materials_(surface, registry),
+      growth_(surface.owner, surface.faces, growth, registry),
       elements_(loop.packs()) {
     for (Index pack = 0; pack < loop.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
@@ -21,18 +23,35 @@ MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFac
         }
 }
 
+// Of a cut face, the mean of the faces that it is made of.
+GrownFace MembraneTerm::grown(Index face) const {
+    Mat3 growth = Mat3::Zero();
+    for (const MembraneFaces::Share& share : faces_.shares(face))
+        growth += share.part * growth_.growth(share.face);
+    return {faces_.rest_corners(face), growth, Mat3::Zero()};
+}
+
+RestFace MembraneTerm::rest_face(Index face) const {
+    if (growth_.any()) return grown(face).face();
+    const std::array<Vec3, 3> corners = faces_.rest_corners(face);
+    return RestFace(corners.data());
+}
+
 bool MembraneTerm::set_values(const Values& values) {
-    if (!materials_.set_values(values)) return false;
+    const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
+    if (!material_changed && !grew) return false;
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
             const Index f = loop_.face(pack, lane);
-            const std::array<Vec3, 3> corners = faces_.rest_corners(f);
+            const RestFace rest = rest_face(f);
             Mat3 stiffness = Mat3::Zero();
             for (const MembraneFaces::Share& share : faces_.shares(f))
                 if (share.part > 0.0)
-                    stiffness +=
-                        share.part * RestFace(corners.data()).membrane_stiffness(materials_[share.face]);
+                    stiffness += share.part * rest.membrane_stiffness(materials_[share.face]);
             set_lane(elements_[pack].stiffness, lane, stiffness);
+            if (!grew) continue;
+            for (int i = 0; i < 3; ++i)
+                elements_[pack].rest_squared_length[i].set(lane, rest.edge_length[i] * rest.edge_length[i]);
         }
     return true;
 }
@@ -122,11 +141,10 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, G
         for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
             const Index f = loop_.face(pack, lane);
             const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
-            const std::array<Vec3, 3> corners = faces_.rest_corners(f);
+            const RestFace rest = rest_face(f);
             for (int k = 0; k < 2; ++k) {
                 const MembraneFaces::Share share = faces_.shares(f)[k];
                 if (share.part == 0.0) continue;
-                const RestFace rest(corners.data());
                 const SheetMaterial& m = materials_[share.face];
                 by_shares[f][k] =
                     share.part * Eigen::Vector2d(along.dot(rest.membrane_stiffness(m) * d),
@@ -137,6 +155,44 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, G
     for (Index f = 0; f < surface_.n_faces(); ++f)
         for (int k = 0; k < 2; ++k)
             materials_.add_vjp(faces_.shares(f)[k].face, 1, by_shares[f][k][0], by_shares[f][k][1], out);
+    if (!growth_.any()) return;
+    std::vector<Mat3> by_faces(surface_.n_faces());
+    each_pack([&](Index pack) {
+        Pack strains[3], rates[3], stresses[3];
+        strain(pack, q, strains);
+        history_.apply(pack, strains);
+        rate(pack, lambda, rates);
+        elements_[pack].stiffness.times(rates, stresses);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.face(pack, lane);
+            const GrownFace own = grown(f);
+            const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
+            Mat2 by_growth = own.lengths_by_growth(-history_.factor() * lane_of(stresses, lane));
+            for (const MembraneFaces::Share& share : faces_.shares(f))
+                if (share.part > 0.0)
+                    by_growth +=
+                        share.part * own.triangle().membrane_by_growth(materials_[share.face], along, d);
+            by_faces[f] = own.in_world(by_growth);
+        }
+    });
+    add_growth_vjp(by_faces, out);
+}
+
+void MembraneTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
+    if (!growth_.any()) return;
+    std::vector<Mat3> by_faces(surface_.n_faces());
+    for (Index f = 0; f < surface_.n_faces(); ++f) {
+        const GrownFace own = grown(f);
+        by_faces[f] = own.in_world(
+            own.lengths_by_growth({-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)}));
+    }
+    add_growth_vjp(by_faces, out);
+}
+
+void MembraneTerm::add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const {
+    for (Index f = 0; f < surface_.n_faces(); ++f)
+        for (const MembraneFaces::Share& share : faces_.shares(f))
+            if (share.part > 0.0) growth_.add_vjp(share.face, share.part * by_faces[f], Mat3::Zero(), out);
 }
 
 void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {
@@ -170,7 +226,8 @@ void MembraneTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
 }
 
 std::size_t MembraneTerm::bytes() const {
-    return materials_.bytes() + bytes_of(elements_) + bytes_of_stresses() + bytes_of(state_);
+    return materials_.bytes() + growth_.bytes() + bytes_of(elements_) + bytes_of_stresses() +
+           bytes_of(state_);
 }
 
 }  // namespace magshell

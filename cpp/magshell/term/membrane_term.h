@@ -3,8 +3,10 @@
 
 #include "magshell/assembly/face_loop.h"
 #include "magshell/body/membrane_faces.h"
+#include "magshell/energy/grown_face.h"
 #include "magshell/energy/membrane.h"
 #include "magshell/term/elastic_term.h"
+#include "magshell/term/sheet_growth.h"
 #include "magshell/term/sheet_materials.h"
 
 namespace magshell {
@@ -13,11 +15,12 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
   public:
     /// `loop` goes over the corners of `faces`.
     MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces, const FaceLoop& loop,
-                 const Nodes& nodes, Registry& registry);
+                 const GrowthForm& growth, const Nodes& nodes, Registry& registry);
 
     std::string_view name() const override { return Membrane::name; }
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
+    bool varies() const override { return growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
@@ -27,7 +30,12 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     bool add_surrogate(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
+    void strains_vjp(const Strains& stresses, Gradient& out) const override;
     std::size_t bytes() const override;
+
+    bool grows() const { return growth_.any(); }
+    /// From what strains are measured.
+    GrownFace grown(Index face) const;
 
   private:
     friend class StrainScaffold<MembraneTerm>;
@@ -39,6 +47,8 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     void begin_rates(const double*) {}
     void strain(Index pack, const double* q, Pack d[3]) const;
     void rate(Index pack, const double* p, Pack d[3]) const;
+    RestFace rest_face(Index face) const;
+    void add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const;
     const Symmetric3& stiffness(Index pack) const { return elements_[pack].stiffness; }
 
     const Surface& surface_;
@@ -47,6 +57,7 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     const FaceLoop& loop_;
     const Index nodes_;
     SheetMaterials materials_;
+    SheetGrowth growth_;
     std::vector<Membrane::Element> elements_;
     std::vector<double> state_;  // the nodes at which stress_ holds
 };

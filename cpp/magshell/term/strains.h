@@ -54,6 +54,9 @@ struct StrainHistory {
         for (int i = 0; i < N; ++i) strain[i] = Pack(scale) * strain[i] - shift->at(pack)[i];
     }
 
+    /// How much of today's strain the stress has.
+    double factor() const { return shift ? scale : 1.0; }
+
     /// scale C.
     template <int N>
     Symmetric<N> scaled(const Symmetric<N>& stiffness) const {

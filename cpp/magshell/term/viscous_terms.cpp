@@ -29,6 +29,10 @@ VectorXd ViscousTerms::forces(const StrainSet& stresses, Index unknowns) const {
     return std::move(forces.gradient);
 }
 
+void ViscousTerms::strains_vjp(const StrainSet& stresses, Gradient& out) const {
+    for (std::size_t k = 0; k < terms_.size(); ++k) terms_[k]->strains_vjp(stresses.of_terms[k], out);
+}
+
 StrainSet ViscousTerms::stresses(const StrainSet& strains) const {
     StrainSet stresses;
     for (std::size_t k = 0; k < terms_.size(); ++k)

@@ -21,6 +21,7 @@ class ViscousTerms {
     /// At the last evaluated state: J p, and J^T s.
     StrainSet rates(const VectorXd& p) const;
     VectorXd forces(const StrainSet& stresses, Index unknowns) const;
+    void strains_vjp(const StrainSet& stresses, Gradient& out) const;
     StrainSet stresses(const StrainSet& strains) const;
     /// Zeros; and how many numbers they are.
     StrainSet zeros() const;

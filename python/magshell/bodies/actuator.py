@@ -35,6 +35,11 @@ class Actuator(Owner):
         """How much of a volume at rest a load factor of 1 adds to it, or takes away."""
         return 0.0
 
+    def _check_in_time(self, name: str, rows: np.ndarray) -> None:
+        """Raises ValueError where it cannot have one of the numbers (n, ...) over time."""
+        for extreme in (rows.min(axis=0), rows.max(axis=0)):
+            self.replaced(**{name: extreme})
+
     def _keep_shapes(self, changed: Actuator) -> Actuator:
         for name in self._replaceable:
             before, after = getattr(self, name), getattr(changed, name)

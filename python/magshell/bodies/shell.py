@@ -8,11 +8,12 @@ import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
-from ..mesh.face_shapes import sides
+from ..mesh.face_shapes import corner_axes, sides
 from ..mesh.quality import MeshQuality
 from ..mesh.six_node_integrals import shape_integrals, shape_products
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
+from .growth import Growth
 
 BENDING = ("midedge", "midedge2", "hinge")
 # Of an element's mass at its nodes, in proportion to the diagonal of its mass matrix where it is flat (Hinton, Rock,
@@ -38,6 +39,20 @@ class Shell(Owner):
         elements: Neunteufel and Schoeberl 2019, 2021); or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several
         percent on irregular meshes).
     remanent_magnetization: (3,) or (n_f, 3) A/m, in a scene with a field, where a solve says nothing else.
+    growth: by what factor lengths have grown in the faces: what they would be without stress. A positive number, or a
+        symmetric tensor in world axes at rest, (3, 3) or one a face (n_f, 3, 3), of which counts what lies in the face:
+        np.eye(3) + 0.1 np.outer(d, d) grows by a tenth along d. A sheet that is stretched by s before it is fixed to others
+        has growth 1/s. None: 1, and no solve can change it.
+    rest_curvature: 1/m, added to the curvature of the rest shape: a number (alike in all directions), or a symmetric
+        tensor as above, np.outer(d, d) / R bends along d; in lengths as they have grown. Positive where normals lean
+        together. None: nothing is added, and no solve can.
+
+    Growth changes what stretching and bending are measured from, and the area whose energy they are; an even one leaves the
+    angles of a curved rest shape as they are, so that it scales the shape (in general its second fundamental form is
+    multiplied by the root of det G). Everything else stays: thickness is that of the grown sheet; mass, weight, magnetization
+    and area loads are those of the mesh, and the magnetization stretches with the sheet, grown or not. Both may change
+    along ms.follow and in ms.simulate. With "hinge" both faces of an edge share one angle, their mean, and free edges have
+    none.
 
     Which one: an element of "midedge2" costs about eight times a face of "midedge", and needs far fewer of them. Where
     deflections and loads are wanted to a percent or better, and where sheets are curved at rest or twist, take "midedge2"
@@ -58,7 +73,10 @@ class Shell(Owner):
         "mass_density",
         "curvature_scale",
         "remanent_magnetization",
+        "growth",
+        "rest_curvature",
     )
+    _in_time = ("growth", "rest_curvature")
 
     def __init__(
         self,
@@ -71,6 +89,8 @@ class Shell(Owner):
         curvature_scale=1.0,
         bending: str | None = None,
         remanent_magnetization=None,
+        growth=None,
+        rest_curvature=None,
     ):
         if not isinstance(mesh, TriangleMesh | SixNodeMesh):
             raise ValueError(f"mesh must be a TriangleMesh or a SixNodeMesh, got {type(mesh).__name__}")
@@ -104,18 +124,29 @@ class Shell(Owner):
             )
         )
 
+        self.growth, self.rest_curvature = (
+            None if given is None else self._growth.checked(name, given)
+            for name, given in (("growth", growth), ("rest_curvature", rest_curvature))
+        )
+        absent = [name for name in type(self)._in_time if getattr(self, name) is None]
+        self._replaceable = tuple(name for name in self._replaceable if name not in absent)
+        self._in_time = tuple(name for name in type(self)._in_time if name not in absent)
+
     def replaced(self, **values) -> Shell:
         """The same sheet with other properties."""
         properties = {name: getattr(self, name) for name in self._replaceable}
-        return Shell(self.mesh, bending=self.bending, **{**properties, **values})
+        grown = {
+            name: self._growth.checked(name, values[name], getattr(self, name))
+            for name in self._in_time
+            if name in values
+        }
+        return Shell(self.mesh, bending=self.bending, **{**properties, **values, **grown})
 
     def add_numbers(self, label: str, values, numbers: dict) -> None:
         for name in self._stiffnesses:
             numbers[label, name] = getattr(self, name)
-        magnetization = self.remanent_magnetization
-        if magnetization is None:  # a solve brings it
-            magnetization = np.zeros((self.mesh.n_elements, 3))
-        numbers[label, "remanent_magnetization"] = magnetization
+        if self.remanent_magnetization is not None:  # else a solve brings it
+            numbers[label, "remanent_magnetization"] = self.remanent_magnetization
 
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
         """With what its values do to the masses of the vertices, and to what contacts make of the thickness."""
@@ -141,7 +172,32 @@ class Shell(Owner):
     def _stiffnesses(self) -> tuple[str, ...]:
         """What of it the core's elastic terms read."""
         names = ("thickness", "young_modulus", "poisson_ratio", "curvature_scale")
-        return names if self.mesh.order == 1 else names[:3]
+        return (*(names if self.mesh.order == 1 else names[:3]), *self._in_time)
+
+    @property
+    def _growth(self) -> Growth:
+        """What its growth may be."""
+        corners = self.mesh.rest_positions[self.mesh.elements[:, :3]]
+        return Growth("n_f" if self.mesh.order == 1 else "n", corner_axes(corners))
+
+    @property
+    def has_grown(self) -> bool:
+        """Whether its rest shape is under stress by itself."""
+        without = {"growth": np.eye(2), "rest_curvature": np.zeros((2, 2))}
+        return any((self._growth.in_faces(getattr(self, name)) != without[name]).any() for name in self._in_time)
+
+    @property
+    def grown_by(self) -> np.ndarray:
+        """(n_f, 2, 2) in `corner_axes` of the faces; of a SixNodeMesh, each flat face like its element."""
+        n = len(self.mesh.faces)
+        if self.growth is None:
+            return np.broadcast_to(np.eye(2), (n, 2, 2))
+        growth = self._on_faces(self.growth) if self.growth.ndim in (1, 3) else self.growth
+        return Growth("n_f", corner_axes(self.mesh.rest_positions[self.mesh.faces])).in_faces(growth)
+
+    def _check_in_time(self, name: str, rows: np.ndarray) -> None:
+        """Of a value over time. Raises ValueError."""
+        self._growth.check(name, rows)
 
     def __getstate__(self) -> dict:
         """What a copy is made from: not what was looked up meanwhile."""

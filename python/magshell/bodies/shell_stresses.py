@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import _core
+from ..mesh.face_shapes import corner_axes
 from .at_points import mean, von_mises
 from .shell import Shell
 
@@ -23,6 +24,8 @@ class ShellStresses(NamedTuple):
     rest_axes, axes: (n_f, 2, 3), unit vectors in the face at rest and now, the first at rest along its first edge, the
         second to the left of it; with their cross product, the normal, they turn as the face does.
     thickness: (n_f,), m. areas: at rest, (n_f,), m2.
+
+    Of a sheet that has grown, "at rest" is the face as it would be by itself, its rest axes those of the mesh.
 
     Stress at the surfaces, (n_f, 2, ...), is at the top, where the normal points to, first, then at the bottom.
     """
@@ -98,19 +101,18 @@ def stresses_of(values, body: Shell, state: np.ndarray) -> ShellStresses:
         positions = scene._model.positions(state)
     mesh = body.mesh
     positions = positions[scene._bodies.spans[scene._bodies.number(body)].vertices]
-    rest_axes, axes = _axes(mesh.rest_positions[mesh.faces], positions[mesh.faces])
+    sheet = values.current(body)
+    rest_axes, axes = _axes(mesh.rest_positions[mesh.faces], sheet.grown_by, positions[mesh.faces])
     in_plane = [np.einsum("fai,fij,fbj->fab", rest_axes, each, rest_axes) for each in tensors]
-    return ShellStresses(*in_plane, rest_axes, axes, values.current(body).face_thickness, mesh.face_areas)
+    areas = mesh.face_areas * np.linalg.det(sheet.grown_by)
+    return ShellStresses(*in_plane, rest_axes, axes, sheet.face_thickness, areas)
 
 
-def _axes(rest: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors in each face, (n_f, 2, 3), at rest and turned as the face is, of corners (n_f, 3, 3) m."""
-    edges = rest[:, 1:] - rest[:, :1]
-    first = edges[:, 0] / np.linalg.norm(edges[:, 0], axis=1, keepdims=True)
-    normal = np.cross(edges[:, 0], edges[:, 1])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    axes = np.stack([first, np.cross(normal, first)], axis=1)
-    flat = np.einsum("fai,fki->fak", axes, edges)  # columns are the edges in these axes
+def _axes(rest: np.ndarray, grown: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors in each face, (n_f, 2, 3), at rest and turned as the face is, of corners (n_f, 3, 3) m, where it has
+    grown (n_f, 2, 2) in these axes."""
+    axes = corner_axes(rest)
+    flat = grown @ np.einsum("fai,fki->fak", axes, rest[:, 1:] - rest[:, :1])  # columns are the edges in these axes
     gradients = np.einsum("fki,fkb->fib", now[:, 1:] - now[:, :1], np.linalg.inv(flat))
     stretches = _square_roots(np.einsum("fia,fib->fab", gradients, gradients))
     turned = np.einsum("fib,fba->fai", gradients, np.linalg.inv(stretches))

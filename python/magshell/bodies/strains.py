@@ -61,6 +61,12 @@ class StrainHistory(NamedTuple):
         numbers = np.array([(membrane, bending) for membrane, _, bending, _ in rows]).reshape(-1, 2)
         return StrainHistory(numbers[:, 0], numbers[:, 1])
 
+    @staticmethod
+    def of_each(strains) -> StrainHistory:
+        """From the Strains of each state."""
+        pairs = [[np.abs(each).max(initial=0.0) for each in of_state] for of_state in strains]
+        return StrainHistory(*np.reshape(pairs, (-1, 2)).T)
+
     @property
     def worst(self) -> int:
         """The state with the largest of all."""

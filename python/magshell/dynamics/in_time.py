@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..bodies.actuator import Actuator
+from ..bodies.shell import Shell
 from ..obstacles import Obstacle
 from ..scene.courses import Course
 from ..surroundings.supports import Support
@@ -16,7 +17,7 @@ class InTime:
     """What of a scene's values changes during one motion.
 
     entries: of the core's values, those that follow the other controls; rows: (knots, m), theirs. poses: {number of an
-    obstacle: its poses at the knots (knots, 4, 3)}. of_actuators: {(actuator, name): (knots, ...)}.
+    obstacle: its poses at the knots (knots, 4, 3)}. varied: {(actuator or shell, name): (knots, ...)}.
     """
 
     def __init__(self, asked, courses: list[Course]):
@@ -25,7 +26,7 @@ class InTime:
         self._places: dict[tuple[int, str], list[slice]] = {}
         self.entries: list[int] = []
         self.poses: dict[int, np.ndarray] = {}
-        self.of_actuators: dict[tuple[Actuator, str], np.ndarray] = {}
+        self.varied: dict[tuple[Actuator | Shell, str], np.ndarray] = {}
         for course in courses:
             course.check(asked.steps)
         of_values = [each for each in courses if not isinstance(each.owner, Obstacle)]
@@ -38,9 +39,9 @@ class InTime:
             numbers = np.reshape(
                 asked.inputs.take(course.name, at_knots, _Values(self, course)), (asked.knots, -1)
             )
-            if isinstance(course.owner, Actuator):
-                self.of_actuators[course.owner, course.name] = numbers.reshape(-1, *course.row)
-                self._check_actuator(course)
+            if isinstance(course.owner, Actuator | Shell):
+                now = self.varied[course.owner, course.name] = numbers.reshape(-1, *course.row)
+                course.owner._check_in_time(course.name, now)
             rows += [numbers] * self._add(course, numbers.shape[1])
         self.rows = np.concatenate(rows, axis=1)
         self._add_obstacles([each for each in courses if isinstance(each.owner, Obstacle)])
@@ -63,12 +64,6 @@ class InTime:
             places.append(slice(end, end + width))
             end += width
         return len(labels)
-
-    def _check_actuator(self, course: Course) -> None:
-        """Raises ValueError where the actuator cannot have one of its numbers."""
-        at_knots = self.of_actuators[course.owner, course.name]
-        for extreme in (at_knots.min(axis=0), at_knots.max(axis=0)):
-            course.owner.replaced(**{course.name: extreme})
 
     def _add_obstacles(self, courses: list[Course]) -> None:
         values, obstacles = self._asked.inputs.values, self._asked.inputs.scene.obstacles

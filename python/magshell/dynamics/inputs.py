@@ -100,9 +100,9 @@ class MotionInputs:
         return self._knots[name][self._recorded_knots(count)]
 
     def varied(self, count: int) -> dict[tuple, np.ndarray]:
-        """Likewise {(actuator, name): its values} of what varies."""
+        """Likewise {(actuator or shell, name): its values} of what varies."""
         at = self._recorded_knots(count)
-        return {key: rows[at] for key, rows in self._in_time.of_actuators.items()}
+        return {key: rows[at] for key, rows in self._in_time.varied.items()}
 
     def _recorded_knots(self, count: int) -> np.ndarray:
         a_step = len(self.integrator._times) + 1

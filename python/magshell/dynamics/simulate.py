@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from .._machine.log import log
 from .._machine.progress import SolveBar
 from ..adjoint.dynamic import MotionAdjoint
 from ..bodies.caps import warn_of_caps
+from ..bodies.shell import Shell
 from ..bodies.strains import StrainHistory, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler, Integrator
@@ -179,7 +181,7 @@ def simulate(
         found = _core.simulate(
             scene._model, asked.core, bool(inputs.leaves), int(memory_budget), asked.keep, _advance(bar)
         )
-    result = _trajectory(asked, found, time.perf_counter() - began)
+    result = _with_strains(_trajectory(asked, found, time.perf_counter() - began))
     log.debug(
         "simulate: %s, %d of %d steps, %d in parts, %d iterations, %d factorizations, %.3g s",
         found.outcome.name,
@@ -207,6 +209,14 @@ def simulate(
     return result
 
 
+def _with_strains(result: Trajectory) -> Trajectory:
+    """With the largest strains of its states where sheets grew during the motion: each with its own growth."""
+    if not any(isinstance(owner, Shell) for owner, _ in result._varied):
+        return result
+    strain = StrainHistory.of_each(result.strains(k) for k in range(len(result)))
+    return replace(result, largest_membrane_strain=strain.membrane, largest_bending_strain=strain.bending)
+
+
 def _warn(result: Trajectory) -> None:
     strain = StrainHistory(result.largest_membrane_strain, result.largest_bending_strain)
     k = strain.worst
@@ -222,7 +232,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     recorded = len(found.kinetic_energy)
     ended = asked.clock.after(found.steps_done)
     thickness = values.whole.thickness
-    strain = StrainHistory.of(found.largest_strains(model, thickness))
+    with values.growth_in_core():
+        strain = StrainHistory.of(found.largest_strains(model, thickness))
     by_term = np.array(found.energies).reshape(recorded, -1)
     return Trajectory(
         scene=scene,

@@ -144,7 +144,7 @@ class Trajectory:
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
     _load_factors: np.ndarray = field(repr=False)
-    _varied: dict = field(repr=False)  # {(actuator, name): (n, ...)}, of the recorded states
+    _varied: dict = field(repr=False)  # {(actuator or shell, name): (n, ...)}, of the recorded states
     _thickness: np.ndarray = field(repr=False)
     _values: Any = field(repr=False)
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
@@ -186,10 +186,10 @@ class Trajectory:
         return self.positions - self.positions.new_tensor(np.array(rest))
 
     def _values_at(self, index: int):
-        """With the actuators as they were then."""
-        then: dict[Actuator, dict] = {}
-        for (actuator, name), rows in self._varied.items():
-            then.setdefault(actuator, {})[name] = rows[index]
+        """With actuators, and growth, as they were then."""
+        then: dict[Actuator | Shell, dict] = {}
+        for (owner, name), rows in self._varied.items():
+            then.setdefault(owner, {})[name] = rows[index]
         now = {each: self._values.current(each).replaced(**named) for each, named in then.items()}
         return self._values.with_objects(now) if now else self._values
 
@@ -241,7 +241,9 @@ class Trajectory:
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face in a recorded state, by default the last."""
-        return strains_of(self.scene, self._state_at(index), self._thickness)
+        state = self._state_at(index)
+        with self._values_at(index).growth_in_core():
+            return strains_of(self.scene, state, self._thickness)
 
     def _state_at(self, index: int) -> np.ndarray:
         """Of the core."""

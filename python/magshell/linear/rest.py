@@ -93,8 +93,15 @@ def forces_at_rest(inputs: Inputs) -> np.ndarray:
 
 
 def refuse_what_acts(inputs: Inputs) -> None:
-    """Raises ValueError where a muscle pulls at the rest shape, whatever the controls: it is no equilibrium then."""
+    """Raises ValueError where a muscle pulls at the rest shape, or a sheet has grown, whatever the controls: it is no
+    equilibrium then."""
     model = inputs.scene._model
+    for body in map(inputs.values.current, inputs.scene._bodies.sheets):
+        if body.has_grown:
+            raise ValueError(
+                f"{body!r} has grown or bent at rest, and its rest shape is no equilibrium then: ms.equilibrium and ms.follow "
+                "have it, and ms.vibration_modes about their result"
+            )
     for k, muscle in enumerate(muscles_in(inputs.scene)):
         states = FibreStates(*_core.fibre_states(model, k, model.rest_state(), None))
         if np.abs(states.tensions).max() > _ROUND_OFF * inputs.values.current(muscle).strength:

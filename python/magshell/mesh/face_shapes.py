@@ -24,6 +24,15 @@ def sides(mesh) -> tuple[np.ndarray, int]:
     return mesh.faces, 1
 
 
+def corner_axes(corners: np.ndarray) -> np.ndarray:
+    """Two unit vectors in the plane of each three corners (n, 3, 3), (n, 2, 3): along the first edge, and to the left."""
+    edges = corners[:, 1:] - corners[:, :1]
+    first = edges[:, 0] / np.linalg.norm(edges[:, 0], axis=1, keepdims=True)
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normal, first)], axis=1)
+
+
 def shares(mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whose nodes feel what acts on the area at rest of some faces (k,), and how much of it: (k, 3) or (k, 6) vertices,
     and the integrals of their shape functions over the face, m2, likewise."""

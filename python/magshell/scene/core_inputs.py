@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..bodies.growth import core_form
 from ..bodies.muscle import Muscle
+from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
@@ -83,6 +85,7 @@ def _sheets(scene, directed_edges: np.ndarray) -> list[dict]:
             "mesh": span.mesh._core,
             "vertices": scene._bodies.original[span.vertices],
             "curvature_scale": shell.curvature_scale,
+            **_growth(shell),
             "directors": shell.bending == "midedge",
             "magnetic": bool(scene.fields),
             "directed_edges": directed[k],
@@ -104,12 +107,17 @@ def _six_node_sheets(scene, directed_edges: np.ndarray) -> list[dict]:
             "surface": span.mesh.surface._core,
             "surface_vertices": scene._bodies.original[span.vertices],
             "surface_acts": _surface_acts(scene, k),
+            **_growth(shell),
             "magnetic": bool(scene.fields),
             "directed_edges": directed[k],
         }
         for k, (shell, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True))
         if isinstance(shell.mesh, SixNodeMesh)
     ]
+
+
+def _growth(shell: Shell) -> dict:
+    return {name: core_form(getattr(shell, name)) for name in ("growth", "rest_curvature")}
 
 
 def _surface_acts(scene, body: int) -> bool:

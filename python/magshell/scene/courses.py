@@ -10,11 +10,13 @@ import numpy as np
 from .._checks.quantity import shape_of
 from .._machine.keywords import nearest_first
 from ..bodies.actuator import Actuator
+from ..bodies.growth import UNITS as _GROWTH_UNITS
 from ..bodies.joint import Joint
+from ..bodies.shell import Shell
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
 
-_JUMPING = (AppliedField, Joint, Actuator)  # their values may change at once, others move
+_JUMPING = (AppliedField, Joint, Actuator, Shell)  # their values may change at once, others move
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,7 @@ _UNITS = {
     "rotation": "rad",
     "displacement": "m",
     "pressure": "Pa",
+    **_GROWTH_UNITS,
 }
 
 

@@ -9,7 +9,9 @@ from ..surroundings.loads import DeadLoad
 from .courses import refuse_functions
 
 # Those of a scene's one body that have a keyword of their own.
-SHELL_NAMES = tuple(name for name in Shell._replaceable if name != "remanent_magnetization")
+SHELL_NAMES = tuple(
+    name for name in Shell._replaceable if name not in ("remanent_magnetization", *Shell._in_time)
+)
 
 
 def requested(

@@ -59,6 +59,9 @@ class Values:
         if magnetization is not None:
             for label, rows in of_carriers(scene, magnetization):
                 numbers[label, "remanent_magnetization"] = rows
+        for label, name in scene._value_layout:
+            if name == "remanent_magnetization":  # of sheets that a solve gives none
+                numbers.setdefault((label, name), 0.0)
         self.numbers = scene._value_layout.packed(numbers)
 
     @contextmanager
@@ -69,6 +72,15 @@ class Values:
             if scene._in_core is not self:
                 scene._model.set_values(self.numbers)
                 scene._in_core = self
+            yield
+
+    @contextmanager
+    def growth_in_core(self):
+        """For who looks at strains: as `in_core` where sheets grow, and only then."""
+        if any(self.current(body)._in_time for body in self.scene._bodies.sheets):
+            with self.in_core():
+                yield
+        else:
             yield
 
     def same_as(self, other: Values) -> bool:

@@ -122,7 +122,8 @@ class Equilibrium:
         >>> rest.strains().membrane[0].round(3)  # (1.1^2 - 1)/2 along, nothing across
         array([0.105, 0.   ])
         """
-        return strains_of(self.scene, self._state, self._values.whole.thickness)
+        with self._values.growth_in_core():
+            return strains_of(self.scene, self._state, self._values.whole.thickness)
 
     def touching(self, contact: BodyContact | Contact) -> Touching:
         """The pairs of a contact that touch, and their forces."""

@@ -25,6 +25,7 @@ from ..mesh.crossings import told
 from ..methods.solvers import MixedNewton, Newton
 from ..scene.inputs import Inputs, plain_inputs
 from ..scene.scene import Scene
+from ..scene.values import Values
 from .along_path import AlongPath
 from .equilibrium import Equilibrium
 from .search import solve
@@ -90,7 +91,8 @@ class Path:
 
     def strains(self, index: int = -1) -> Strains:
         """The principal strains of every face at one of the points, by default the last."""
-        return strains_of(self.scene, self._state_at(index), self._inputs.values.whole.thickness)
+        with self._values_at(index).growth_in_core():
+            return strains_of(self.scene, self._state_at(index), self._inputs.values.whole.thickness)
 
     def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene, a row for each point; points themselves: `equilibrium`."""
@@ -300,8 +302,7 @@ def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> 
     scene = inputs.scene
     model = scene._model
     points = found.points
-    thickness = inputs.values.whole.thickness
-    strain = StrainHistory.of([model.largest_strains(point.state, thickness) for point in points])
+    strain = StrainHistory.of([_largest(model, moving.values(point.parameter), point) for point in points])
     return Path(
         scene=scene,
         parameters=np.array([point.parameter for point in points]),
@@ -324,6 +325,11 @@ def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> 
         _from=from_,
         _to=inputs.controls,
     )
+
+
+def _largest(model, values: Values, point) -> tuple:
+    with values.growth_in_core():
+        return model.largest_strains(point.state, values.whole.thickness)
 
 
 def _critical(model, found) -> CriticalPoint:
