@@ -8,9 +8,7 @@ from test_adjoint import MESH, N_F
 
 import magshell as ms
 
-_DOME = ms.TriangleMesh(
-    MESH.rest_positions + 4.0 * MESH.rest_positions[:, :1] ** 2 * (0, 0, 1), MESH.faces
-)
+_DOME = ms.TriangleMesh(MESH.rest_positions + 4.0 * MESH.rest_positions[:, :1] ** 2 * (0, 0, 1), MESH.faces)
 
 
 def _tensors(n: int, middle: float, size: float) -> np.ndarray:

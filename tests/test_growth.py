@@ -112,19 +112,27 @@ def test_six_nodes_close_to_a_ring():
 
 
 def bilayer(thicknesses, moduli, mismatch):
-    """Of a strip of two layers with Poisson's ratio 0, the first below and longer by `mismatch`: what it is as one sheet, from
-    its stiffness through the thickness about the middle where stretching and bending do not mix."""
+    """A strip of two layers, Poisson's ratio 0, the first below and longer by `mismatch`: what it is as one sheet, from its
+    stiffness through the thickness about the middle where stretching and bending do not mix."""
     bounds = np.cumsum([0.0, *thicknesses])
     stiffness = [e * t for e, t in zip(moduli, thicknesses, strict=True)]
     middles = 0.5 * (bounds[1:] + bounds[:-1])
     middle = np.dot(stiffness, middles) / np.sum(stiffness)
-    bending = sum(e * ((b - middle) ** 3 - (a - middle) ** 3) / 3 for e, a, b in zip(moduli, bounds, bounds[1:], strict=False))
+    bending = sum(
+        e * ((b - middle) ** 3 - (a - middle) ** 3) / 3
+        for e, a, b in zip(moduli, bounds, bounds[1:], strict=False)
+    )
     strains = np.array([mismatch, 0.0])
     growth = 1.0 + np.dot(stiffness, strains) / np.sum(stiffness)
     # Positive where the normal's side, the upper one, is shorter.
     curvature = -np.dot(stiffness, strains * (middles - middle)) / bending
     thickness = np.sqrt(12.0 * bending / np.sum(stiffness))
-    return {"thickness": thickness, "young_modulus": np.sum(stiffness) / thickness, "growth": growth, "rest_curvature": curvature}
+    return {
+        "thickness": thickness,
+        "young_modulus": np.sum(stiffness) / thickness,
+        "growth": growth,
+        "rest_curvature": curvature,
+    }
 
 
 @pytest.mark.parametrize(
@@ -145,33 +153,26 @@ def test_a_bilayer_bends_as_timoshenko_says(ratio, moduli, curvature):
     assert abs(turns[-1] - turns[0]) / length * height == pytest.approx(curvature, rel=1e-8)
 
 
-def disk_with_rim(bending, growth):
-    mesh = ms.meshes.disk(0.05, cells=5 if bending == "midedge2" else 10, order=order(bending))
-    centers = mesh.rest_positions[mesh.elements[:, :3]].mean(axis=1)
-    rim = np.linalg.norm(centers, axis=1) > 0.04
-    return shell(mesh, bending, thickness=5e-4, growth=np.where(rim, growth, 1.0)), mesh
-
-
 @pytest.mark.parametrize("bending", BENDINGS)
 def test_a_disk_with_a_swollen_rim_goes_into_waves(bending):
-    sheet, mesh = disk_with_rim(bending, 1.1)
+    mesh = ms.meshes.disk(0.05, cells=3 if bending == "midedge2" else 5, order=order(bending))
     at = mesh.rest_positions
-    middle = int(np.argmin(np.linalg.norm(at, axis=1)))
-    side = int(np.argmax(at[:, 0]))
-    scene = ms.Scene(sheet, supports=[ms.Pin([middle]), ms.Pin([side], "yz")], allow_rigid_motions=True)
+    rim = np.linalg.norm(at[mesh.elements[:, :3]].mean(axis=1), axis=1) > 0.03
+    sheet = shell(mesh, bending, growth=np.where(rim, 1.05, 1.0))
+    middle, side = [int(np.argmin(np.linalg.norm(at, axis=1)))], [int(np.argmax(at[:, 0]))]
+    supports = [ms.Pin(middle), ms.Pin(side, "yz")]
+    scene = ms.Scene(sheet, supports=supports, allow_rigid_motions=True)
     flat = ms.equilibrium(scene, require_stable=False)
     assert np.abs(flat.positions[:, 2]).max() < 1e-9 and not flat.stable
-    angle = np.arctan2(at[:, 1], at[:, 0])
-    waves = 1e-3 * (at**2).sum(axis=1) / 0.05**2 * np.sin(3.0 * angle)
-    start = at + waves[:, None] * (0, 0, 1)
-    wavy = ms.equilibrium(scene, start=start)
-    assert wavy.stable and np.ptp(wavy.positions[:, 2]) > 5e-3
+    saddle = 4e-3 * (at[:, 0] ** 2 - at[:, 1] ** 2 + at[:, 0] * at[:, 1]) / 0.05**2
+    wavy = ms.equilibrium(scene, start=at + saddle[:, None] * (0, 0, 1))
+    assert wavy.stable and np.ptp(wavy.positions[:, 2]) > 0.01
     assert sum(wavy.energies.values()) < 0.5 * sum(flat.energies.values())
 
 
 def test_growth_along_a_path_buckles_where_the_theory_says():
     """A strip between clamps, as a column: at the strain (pi^2 / 3) (h / L)^2."""
-    mesh = ms.meshes.rectangle(LENGTH, 0.004, cells=(24, 1), diagonals="aligned")
+    mesh = ms.meshes.rectangle(LENGTH, 0.004, cells=(40, 1), diagonals="aligned")
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0, growth=np.eye(3))
     ends = [ms.Clamp(mesh.edges_at(x=place)) for place in (0.0, LENGTH)]
     scene = ms.Scene(sheet, supports=ends)
@@ -199,11 +200,14 @@ def test_stresses_of_a_sheet_that_cannot_grow():
     mesh = rectangle("midedge", irregular=0.2, seed=2)
     growth = 1.02
     sheet = shell(mesh, "midedge", growth=growth)
-    found = ms.equilibrium(ms.Scene(sheet, supports=[ms.Clamp(mesh.boundary_edges)]))
+    scene = ms.Scene(sheet, supports=[ms.Pin(np.arange(mesh.n_vertices))])
+    found = ms.equilibrium(scene, require_stable=False)
     strain = 0.5 * (1.0 / growth**2 - 1.0)
     stresses = found[sheet].stresses()
     force = 1e6 * 1e-3 / (1.0 - 0.3) * strain
-    np.testing.assert_allclose(stresses.membrane_strains, np.broadcast_to(strain * np.eye(2), (mesh.n_faces, 2, 2)), atol=1e-12)
+    np.testing.assert_allclose(
+        stresses.membrane_strains, np.broadcast_to(strain * np.eye(2), (mesh.n_faces, 2, 2)), atol=1e-12
+    )
     np.testing.assert_allclose(stresses.principal_membrane_forces, force, rtol=1e-9)
     np.testing.assert_allclose(stresses.areas, growth**2 * mesh.face_areas)
     np.testing.assert_allclose(found.strains().membrane, strain, rtol=1e-9)
@@ -223,5 +227,11 @@ def test_moments_of_a_sheet_that_is_kept_flat(bending):
     moments = np.einsum("fai,fab,fbj->fij", stresses.rest_axes, stresses.bending_moments, stresses.rest_axes)
     wanted = -modulus * (0.7 * bent + 0.3 * np.trace(bent) * np.diag([1.0, 1.0, 0.0]))
     # A hinge has no angle at the border, and nothing there to be held by: inside only.
-    inside = ~np.isin(np.arange(len(mesh.faces)), mesh.edge_faces[mesh.boundary_edges].ravel()) if bending == "hinge" else slice(None)
-    np.testing.assert_allclose(moments[inside], np.broadcast_to(wanted, moments.shape)[inside], atol=1e-9 * modulus)
+    inside = (
+        ~np.isin(np.arange(len(mesh.faces)), mesh.edge_faces[mesh.boundary_edges].ravel())
+        if bending == "hinge"
+        else slice(None)
+    )
+    np.testing.assert_allclose(
+        moments[inside], np.broadcast_to(wanted, moments.shape)[inside], atol=1e-9 * modulus
+    )

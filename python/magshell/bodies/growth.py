@@ -20,7 +20,7 @@ class Growth:
         self._rows, self._axes = rows, axes
 
     def checked(self, name: str, given, before: np.ndarray | None = None) -> np.ndarray:
-        """A number, (n,), (3, 3) or (n, 3, 3) as it was given; of the shape of what was there `before`. Raises ValueError."""
+        """A number, (n,), (3, 3) or (n, 3, 3), as it was given; of the shape of what was `before`. Raises ValueError."""
         label, n = f"{name} [{UNITS[name]}]", len(self._axes)
         array = real_numbers(label, given)
         if array.shape not in ((), (n,), (3, 3), (n, 3, 3)):

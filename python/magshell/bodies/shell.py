@@ -47,12 +47,12 @@ class Shell(Owner):
         tensor as above, np.outer(d, d) / R bends along d; in lengths as they have grown. Positive where normals lean
         together. None: nothing is added, and no solve can.
 
-    Growth changes what stretching and bending are measured from, and the area whose energy they are; an even one leaves the
-    angles of a curved rest shape as they are, so that it scales the shape (in general its second fundamental form is
-    multiplied by the root of det G). Everything else stays: thickness is that of the grown sheet; mass, weight, magnetization
-    and area loads are those of the mesh, and the magnetization stretches with the sheet, grown or not. Both may change
-    along ms.follow and in ms.simulate. With "hinge" both faces of an edge share one angle, their mean, and free edges have
-    none.
+    Growth changes what stretching and bending are measured from, and the area whose energy they are; an even one leaves
+    the angles of a curved rest shape as they are, so that it scales the shape (in general its second fundamental form is
+    multiplied by the root of det G). Everything else stays: thickness is that of the grown sheet; mass, weight,
+    magnetization and area loads are those of the mesh, and the magnetization stretches with the sheet, grown or not. Both
+    may change along ms.follow and in ms.simulate. With "hinge" both faces of an edge share one angle, their mean, and free
+    edges have none.
 
     Which one: an element of "midedge2" costs about eight times a face of "midedge", and needs far fewer of them. Where
     deflections and loads are wanted to a percent or better, and where sheets are curved at rest or twist, take "midedge2"
@@ -184,7 +184,9 @@ class Shell(Owner):
     def has_grown(self) -> bool:
         """Whether its rest shape is under stress by itself."""
         without = {"growth": np.eye(2), "rest_curvature": np.zeros((2, 2))}
-        return any((self._growth.in_faces(getattr(self, name)) != without[name]).any() for name in self._in_time)
+        return any(
+            (self._growth.in_faces(getattr(self, name)) != without[name]).any() for name in self._in_time
+        )
 
     @property
     def grown_by(self) -> np.ndarray:

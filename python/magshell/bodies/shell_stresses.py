@@ -112,7 +112,9 @@ def _axes(rest: np.ndarray, grown: np.ndarray, now: np.ndarray) -> tuple[np.ndar
     """Two unit vectors in each face, (n_f, 2, 3), at rest and turned as the face is, of corners (n_f, 3, 3) m, where it has
     grown (n_f, 2, 2) in these axes."""
     axes = corner_axes(rest)
-    flat = grown @ np.einsum("fai,fki->fak", axes, rest[:, 1:] - rest[:, :1])  # columns are the edges in these axes
+    flat = grown @ np.einsum(
+        "fai,fki->fak", axes, rest[:, 1:] - rest[:, :1]
+    )  # columns are the edges in these axes
     gradients = np.einsum("fki,fkb->fib", now[:, 1:] - now[:, :1], np.linalg.inv(flat))
     stretches = _square_roots(np.einsum("fia,fib->fab", gradients, gradients))
     turned = np.einsum("fib,fba->fai", gradients, np.linalg.inv(stretches))

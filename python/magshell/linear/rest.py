@@ -99,8 +99,8 @@ def refuse_what_acts(inputs: Inputs) -> None:
     for body in map(inputs.values.current, inputs.scene._bodies.sheets):
         if body.has_grown:
             raise ValueError(
-                f"{body!r} has grown or bent at rest, and its rest shape is no equilibrium then: ms.equilibrium and ms.follow "
-                "have it, and ms.vibration_modes about their result"
+                f"{body!r} has grown or bent at rest, and its rest shape is no equilibrium then: ms.equilibrium and "
+                "ms.follow have it, and ms.vibration_modes about their result"
             )
     for k, muscle in enumerate(muscles_in(inputs.scene)):
         states = FibreStates(*_core.fibre_states(model, k, model.rest_state(), None))

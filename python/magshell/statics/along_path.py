@@ -32,7 +32,7 @@ class AlongPath:
         if fixed := [name for owner, name in differ if (owner, name) not in can]:
             raise ValueError(
                 f"start has another {fixed[0]} than the path, which cannot change on its way; what can is the place of "
-                "field sources, obstacles and supports, pressures, what acts in joints, activations of muscles and growth of sheets"
+                "field sources, obstacles and supports, pressures, what acts in joints, activations of muscles and growth"
             )
         every = list(self._layout)
         self.entries = [every.index(key) for key in differ]
