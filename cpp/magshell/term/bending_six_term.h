@@ -74,6 +74,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void inside(Index pack, const double* q, Pack f[9]) const;
     Vec9 rest_angles(Index face) const;
     void grow();
+    void add_growth_vjp(const double* q, const double* lambda, Gradient& out) const;
     GrownFace::ByNatural strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
                                            const Vec9& inside) const;
     void begin_strains(const double* q) { store_folds(q); }
