@@ -11,6 +11,7 @@
 #include "magshell/linalg/build_info.h"
 #include "magshell/linalg/factor.h"
 #include "magshell/linalg/low_rank_factor.h"
+#include "magshell/linalg/residual.h"
 
 namespace magshell::bindings {
 namespace {
@@ -61,11 +62,7 @@ class SharedFactor {
     }
 
     FactorReport factorize(const Array& values, const Eigen::MatrixXd& columns, const VectorXd& stiffness) {
-        if (values.ndim() != 1 || values.size() != entries_) {
-            throw InvalidInput("values must have one axis and an entry for each of the " +
-                               std::to_string(entries_) + " rows of the pattern, got " +
-                               std::to_string(values.size()));
-        }
+        check_values(values);
         const py::gil_scoped_release release;
         const std::unique_lock lock(mutex_);
         if (columns.cols() > 0 && (columns.rows() != factor_->size() || columns.cols() != stiffness.size()))
@@ -98,9 +95,26 @@ class SharedFactor {
         return result;
     }
 
+    VectorXd residual(const Array& values, const VectorXd& x, const VectorXd& rhs) const {
+        check_values(values);
+        if (x.size() != factor_->size() || rhs.size() != factor_->size())
+            throw InvalidInput("the solution and the right-hand side must have shape (" +
+                               std::to_string(factor_->size()) + ",), got " + std::to_string(x.size()) +
+                               " and " + std::to_string(rhs.size()));
+        const py::gil_scoped_release release;
+        return magshell::residual(*factor_->pattern(), values.data(), x, rhs);
+    }
+
     const Factor& factor() const { return *factor_; }
 
   private:
+    void check_values(const Array& values) const {
+        if (values.ndim() == 1 && values.size() == entries_) return;
+        throw InvalidInput("values must have one axis and an entry for each of the " +
+                           std::to_string(entries_) + " rows of the pattern, got " +
+                           std::to_string(values.size()));
+    }
+
     py::ssize_t entries_;
     std::unique_ptr<Factor> factor_;
     LowRankFactor* bordered_ = nullptr;  // factor_, once there were columns
@@ -137,6 +151,10 @@ void register_linalg(py::module_& module) {
              "columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T.")
         .def("solve", &SharedFactor::solve, py::arg("rhs"),
              "The solution for the right-hand side (n,) or (n, k).")
+        .def("residual", &SharedFactor::residual, py::arg("values"), py::arg("solution"), py::arg("rhs"),
+             "rhs (n,) minus the matrix with these values (nnz,) times a solution (n,), added up in as many "
+             "digits as the "
+             "machine has.")
         .def_property_readonly("name", [](const SharedFactor& f) { return f.factor().name(); })
         .def_property_readonly("size", [](const SharedFactor& f) { return f.factor().size(); })
         .def_property_readonly(

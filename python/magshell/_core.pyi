@@ -117,6 +117,15 @@ class Factor:
         """
         The solution for the right-hand side (n,) or (n, k).
         """
+    def residual(
+        self,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        solution: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        rhs (n,) minus the matrix with these values (nnz,) times a solution (n,), added up in as many digits as the machine has.
+        """
     @property
     def bytes(self) -> int: ...
     @property

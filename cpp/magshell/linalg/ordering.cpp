@@ -1,9 +1,9 @@
 #include "magshell/linalg/ordering.h"
 
-#include <Eigen/OrderingMethods>
 #include <mutex>
 
 #include "magshell/core/errors.h"
+#include "magshell/linalg/approximate_degree.h"
 #include "magshell/linalg/nested_dissection.h"
 #ifdef MAGSHELL_HAS_CHOLMOD
 #include "magshell/linalg/cholmod_workspace.h"
@@ -12,17 +12,7 @@
 namespace magshell {
 namespace {
 
-std::vector<Index> eigen_amd(const SparsePattern& pattern) {
-    const std::vector<double> values(pattern.rows.size(), 1.0);
-    const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::ColMajor, Index>> lower(
-        pattern.size, pattern.size, static_cast<Index>(pattern.rows.size()), pattern.column_starts.data(),
-        pattern.rows.data(), values.data());
-    const Eigen::SparseMatrix<double, Eigen::ColMajor, Index> matrix = lower;
-    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, Index> permutation;
-    Eigen::AMDOrdering<Index>()(matrix.selfadjointView<Eigen::Lower>(), permutation);
-    return {permutation.indices().begin(), permutation.indices().end()};
-}
-
+#ifdef MAGSHELL_HAS_CHOLMOD
 // Nodes in the order of the first of their unknowns.
 std::vector<Index> nodes_in_order(const Quotient& quotient, const std::vector<Index>& unknowns) {
     std::vector<Index> node_of(unknowns.size()), order;
@@ -38,7 +28,6 @@ std::vector<Index> nodes_in_order(const Quotient& quotient, const std::vector<In
     return order;
 }
 
-#ifdef MAGSHELL_HAS_CHOLMOD
 std::vector<Index> metis(const SparsePattern& pattern) {
     static std::mutex one_at_a_time;  // METIS keeps the state of its random numbers in a global variable
     const std::lock_guard lock(one_at_a_time);
@@ -49,10 +38,6 @@ std::vector<Index> metis(const SparsePattern& pattern) {
         throw InvalidInput("METIS could not order the matrix");
     return order;
 }
-#else
-std::vector<Index> metis(const SparsePattern&) {
-    throw InvalidInput("magshell was built without METIS; use the ordering \"best\"");
-}
 #endif
 
 }  // namespace
@@ -60,12 +45,16 @@ std::vector<Index> metis(const SparsePattern&) {
 AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, const FactorOptions& options) {
     if (pattern.size == 0) return {};
     const Quotient quotient = quotient_graph(pattern);
-    const auto by_amd = [&] { return assembly_tree(quotient, nodes_in_order(quotient, eigen_amd(pattern))); };
+    const NodeGraph graph = node_graph(quotient, options.points);
+    const auto by_amd = [&] {
+        return assembly_tree(quotient, approximate_minimum_degree(graph, options.watch));
+    };
     if (options.ordering == Ordering::amd) return by_amd();
+#ifdef MAGSHELL_HAS_CHOLMOD
     if (options.ordering == Ordering::metis)
         return assembly_tree(quotient, nodes_in_order(quotient, metis(pattern)));
-    AssemblyTree dissection =
-        assembly_tree(quotient, nested_dissection(node_graph(quotient, options.points), options.watch));
+#endif
+    AssemblyTree dissection = assembly_tree(quotient, nested_dissection(graph, options.watch));
     if (options.ordering == Ordering::dissection) return dissection;
     // AMD takes longer than a factorization. It does better than nested dissection where cuts are short
     // beside the whole, on narrow strips above all, and may where nothing is known but the pattern.

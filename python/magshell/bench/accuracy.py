@@ -26,7 +26,7 @@ SINGLE_SOLVES: dict[str, tuple[Callable[[], Outcome], int]] = {
 }
 
 
-ROUNDS_BESIDE = 7  # beside NGSolve: few meshes, and short calls
+ROUNDS_BESIDE = 12  # beside NGSolve: few meshes, and short calls
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

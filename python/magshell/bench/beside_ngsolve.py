@@ -15,7 +15,6 @@ from .cases.plates import SQUARE, square_plate
 from .cases.shear_strip import end_shear
 from .ratios import note
 from .report import bar, print_table
-from .timing import with_share
 
 BOUND = 1e-3
 GOAL = 0.7  # of NGSolve's time
@@ -109,13 +108,13 @@ def _ways(case: Case, irregular: bool) -> dict[int, Callable]:
 
     def ours(mesh) -> Tried | None:
         try:
-            run, share = with_share(lambda: case.run(mesh, "midedge2", irregular=moved))
+            run = case.run(mesh, "midedge2", irregular=moved)
         except ms.NotConverged:
             return None
         errors = [comparison.error for comparison in run.comparisons]
         if len(case.parts) == 1:
-            return Tried(mesh, (max(errors),), (run.time * share,))
-        return Tried(mesh, tuple(errors), tuple(share * each for each in run.times))
+            return Tried(mesh, (max(errors),), (run.time,))
+        return Tried(mesh, tuple(errors), run.times)
 
     def theirs(order: int):
         def run(mesh) -> Tried | None:

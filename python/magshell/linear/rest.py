@@ -10,6 +10,7 @@ from ..bodies.muscle_result import FibreStates, muscles_in
 from ..scene.inputs import Inputs
 
 _ROUND_OFF = 1e-9  # of a muscle's strength
+_SMALL = 20000  # unknowns, for which the better of two orderings takes longer than it saves one factorization
 
 
 class RestStiffness:
@@ -30,7 +31,7 @@ class RestStiffness:
         self.rest = self._model.rest_state()
         refuse_what_acts(inputs)
         *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())
-        self._factor = _core.analyze(*self._pattern, points=self._model.free_points)
+        self._factor = self._analysed()
         report = self._factor.factorize(self._values)
         if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
             raise ValueError(
@@ -50,18 +51,17 @@ class RestStiffness:
 
     def negative_directions(self, change: np.ndarray) -> int:
         """How many negative eigenvalues K plus a change of its values has, by another factorization."""
-        return (
-            _core.analyze(*self._pattern, points=self._model.free_points)
-            .factorize(self._values + change)
-            .negative_pivots
-        )
+        return self._analysed().factorize(self._values + change).negative_pivots
+
+    def _analysed(self) -> _core.Factor:
+        ordering = "amd" if self._pattern[0] <= _SMALL else "best"
+        return _core.analyze(*self._pattern, points=self._model.free_points, ordering=ordering)
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """u (n,) of K u = forces (n,), refined once with a residual of more digits: where stiffnesses differ by 1e6, the
         order of elimination would decide what is left of the soft ones' digits."""
         solution = self._factor.solve(forces)
-        residual = forces - self.matrix.astype(np.longdouble) @ solution.astype(np.longdouble)
-        return solution + self._factor.solve(residual.astype(np.float64))
+        return solution + self._factor.solve(self._factor.residual(self._values, solution, forces))
 
     def response(self, inputs: Inputs, at_rest: np.ndarray | None = None) -> np.ndarray:
         """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports and motors move.
