@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from .._checks.scalars import positive
-from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from ._gmsh_session import gmsh_session
 from ._grid import check_size
@@ -30,7 +30,7 @@ _ON_BOUNDARY = 1e-7  # of the outline's extent: a slit that ends this close to t
 
 def outline(
     outer, holes: Sequence = (), slits: Sequence = (), *, size: float, order: int = 1
-) -> TriangleMesh | SixNodeMesh:
+) -> TriangleMesh | Any:
     """The sheet inside a polygon in the plane z = 0, its normal along +z. Needs the extra `gmsh`.
 
     Args:
