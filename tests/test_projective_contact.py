@@ -1,4 +1,4 @@
-"""Coulomb's law node by node in Projective Dynamics ([Qiao21] 5), and the time step at which an unsplit scheme diverges."""
+"""Coulomb's law in Projective Dynamics ([Qiao21] 5), and the time step at which an unsplit scheme diverges."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ import magshell as ms
 
 GRAVITY = 9.81
 SIZE = 0.02
+REACH = 3e-4
 
 
 def block(poisson_ratio=0.3, young_modulus=5e4, cells=(3, 3, 2)):
@@ -166,3 +167,82 @@ def test_what_it_refuses():
     )
     with pytest.raises(ValueError, match="hold vertices entirely"):
         ms.simulate(guided, integrator=method, **given)
+
+
+def pushed_together(friction, velocity=(0.0, 0.0, -0.5), **contact):
+    """A block flies against another; nothing else acts. Their distance is the reach of the contact."""
+    lower = block(poisson_ratio=0.0)
+    x = lower.mesh.rest_positions + np.array((1.3e-3, 0.7e-3, 0.5 * SIZE + 6e-4))
+    upper = ms.Solid(
+        ms.TetMesh(x, lower.mesh.tetrahedra), material=lower.material, mass_density=1e3, element="linear"
+    )
+    touching = ms.Contact(lower, upper, reach=REACH, friction_coefficient=friction, **contact)
+    scene = ms.Scene([lower, upper], contacts=[touching], allow_rigid_motions=True)
+    start = np.zeros((scene.mesh.n_vertices, 3))
+    start[lower.mesh.n_vertices :] = velocity
+    return scene, lower, upper, start
+
+
+def of_body(body, values):
+    return (body.vertex_masses[:, None] * values).sum(axis=-2)
+
+
+def nearest(scene, move) -> float:
+    """J: the largest energy that the contact's own barrier would have: none where nothing is nearer than its reach."""
+    controls, rotations = scene._control_layout.zeros(), np.zeros(scene.mesh.n_edges)
+    states = [scene._model.state(x, rotations) for x in move.positions]
+    return max(scene._model.energies(q, controls)["body contact"] for q in states)
+
+
+@pytest.mark.parametrize("friction", [None, 0.3])
+def test_bodies_exchange_momentum_and_gain_no_energy(friction):
+    scene, lower, upper, start = pushed_together(friction, (0.1, 0.0, -0.5))
+    method = ms.ProjectiveDynamics(contact="coulomb")
+    move = ms.simulate(scene, velocities=start, steps=12, time_step=5e-4, integrator=method, progress=False)
+    n = lower.mesh.n_vertices
+    first = of_body(lower, move.velocities[:, :n])
+    second = of_body(upper, move.velocities[:, n:])
+    assert np.abs(first[-1, 2]) > 0.2 * np.abs(second[0, 2])  # it was pushed
+    assert np.abs(first + second - second[0]).max() < 1e-9 * np.abs(second[0]).max()
+    energy = move.kinetic_energy + sum(move.energies.values())
+    assert np.diff(energy).max() < 1e-9 * energy[0]
+    assert nearest(scene, move) < 1e-12 * energy[0]
+
+
+@pytest.mark.parametrize("sticks", [True, False])
+def test_a_block_sticks_or_slides_on_another(sticks):
+    """Gravity leans by an angle: it stays where friction's is larger, else all of that friction brakes it."""
+    angle = 0.4
+    friction = (1.2 if sticks else 0.5) * np.tan(angle)
+    lower = block(poisson_ratio=0.0, cells=(2, 2, 1))
+    small = ms.meshes.box((0.6 * SIZE, 0.6 * SIZE, 0.3 * SIZE), cells=(2, 2, 1))
+    x = small.rest_positions + np.array((2.3e-3, 3.1e-3, 0.5 * SIZE + 1.02 * REACH))
+    upper = ms.Solid(
+        ms.TetMesh(x, small.tetrahedra), material=lower.material, mass_density=1e3, element="linear"
+    )
+    scene = ms.Scene(
+        [lower, upper],
+        supports=[ms.Pin(lower.mesh.vertices_at(z=lower.mesh.rest_positions[:, 2].min()), body=lower)],
+        contacts=[ms.Contact(lower, upper, reach=REACH, friction_coefficient=friction)],
+        gravity=GRAVITY * np.array([np.sin(angle), 0.0, -np.cos(angle)]),
+        allow_rigid_motions=True,
+    )
+    time_step = 2e-3
+    move = moved(scene, 30, time_step)
+    place = of_body(upper, move.positions[:, lower.mesh.n_vertices :]) / upper.vertex_masses.sum()
+    force = (np.diff(place, 2, axis=0) / time_step**2 - scene.gravity)[5:]
+    if sticks:
+        assert np.abs(place[-1] - place[-10]).max() < 1e-5 * SIZE
+        assert (force[:, 0] < friction * force[:, 2]).all()
+    else:
+        # What lies below leans a little, and the normals with it.
+        assert np.abs(force[:, 0] + friction * force[:, 2]).max() < 1e-3 * GRAVITY
+        steady = GRAVITY * (np.sin(angle) - friction * np.cos(angle))
+        assert np.diff(place[5:, 0], 2).mean() / time_step**2 == pytest.approx(steady, rel=1e-2)
+
+
+def test_other_coefficients_of_what_sticks_are_refused():
+    scene, *_ = pushed_together(0.3, static_friction_coefficient=0.5)
+    method = ms.ProjectiveDynamics(contact="coulomb")
+    with pytest.raises(ValueError, match="static_friction_coefficient"):
+        ms.simulate(scene, steps=1, time_step=1e-3, integrator=method, progress=False)

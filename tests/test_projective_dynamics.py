@@ -232,20 +232,6 @@ def test_a_motion_has_the_same_bits_in_parts_and_on_any_threads():
         ms.set_num_threads(before)
 
 
-def test_what_it_cannot_do_is_named():
-    given = {"steps": 1, "time_step": 1e-3, "progress": False}
-    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1))
-    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)  # with edge rotations
-    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
-    with pytest.raises(ValueError, match="edge rotations"):
-        ms.simulate(scene, integrator=ms.ProjectiveDynamics(), **given)
-    a, b = bar(MATERIALS["Projective"]), bar(MATERIALS["Projective"])
-    scene = ms.Scene([a, b], contacts=[ms.Contact(a, b)], allow_rigid_motions=True)
-    start = np.concatenate([a.mesh.rest_positions, b.mesh.rest_positions + np.array([0, 0, 0.03])])
-    with pytest.raises(ValueError, match="contact energy"):
-        ms.simulate(scene, integrator=ms.ProjectiveDynamics(), start=start, **given)
-
-
 @pytest.mark.parametrize(
     "bad, words",
     [

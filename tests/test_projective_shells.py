@@ -1,4 +1,4 @@
-"""Shells with hinges by Projective Dynamics: steps of implicit Euler, beside solids and on obstacles; gradients."""
+"""Shells by Projective Dynamics: steps of implicit Euler, beside solids and on obstacles; gradients."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ import torch
 
 import magshell as ms
 
+BENDINGS = ("hinge", "midedge", "midedge2")
 
-def sheet(**options) -> ms.Shell:
-    mesh = ms.meshes.rectangle(0.06, 0.02, cells=(6, 2))
+
+def sheet(bending="hinge", cells=(6, 2), **options) -> ms.Shell:
+    mesh = ms.meshes.rectangle(0.06, 0.02, cells=cells, order=2 if bending == "midedge2" else 1)
     own = {"thickness": 1e-3, "young_modulus": 1e5, "poisson_ratio": 0.3, "mass_density": 1e3, **options}
-    return ms.Shell(mesh, bending="hinge", **own)
+    return ms.Shell(mesh, bending=bending, **own)
 
 
 def both(scene, **options):
@@ -24,9 +26,10 @@ def both(scene, **options):
     )
 
 
+@pytest.mark.parametrize("bending", BENDINGS)
 @pytest.mark.parametrize("thickness", [1e-3, 3e-4])
-def test_a_flag_falls_as_newton_has_it(thickness):
-    flag = sheet(thickness=thickness)
+def test_a_flag_falls_as_newton_has_it(thickness, bending):
+    flag = sheet(bending, thickness=thickness)
     scene = ms.Scene(flag, supports=[ms.Clamp(flag.mesh.edges_at(x=0.0))], gravity=(0, 1.0, -9.81))
     found, exact = both(scene)
     assert np.abs(exact.displacements[-1]).max() > 2e-3
@@ -35,7 +38,8 @@ def test_a_flag_falls_as_newton_has_it(thickness):
     assert found.factorizations <= 2
 
 
-def test_a_curved_sheet_in_a_field():
+@pytest.mark.parametrize("bending", BENDINGS[:2])
+def test_a_curved_sheet_in_a_field(bending):
     """A roof, magnetized along: its rest shape has folds."""
     roof = ms.meshes.rectangle(0.06, 0.02, cells=(6, 2))
     x = roof.rest_positions.copy()
@@ -46,7 +50,7 @@ def test_a_curved_sheet_in_a_field():
         young_modulus=1e5,
         poisson_ratio=0.3,
         mass_density=1e3,
-        bending="hinge",
+        bending=bending,
         remanent_magnetization=(3e4, 0, 0),
     )
     ends = shell.mesh.edges_at(x=0.0)
@@ -73,8 +77,35 @@ def test_a_sheet_that_lands_beside_a_block():
     assert np.abs(found.positions - exact.positions).max() < 1e-7 * 0.06
 
 
-def test_gradients_are_those_of_newton():
-    flag = sheet()
+@pytest.mark.parametrize("bending", BENDINGS[1:])
+def test_what_bends_far_stays_soft(bending):
+    """A flag that hangs down from one end: when it has turned by a right angle, a step takes as many rounds as at first."""
+    flag = sheet(bending, cells=(6, 1), young_modulus=1e4)
+    scene = ms.Scene(flag, supports=[ms.Clamp(flag.mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    given = {"time_step": 5e-3, "progress": False, "integrator": ms.ProjectiveDynamics(2000, 1e-10)}
+    first = ms.simulate(scene, steps=6, **given)
+    whole = ms.simulate(scene, steps=40, **given)
+    assert whole.positions[-1, :, 2].min() < -0.03
+    assert (whole.iterations - first.iterations) / 34 < 2.0 * first.iterations / 6
+
+
+def test_on_a_slanted_support_beside_edge_rotations():
+    """Nodes that are eliminated densely and rotations in one matrix."""
+    turn = np.array([[0.8, 0, -0.6], [0, 1.0, 0], [0.6, 0, 0.8]])
+    flat = ms.meshes.rectangle(0.06, 0.02, cells=(6, 2))
+    leaning = flat.transformed(rotation=turn)
+    shell = ms.Shell(
+        leaning, thickness=1e-3, young_modulus=1e5, poisson_ratio=0.3, mass_density=1e3, bending="midedge"
+    )
+    mirror = ms.SymmetryPlane(turn[:, 0])
+    scene = ms.Scene(shell, supports=[mirror], gravity=(0, 1.0, -9.81), allow_rigid_motions=True)
+    found, exact = both(scene)
+    assert np.abs(found.positions - exact.positions).max() < 1e-8 * 0.06
+
+
+@pytest.mark.parametrize("bending", BENDINGS)
+def test_gradients_are_those_of_newton(bending):
+    flag = sheet(bending)
     scene = ms.Scene(flag, supports=[ms.Clamp(flag.mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
     found = []
     for integrator in (ms.ProjectiveDynamics(2000, 1e-12), ms.ImplicitEuler()):
@@ -86,3 +117,26 @@ def test_gradients_are_those_of_newton():
         found.append(float(modulus.grad))
     assert found[0] == pytest.approx(found[1], rel=1e-6)
     assert found[1] != 0.0
+
+
+def test_gradients_of_edge_rotations_over_200_steps():
+    """Against differences."""
+    flag = sheet("midedge", cells=(4, 1))
+    scene = ms.Scene(flag, supports=[ms.Clamp(flag.mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+
+    def end(thickness):
+        return ms.simulate(
+            scene,
+            steps=200,
+            time_step=2e-3,
+            integrator=ms.ProjectiveDynamics(2000, 1e-12),
+            thickness=thickness,
+            record_every=200,
+            progress=False,
+        ).positions[-1]
+
+    thickness = torch.tensor(1e-3, dtype=torch.float64, requires_grad=True)
+    end(thickness)[:, 2].sum().backward()
+    step = 1e-8
+    sums = [float(np.asarray(end(1e-3 + sign * step))[:, 2].sum()) for sign in (1, -1)]
+    assert float(thickness.grad) == pytest.approx((sums[0] - sums[1]) / (2 * step), rel=1e-5)

@@ -6,7 +6,7 @@
 namespace magshell {
 
 void NodeMatrix::finish() {
-    for (Index node = 0; node < nodes_; ++node) entries_.push_back({node, node, 0.0});
+    for (Index point = 0; point < points_; ++point) entries_.push_back({point, point, 0.0});
     // Stable, so that sums do not depend on how sorting goes about it.
     std::stable_sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
         return std::tie(a.column, a.row) < std::tie(b.column, b.row);
@@ -30,7 +30,7 @@ void NodeMatrix::finish() {
 
 VectorXd NodeMatrix::times(const VectorXd& x) const {
     VectorXd y = VectorXd::Zero(x.size());
-    for (Index j = 0; j < nodes_; ++j) {
+    for (Index j = 0; j < points_; ++j) {
         Index k = column_starts_[j];
         const Vec3 own = x.segment<3>(3 * j);
         Vec3 sum = values_[k] * own;

@@ -1,18 +1,22 @@
 // A symmetric matrix of the nodes, the same along x, y and z: what Projective Dynamics has for stiffness.
+//
+// A scalar, an edge rotation, has a point beside the nodes. Of the three numbers of that point one is there: the part along
+// the normal of the sheet, wherever that points.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "magshell/core/types.h"
 
 namespace magshell {
 
-/// Entries are added in any order, a pair of nodes any number of times; finish() makes columns of them.
+/// Entries are added in any order, a pair of points any number of times; finish() makes columns of them.
 class NodeMatrix {
   public:
-    explicit NodeMatrix(Index nodes = 0) : nodes_(nodes) {}
+    explicit NodeMatrix(Index nodes = 0, Index scalars = 0) : nodes_(nodes), points_(nodes + scalars) {}
 
-    void add_diagonal(Index node, double value) { entries_.push_back({node, node, value}); }
+    void add_diagonal(Index point, double value) { entries_.push_back({point, point, value}); }
     /// Adds to (i, j) and to (j, i), which are the same place where one node takes two of an element.
     void add_pair(Index i, Index j, double value) {
         entries_.push_back({i < j ? i : j, i < j ? j : i, i == j ? 2.0 * value : value});
@@ -20,12 +24,27 @@ class NodeMatrix {
     void finish();
 
     Index nodes() const { return nodes_; }
+    /// Nodes first, then scalars.
+    Index points() const { return points_; }
+    Index scalars() const { return points_ - nodes_; }
+    Index point(Index scalar) const { return nodes_ + scalar; }
+
+    /// A face beside a scalar, by its corners: the scalar's normal is the mean of those of its faces.
+    struct Beside {
+        Index scalar;
+        std::array<Index, 3> corners;
+    };
+    void add_beside(Index scalar, const std::array<Index, 3>& corners) {
+        beside_.push_back({scalar, corners});
+    }
+    const std::vector<Beside>& beside() const { return beside_; }
+
     /// The lower triangle by columns, every diagonal entry among them, first in its column.
     const std::vector<Index>& column_starts() const { return column_starts_; }
     const std::vector<Index>& rows() const { return rows_; }
     const std::vector<double>& values() const { return values_; }
 
-    /// The product with x, three numbers a node.
+    /// The product with x, three numbers a point.
     VectorXd times(const VectorXd& x) const;
 
   private:
@@ -33,10 +52,46 @@ class NodeMatrix {
         Index column, row;
         double value;
     };
-    Index nodes_;
+    Index nodes_, points_;
     std::vector<Entry> entries_;
+    std::vector<Beside> beside_;
     std::vector<Index> column_starts_, rows_;
     std::vector<double> values_;
+};
+
+/// Sums of a few points' places, of which an element's stiffness C makes J^T C J.
+class NodeRows {
+  public:
+    explicit NodeRows(std::size_t count) : rows_(count) {}
+    void add(std::size_t row, Index point, double value) { rows_[row].push_back({point, value}); }
+    /// stiffness(r, s): C.
+    template <class Stiffness>
+    void add_to(NodeMatrix& out, const Stiffness& stiffness) const {
+        for (std::size_t r = 0; r < rows_.size(); ++r)
+            for (std::size_t s = 0; s <= r; ++s) {
+                const double factor = stiffness(static_cast<int>(r), static_cast<int>(s));
+                if (r == s)
+                    add_square(out, rows_[r], factor);
+                else
+                    for (const Part& a : rows_[r])
+                        for (const Part& b : rows_[s])
+                            out.add_pair(a.point, b.point, factor * a.value * b.value);
+            }
+    }
+
+  private:
+    struct Part {
+        Index point;
+        double value;
+    };
+    static void add_square(NodeMatrix& out, const std::vector<Part>& row, double factor) {
+        for (std::size_t a = 0; a < row.size(); ++a) {
+            out.add_diagonal(row[a].point, factor * row[a].value * row[a].value);
+            for (std::size_t b = 0; b < a; ++b)
+                out.add_pair(row[a].point, row[b].point, factor * row[a].value * row[b].value);
+        }
+    }
+    std::vector<std::vector<Part>> rows_;
 };
 
 }  // namespace magshell

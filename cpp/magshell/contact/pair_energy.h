@@ -67,6 +67,8 @@ class PairEnergy {
     int count() const { return nodes_of(pair_.kind); }
     /// N = - dE/dd [N], the force that pushes them apart.
     double normal_force() const { return -edges_.factor * slope_; }
+    /// - dN/dd [N/m]
+    double normal_stiffness() const { return edges_.factor * curvature_; }
     /// dN/dx [N/m]
     PairVectors normal_force_by_place() const;
     PairVectors gradient() const;

@@ -129,7 +129,7 @@ void Model::hand_out_values() {
 }
 
 NodeMatrix Model::surrogate() const {
-    NodeMatrix sum(nodes().n_nodes());
+    NodeMatrix sum(nodes().n_nodes(), nodes().scalars);
     // Dampers act on few coordinates, whose stiffness in a step secants learn.
     for (const std::unique_ptr<Term>& term : terms_)
         if (term.get() != damper_term_ && !term->add_surrogate(sum))

@@ -162,6 +162,8 @@ class Model {
     NodeMatrix surrogate() const;
     /// What the obstacles that are touched at the last evaluated state add on the nodes [N/m].
     VectorXd touching_stiffness() const;
+    /// What the pairs of bodies that touch there add, in a time step.
+    std::vector<PairStiffness> touching_pairs() const;
     /// Counts changes of the values.
     int values_version() const { return values_version_; }
 

@@ -66,6 +66,14 @@ void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const S
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
 }
 
+std::vector<PairStiffness> Model::touching_pairs() const {
+    std::vector<PairStiffness> pairs;
+    if (!body_contact_) return pairs;
+    body_contact_->add_stiffness(pairs);
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_stiffness(kinematics_, pairs);
+    return pairs;
+}
+
 void Model::add_cancelling_forces_here(bool in_motion, VectorXd& out) const {
     for (const BorderTerm* term : borders_) term->add_cancelling_here(out);
     if (contact_) contact_->add_cancelling_normal_forces(out);

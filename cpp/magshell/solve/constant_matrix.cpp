@@ -14,14 +14,19 @@ constexpr std::size_t most_special = 2000;
 }  // namespace
 
 ConstantMatrix::ConstantMatrix(const Model& model)
-    : model_(model), version_(model.values_version()), stiffness_(model.surrogate()) {
+    : model_(model),
+      version_(model.values_version()),
+      stiffness_(model.surrogate()),
+      normals_(stiffness_.scalars(), Vec3::UnitZ()) {
     const Reduction& reduction = model.reduction();
     const std::vector<Index>& free = reduction.free_unknowns();
-    const Index nodes = model.nodes().n_nodes();
-    if (!free.empty() && free.back() >= 3 * nodes)
-        throw InvalidInput("Projective Dynamics has no constant matrix for edge rotations");
-    std::vector<Index> of_axis[3], place[3];
+    const Index scalars = 3 * stiffness_.nodes();
+    std::vector<Index> of_axis[3], place[3], rotations;
     for (Index k = 0; k < reduction.size(); ++k) {
+        if (k < static_cast<Index>(free.size()) && free[k] >= scalars) {
+            rotations.push_back(k);
+            continue;
+        }
         if (k >= static_cast<Index>(free.size()) || reduction.framed(free[k] / 3)) {
             special_.push_back(k);
             continue;
@@ -35,72 +40,67 @@ ConstantMatrix::ConstantMatrix(const Model& model)
             "are " +
             std::to_string(special_.size()) + " such unknowns: hold them along x, y or z, or entirely");
     for (int axis = 0; axis < 3; ++axis) {
+        for (const Index k : rotations) {
+            of_axis[axis].push_back(stiffness_.point(free[k] - scalars));
+            place[axis].push_back(k);
+        }
         if (of_axis[axis].empty()) continue;
         const auto same = std::find_if(groups_.begin(), groups_.end(),
-                                       [&](const Group& group) { return group.nodes == of_axis[axis]; });
+                                       [&](const Group& group) { return group.points == of_axis[axis]; });
         Group& group = same != groups_.end() ? *same : groups_.emplace_back();
-        group.nodes = of_axis[axis];
+        group.points = of_axis[axis];
         group.axes.push_back(axis);
         group.reduced.push_back(std::move(place[axis]));
     }
-    for (Group& group : groups_) analyse(group);
-    column_of_.assign(nodes, -1);
-    if (groups_.size() == 1 && groups_[0].axes.size() == 3)
-        for (std::size_t k = 0; k < groups_[0].nodes.size(); ++k)
-            column_of_[groups_[0].nodes[k]] = static_cast<Index>(k);
+    for (Group& group : groups_) {
+        group.first = wide_size_;
+        wide_size_ += group.count() * static_cast<Eigen::Index>(group.axes.size());
+        analyse(group);
+    }
 }
 
-bool ConstantMatrix::solves(Index node) const {
-    if (groups_.size() != 1 || groups_[0].axes.size() != 3 || !special_.empty())
+void ConstantMatrix::require_isotropic() const {
+    if (!special_.empty() || groups_.size() > 1 || (groups_.size() == 1 && groups_[0].axes.size() != 3))
         throw InvalidInput(
             "Coulomb's law node by node is for scenes whose supports hold vertices entirely, and without "
-            "rigid parts or "
-            "skeletons");
-    return column_of_[node] >= 0;
+            "rigid parts or skeletons");
 }
 
-const VectorXd& ConstantMatrix::inverse_column(Index node) const {
-    const auto known = inverse_columns_.find(node);
-    if (known != inverse_columns_.end()) return known->second;
-    Eigen::MatrixXd column = Eigen::MatrixXd::Zero(groups_[0].nodes.size(), 1);
-    column(column_of_[node], 0) = 1.0;
-    groups_[0].factor->solve(column);
-    return inverse_columns_.emplace(node, column.col(0)).first->second;
-}
-
-double ConstantMatrix::inverse(Index row, Index column) const {
-    return inverse_column(column)[column_of_[row]];
-}
-
-void ConstantMatrix::add_inverse_column(Index node, const Vec3& vector, VectorXd& full) const {
-    const VectorXd& column = inverse_column(node);
-    for (std::size_t k = 0; k < groups_[0].nodes.size(); ++k)
-        full.segment<3>(3 * groups_[0].nodes[k]) += column[k] * vector;
+const VectorXd& ConstantMatrix::inverse_column(Group& group, Index column) const {
+    const auto known = group.inverse_columns.find(column);
+    if (known != group.inverse_columns.end()) return known->second;
+    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(group.count(), 1);
+    unit(column, 0) = 1.0;
+    group.factor->solve(unit);
+    return group.inverse_columns.emplace(column, unit.col(0)).first->second;
 }
 
 void ConstantMatrix::analyse(Group& group) {
-    std::vector<Index> column(stiffness_.nodes(), -1);
-    for (std::size_t k = 0; k < group.nodes.size(); ++k) column[group.nodes[k]] = static_cast<Index>(k);
+    group.column_of.assign(stiffness_.points(), -1);
+    for (std::size_t k = 0; k < group.points.size(); ++k)
+        group.column_of[group.points[k]] = static_cast<Index>(k);
     auto pattern = std::make_shared<SparsePattern>();
-    pattern->size = static_cast<Index>(group.nodes.size());
+    pattern->size = static_cast<Index>(group.points.size());
     pattern->column_starts.push_back(0);
-    for (const Index node : group.nodes) {
-        for (Index k = stiffness_.column_starts()[node]; k < stiffness_.column_starts()[node + 1]; ++k) {
-            const Index row = column[stiffness_.rows()[k]];
+    for (const Index point : group.points) {
+        for (Index k = stiffness_.column_starts()[point]; k < stiffness_.column_starts()[point + 1]; ++k) {
+            const Index row = group.column_of[stiffness_.rows()[k]];
             if (row < 0) continue;
             pattern->rows.push_back(row);
             group.from.push_back(k);
         }
         pattern->column_starts.push_back(static_cast<Index>(pattern->rows.size()));
     }
+    const std::vector<Vec3> all = model_.bodies().unknown_points();
     std::vector<Vec3> points;
-    for (const Index node : group.nodes) points.push_back(model_.nodes().rest[node]);
+    for (const Index point : group.points)
+        points.push_back(is_scalar(point) ? all[2 * stiffness_.nodes() + point] : model_.nodes().rest[point]);
     group.factor = analyze(std::move(pattern), {.points = std::move(points)});
 }
 
 void ConstantMatrix::set(double scale, const VectorXd& weights, const VectorXd& of_nodes) {
-    VectorXd sum = of_nodes;
-    for (Index node = 0; node < sum.size(); ++node) sum[node] += weights[3 * node];
+    VectorXd sum = VectorXd::Zero(stiffness_.points());
+    for (Index node = 0; node < of_nodes.size(); ++node) sum[node] = of_nodes[node] + weights[3 * node];
     bool same = scale == scale_ && sum == weights_;
     if (version_ != model_.values_version()) {  // perhaps of what does not enter
         version_ = model_.values_version();
@@ -116,13 +116,13 @@ void ConstantMatrix::set(double scale, const VectorXd& weights, const VectorXd& 
 
 void ConstantMatrix::factorize() {
     linearized_ = false;
-    inverse_columns_.clear();
     for (Group& group : groups_) {
+        group.inverse_columns.clear();
         LargeVector<double>& values = group.factor->values();
         for (std::size_t k = 0; k < group.from.size(); ++k)
             values[k] = scale_ * stiffness_.values()[group.from[k]];
         const std::vector<Index>& starts = group.factor->pattern()->column_starts;
-        for (std::size_t k = 0; k < group.nodes.size(); ++k) values[starts[k]] += weights_[group.nodes[k]];
+        for (std::size_t k = 0; k < group.points.size(); ++k) values[starts[k]] += weights_[group.points[k]];
         const FactorReport report = group.factor->factorize();
         ++factorizations_;
         if (!report.succeeded)
@@ -130,68 +130,182 @@ void ConstantMatrix::factorize() {
     }
 }
 
-VectorXd ConstantMatrix::times(const VectorXd& full) const {
-    VectorXd product = VectorXd::Zero(full.size());
-    const Index coordinates = 3 * stiffness_.nodes();
-    product.head(coordinates) = scale_ * stiffness_.times(full.head(coordinates));
-    for (Index node = 0; node < stiffness_.nodes(); ++node)
-        product.segment<3>(3 * node) += weights_[node] * full.segment<3>(3 * node);
+void ConstantMatrix::find_normals(const VectorXd& q) {
+    for (Vec3& normal : normals_) normal.setZero();
+    for (const NodeMatrix::Beside& each : stiffness_.beside()) {
+        const Vec3 x = q.segment<3>(3 * each.corners[0]);
+        const Vec3 across =
+            (q.segment<3>(3 * each.corners[1]) - x).cross(q.segment<3>(3 * each.corners[2]) - x);
+        normals_[each.scalar] += across.normalized();
+    }
+    for (Vec3& normal : normals_)
+        normal = normal.squaredNorm() > 0.0 ? Vec3(normal.normalized()) : Vec3(Vec3::UnitZ());
+}
+
+VectorXd ConstantMatrix::by_point(const VectorXd& full) const {
+    VectorXd points(3 * stiffness_.points());
+    const Index nodes = 3 * stiffness_.nodes();
+    points.head(nodes) = full.head(nodes);
+    for (Index s = 0; s < stiffness_.scalars(); ++s)
+        points.segment<3>(nodes + 3 * s) = full[nodes + s] * normals_[s];
+    return points;
+}
+
+VectorXd ConstantMatrix::times_points(const VectorXd& points) const {
+    VectorXd product = scale_ * stiffness_.times(points);
+    for (Index point = 0; point < stiffness_.points(); ++point)
+        product.segment<3>(3 * point) += weights_[point] * points.segment<3>(3 * point);
     return product;
 }
 
-void ConstantMatrix::linearize() {
-    if (special_.empty() || (linearized_ && !model_.reduction().carries())) return;
+VectorXd ConstantMatrix::times(const VectorXd& full) const {
+    const VectorXd points = times_points(by_point(full));
+    const Index nodes = 3 * stiffness_.nodes();
+    VectorXd product(full.size());
+    product.head(nodes) = points.head(nodes);
+    for (Index s = 0; s < stiffness_.scalars(); ++s)
+        product[nodes + s] = normals_[s].dot(points.segment<3>(nodes + 3 * s));
+    return product;
+}
+
+VectorXd ConstantMatrix::wide_of(const VectorXd& points) const {
+    VectorXd out(wide_size_);
+    for (const Group& group : groups_)
+        for (std::size_t axis = 0; axis < group.axes.size(); ++axis)
+            for (Eigen::Index k = 0; k < group.count(); ++k)
+                out[group.first + static_cast<Eigen::Index>(axis) * group.count() + k] =
+                    points[3 * group.points[k] + group.axes[axis]];
+    return out;
+}
+
+VectorXd ConstantMatrix::wide(const VectorXd& reduced) const {
+    VectorXd out(wide_size_);
+    for (const Group& group : groups_)
+        for (std::size_t axis = 0; axis < group.axes.size(); ++axis)
+            for (Eigen::Index k = 0; k < group.count(); ++k) {
+                const Index point = group.points[k];
+                const double part = is_scalar(point) ? normal(point)[group.axes[axis]] : 1.0;
+                out[group.first + static_cast<Eigen::Index>(axis) * group.count() + k] =
+                    part * reduced[group.reduced[axis][k]];
+            }
+    return out;
+}
+
+void ConstantMatrix::narrow(const VectorXd& wide, VectorXd& reduced) const {
+    if (stiffness_.scalars() > 0)
+        for (const Group& group : groups_)
+            for (Eigen::Index k = 0; k < group.count(); ++k)
+                if (is_scalar(group.points[k])) reduced[group.reduced[0][k]] = 0.0;
+    for (const Group& group : groups_)
+        for (std::size_t axis = 0; axis < group.axes.size(); ++axis)
+            for (Eigen::Index k = 0; k < group.count(); ++k) {
+                const Index point = group.points[k];
+                const double value = wide[group.first + static_cast<Eigen::Index>(axis) * group.count() + k];
+                double& into = reduced[group.reduced[axis][k]];
+                if (is_scalar(point))
+                    into += normal(point)[group.axes[axis]] * value;
+                else
+                    into = value;
+            }
+}
+
+void ConstantMatrix::solve_wide(VectorXd& wide) const {
+    for (const Group& group : groups_) {
+        Eigen::Map<Eigen::MatrixXd> columns(wide.data() + group.first, group.count(),
+                                            static_cast<Eigen::Index>(group.axes.size()));
+        group.factor->solve(columns);
+    }
+}
+
+void ConstantMatrix::linearize(const VectorXd& q) {
+    const bool turns = stiffness_.scalars() > 0;
+    if (turns) find_normals(q);
+    if (special_.empty() || (linearized_ && !turns && !model_.reduction().carries())) return;
     linearized_ = true;
     const Reduction& reduction = model_.reduction();
     const Eigen::Index count = static_cast<Eigen::Index>(special_.size());
-    coupling_.resize(reduction.size(), count);
+    forces_.resize(wide_size_, count);
     Eigen::MatrixXd own(count, count);
     for (Eigen::Index k = 0; k < count; ++k) {
         VectorXd unit = VectorXd::Zero(reduction.size());
         unit[special_[k]] = 1.0;
-        VectorXd image = reduction.vector(times(reduction.expand(unit)));
-        for (Eigen::Index l = 0; l < count; ++l) {
-            own(l, k) = image[special_[l]];
-            image[special_[l]] = 0.0;
-        }
-        coupling_.col(k) = image;
+        const VectorXd points = times_points(by_point(reduction.expand(unit)));
+        VectorXd image = VectorXd::Zero(model_.size());
+        image.head(3 * stiffness_.nodes()) = points.head(3 * stiffness_.nodes());
+        image = reduction.vector(image);
+        for (Eigen::Index l = 0; l < count; ++l) own(l, k) = image[special_[l]];
+        forces_.col(k) = wide_of(points);
     }
-    const Eigen::MatrixXd forces = coupling_;
+    coupling_ = forces_;
     for (Eigen::Index k = 0; k < count; ++k) {
         VectorXd column = coupling_.col(k);
-        solve_plain(column);
+        solve_wide(column);
         coupling_.col(k) = column;
     }
-    schur_.compute(own - forces.transpose() * coupling_);
-}
-
-void ConstantMatrix::solve_plain(VectorXd& reduced) const {
-    for (const Group& group : groups_) {
-        Eigen::MatrixXd columns(group.nodes.size(), group.axes.size());
-        for (std::size_t axis = 0; axis < group.axes.size(); ++axis)
-            for (std::size_t k = 0; k < group.nodes.size(); ++k)
-                columns(k, axis) = reduced[group.reduced[axis][k]];
-        group.factor->solve(columns);
-        for (std::size_t axis = 0; axis < group.axes.size(); ++axis)
-            for (std::size_t k = 0; k < group.nodes.size(); ++k)
-                reduced[group.reduced[axis][k]] = columns(k, axis);
-    }
+    schur_.compute(own - forces_.transpose() * coupling_);
 }
 
 void ConstantMatrix::solve(VectorXd& reduced) const {
-    if (special_.empty()) {
-        solve_plain(reduced);
-        return;
-    }
-    VectorXd of_special(special_.size());
-    for (std::size_t k = 0; k < special_.size(); ++k) {
-        of_special[k] = reduced[special_[k]];
-        reduced[special_[k]] = 0.0;
-    }
-    of_special = schur_.solve(of_special - coupling_.transpose() * reduced).eval();
-    solve_plain(reduced);
-    reduced -= coupling_ * of_special;
+    VectorXd rest = wide(reduced), of_special(special_.size());
+    for (std::size_t k = 0; k < special_.size(); ++k) of_special[k] = reduced[special_[k]];
+    if (!special_.empty()) of_special = schur_.solve(of_special - coupling_.transpose() * rest).eval();
+    solve_wide(rest);
+    if (!special_.empty()) rest -= coupling_ * of_special;
+    narrow(rest, reduced);
     for (std::size_t k = 0; k < special_.size(); ++k) reduced[special_[k]] = of_special[k];
+}
+
+Eigen::MatrixXd ConstantMatrix::compliance(const std::vector<Forces>& of) const {
+    const Eigen::Index count = static_cast<Eigen::Index>(of.size());
+    Eigen::MatrixXd product = Eigen::MatrixXd::Zero(count, count);
+    Eigen::MatrixXd pushed(static_cast<Eigen::Index>(special_.size()), count);  // of the special ones
+    for (Eigen::Index k = 0; k < count && !special_.empty(); ++k) {
+        VectorXd full = VectorXd::Zero(model_.size());
+        for (int i = 0; i < of[k].count; ++i) full.segment<3>(3 * of[k].nodes[i]) += of[k].forces[i];
+        const VectorXd reduced = model_.reduction().vector(full);
+        for (std::size_t l = 0; l < special_.size(); ++l) pushed(l, k) = reduced[special_[l]];
+    }
+    for (Group& group : groups_) {
+        std::vector<Index> columns;  // what is pushed, each once
+        std::vector<std::array<Eigen::Index, 4>> at(of.size());
+        std::map<Index, Eigen::Index> number;
+        for (Eigen::Index k = 0; k < count; ++k)
+            for (int i = 0; i < of[k].count; ++i) {
+                const Index column = group.column_of[of[k].nodes[i]];
+                at[k][i] = -1;
+                if (column < 0) continue;
+                const auto [found, fresh] = number.emplace(column, static_cast<Eigen::Index>(columns.size()));
+                if (fresh) columns.push_back(column);
+                at[k][i] = found->second;
+            }
+        const Eigen::Index pushed_columns = static_cast<Eigen::Index>(columns.size());
+        Eigen::MatrixXd inverse(pushed_columns, pushed_columns);
+        for (Eigen::Index c = 0; c < pushed_columns; ++c) {
+            const VectorXd& column = inverse_column(group, columns[c]);
+            for (Eigen::Index r = 0; r < pushed_columns; ++r) inverse(r, c) = column[columns[r]];
+        }
+        for (std::size_t a = 0; a < group.axes.size(); ++a) {
+            const int axis = group.axes[a];
+            const auto gather = [&](const auto& from, Eigen::Index k, auto&& into) {
+                for (int i = 0; i < of[k].count; ++i)
+                    if (at[k][i] >= 0) into += of[k].forces[i][axis] * from.row(at[k][i]);
+            };
+            Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(count, pushed_columns);
+            for (Eigen::Index k = 0; k < count; ++k) gather(inverse, k, moved.row(k));
+            const Eigen::MatrixXd by_column = moved.transpose();
+            for (Eigen::Index k = 0; k < count; ++k) gather(by_column, k, product.row(k));
+            for (Eigen::Index k = 0; k < count && !special_.empty(); ++k)
+                for (int i = 0; i < of[k].count; ++i)
+                    if (at[k][i] >= 0)
+                        pushed.col(k) -= of[k].forces[i][axis] *
+                                         coupling_
+                                             .row(group.first + static_cast<Eigen::Index>(a) * group.count() +
+                                                  columns[at[k][i]])
+                                             .transpose();
+        }
+    }
+    if (!special_.empty()) product += pushed.transpose() * schur_.solve(pushed);
+    return product;
 }
 
 }  // namespace magshell

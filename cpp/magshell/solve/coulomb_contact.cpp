@@ -1,97 +1,161 @@
 #include "magshell/solve/coulomb_contact.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "magshell/core/errors.h"
 
 namespace magshell {
 
+StandingAside::StandingAside(const Model& model) : model_(model) {
+    stand(true);
+}
+
+void StandingAside::stand(bool aside) const {
+    if (model_.contact()) model_.contact()->stand_aside(aside);
+    if (model_.body_contact()) model_.body_contact()->stand_aside(aside);
+}
+
 CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix, const Controls& controls,
                                const VectorXd& begin, double time)
-    : matrix_(matrix),
+    : model_(model),
+      matrix_(matrix),
       begin_(begin),
       time_(time),
       negligible_(1e-14 * model.extent()),
       forces_(VectorXd::Zero(model.size())) {
-    for (const ContactTerm::Keeping& keeping : model.contact()->keepings())
-        if (matrix.solves(keeping.node))
-            pairs_.push_back({keeping, model.contact()->standing(keeping.obstacle, controls)});
+    matrix.require_isotropic();
+    if (model.body_contact()) model.body_contact()->require_one_coefficient();
+    if (!model.contact()) return;
+    for (const ContactTerm::Keeping& keeping : model.contact()->keepings()) {
+        if (!matrix.solves(keeping.node)) continue;
+        obstacles_.push_back({keeping, model.contact()->standing(keeping.obstacle, controls)});
+        pairs_.push_back({{keeping.node, -1, -1, -1}, 1, {1.0, 0.0, 0.0, 0.0}, keeping.friction});
+    }
 }
 
-// The force on a node that would be at `without` if this pair had none.
-Vec3 CoulombContact::answer(const Pair& pair, const Vec3& from, const Vec3& without, double inverse) const {
-    const double gap = pair.gap + pair.normal.dot(without - from);
+Vec3 CoulombContact::answer(const Pair& pair, const Vec3& ahead, const Vec3& without, double own) const {
+    const double gap = pair.gap + pair.normal.dot(ahead);
     if (!(gap < 0.0)) return Vec3::Zero();
-    const double push = -gap / inverse;
-    const Vec3 slip = without - begin_.segment<3>(3 * pair.keeping.node) - pair.obstacle_move;
-    Vec3 rub = -(slip - pair.normal.dot(slip) * pair.normal) / inverse;
-    const double limit = pair.keeping.friction * push, wanted = rub.norm();
+    const double push = -gap / own;
+    const Vec3 slip = without - pair.of(begin_) - pair.carried;
+    Vec3 rub = -(slip - pair.normal.dot(slip) * pair.normal) / own;
+    const double limit = pair.friction * push, wanted = rub.norm();
     if (wanted > limit) rub *= limit / wanted;
     return push * pair.normal + rub;
 }
 
-double CoulombContact::look(const VectorXd& q) {
-    double off = 0.0;
-    for (Pair& pair : pairs_) {
-        const Vec3 x = q.segment<3>(3 * pair.keeping.node);
-        const Distance at = pair.obstacle.distance(x);
-        pair.gap = at.value - pair.keeping.offset;
+void CoulombContact::look_at_obstacles(const VectorXd& q) {
+    for (std::size_t k = 0; k < obstacles_.size(); ++k) {
+        Pair& pair = pairs_[k];
+        const Vec3 x = q.segment<3>(3 * pair.nodes[0]);
+        const Distance at = obstacles_[k].obstacle.distance(x);
+        pair.gap = at.value - obstacles_[k].keeping.offset;
         pair.normal = at.normal;
-        pair.obstacle_move = time_ * pair.obstacle.velocity(x);
-        if (pair.force.isZero(0.0)) {
-            off = std::max(off, -pair.gap);
-            continue;
-        }
-        const double own = matrix_.inverse(pair.keeping.node, pair.keeping.node);
-        off = std::max(off, own * (answer(pair, x, x - own * pair.force, own) - pair.force).norm());
+        pair.carried = time_ * obstacles_[k].obstacle.velocity(x);
+    }
+}
+
+// What is near changes; the forces stay with their pairs.
+void CoulombContact::look_at_bodies(const VectorXd& q) {
+    if (!model_.body_contact()) return;
+    using Key = std::array<Index, 6>;
+    const auto key = [](const NearPair& near) {
+        const std::array<Index, 4>& n = near.pair.nodes;
+        return Key{near.contact, static_cast<Index>(near.pair.kind), n[0], n[1], n[2], n[3]};
+    };
+    std::map<Key, Vec3> pushed;
+    for (std::size_t k = 0; k < between_.size(); ++k)
+        if (const Pair& pair = pairs_[obstacles_.size() + k]; !pair.force.isZero(0.0))
+            pushed[key(between_[k].near)] = pair.force;
+    between_ = model_.body_contact()->hard_pairs(q.data());
+    std::erase_if(between_, [&](const BodyContactTerm::HardPair& each) {
+        return std::none_of(each.near.pair.nodes.begin(), each.near.pair.nodes.end(),
+                            [&](Index node) { return node >= 0 && matrix_.solves(node); });
+    });
+    pairs_.erase(pairs_.begin() + static_cast<std::ptrdiff_t>(obstacles_.size()), pairs_.end());
+    for (const BodyContactTerm::HardPair& each : between_) {
+        Pair& pair = pairs_.emplace_back(Pair{each.near.pair.nodes, nodes_of(each.near.pair.kind),
+                                              each.at.weights, each.friction, each.gap, each.at.normal});
+        if (const auto found = pushed.find(key(each.near)); found != pushed.end()) pair.force = found->second;
+    }
+}
+
+Eigen::MatrixXd CoulombContact::compliance(const std::vector<std::size_t>& of) const {
+    std::vector<ConstantMatrix::Forces> columns;
+    for (const std::size_t k : of) {
+        ConstantMatrix::Forces& column = columns.emplace_back();
+        column.nodes = pairs_[k].nodes;
+        column.count = pairs_[k].count;
+        for (int i = 0; i < column.count; ++i) column.forces[i] = pairs_[k].weights[i] * Vec3::UnitX();
+    }
+    return matrix_.compliance(columns);
+}
+
+double CoulombContact::look(const VectorXd& q) {
+    look_at_obstacles(q);
+    look_at_bodies(q);
+    double off = 0.0;
+    std::vector<std::size_t> pushing;
+    for (std::size_t k = 0; k < pairs_.size(); ++k)
+        if (pairs_[k].force.isZero(0.0))
+            off = std::max(off, -pairs_[k].gap);
+        else
+            pushing.push_back(k);
+    const VectorXd own = compliance(pushing).diagonal();
+    for (std::size_t a = 0; a < pushing.size(); ++a) {
+        const Pair& pair = pairs_[pushing[a]];
+        const Vec3 back = -own[a] * pair.force;
+        off = std::max(off, own[a] * (answer(pair, back, pair.of(q) + back, own[a]) - pair.force).norm());
     }
     return off;
 }
 
+void CoulombContact::push(VectorXd& move) {
+    VectorXd now = VectorXd::Zero(forces_.size());
+    for (const Pair& pair : pairs_)
+        for (int i = 0; i < pair.count; ++i)
+            now.segment<3>(3 * pair.nodes[i]) += pair.weights[i] * pair.force;
+    VectorXd change = model_.reduction().vector(now - forces_);
+    forces_ = std::move(now);
+    if (change.isZero(0.0)) return;
+    matrix_.solve(change);
+    move += model_.reduction().expand(change);
+}
+
 void CoulombContact::settle(const VectorXd& q, VectorXd& move) {
-    constexpr int most_sweeps = 50;
-    const auto reach = [&](Index node) { return Vec3(q.segment<3>(3 * node) + move.segment<3>(3 * node)); };
-    std::vector<Vec3> change(pairs_.size(), Vec3::Zero());
-    for (int round = 0; round < most_sweeps; ++round) {
+    constexpr int most_rounds = 50, most_sweeps = 200;
+    push(move);  // closest points have moved
+    for (int round = 0; round < most_rounds; ++round) {
         // Those that push, and those that would go in.
         std::vector<std::size_t> active;
+        bool more_go_in = false;
         for (std::size_t k = 0; k < pairs_.size(); ++k) {
             const Pair& pair = pairs_[k];
-            const Vec3 x = q.segment<3>(3 * pair.keeping.node);
-            if (!pair.force.isZero(0.0) || pair.gap + pair.normal.dot(reach(pair.keeping.node) - x) < 0.0)
-                active.push_back(k);
+            const bool pushes = !pair.force.isZero(0.0);
+            const double gap = pair.gap + pair.normal.dot(pair.of(move));
+            if (pushes || gap < 0.0) active.push_back(k);
+            more_go_in |= !pushes && gap < -negligible_;
         }
-        std::vector<Vec3> places;
-        for (const std::size_t k : active) places.push_back(reach(pairs_[k].keeping.node));
+        if (round > 0 && !more_go_in) return;
+        const Eigen::MatrixXd between = compliance(active);
+        std::vector<Vec3> ahead;  // of where they are at q
+        for (const std::size_t k : active) ahead.push_back(pairs_[k].of(move));
         for (int sweep = 0; sweep < most_sweeps; ++sweep) {
             double moved = 0.0;
             for (std::size_t a = 0; a < active.size(); ++a) {
                 Pair& pair = pairs_[active[a]];
-                const Index node = pair.keeping.node;
-                const double own = matrix_.inverse(node, node);
-                const Vec3 now = answer(pair, q.segment<3>(3 * node), places[a] - own * pair.force, own);
-                const Vec3 more = now - pair.force;
+                const double own = between(a, a);
+                const Vec3 without = ahead[a] - own * pair.force;
+                const Vec3 more = answer(pair, without, pair.of(q) + without, own) - pair.force;
                 if (more.isZero(0.0)) continue;
-                for (std::size_t b = 0; b < active.size(); ++b)
-                    places[b] += matrix_.inverse(pairs_[active[b]].keeping.node, node) * more;
-                pair.force = now;
-                change[active[a]] += more;
+                for (std::size_t b = 0; b < active.size(); ++b) ahead[b] += between(b, a) * more;
+                pair.force += more;
                 moved = std::max(moved, own * more.norm());
             }
             if (moved <= negligible_) break;
         }
-        for (const std::size_t k : active) {
-            if (change[k].isZero(0.0)) continue;
-            matrix_.add_inverse_column(pairs_[k].keeping.node, change[k], move);
-            forces_.segment<3>(3 * pairs_[k].keeping.node) += change[k];
-            change[k].setZero();
-        }
-        const bool all = std::none_of(pairs_.begin(), pairs_.end(), [&](const Pair& pair) {
-            const Vec3 x = q.segment<3>(3 * pair.keeping.node);
-            return pair.force.isZero(0.0) &&
-                   pair.gap + pair.normal.dot(reach(pair.keeping.node) - x) < -negligible_;
-        });
-        if (all) return;
+        push(move);
     }
 }
 

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "magshell/solve/anderson.h"
-#include "magshell/solve/coulomb_contact.h"
 #include "magshell/solve/secants.h"
 
 namespace magshell {
@@ -19,22 +18,16 @@ constexpr double law_tolerance = 1e-10;
 // Points that begin or cease to touch make another matrix, which is looked for now and then.
 constexpr int rounds_between_looks = 5;
 
-// The penalty of obstacles is off while it lives.
-class StandingAside {
-  public:
-    explicit StandingAside(ContactTerm& contact) : contact_(contact) { contact_.stand_aside(true); }
-    StandingAside(const StandingAside&) = delete;
-    StandingAside& operator=(const StandingAside&) = delete;
-    ~StandingAside() { contact_.stand_aside(false); }
-
-  private:
-    ContactTerm& contact_;
-};
-
 }  // namespace
 
 ProjectiveSolver::ProjectiveSolver(Newton& newton, const ProjectiveOptions& options)
-    : newton_(newton), model_(newton.model()), options_(options), matrix_(newton.model()) {}
+    : newton_(newton),
+      model_(newton.model()),
+      options_(options),
+      matrix_(newton.model()),
+      touching_(newton.model(), matrix_) {
+    if (options.coulomb) aside_.emplace(model_);
+}
 
 VectorXd ProjectiveSolver::reduced_gradient(const VectorXd& q, const Anchor& anchor) const {
     return model_.reduction().vector(newton_.gradient(q, anchor));
@@ -52,18 +45,17 @@ bool ProjectiveSolver::touches_otherwise(const Anchor& anchor, VectorXd& before)
     return changed;
 }
 
-void ProjectiveSolver::prepare(const Anchor& anchor, double scale) {
+void ProjectiveSolver::prepare(const VectorXd& q, const Anchor& anchor, double scale) {
     const int factorized = matrix_.factorizations();
     matrix_.set(scale, *anchor.weights, model_.touching_stiffness());
     newton_.count_factorizations(matrix_.factorizations() - factorized);
-    matrix_.linearize();
+    matrix_.linearize(q);
 }
 
 NewtonReport ProjectiveSolver::solve(VectorXd& q, const Controls& controls, const Anchor& anchor,
                                      double scale) {
-    if (!options_.coulomb || !model_.has_contact()) return solve_rounds(q, controls, anchor, scale);
-    const StandingAside aside(*model_.contact());
-    return solve_touching(q, controls, anchor, scale);
+    const bool touches = options_.coulomb && (model_.has_contact() || model_.has_body_contact());
+    return touches ? solve_touching(q, controls, anchor, scale) : solve_rounds(q, controls, anchor, scale);
 }
 
 NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& controls, const Anchor& anchor,
@@ -77,7 +69,7 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
     const Reduction& reduction = model_.reduction();
     VectorXd move = reduction.prescribed_increment(q, controls);
     newton_.evaluate(q, controls, anchor);
-    prepare(anchor, scale);
+    prepare(q, anchor, scale);
     Secants secants(options_.history);
     VectorXd touched = model_.touching_stiffness();
     VectorXd gradient = reduced_gradient(q, anchor);
@@ -98,17 +90,18 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
                         std::to_string(report.residual));
         if (report.iterations % rounds_between_looks == rounds_between_looks - 1 &&
             touches_otherwise(anchor, touched)) {
-            prepare(anchor, scale);
+            prepare(q, anchor, scale);
             secants.clear();
         }
+        touching_.set(model_.touching_pairs());
         VectorXd direction = -gradient;
         if (!in_place) direction -= reduction.vector(matrix_.times(move));
-        secants.solve(direction, [&](VectorXd& rhs) { matrix_.solve(rhs); });
+        secants.solve(direction, [&](VectorXd& rhs) { touching_.solve(rhs); });
         double slope = -gradient.dot(direction);
         if (in_place && !(slope > 0.0) && !secants.empty()) {
             secants.clear();
             direction = -gradient;
-            matrix_.solve(direction);
+            touching_.solve(direction);
             slope = -gradient.dot(direction);
         }
         const VectorXd from = q;
@@ -133,11 +126,12 @@ NewtonReport ProjectiveSolver::solve_touching(VectorXd& q, const Controls& contr
         return report;
     };
     const Reduction& reduction = model_.reduction();
-    const VectorXd first_move = reduction.prescribed_increment(q, controls);
-    reduction.advance(q, first_move);
+    VectorXd first_move = reduction.prescribed_increment(q, controls);
+    if (const double share = newton_.advance(q, first_move, shortest_share, report); share < 1.0)
+        return fail(share < 0.0 ? report.reason : "what supports move is in the way of another body");
     if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
     newton_.evaluate(q, controls, anchor);
-    prepare(anchor, scale);
+    prepare(q, anchor, scale);
     CoulombContact contact(model_, matrix_, controls, *anchor.motion->x_hat, anchor.motion->time);
     VectorXd target = *anchor.target;
     const Anchor pushed{anchor.weights, &target, anchor.motion};

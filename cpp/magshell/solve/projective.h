@@ -8,13 +8,16 @@
 //
 // with the residual r of implicit Euler that Newton has too: a quasi-Newton step. So terms evaluate their forces, which is
 // the local step, and any energy will do for which a constant L is stiff enough. The last few steps correct the matrix
-// (solve/secants.h), and a step ends where the energy has begun to rise along it.
+// (solve/secants.h), and a step ends where the energy has begun to rise along it. Bodies that touch each other are stiff,
+// and nothing of them is constant: they add to the matrix in every round (solve/touching_matrix.h).
 #pragma once
 
 #include <memory>
+#include <optional>
 
-#include "magshell/solve/constant_matrix.h"
+#include "magshell/solve/coulomb_contact.h"
 #include "magshell/solve/newton.h"
+#include "magshell/solve/touching_matrix.h"
 
 namespace magshell {
 
@@ -23,7 +26,7 @@ struct ProjectiveOptions {
     int iterations = 0;      // at most; without a tolerance just so many
     double tolerance = 0.0;  // of the residual, as Newton's; 0: none
     int history = 0;         // pairs of secants; 0: the rounds as they are
-    bool coulomb = false;    // obstacles are hard, with Coulomb's law: solve/coulomb_contact.h
+    bool coulomb = false;    // contact is hard, with Coulomb's law: solve/coulomb_contact.h
 };
 
 class ProjectiveSolver {
@@ -40,13 +43,15 @@ class ProjectiveSolver {
     NewtonReport solve_touching(VectorXd& q, const Controls& controls, const Anchor& anchor, double scale);
     /// Whether what obstacles add has changed by much since it was `before`, which then is what it is now.
     bool touches_otherwise(const Anchor& anchor, VectorXd& before) const;
-    void prepare(const Anchor& anchor, double scale);
+    void prepare(const VectorXd& q, const Anchor& anchor, double scale);
     VectorXd reduced_gradient(const VectorXd& q, const Anchor& anchor) const;
 
     Newton& newton_;
     Model& model_;
     ProjectiveOptions options_;
     ConstantMatrix matrix_;
+    TouchingMatrix touching_;
+    std::optional<StandingAside> aside_;  // with Coulomb's law
 };
 
 }  // namespace magshell

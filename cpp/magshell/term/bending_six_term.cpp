@@ -27,7 +27,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
     : StrainScaffold(sheet.n_faces()),
       sheet_(sheet),
       body_(body),
-      nodes_(nodes.n_nodes()),
+      nodes_(nodes),
       first_scalar_(nodes.first_scalar()),
       chunks_(chunks),
       loop_(sheet.own_nodes, chunks, matrix),
@@ -89,7 +89,7 @@ double BendingSixTerm::turn_from(Index fold, int point, double angle) const {
 }
 
 void BendingSixTerm::store_folds(const double* q) {
-    state_.assign(q, q + 3 * nodes_);
+    state_.assign(q, q + 3 * nodes_.n_nodes());
     chunks_.each([&](const Chunk& chunk) {
         for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, chunk.last_fold);

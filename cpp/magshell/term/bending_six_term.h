@@ -32,6 +32,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    bool add_surrogate(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
@@ -82,6 +83,8 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void strain(Index pack, const double* q, Pack d[9]) const;
     void rate(Index pack, const double* p, Pack d[9]) const;
     const Symmetric9& stiffness(Index pack) const { return stiffness_[pack]; }
+    /// Of each fold at rest, at both points, how its angle goes with its nodes along a normal of both of its sides.
+    std::vector<std::array<std::array<double, 9>, 2>> slopes_at_rest() const;
     void store_folds(const double* q);
     void store_rates(const double* p);
     double moment(const FoldSixStencil& fold, int point, const Strains& stress) const;
@@ -90,7 +93,9 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
                         SystemMatrix& out) const;
 
     const SixNodeSheet& sheet_;
-    const Index body_, nodes_, first_scalar_;
+    const Index body_;
+    const Nodes& nodes_;
+    const Index first_scalar_;
     const ChunkLoop& chunks_;
     ElementLoop<6> loop_;
     SheetMaterials materials_;

@@ -1,5 +1,5 @@
 // What Projective Dynamics has in the place of a sheet's bending stiffness: J^T C J at rest with slopes of folds along their
-// normals alone, taken for all three directions. Edge rotations have no place in it.
+// normals alone, taken for all three directions.
 #include "magshell/assembly/folds.h"
 #include "magshell/term/bending_term.h"
 
@@ -26,30 +26,19 @@ std::vector<std::array<double, 4>> BendingTerm::slopes_at_rest() const {
 
 bool BendingTerm::add_surrogate(NodeMatrix& out) const {
     const std::vector<std::array<double, 4>> slopes = slopes_at_rest();
-    struct Entry {
-        Index node;
-        double slope;
-        int side;
-    };
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const Symmetric3& stiffness = stiffness_[f / Pack::width];
-        const int lane = f % Pack::width;
-        std::vector<Entry> entries;
+        NodeRows rows(3);
         for (int i = 0; i < 3; ++i) {
             const FaceSide& side = sheet_.sides[f][i];
             for (int k = 0; k < 4 && side.fold >= 0; ++k)
-                entries.push_back({sheet_.folds[side.fold].nodes[k],
-                                   static_cast<double>(side.weight) * slopes[side.fold][k], i});
+                rows.add(i, sheet_.folds[side.fold].nodes[k],
+                         static_cast<double>(side.weight) * slopes[side.fold][k]);
+            if (side.rotation < 0) continue;
+            rows.add(i, out.point(side.rotation), side.sign);
+            out.add_beside(side.rotation, sheet_.corners[f]);
         }
-        for (std::size_t a = 0; a < entries.size(); ++a)
-            for (std::size_t b = 0; b <= a; ++b) {
-                const double value =
-                    stiffness(entries[a].side, entries[b].side)[lane] * entries[a].slope * entries[b].slope;
-                if (a == b)
-                    out.add_diagonal(entries[a].node, value);
-                else
-                    out.add_pair(entries[a].node, entries[b].node, value);
-            }
+        rows.add_to(out, [&](int r, int s) { return stiffness(r, s)[f % Pack::width]; });
     }
     return true;
 }

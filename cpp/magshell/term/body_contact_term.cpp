@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "magshell/contact/continuous.h"
+#include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
 
 namespace magshell {
@@ -118,6 +119,40 @@ double BodyContactTerm::curvature(const double* p) const {
     return sum;
 }
 
+void BodyContactTerm::add_stiffness(std::vector<PairStiffness>& out) const {
+    for (const Touch& touch : touching()) {
+        const double stiffness = touch.at.normal_stiffness();
+        const Proximity& near = touch.at.near();
+        if (stiffness > 0.0)
+            out.push_back({touch.near.pair.nodes, touch.at.count(), near.weights,
+                           stiffness * near.normal * near.normal.transpose()});
+    }
+}
+
+// Where edges are nearly parallel their closest points are anywhere, and where one's is an end, that end and a face are near.
+std::vector<BodyContactTerm::HardPair> BodyContactTerm::hard_pairs(const double* q) const {
+    std::vector<HardPair> hard;
+    for (const NearPair& near : candidates_.near(q)) {
+        const bool edges = near.pair.kind == PairKind::edge_edge;
+        if (!edges && near.pair.kind != PairKind::point_triangle) continue;
+        const PairPlaces x = places_of(near.pair, q);
+        if (edges && !((x[1] - x[0]).cross(x[3] - x[2]).squaredNorm() > near.pair.parallel)) continue;
+        const Proximity at = proximity(near.pair.kind, x);
+        if (edges && at.free < 2) continue;
+        const BarrierLaw law = near.pair.scaled(laws_[near.contact]);
+        hard.push_back({near, at, at.distance - law.reach - law.thickness, friction_[near.contact].kinetic});
+    }
+    return hard;
+}
+
+void BodyContactTerm::require_one_coefficient() const {
+    for (const FrictionLaw& law : friction_)
+        if (law.fixed != law.kinetic)
+            throw InvalidInput(
+                "Coulomb's law node by node has one coefficient of friction: take no "
+                "static_friction_coefficient");
+}
+
 std::string BodyContactTerm::hardest() const {
     const Touch* most = nullptr;
     for (const Touch& touch : touching())
@@ -132,13 +167,14 @@ std::pair<double, std::string> BodyContactTerm::nearest_neighbours(Index contact
 }
 
 double BodyContactTerm::energy(const double* q, const Controls&) const {
+    if (aside_) return 0.0;
     double total = 0.0;
     for (const Touch& touch : *found(q)) total += touch.at.energy();
     return total;
 }
 
 void BodyContactTerm::evaluate(const double* q, const Controls&, Residual& out) {
-    touching_ = found(q);
+    touching_ = aside_ ? std::make_shared<const std::vector<Touch>>() : found(q);
     for (const Touch& touch : *touching_) {
         const PairVectors gradient = touch.at.gradient();
         for (int k = 0; k < touch.at.count(); ++k)

@@ -16,6 +16,7 @@
 #include "magshell/contact/pair_energy.h"
 #include "magshell/force/friction.h"
 #include "magshell/term/contact_candidates.h"
+#include "magshell/term/pair_stiffness.h"
 #include "magshell/term/term.h"
 
 namespace magshell {
@@ -34,7 +35,7 @@ class BodyContactTerm final : public Term {
                     const std::vector<BodyContactInput>& contacts, ContactLayer& layer, Registry& registry);
 
     /// The pairs that touch at q, always in the same order; and those at the last evaluated state.
-    std::vector<Touch> touches(const double* q) const { return *found(q); }
+    std::vector<Touch> touches(const double* q) const { return aside_ ? std::vector<Touch>() : *found(q); }
     const std::vector<Touch>& touching() const { return *touching_; }
     /// Whether any pair touches at q.
     bool acts(const double* q) const { return !found(q)->empty(); }
@@ -43,6 +44,21 @@ class BodyContactTerm final : public Term {
     double slope(const double* q, const double* p) const { return slope(*found(q), p); }
     double slope(const double* p) const { return slope(touching(), p); }
     double curvature(const double* p) const;
+    /// Of the pairs that touch at the last evaluated state, along their normals.
+    void add_stiffness(std::vector<PairStiffness>& out) const;
+    /// From now on, until told otherwise, nothing touches: somebody else keeps bodies apart. Steps pass none all the same.
+    void stand_aside(bool aside) const { aside_ = aside; }
+    /// A pair as hard contact has it: kept at the distance at which the law begins.
+    struct HardPair {
+        NearPair near;
+        Proximity at;
+        double gap;  // [m] that is left to that
+        double friction;
+    };
+    /// Those near each other at q: points and triangles, and edges that cross.
+    std::vector<HardPair> hard_pairs(const double* q) const;
+    /// Throws InvalidInput where what sticks has another coefficient of friction than what slides.
+    void require_one_coefficient() const;
     /// The faces that push each other hardest at the last evaluated state, in words; empty: none touch.
     std::string hardest() const;
     /// The neighbours along a surface that a contact has nearest each other at rest: [m], and in words; endlessly far and
@@ -75,7 +91,6 @@ class BodyContactTerm final : public Term {
     /// The layer couples these as well, whether they still touch or not, until others take their place.
     void keep_coupled(const std::vector<Touch>& touches);
 
-    bool add_surrogate(NodeMatrix&) const override { return false; }
     std::string_view name() const override { return "body contact"; }
     bool set_values(const Values& values) override;
     bool refuses_states() const override { return true; }
@@ -123,6 +138,7 @@ class BodyContactTerm final : public Term {
     Touches touching_ = std::make_shared<const std::vector<Touch>>();
     std::vector<ContactLayer::Group> kept_;
     bool cautious_ = false;
+    mutable bool aside_ = false;
     // Assemblies since anything touched, and since the layer couples what it couples; what it has coupled ahead of its
     // touching then, as a share of the margin: little, as it fills the factorization, but more where pairs change fast.
     mutable int untouched_ = 0, assembled_ = often;

@@ -51,6 +51,12 @@ void BodyFrictionTerm::assemble(const Kinematics& at, const Controls&, bool caut
     }
 }
 
+void BodyFrictionTerm::add_stiffness(const Kinematics& at, std::vector<PairStiffness>& out) const {
+    for (const Rub& each : rubbing_)
+        out.push_back({each.touch->near.pair.nodes, each.touch->at.count(), each.touch->at.near().weights,
+                       -at.rate * each.friction.friction().secant});
+}
+
 void BodyFrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambda, KinematicsGradient& by,
                            Gradient& out) const {
     for (const Rub& each : rubbing_) {

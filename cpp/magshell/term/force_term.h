@@ -9,6 +9,7 @@
 #pragma once
 
 #include "magshell/assembly/remainder.h"
+#include "magshell/term/pair_stiffness.h"
 #include "magshell/term/term.h"
 
 namespace magshell {
@@ -49,6 +50,9 @@ class ForceTerm {
     /// exact derivatives, where there is such a thing.
     virtual void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
                           Remainder& rest) const = 0;
+
+    /// Of pairs that touch, at the last evaluated state: what never overshoots.
+    virtual void add_stiffness(const Kinematics& /*at*/, std::vector<PairStiffness>& /*out*/) const {}
 
     /// At the last evaluated state: adds lambda . df/dv, lambda . df/dw and lambda . df/d(begin) to `by`, and
     /// - lambda . df/dk to the gradient.

@@ -14,25 +14,27 @@ class ProjectiveDynamics:
 
     The matrix is M/dt^2 + L, L a constant in the place of the stiffness, the same along x, y, z: of `ms.Projective` solids
     that of Bouaziz et al. 2014, of other solids with their modulus of waves at rest, 2 mu + lam (Liu, Bouaziz, Kavan 2017),
-    which is slower where they get much stiffer; of shells with bending="hinge" that of waves in their plane, and their
-    bending as it is at rest, which takes more rounds the thinner they are. A round then is a quasi-Newton step on the
-    residual of ms.ImplicitEuler, corrected by the last few steps (L-BFGS); converged, a step is that of ms.ImplicitEuler. A
-    muscle adds w m m^T to L, its stiffness or peak stress along its fibres. Loads, fields, water, cells, cavities, tendons,
-    joints and obstacles act as they do there, without a share in L; what is stiff among them takes more rounds, and a
-    history.
+    which is slower where they get much stiffer; of shells that of waves in their plane, and their bending as it is at rest,
+    edge rotations with it, along normals that turn with the sheet. It takes more rounds the thinner they are, and with
+    bending="midedge" as many as with "hinge". A round then is a quasi-Newton step on the residual of ms.ImplicitEuler,
+    corrected by the last few steps (L-BFGS); converged, a step is that of ms.ImplicitEuler. A muscle adds w m m^T to L, its
+    stiffness or peak stress along its fibres. Bodies that touch each other or themselves add the stiffness of the pairs
+    that touch to the solution with the matrix in every round; of more than 1000 such numbers, the stiffest. Loads, fields,
+    water, cells, cavities, tendons, joints and obstacles act as they do there, without a share in L; what is stiff among
+    them takes more rounds, and a history.
 
     iterations: rounds of a step, at most.
     tolerance: of the residual, relative to the forces that cancel in it, as Newton's. A step that does not reach it is taken
         in halves. None: every step takes just `iterations` rounds, whatever is left; such steps have no gradient.
     history: steps that L-BFGS goes by, and Anderson's acceleration with contact="coulomb"; 0: the rounds as they are.
-    contact: with obstacles. "penalty": as ms.Contact says, as in the other integrators. "coulomb": hard, by Coulomb's law
-        node by node, static and kinetic, in every round ([Qiao21] 5; Ly et al. 2020): vertices keep just `offset` of
-        ms.Contact, its stiffness, smoothing and sticking speed do not count. Such motions have no gradient: forces jump
-        where points touch, stick or slip. It takes supports that hold vertices entirely, and no rigid parts.
+    contact: "penalty": as each ms.Contact and ms.SelfContact says, as in the other integrators. "coulomb": hard, by
+        Coulomb's law, in every round ([Qiao21] 5; Ly et al. 2020): of obstacles vertices keep just the `offset`; bodies keep
+        the reach and the minimal distance together from each other, by vertices and faces and by edges that cross.
+        Stiffness, smoothing and sticking speed do not count. Such motions have no gradient: forces jump where points touch,
+        stick or slip. It takes supports that hold vertices entirely, no rigid parts, no points on faces (`face_samples`) and one
+        coefficient of friction.
 
     Gradients are those of the solved step, by the exact Hessian: as of every integrator, and as exact as the tolerance.
-    Shells with edge rotations ("midedge", "midedge2") and contacts between bodies have no constant matrix here: they raise
-    ValueError.
 
     >>> import magshell as ms
     >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
