@@ -28,9 +28,12 @@ std::ptrdiff_t panel_place(const FrontShape& front, Index row, bool is_pivot, In
 
 void place_entries(const SparsePattern& pattern, AssemblyPlan& plan) {
     std::vector<Index> position(pattern.size), front_of(pattern.size), local_row(pattern.size);
-    for (Index k = 0; k < pattern.size; ++k) position[plan.order[k]] = k;
     for (Index s = 0; s < plan.front_count(); ++s) {
-        std::fill_n(front_of.begin() + plan.fronts[s].shape.first, plan.fronts[s].shape.pivots, s);
+        const FrontShape& front = plan.fronts[s].shape;
+        for (Index k = front.first; k < front.first + front.pivots; ++k) {
+            position[plan.order[k]] = k;
+            front_of[plan.order[k]] = s;
+        }
     }
 
     // Sorted by front: for now, with an entry's column in the matrix for its place.
@@ -39,7 +42,7 @@ void place_entries(const SparsePattern& pattern, AssemblyPlan& plan) {
     const auto each_entry = [&](auto&& visit) {
         for (Index j = 0; j < pattern.size; ++j)
             for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k)
-                visit(front_of[std::min(position[j], position[pattern.rows[k]])], PlacedEntry{k, j});
+                visit(std::min(front_of[j], front_of[pattern.rows[k]]), PlacedEntry{k, j});
     };
     each_entry([&](Index front, const PlacedEntry&) { ++next[front + 1]; });
     for (std::size_t s = 0; s + 1 < next.size(); ++s) next[s + 1] += next[s];
