@@ -39,6 +39,15 @@ def test_one_motion_does_what_the_search_did(swim) -> None:
     assert np.array_equal(swim["found"]["positions"][-1], swim["search"].state.positions[-1])
 
 
+def test_without_gradients_plans_are_only_tried(example) -> None:
+    swim = example.Swim.of(example.CHANNELS["pipe I"], 40, gradients=False)
+    asked, objective = [], swim.objective
+    swim.objective = lambda field, *rest: asked.append(field.requires_grad) or objective(field, *rest)
+    found = swim.solve()
+    assert found.trials == len(asked) == 11 and not any(asked)
+    assert found.reached == 40 and found.evaluations == 0 and found.controls[:, 0].any()
+
+
 def test_it_stays_in_the_pipe_and_the_field_in_its_limit(swim) -> None:
     assert swim["found"]["deepest"] < 1e-4
     assert np.abs(swim["found"]["field"]).max() <= 50e-3

@@ -136,7 +136,7 @@ def _about(name: str, result: dict) -> str:
         (
             f"{name}: {steps} steps, {search.controls.numel()} unknowns; passed when all is beyond {end:.0f} mm",
             *(_about_motion(LABELS[which], result[which]) for which in COLORS),
-            f"  searched for {search.reached} steps, in {len(search.searches)} horizons: {search.trials} controls tried, "
+            f"  searched for {search.reached} steps: {search.trials} controls tried, {len(search.searches)} searches with "
             f"{search.evaluations} gradients over {with_gradient} steps in all",
             f"  {result['processor_time']:.0f} s of processor time; a motion {forward:.2f} ms a step without gradient",
             f"  [Chen22] Table 1: {theirs} iterations, {seconds / theirs:.0f} s each on six cores",

@@ -21,6 +21,7 @@ WATER = 1e3  # kg/m3, [Chen22] 6.3: as heavy as the octopus, which therefore flo
 
 HORIZON, STRIDE = 400, 200  # steps that are looked at, and that are then done
 TRIALS, ITERATIONS = 5, 2  # of every horizon: plans tried before its search, and steps of the search
+ONLY_TRIALS = 10  # where there is no search: as many motions in all, a gradient counted as one
 SWING, PERIODS = 12e-3, (100, 400)  # T, of Bx, and steps: the trials' swings
 
 EVEN, EVEN_FREQUENCY = 6e-3, 4.0  # T and Hz, of the swing that the field found is compared with
@@ -37,6 +38,7 @@ class Swim:
 
     goal: m, where along x the mass center is asked to be at the end; its path leads there evenly.
     noise: m, of every coordinate in the start, drawn with this seed.
+    gradients: whether there is a search, or trials only.
     """
 
     body: Octopus
@@ -46,6 +48,7 @@ class Swim:
     noise: float = 0.0
     seed: int = 0
     precision: float = PRECISION
+    gradients: bool = True
 
     @classmethod
     def of(cls, channel: Channel, steps: int, **options) -> Swim:
@@ -143,12 +146,12 @@ class Swim:
             stride=STRIDE,
             lower=-FIELD_LIMIT,
             upper=FIELD_LIMIT,
-            trials=TRIALS,
+            trials=TRIALS if self.gradients else ONLY_TRIALS,
             spread=(SWING, 0.0, 0.0),
             periods=PERIODS,
             seed=self.seed,
             optimizer=_lbfgs,
-            max_iterations=ITERATIONS,
+            max_iterations=ITERATIONS if self.gradients else 0,
             until=lambda motion: self.passed(motion.positions).size > 0,
             progress=progress,
         )
