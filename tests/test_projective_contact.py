@@ -171,7 +171,7 @@ def test_what_it_refuses():
 
 def pushed_together(friction, velocity=(0.0, 0.0, -0.5), **contact):
     """A block flies against another; nothing else acts. Their distance is the reach of the contact."""
-    lower = block(poisson_ratio=0.0)
+    lower = block(poisson_ratio=0.0, cells=(2, 2, 1))
     x = lower.mesh.rest_positions + np.array((1.3e-3, 0.7e-3, 0.5 * SIZE + 6e-4))
     upper = ms.Solid(
         ms.TetMesh(x, lower.mesh.tetrahedra), material=lower.material, mass_density=1e3, element="linear"

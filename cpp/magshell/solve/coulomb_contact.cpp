@@ -125,6 +125,7 @@ void CoulombContact::push(VectorXd& move) {
 
 void CoulombContact::settle(const VectorXd& q, VectorXd& move) {
     constexpr int most_rounds = 50, most_sweeps = 200;
+    constexpr double settled = 1e-4;  // of the first sweep: the next round moves the nodes anyway
     push(move);  // closest points have moved
     for (int round = 0; round < most_rounds; ++round) {
         // Those that push, and those that would go in.
@@ -141,6 +142,7 @@ void CoulombContact::settle(const VectorXd& q, VectorXd& move) {
         const Eigen::MatrixXd between = compliance(active);
         std::vector<Vec3> ahead;  // of where they are at q
         for (const std::size_t k : active) ahead.push_back(pairs_[k].of(move));
+        double enough = negligible_;
         for (int sweep = 0; sweep < most_sweeps; ++sweep) {
             double moved = 0.0;
             for (std::size_t a = 0; a < active.size(); ++a) {
@@ -153,7 +155,8 @@ void CoulombContact::settle(const VectorXd& q, VectorXd& move) {
                 pair.force += more;
                 moved = std::max(moved, own * more.norm());
             }
-            if (moved <= negligible_) break;
+            if (sweep == 0) enough = std::max(enough, settled * moved);
+            if (moved <= enough) break;
         }
         push(move);
     }

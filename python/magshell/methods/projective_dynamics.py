@@ -31,8 +31,8 @@ class ProjectiveDynamics:
         Coulomb's law, in every round ([Qiao21] 5; Ly et al. 2020): of obstacles vertices keep just the `offset`; bodies keep
         the reach and the minimal distance together from each other, by vertices and faces and by edges that cross.
         Stiffness, smoothing and sticking speed do not count. Such motions have no gradient: forces jump where points touch,
-        stick or slip. It takes supports that hold vertices entirely, no rigid parts, no points on faces (`face_samples`) and one
-        coefficient of friction.
+        stick or slip. It takes supports that hold vertices entirely, no rigid parts, no points on faces (`face_samples`)
+        and one coefficient of friction.
 
     Gradients are those of the solved step, by the exact Hessian: as of every integrator, and as exact as the tolerance.
 
