@@ -54,10 +54,12 @@ class Steered(Actuator):
 
     @property
     def owners(self) -> tuple:
+        """Of what the value is set, one by one."""
         return (self.owner, *(each.owner for each in self._further))
 
     @property
     def at_start(self) -> np.ndarray:
+        """Its value in the scene, before any action; with several owners one row each."""
         first = super().at_start
         return np.stack([first, *(each.at_start for each in self._further)]) if self._several else first
 
