@@ -18,6 +18,18 @@ constexpr double law_tolerance = 1e-10;
 // Points that begin or cease to touch make another matrix, which is looked for now and then.
 constexpr int rounds_between_looks = 5;
 
+// What changes the diagonal of the matrix by less, of what it is, secants learn.
+constexpr double much = 0.5;
+
+// What pairs add to the diagonal, by node.
+VectorXd diagonal_of(const std::vector<PairStiffness>& pairs, Index nodes) {
+    VectorXd of_nodes = VectorXd::Zero(nodes);
+    for (const PairStiffness& pair : pairs)
+        for (int i = 0; i < pair.count; ++i)
+            of_nodes[pair.nodes[i]] += pair.weights[i] * pair.weights[i] * pair.stiffness.trace();
+    return of_nodes;
+}
+
 }  // namespace
 
 ProjectiveSolver::ProjectiveSolver(Newton& newton, const ProjectiveOptions& options)
@@ -35,7 +47,6 @@ VectorXd ProjectiveSolver::reduced_gradient(const VectorXd& q, const Anchor& anc
 
 bool ProjectiveSolver::touches_otherwise(const Anchor& anchor, VectorXd& before) const {
     if (!model_.has_contact()) return false;
-    constexpr double much = 0.5;  // of the diagonal without it
     VectorXd now = model_.touching_stiffness();
     bool changed = false;
     for (Index node = 0; node < now.size() && !changed; ++node)
@@ -71,7 +82,19 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
     newton_.evaluate(q, controls, anchor);
     prepare(q, anchor, scale);
     Secants secants(options_.history);
-    VectorXd touched = model_.touching_stiffness();
+    VectorXd touched = model_.touching_stiffness(), between;
+    // A small matrix of many pairs costs more than a round.
+    const auto take_pairs = [&] {
+        if (!model_.has_body_contact()) return;
+        const std::vector<PairStiffness> pairs = model_.touching_pairs();
+        VectorXd now = diagonal_of(pairs, model_.nodes().n_nodes());
+        bool changed = between.size() == 0;
+        for (Index node = 0; node < now.size() && !changed; ++node)
+            changed = std::abs(now[node] - between[node]) > much * (matrix_.diagonal(node) + between[node]);
+        if (!changed) return;
+        touching_.set(pairs);
+        between = std::move(now);
+    };
     VectorXd gradient = reduced_gradient(q, anchor);
     for (;; ++report.iterations, newton_.count_iteration()) {
         const bool last = report.iterations == options_.iterations;
@@ -92,8 +115,9 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
             touches_otherwise(anchor, touched)) {
             prepare(q, anchor, scale);
             secants.clear();
+            between.resize(0);
         }
-        touching_.set(model_.touching_pairs());
+        take_pairs();
         VectorXd direction = -gradient;
         if (!in_place) direction -= reduction.vector(matrix_.times(move));
         secants.solve(direction, [&](VectorXd& rhs) { touching_.solve(rhs); });

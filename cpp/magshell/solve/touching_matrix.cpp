@@ -10,7 +10,7 @@ namespace {
 // Of the dense part: more would take longer than what it saves.
 constexpr std::size_t most_columns = 1000;
 // Of the stiffness of a node: less is not worth a column.
-constexpr double negligible = 1e-3;
+constexpr double negligible = 1e-2;
 
 }  // namespace
 
