@@ -156,6 +156,16 @@ def test_share_of_the_processor() -> None:
     assert timing.with_share(lambda: time.sleep(0.01))[1] == 1.0
 
 
+def test_solves_measure_the_processor_if_told_to():
+    walls = time.perf_counter
+    for threads, clock in ((1, time.process_time), (2, walls)):
+        ms.set_num_threads(threads)
+        with pytest.raises(RuntimeError, match="stopped"), timing.processor_clock():
+            assert time.perf_counter is clock
+            raise RuntimeError("stopped")
+        assert time.perf_counter is walls
+
+
 def test_terms(tmp_path, capsys) -> None:
     results = run("terms", tmp_path, "--faces", "32")
     assert "+ field of a dipole" in capsys.readouterr().out

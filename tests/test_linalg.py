@@ -142,23 +142,6 @@ def test_indefinite_matrices_are_solved_and_their_inertia_is_right(name):
     assert abs(residual).max() < 1e-12 * size
 
 
-def test_a_residual_has_more_digits_than_the_solution():
-    """Of b = A x rounded, where all of A x but the last digits cancels."""
-    if np.finfo(np.longdouble).eps >= np.finfo(float).eps:
-        pytest.skip("this machine has no more digits than those of a double")
-    matrix = random_symmetric(40, 0.3, seed=5)
-    (factor, _), x = factorized(matrix), np.random.default_rng(6).standard_normal(40)
-    exact = sp.csc_matrix(matrix).toarray().astype(np.longdouble) @ x.astype(np.longdouble)
-    rhs = exact.astype(np.float64)
-    left = factor.residual(lower(matrix)[2], x, rhs)
-    wanted = (rhs - exact).astype(np.float64)
-    assert np.abs(left - wanted).max() <= 0.01 * np.abs(wanted).max() and wanted.any()
-    with pytest.raises(ValueError, match=r"must have shape \(40,\), got 39 and 40"):
-        factor.residual(lower(matrix)[2], x[1:], rhs)
-    with pytest.raises(ValueError, match="an entry for each"):
-        factor.residual(lower(matrix)[2][1:], x, rhs)
-
-
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("columns", [0, 1, 2, 7, 8, 9, 23])
 def test_any_number_of_right_hand_sides(columns, backend):

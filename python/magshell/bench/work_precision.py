@@ -19,7 +19,7 @@ from .cases.plates import circular_plate, even_plate, square_plate
 from .cases.rolled_strip import end_moment
 from .cases.shear_strip import end_shear
 from .report import bar, print_table
-from .timing import LONG, SHORT, with_share
+from .timing import LONG, SHORT, processor_clock
 
 BENDINGS = ("midedge", "midedge2", "hinge")
 IRREGULAR = 0.25  # of the spacing: how far vertices are moved
@@ -150,8 +150,9 @@ def _point(study: Study, mesh, bending: str, solver: str, irregular: bool, round
     runs: list[tuple[Outcome, float]] = []
     try:
         while not runs or len(runs) < _worth_repeating(runs[-1][1], rounds):
-            run, share = with_share(lambda: study.run(mesh, bending, **options))
-            runs.append((run, run.time * share))
+            with processor_clock():
+                run = study.run(mesh, bending, **options)
+            runs.append((run, run.time))
     except ms.NotConverged as error:
         found = error.last_good
         return Point(

@@ -34,7 +34,7 @@ def draw(results: dict, setting: dict) -> Figure:
         axes.tick_params(labelleft=k % columns == 0, labelbottom=below >= len(studies))
     figure.supylabel("largest relative error", fontsize=10, color=INK)
     figure.supxlabel(
-        f"wall time of one call from the rest shape, analysis included ({machine(setting)})",
+        f"time of one call from the rest shape, analysis included ({machine(setting)})",
         fontsize=10,
         color=INK,
     )
