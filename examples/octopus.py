@@ -28,8 +28,8 @@ Searches with another seed of noise and trials, one each: pipe I passes after 1.
 pass in 10 runs a channel has not been run.
 
 What gradients are worth. The channels do not ask for much: an even swing of 6 mT at 4 Hz passes all three, after 1.92, 1.94
-and 1.79 s, and one of 10 mT passes pipe I after 1.26 s with as much field (63 mT2 s until then; the field found in 1.14 s, 68). Of what
-a horizon's search gains, most comes from the trials: in 14 horizons of two searches the best of five has 0.46 of the
+and 1.79 s, and one of 10 mT passes pipe I after 1.26 s with as much field (63 mT2 s until then; what was found in 1.14 s,
+68). Of what a horizon's search gains, most comes from the trials: in 14 horizons of two searches the best of five has 0.46 of the
 objective that the plan as it was has, and the gradient search 0.80 of that (geometric means).
 Even swings have no feedback, though, and pass only from a start that is all but exact. Pipe I, seed 1:
 

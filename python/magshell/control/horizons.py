@@ -77,8 +77,9 @@ def receding(
     For motions that are unstable: what a little noise in the start becomes grows with time, until gradients of the whole
     motion say nothing that a search can use, and the motion found depends on rounding. Over a horizon in which noise grows
     little, gradients are good; and as every search begins where the motion really is, it also corrects what has gone astray
-    until there: this is feedback, computed beforehand. Stable motions are better searched at once, to their end. Done again from the same start, the control found moves everything
-    with the same bits, if `advance` does (ms.simulate, from a MotionState, does).
+    until there: this is feedback, computed beforehand. Stable motions are better searched at once, to their end. Done
+    again from the same start, the control found moves everything with the same bits, if `advance` does (ms.simulate, from
+    a MotionState, does).
 
     objective: function of rows (end - first, ...) of the control, a tensor; of the Horizon; and of the state in which row
         `first` begins. It returns what an objective of ms.minimize does.
