@@ -126,7 +126,7 @@ def test_a_failure_says_where_and_what_was_tried():
             solver=solver,
         )
     text = str(caught.value)
-    assert "Load steps were shortened to 0.25 of the way." in text
+    assert "Load steps were shortened to 0.2 of the way." in text
     assert "Relaxation took 1 step; it still moved the sheet by" in text
     assert "The forces are out of balance most at vertices" in text
     assert "max_relaxation_steps" in text and "first_load_step" not in text

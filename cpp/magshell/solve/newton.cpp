@@ -29,6 +29,8 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
 constexpr Index most_new_negative_pivots = 10;
 constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
+// One that settles, as in the plane of a sheet, may pass a state that is not stable.
+constexpr double settling = 0.3;
 // A residual that shrinks less makes the next step a cautious one.
 constexpr double contracting = 0.5;
 
@@ -144,6 +146,10 @@ NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const An
     return iterate(q, controls, anchor, options_.max_iterations, false);
 }
 
+NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls) {
+    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, true);
+}
+
 // With friction held, the stage is a minimization, which damped steps do not leave. Normal forces follow,
 // until Newton finds the rest of the way.
 NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor) {
@@ -234,7 +240,7 @@ double Newton::obstacles_change(const VectorXd& step) const {
 }
 
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
-                             bool mixed) {
+                             bool mixed, bool wary) {
     NewtonReport report;
     VectorXd move = model_.reduction().prescribed_increment(q, controls);
     bool extrapolated = false;
@@ -325,6 +331,12 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             }
         move = left_of(move, share, q, controls);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+        if (report.iterations == 0) report.first_length = length;
+        if (wary && report.iterations > 0 &&
+            length > std::max(settling * last_step, 1e-3 * model_.extent()) &&
+            (report.factor.negative_pivots > first_negative_pivots ||
+             (report.iterations > 1 && length > last_step)))
+            return fail("the iteration leaves the stable states");
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())
             return fail("the steps of the iteration do not get shorter");

@@ -36,7 +36,8 @@ struct NewtonReport {
     bool touched = false;   // whether bodies touched, or were in each other's way, at any of its iterations
     std::string blocked;    // what was in the way of the last step of which little could be taken, in words
     bool lost = false;      // far from any solution: a step half as long will hardly do
-    std::string reason;     // why not converged
+    double first_length = 0.0;  // [m] of the first step
+    std::string reason;         // why not converged
 };
 
 /// A quadratic pull, 1/2 sum w_i (q_i - target_i)^2: the inertia of a time step, or one implicit Euler step
@@ -65,6 +66,9 @@ class Newton {
 
     /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
+    /// As solve(), and given up as soon as the matrix has unstable directions that it had not at the beginning, and steps
+    /// do not get much shorter.
+    NewtonReport solve_wary(VectorXd& q, const Controls& controls);
     NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
     /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity), in rounds
     /// of held normal forces: slower, and sure of foot where contacts open and close, stick and slip.
@@ -130,7 +134,7 @@ class Newton {
 
   private:
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
-                         bool mixed);
+                         bool mixed, bool wary = false);
     /// What is left of a motion that supports and motors prescribe after a share of it.
     VectorXd left_of(const VectorXd& move, double share, const VectorXd& q, const Controls& controls) const;
     /// Of a step, which is a share of a whole one, the part up to which bodies that touch do not push back by more than it

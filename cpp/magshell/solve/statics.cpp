@@ -11,6 +11,8 @@ namespace magshell {
 namespace {
 
 constexpr int quick_iterations = 8;  // a load step that converged in so many is followed by one twice as long
+constexpr double good_length =
+    0.25;  // of the extent: as far as the first iteration of a load step should lead
 constexpr double longest_turn =
     0.5;                            // [rad] of a support in one load step: full circles must be gone through
 constexpr double forgetting = 1.2;  // of a step that failed, with every one that did not
@@ -19,7 +21,7 @@ class Statics {
   public:
     Statics(Newton& newton, const Controls& from, const Controls& to, const StaticsOptions& options,
             StaticsResult& result)
-        : newton_(newton), from_(from), to_(to), options_(options), result_(result) {}
+        : newton_(newton), from_(from), to_(to), options_(options), result_(result), wary_(goes_warily()) {}
 
     bool run() {
         result_.reason = newton_.model().refusal(result_.state);
@@ -28,6 +30,14 @@ class Statics {
     }
 
   private:
+    // Supports must be gone along with, through saddles too; solids have unstable directions on the way to stable states.
+    bool goes_warily() const {
+        const Model& model = newton_.model();
+        return options_.start_at_rest && options_.require_stable && !model.has_body_contact() &&
+               !model.follows() && model.bodies().solids().empty() &&
+               model.reduction().prescribed_increment(result_.state, to_).isZero(0.0);
+    }
+
     bool load() {
         if (options_.start_at_rest && from_ == to_ && newton_.still_holds(result_.state, to_))
             accept(result_.state, to_, 1.0, newton_.relative_residual(result_.state, {}));
@@ -42,7 +52,8 @@ class Statics {
             const double target = std::min(1.0, result_.progress + step);
             const Controls controls = interpolate(from_, to_, target);
             VectorXd trial = result_.state;
-            NewtonReport report = newton_.solve(trial, controls);
+            NewtonReport report =
+                wary_ ? newton_.solve_wary(trial, controls) : newton_.solve(trial, controls);
             if (report.converged && strays(report, target - result_.progress)) {
                 report.converged = false;
                 report.reason = "a step ended on another branch, which is not stable";
@@ -60,11 +71,16 @@ class Statics {
             failed_step = target - result_.progress;
             result_.failed.shortest_step = std::min(result_.failed.shortest_step, failed_step);
             step = (report.lost ? 0.25 : 0.5) * failed_step;
-            if (step >= options_.smallest_step * longest_step && options_.start_at_rest) continue;
+            // How far its first iteration led tells how much too long it was.
+            const double far = report.first_length / newton_.model().extent();
+            const double smallest = options_.smallest_step * longest_step;
+            if (wary_ && far > 0.5 * good_length && failed_step > smallest)
+                step = std::max(std::min(step, good_length / far * failed_step), smallest);
+            if (step >= smallest && options_.start_at_rest) continue;
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
             factor = {};
             const double end = longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0;
-            if (!plain_steps(end) && !descend(end)) return false;
+            if ((wary_ || !plain_steps(end)) && !descend(end)) return false;
             step = longest_step;
         }
         return factor.succeeded ? judge(factor) : check_stability();
@@ -128,7 +144,8 @@ class Statics {
         for (int k = 0; k < attempts; ++k) {
             VectorXd trial = result_.state;
             const Controls controls = interpolate(from_, to_, target);
-            const RelaxationReport report = relax(newton_, trial, controls, options_.max_relaxation_steps);
+            const RelaxationReport report =
+                relax(newton_, trial, controls, options_.max_relaxation_steps, options_.start_at_rest);
             result_.relaxation_steps += report.steps;
             result_.saddles_left += report.saddles_left;
             if (!report.converged) {
@@ -155,6 +172,7 @@ class Statics {
     const Controls from_, to_;
     const StaticsOptions& options_;
     StaticsResult& result_;
+    const bool wary_;         // load steps are given up at once where they leave the stable states
     bool was_stable_ = true;  // where the last load step ended
 };
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -34,6 +35,13 @@ CASES: dict[str, tuple[Callable[[str], ms.Scene], dict, int]] = {
         40,
     ),
 }
+# Angle [degrees] of the field to the magnetization of C1, beta: how many factorizations the stable state may take.
+OBLIQUE: dict[tuple[int, float], int] = {
+    (angle, beta): 30 for angle in (30, 60, 90, 120, 150) for beta in (5.0, 20.0)
+}
+PULLED: dict[tuple[int, float], int] = {
+    (cells, force): 60 for cells in (8, 16, 24) for force in (2000.0, -2000.0)
+}
 BENDINGS = ("midedge", "hinge")
 SOLVERS = {"mixed": ms.MixedNewton(), "plain": ms.Newton(max_iterations=60)}
 
@@ -50,6 +58,7 @@ def run(options: argparse.Namespace) -> dict:
         raise SystemExit("--faces must be at least 2")
     scene, controls = strongly_bent(faces)
     from_flat = _from_flat()
+    to_stable = _to_stable(options.quick)
     iteration = _iteration(scene, controls, options.rounds)
     threads = _threads(scene, controls, options.rounds)
     backends = _backends(scene, controls, options.rounds)
@@ -57,6 +66,7 @@ def run(options: argparse.Namespace) -> dict:
     return {
         "faces": scene.mesh.n_faces,
         "from flat": from_flat,
+        "to stable": to_stable,
         "iteration": {**iteration, "worth": worth},
         "threads": threads,
         "backends": backends,
@@ -100,6 +110,60 @@ def _from_flat() -> dict:
                 }
     headings = ["one call from flat", "", "factorizations", "load steps", "iterations", "allowed", "time [s]"]
     print_table("Factorizations, failed attempts counted", headings, rows)
+    return results
+
+
+def semi_cylinder(cells: int, force: float) -> ms.Scene:
+    """A8: half of a semi-cylinder clamped at one end, a force [N] on the top of the other (Sze, Liu, Lo 2004)."""
+    radius, length = 1.016, 3.048
+    mesh = ms.meshes.cylinder(radius, length, (0.0, np.pi / 2), cells=(cells, cells))
+    sheet = ms.Shell(mesh, thickness=0.03, young_modulus=2.0685e7, poisson_ratio=0.3)
+    supports = [
+        ms.Clamp(mesh.edges_at(y=0.0)),
+        ms.SymmetryPlane((1, 0, 0)),
+        ms.SymmetryPlane((0, 0, 1)),
+    ]
+    top = mesh.nearest_vertex((0, length, radius))
+    return ms.Scene(sheet, supports=supports, loads=[ms.PointLoad(top, (0, 0, force / 2))])
+
+
+def oblique_field(angle: float, beta: float, cells: tuple[int, int] = (10, 1)) -> tuple[ms.Scene, dict]:
+    """C1: a strip in a field at an angle [degrees] to its magnetization; and the controls."""
+    mesh = ms.meshes.rectangle(magnetic_strip.LENGTH, magnetic_strip.WIDTH, cells=cells)
+    direction = (np.cos(np.radians(angle)), 0.0, np.sin(np.radians(angle)))
+    return magnetic_strip.scene(mesh, "midedge"), magnetic_strip.controls(beta, direction)
+
+
+def _to_stable(quick: bool) -> dict:
+    """Where steps of the load go astray, or snap: the stable state from rest in one call."""
+    cases = [
+        (f"C1-{angle}, beta {beta:g}", *oblique_field(angle, beta), allowed)
+        for (angle, beta), allowed in OBLIQUE.items()
+    ]
+    cases += [
+        (f"A8, {cells}x{cells}, {force:g} N", semi_cylinder(cells, force), {}, allowed)
+        for (cells, force), allowed in PULLED.items()
+        if cells == 8 or not quick
+    ]
+    rows, results = [], {}
+    for name, scene, controls, allowed in cases:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ms.LargeStrainWarning)
+            found = ms.equilibrium(scene, **controls)
+        missed = note("count", f"factorizations of {name}, stable", found.factorizations, at_most=allowed)
+        counts = [found.load_steps, found.relaxation_steps, found.saddles_left]
+        rows.append([name, "", f"{found.factorizations}{missed}", *map(str, counts), str(allowed)])
+        results[name] = {"factorizations": found.factorizations, "energy": found.energy}
+    headings = [
+        "one call from rest",
+        "",
+        "factorizations",
+        "load steps",
+        "relaxation steps",
+        "saddles",
+        "allowed",
+    ]
+    print_table("Factorizations to the stable state", headings, rows)
     return results
 
 

@@ -1,0 +1,259 @@
+#include "magshell/solve/downhill.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "magshell/solve/descent.h"
+#include "magshell/solve/relaxing.h"
+
+namespace magshell {
+namespace {
+
+constexpr int iterations_a_stride = 10, steps_a_slide = 20;
+constexpr double above_instability = 1.1;         // the rate, over the most negative eigenvalue's size
+constexpr double longest = 0.3, shortest = 1e-3;  // of the extent: the radius of strides
+constexpr double has_settled = 1e-2;              // of its longest iteration: a stride's last one
+constexpr int tries = 2,
+              more_tries = 5;        // strides, ever shorter, before a slide; where strides have done better
+constexpr int longest_pause = 8;     // steps in which no stride is tried
+constexpr double much_better = 4.0;  // than strides slides must be to be preferred to them
+constexpr double near = 0.05;        // of the extent: a Newton step so long may be the last
+constexpr double round_off = 1e-6;   // of the extent: no energy tells such a step
+
+class Downhill : private Relaxing {
+  public:
+    Downhill(Newton& newton, VectorXd& q, const Controls& controls)
+        : Relaxing(newton, q, controls), radius_(longest * model_.extent()), near_(near * model_.extent()) {}
+
+    RelaxationReport run(int max_steps) {
+        if (!report_.reason.empty()) return report_;
+        for (; report_.steps < max_steps; ++report_.steps) {
+            if (!look()) return report_;
+            if (!step()) {
+                report_.reason = "no step lowers the energy, however short";
+                return report_;
+            }
+        }
+        report_.reason = "not at rest after " + std::to_string(max_steps) + " steps";
+        return report_;
+    }
+
+  private:
+    // From the Hessian at q: done, or the rate of the next step, 0 where the last factorization will do.
+    bool look() {
+        const FactorReport factor = newton_.factorize_at(q_, controls_);
+        const double residual = newton_.relative_residual(q_, {});
+        at_rest_ = residual <= newton_.options().tolerance;
+        falls_ = false;
+        if (!factor.succeeded) {  // as of a sheet that can still turn freely: the forces say how fast it may
+            rate_ = std::max(rate_, forced_rate());
+            report_.reason = factor.reason;
+            if (!at_rest_) return rate_ > 0.0;
+            report_.reason = "the equilibrium is neutral: its Hessian is singular (" + factor.reason + ")";
+            report_.neutral = true;
+            return false;
+        }
+        if (factor.negative_pivots > 0) {
+            mode_ = most_unstable_mode(newton_, q_, controls_, factor.negative_pivots);
+            rate_ = above_instability * std::abs(mode_.eigenvalue);
+            falls_ = mode_.eigenvalue < 0.0;
+            if (falls_) report_.falling = mode_.shape;
+            return true;
+        }
+        rate_ = 0.0;
+        report_.falling.resize(0);
+        report_.residual = residual;
+        report_.converged = at_rest_ || ends();
+        return !report_.converged;
+    }
+
+    // Whether Newton finds an equilibrium from here, where the Hessian is positive definite: tried where its step is short,
+    // and ever more seldom elsewhere.
+    bool ends() {
+        const double expected = length(newton_.solve_with_factor(-newton_.gradient(q_, {})));
+        if (++looks_ == next_end_)
+            next_end_ *= 2;
+        else if (expected > near_)
+            return false;
+        if (finish(expected)) return true;
+        near_ = 0.25 * expected;
+        if (!newton_.factorize_at(q_, controls_).succeeded) rate_ = forced_rate();
+        return false;
+    }
+
+    bool finish(double expected) {
+        VectorXd trial = q_;
+        const Model::Turns turns = model_.turns();
+        const NewtonReport report = newton_.solve(trial, controls_);
+        const bool there = expected <= round_off * model_.extent() && length(trial - q_) <= 3.0 * expected;
+        if (!report.converged || report.factor.negative_pivots > 0 ||
+            !(there || lowers(model_.energy(trial, controls_)))) {
+            model_.set_turns(turns);
+            return false;
+        }
+        report_.residual = report.residual;
+        q_ = trial;
+        return true;
+    }
+
+    bool step() {
+        const bool definite = rate_ == 0.0;
+        const double before = energy_, first_rate = rate_;
+        const int factorizations = newton_.factorizations() - 1;
+        const auto gain = [&] { return (before - energy_) / (newton_.factorizations() - factorizations); };
+        if (falls_ && at_rest_) push();
+        newton_.evaluate(q_, controls_, {});
+        if (!definite && !factorize_definite()) return false;
+        if (falls_ && !at_rest_ && rate_ == first_rate && last_move_ < settled_ &&
+            length(newton_step()) < settled_) {
+            push();
+            newton_.evaluate(q_, controls_, {});
+            if (!factorize_definite()) return false;
+        }
+        bool found = false;
+        if (!strides(found)) return false;
+        if (found) {
+            stride_gain_ = gain();
+            if (much_better * stride_gain_ < slide_gain_)
+                rest_from_strides();
+            else
+                next_pause_ = 1;
+            return true;
+        }
+        if (!slide()) return false;
+        slide_gain_ = gain();
+        if (slide_gain_ < much_better * stride_gain_) pause_ = 0;
+        return true;
+    }
+
+    void push() { energy_ = std::min(energy_, leave_saddle(mode_)); }
+
+    void rest_from_strides() {
+        pause_ = next_pause_;
+        next_pause_ = std::min(2 * next_pause_, longest_pause);
+    }
+
+    VectorXd newton_step() const { return newton_.solve_with_factor(-newton_.gradient(q_, {})); }
+
+    bool raise_rate(double times = 4.0) {
+        rate_ = rate_ > 0.0 ? times * rate_ : std::max(1e-3 * forced_rate(), 1e-12 * largest_stiffness());
+        return is_sensible(rate_);
+    }
+
+    // With the rate, raised until the matrix is positive definite. The model is evaluated at q.
+    bool factorize_definite() {
+        Eigen::MatrixXd no_moves(q_.size(), 0);
+        for (double times = 4.0;; times *= 4.0) {
+            const VectorXd weights = rate_ * model_.metric();
+            const FactorReport factor = newton_.factorize(q_, controls_, false, {&weights, &q_}, no_moves);
+            if (factor.succeeded && factor.negative_pivots == 0) return true;
+            if (!raise_rate(times)) return false;
+        }
+    }
+
+    // Raises the rate so that the step p becomes as long as the radius, and factorizes.
+    bool shorten(const VectorXd& p) {
+        const double stiffness = -newton_.gradient(q_, {}).dot(p) / p.dot(model_.metric().cwiseProduct(p));
+        const double more = stiffness * (length(p) / radius_ - 1.0);
+        if (more > 0.0 && std::isfinite(more))
+            rate_ += more;
+        else if (!raise_rate())
+            return false;
+        return factorize_definite();
+    }
+
+    // Ever shorter ones, until one is found; false where no rate leads on.
+    bool strides(bool& found) {
+        if (pause_ > 0) {
+            --pause_;
+            return true;
+        }
+        const double radius = radius_;
+        const bool proven = slide_gain_ > 0.0 && stride_gain_ >= slide_gain_;
+        for (int k = 0; k < (proven ? more_tries : tries); ++k) {
+            VectorXd p = newton_step();
+            if (length(p) > 1.5 * radius_) {
+                if (!shorten(p)) return false;
+                p = newton_step();
+            }
+            const double whole = length(p);
+            if (stride(p)) {
+                radius_ = std::min(std::max(2.0 * radius_, 4.0 * last_move_), longest * model_.extent());
+                found = true;
+                return true;
+            }
+            radius_ = std::max(0.25 * std::min(whole, radius_), shortest * model_.extent());
+            if (!shorten(p)) return false;
+        }
+        rest_from_strides();
+        radius_ = std::min(4.0 * radius_, radius);
+        return true;
+    }
+
+    // An implicit Euler step by mixed iterations, of which p is the first.
+    bool stride(VectorXd p) {
+        const VectorXd from = q_, weights = rate_ * model_.metric();
+        const Anchor anchor{&weights, &from};
+        const Model::Turns turns = model_.turns();
+        VectorXd trial = q_;
+        Eigen::MatrixXd no_moves(q_.size(), 0);
+        NewtonReport report;
+        double last = 0.0, whole = 0.0;
+        bool settles = false;
+        for (int k = 0; k < iterations_a_stride && !settles; ++k, newton_.count_iteration()) {
+            if (k > 0) {
+                const FactorReport factor =
+                    newton_.factorize(trial, controls_, newton_.options().mixed, anchor, no_moves);
+                if (!factor.succeeded || factor.negative_pivots > 0) break;
+                p = newton_.solve_with_factor(-newton_.gradient(trial, anchor));
+            }
+            const double each = length(p);
+            if (!(each <= model_.extent()) || (k > 1 && each > last)) break;
+            if (newton_.advance(trial, p, 1e-4, report) < 0.0) break;
+            if (newton_.options().mixed) model_.extrapolate(p);
+            newton_.evaluate(trial, controls_, anchor);
+            newton_.watch(newton_.relative_residual(trial, anchor));
+            last = each;
+            whole = std::max(whole, each);
+            settles = k > 0 && each < has_settled * whole;
+        }
+        const double energy = settles ? model_.energy(trial, controls_) : 0.0;
+        if (!settles || !lowers(energy)) {
+            model_.set_turns(turns);
+            newton_.evaluate(q_, controls_, {});
+            return false;
+        }
+        q_ = trial;
+        energy_ = energy;
+        last_move_ = report_.last_move = length(trial - from);
+        return true;
+    }
+
+    bool slide() {
+        constexpr double no_move = 1e-9;  // of the extent
+        for (;;) {
+            const double moved = descend(newton_, q_, energy_, controls_, steps_a_slide);
+            if (moved > no_move * model_.extent()) {
+                last_move_ = report_.last_move = moved;
+                return true;
+            }
+            newton_.evaluate(q_, controls_, {});
+            if (!raise_rate() || !factorize_definite()) return false;
+        }
+    }
+
+    double radius_, near_;  // [m] of strides, and of Newton's steps that may be the last
+    Mode mode_;             // the most unstable one, where the energy falls along it
+    bool falls_ = false, at_rest_ = false;
+    int looks_ = 0, next_end_ = 2;
+    int pause_ = 0, next_pause_ = 1;
+    double stride_gain_ = 0.0, slide_gain_ = 0.0;  // [J] a factorization, of the last ones
+};
+
+}  // namespace
+
+RelaxationReport go_downhill(Newton& newton, VectorXd& q, const Controls& controls, int max_steps) {
+    return Downhill(newton, q, controls).run(max_steps);
+}
+
+}  // namespace magshell

@@ -1,0 +1,77 @@
+#include "magshell/solve/relaxing.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace magshell {
+namespace {
+
+constexpr double settled = 1e-4;  // of the extent
+constexpr double rigid =
+    1e4;  // a rate this many times the stiffness, or the forces', allows no step to speak of
+
+}  // namespace
+
+Relaxing::Relaxing(Newton& newton, VectorXd& q, const Controls& controls)
+    : newton_(newton),
+      model_(newton.model()),
+      q_(q),
+      controls_(controls),
+      settled_(settled * model_.extent()) {
+    const VectorXd move = model_.reduction().prescribed_increment(q_, controls);
+    if (model_.has_body_contact() && model_.largest_share(q_, move) < 1.0)
+        report_.reason = model_.stuck(q_, move);
+    model_.reduction().advance(q_, move);
+    energy_ = model_.energy(q_, controls);
+    if (report_.reason.empty()) report_.reason = model_.refusal(q_);
+}
+
+double Relaxing::forced_rate() const {
+    const Reduction& reduction = model_.reduction();
+    const VectorXd force = reduction.vector(model_.residual().gradient),
+                   area = reduction.weights(model_.metric());
+    double largest = 0.0;
+    for (Index k = 0; k < reduction.size(); ++k)
+        if (area[k] > 0.0) largest = std::max(largest, std::abs(force[k]) / area[k]);
+    return largest / (0.05 * model_.extent());
+}
+
+double Relaxing::largest_stiffness() const {
+    const VectorXd stiffness = model_.diagonal();
+    double largest = 0.0;
+    for (Index k = 0; k < model_.n_coordinates(); ++k)
+        if (model_.metric()[k] > 0.0)
+            largest = std::max(largest, std::abs(stiffness[k]) / model_.metric()[k]);
+    return largest;
+}
+
+bool Relaxing::is_sensible(double rate) const {
+    return rate > 0.0 && rate <= rigid * std::max(largest_stiffness(), forced_rate()) && std::isfinite(rate);
+}
+
+double Relaxing::length(const VectorXd& p) const {
+    return p.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+}
+
+double Relaxing::leave_saddle(const Mode& mode) {
+    constexpr double told = 1e-6;  // a force along the mode, over what it could be: less is round-off
+    const VectorXd saddle = q_, force = -model_.reduction().project(newton_.gradient(q_, {}));
+    const double along = force.dot(mode.shape);
+    const double sign = along < -told * force.norm() * mode.shape.norm() ? -1.0 : 1.0;
+    double reached = energy_;
+    ++report_.saddles_left;
+    for (double amplitude = settled_; amplitude < model_.extent(); amplitude *= 2.0) {
+        VectorXd trial = saddle;
+        const VectorXd push = sign * amplitude * mode.shape;
+        if (model_.has_body_contact() && model_.largest_share(saddle, push) < 1.0) break;
+        model_.reduction().advance(trial, push);
+        const double energy = model_.energy(trial, controls_);
+        // The first push may be too small for the energy to tell, but must be made.
+        if (amplitude > settled_ && !(energy < reached)) break;
+        reached = energy;
+        q_ = trial;
+    }
+    return reached;
+}
+
+}  // namespace magshell

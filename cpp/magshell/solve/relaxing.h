@@ -1,0 +1,39 @@
+// What ways down in energy have in common: where they are, what they know of the rate that keeps steps short, and how they
+// leave a saddle.
+#pragma once
+
+#include <limits>
+
+#include "magshell/solve/modes.h"
+#include "magshell/solve/relaxation.h"
+
+namespace magshell {
+
+class Relaxing {
+  protected:
+    /// At the controls, supports moved to where these want them; the report says what is wrong with that.
+    Relaxing(Newton& newton, VectorXd& q, const Controls& controls);
+
+    /// [N/m3] With this rate the forces move a sheet that only the anchor holds by a twentieth of its extent.
+    double forced_rate() const;
+    /// [N/m3] Of the last assembled Hessian, per area: a rate like it holds every vertex where it is.
+    double largest_stiffness() const;
+    /// Whether a rate allows steps to speak of; not so numbers beyond all bounds, and zero, which no doubling changes.
+    bool is_sensible(double rate) const;
+    double length(const VectorXd& p) const;  // [m], of what moves most
+    bool lowers(double energy) const { return energy <= energy_ + 1e-12 * std::abs(energy_); }
+    /// Pushes q along the mode, to the side to which the forces push, as far as the energy falls, and at least a little;
+    /// the energy there.
+    double leave_saddle(const Mode& mode);
+
+    Newton& newton_;
+    Model& model_;
+    VectorXd& q_;
+    const Controls& controls_;
+    RelaxationReport report_;
+    double energy_, rate_ = 0.0;
+    double last_move_ = std::numeric_limits<double>::infinity();
+    const double settled_;  // [m] a step that moves less has come to rest, or to a saddle
+};
+
+}  // namespace magshell
