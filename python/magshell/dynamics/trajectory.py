@@ -14,6 +14,7 @@ from .._checks.tensors import detached, plain_arrays
 from .._machine.files import replace_file
 from ..bodies.actuator import Actuator
 from ..bodies.of_body import result_of
+from ..bodies.shell import Shell
 from ..bodies.solid_result import told_strains
 from ..bodies.strains import StrainHistory, Strains, strains_of
 from ..mesh.crossings import told
