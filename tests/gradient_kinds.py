@@ -255,7 +255,6 @@ MAKERS = {
         ob.Plane, step=1e-4, smoothing=4e-4, offset=5e-4, face_samples=3
     ),
     **CONTACT_MAKERS,
-    **GROWTH_MAKERS,
     "a solid at rest": solid_at_rest,
     "a solid in motion": solid_in_motion,
     "a solid by Projective Dynamics": solid_by_projective_dynamics,
@@ -318,6 +317,7 @@ MAKERS = {
     "tied sheets at rest": lambda: tied(False),
     "tied sheets in motion": lambda: tied(True),
     "two sheets in motion": two_sheets_in_motion,
+    **GROWTH_MAKERS,  # last: makers draw from one stream of random numbers
 }
 
 

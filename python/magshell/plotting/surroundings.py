@@ -1,4 +1,4 @@
-"""The obstacles around sheets as solids that one sees through."""
+"""What is around sheets: obstacles as solids that one sees through, and magnets."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROOM = 0.15  # extents of the bodies: how far around them it is shown then
 
 
 def obstacle_solids(states: list[State], size: float) -> list[Solid]:
-    """Those of states that lie over each other: one at rest once, a moving one where it is in each state.
+    """Obstacles and magnets of states that lie over each other: one at rest once, a moving one where it is in each state.
 
     size: of the drawing, m.
     """
@@ -31,6 +31,10 @@ def obstacle_solids(states: list[State], size: float) -> list[Solid]:
                 vertices, faces = obstacle.surface(time, extent=REACH * size, around=middle)
                 surface = sheet(vertices, faces, colors.rgb(colors.OBSTACLE))
                 shown[key] = replace(surface, opacity=OPACITY, around=True)
+    for state in states:
+        for points, faces in state.magnets:
+            key = (points.tobytes(), None)
+            shown.setdefault(key, replace(sheet(points, faces, colors.rgb(colors.MAGNET)), around=True))
     return list(shown.values())
 
 

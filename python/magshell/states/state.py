@@ -29,6 +29,7 @@ from ..statics.equilibria import Equilibria
 from ..statics.path import Path
 from .bones import bones_at_rest, bones_of, joined, mesh_of, shapes_at_rest, shapes_of
 from .contact_loads import ContactLoads, contact_loads
+from .magnets import surfaces_of
 from .tendons import tendons_at_rest, tendons_of
 from .units import clock
 
@@ -42,7 +43,7 @@ class State:
     sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
     title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
     bones, tendons: surfaces of links and of tendons inside, vertices (n, 3) m and faces (m, 3) each. shapes: of free rigid
-        parts, likewise.
+        parts, likewise. magnets: of the fields' magnets and wires.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
     loads: () -> ContactLoads of a result of a scene with contacts, or None without any.
     """
@@ -62,6 +63,7 @@ class State:
     tendons: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     loads: Callable[[], ContactLoads] | None = None
     shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    magnets: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     @property
     def contact_pressures(self) -> np.ndarray | None:
@@ -263,6 +265,7 @@ def _states(
     count = len(frames)
     magnetization = _magnetization(mesh, given["remanent_magnetization"])
     sources = [f for f in _listed(given["field"]) or fields if not isinstance(f, UniformField)]
+    magnets = tuple(surface for field in sources for surface in surfaces_of(field))
     flux_densities = _flux_densities(given["applied_flux_density"], count)
     obstacles = _obstacles(given["obstacles"])
     strengths, titles = (
@@ -277,6 +280,7 @@ def _states(
             _sum_of(sources, strength) if sources and strength else None,
             title,
             obstacles=obstacles,
+            magnets=magnets if strength else (),
         )
         for frame, flux, strength, title in zip(frames, flux_densities, strengths, titles, strict=True)
     ]
