@@ -9,7 +9,8 @@
 namespace magshell::bindings {
 
 /// Throws InvalidInput where the ends of a way have not as many numbers as the model and what varies.
-inline void check_controls(const Model& model, const Varying& varying, const Controls& from, const Controls& to) {
+inline void check_controls(const Model& model, const Varying& varying, const Controls& from,
+                           const Controls& to) {
     const Index width = model.registry().controls.size() + varying.size();
     if (from.size() != width || to.size() != width)
         throw InvalidInput("controls must have shape (" + std::to_string(width) + ",)");

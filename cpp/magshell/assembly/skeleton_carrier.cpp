@@ -15,7 +15,7 @@ namespace {
 using Eigen::MatrixXd;
 
 constexpr int most_fits = 30;
-constexpr double fitted = 1e-14;    // of a length
+constexpr double fitted = 1e-14;     // of a length
 constexpr double round_off = 1e-14;  // likewise
 
 Vec3 across(const Vec3& axis) {

@@ -19,8 +19,7 @@ DrivenEnd::DrivenEnd(Newton& newton, const Inertia& inertia, const MotionState& 
     share_before_ = r * r / (1.0 + r) / dt;
     change_ = share_last_ * last.v + share_begin_ * begin.v + share_before_ * begin.v_before - last.w;
     const VectorXd pull = inertia.mass.cwiseProduct(change_);
-    target_ -=
-        (anchor.weights->array() != 0.0).select(pull.array() / anchor.weights->array(), 0.0).matrix();
+    target_ -= (anchor.weights->array() != 0.0).select(pull.array() / anchor.weights->array(), 0.0).matrix();
     const Model::Turns turns = model.turns();
     found_ = find(controls);
     model.set_turns(turns);
