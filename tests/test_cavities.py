@@ -166,6 +166,47 @@ def test_a_path_by_pressure_turns_round_at_the_largest():
     assert np.abs(same.positions - unstable.positions).max() < 1e-6
 
 
+def test_a_path_by_a_pressure_that_is_a_value():
+    """As by a load factor on it: the balloon's largest pressure is a limit point."""
+    body = hollow_ball()
+    air = ms.Cavity(body, pressure=0.0)
+    scene = ball_scene(body, air)
+    path = ms.follow(
+        scene,
+        start=ms.equilibrium(scene),
+        values={air: {"pressure": 2.0}},
+        largest_step=0.1,
+        progress=False,
+        until=lambda _, x: np.abs(x).max() > 2.0,
+    )
+    assert [each.kind for each in path.critical] == ["limit"] and path.unstable_directions[-1] == 1
+    largest = pressure_of_thick_ball(np.linspace(1, 100, 10_000)).max()
+    assert 2.0 * path.critical[0].parameter == pytest.approx(largest, rel=0.06)
+    assert path[air].pressure == pytest.approx(2.0 * path.parameters, abs=1e-12)
+
+
+@pytest.mark.parametrize("times", [0.3, 100.0])
+def test_a_balloon_is_filled_from_one_at_rest(times):
+    """A start under the whole load already: the volume is stepped on the way to the new one, as under a growing load."""
+    body = hollow_ball()
+    rest = ms.Cavity(body, pressure=0.0).rest_volume(ball_scene(body))
+    liquid = ms.Cavity(body, volume=rest, bulk_modulus=1e5)
+    scene = ball_scene(body, liquid)
+    start = ms.equilibrium(scene)
+    filled = {liquid: {"volume": times * rest}}
+    found = ms.equilibrium(scene, start=start, values=filled)
+    assert found.stable and found.load_steps > 1
+    assert np.abs(found.positions - ms.equilibrium(scene, values=filled).positions).max() < 1e-6
+    if times < 1.0:
+        return
+    # Where it ends on the way, what it hands back is of that place.
+    with pytest.raises(ms.NotConverged) as caught:
+        ms.equilibrium(scene, start=start, values=filled, solver=ms.MixedNewton(max_iterations=3))
+    left = caught.value.last_good
+    assert 0.0 <= left.progress < 1.0
+    assert float(left[liquid].volume) == pytest.approx((1.0 + left.progress * (times - 1.0)) * rest, rel=1e-3)
+
+
 def test_a_path_by_the_amount_of_gas():
     body = hollow_ball()
     gas = ms.Cavity(body, filling_pressure=1.0, outside_pressure=1.0)

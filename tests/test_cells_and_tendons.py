@@ -197,3 +197,36 @@ def test_a_tendon_rides_on_curved_elements():
         with pytest.raises(ValueError, match=r"point 0 of the Tendon, .* lies outside every element"):
             beside = ms.Tendon([points[0] + away, points[1]], sheet, tension=1.0)
             ms.equilibrium(ms.Scene(sheet, supports=scene.supports, actuators=[beside]))
+
+
+def test_a_path_by_the_rest_length_of_a_tendon_passes_limit_points():
+    """A soft tendon to the ground pulls a shallow arch through: the path turns round twice, and ends at the new length on
+    the other side, where an equilibrium is."""
+    mesh = ms.meshes.box((1.0, 0.1, 0.02), cells=(16, 1, 1))
+    points = mesh.rest_positions.copy()
+    points[:, 2] += 0.06 * np.sin(np.pi * points[:, 0])
+    arch = ms.Solid(
+        ms.TetMesh(points, mesh.tetrahedra),
+        material=ms.StVenantKirchhoff(young_modulus=1e5, poisson_ratio=0.0),
+    )
+    first, middle, last = (
+        arch.mesh.vertices_where(lambda x, at=at: np.abs(x[:, 0] - at) < 1e-9) for at in (0.0, 0.5, 1.0)
+    )
+    low = (0.5, 0.05, float(arch.mesh.rest_positions[middle, 2].min()))
+    ground = ms.Link(mass=1.0, inertia=1.0, center=(0.5, 0.05, -1.0))
+    tendon = ms.Tendon([(ground, (0.5, 0.05, -1.0)), (arch, low)], stiffness=0.5)
+    scene = ms.Scene(
+        [arch, ms.Skeleton([ground], [ms.Fixed(ground)])],
+        supports=[ms.Pin(first), ms.Pin(last)],
+        actuators=[tendon],
+    )
+    shorter = {tendon: {"rest_length": float(tendon.rest_length) - 0.5}}
+    path = ms.follow(scene, start=ms.equilibrium(scene), values=shorter, progress=False)
+    limits = [each.parameter for each in path.critical if each.kind == "limit"]
+    assert len(limits) == 2 and limits[0] > limits[1] > 0.0
+    assert path.parameters[-1] == 1.0 and path.unstable_directions[-1] == 0
+    end = ms.equilibrium(scene, values=shorter, start=path.positions[-1])
+    assert np.abs(end.positions - path.positions[-1]).max() < 1e-9
+    assert end.displacements[middle, 2].max() < -0.06
+    expected = 0.5 * (end[tendon].length - (float(tendon.rest_length) - 0.5))
+    assert float(end[tendon].tension) == pytest.approx(float(expected), rel=5e-3)

@@ -231,3 +231,34 @@ def test_a_motion_does_not_go_on_from_another_axis():
         ms.simulate(scene, start=rest, **options)
     move = ms.simulate(scene, start=rest, values=leaning, **options)
     assert np.abs(move[hinge].angle - float(rest[hinge].angle)).max() < 1e-9
+
+
+def test_gradient_by_the_axis_of_a_damped_joint_behind_a_fast_one():
+    """Velocities of steps this long are no turn about the axis alone: how fast the damper is drawn feels it."""
+    arm, hand = (
+        ms.Link(mass=m, inertia=(0.02, 0.03, 0.04), center=(x, 0.1, 0)) for m, x in ((2.0, 0.5), (0.5, 1.2))
+    )
+    shoulder = ms.Revolute(arm, origin=(0, 0, 0), axis=(0.2, -1, 0.1), rate=6.0)
+    wrist = ms.Revolute(
+        hand, arm, origin=(1, 0, 0), axis=(0, -0.5, 1), spring_stiffness=15.0, damping=0.3, rate=-5.0
+    )
+    slide_hand = ms.Link(mass=0.3, inertia=0.01, center=(1.5, 0.1, 0.2))
+    slide = ms.Prismatic(
+        slide_hand, hand, axis=(1, 0.2, 0.4), origin=(1.4, 0, 0), spring_stiffness=40.0, damping=2.0
+    )
+    scene = ms.Scene(ms.Skeleton([arm, hand, slide_hand], [shoulder, wrist, slide]), gravity=(0, 0, -G))
+
+    def end(axis, joint):
+        move = ms.simulate(
+            scene, steps=8, time_step=2e-2, values={joint: {"axis": axis}}, progress=False, **EXACT
+        )
+        return move[slide_hand].center[-1].sum() + move[arm].center[4, 0]
+
+    for joint in (wrist, slide):
+        given = np.array(joint.axis)
+        axis = torch.tensor(given, requires_grad=True)
+        end(axis, joint).backward()
+        by_hand = np.array(
+            [(float(end(given + h, joint)) - float(end(given - h, joint))) / 2e-4 for h in 1e-4 * np.eye(3)]
+        )
+        np.testing.assert_allclose(axis.grad.numpy(), by_hand, rtol=1e-5, atol=1e-6 * np.abs(by_hand).max())

@@ -85,14 +85,14 @@ def slider_crank():
 
 @pytest.mark.parametrize(("theta", "x", "speed", "torque"), SLIDER_CRANK)
 def test_a_driven_slider_crank(theta, x, speed, torque):
-    """Case K5: place to 1e-8 (at rest), speed and torque as they converge at second order (allowed 1e-6)."""
+    """Case K5: place to 1e-8 (at rest), speed and torque as they converge at second order, to 1e-6."""
     scene, (drive, _, slide, _) = slider_crank()
     rest = None
     for angle in np.linspace(0, theta, 2 + int(3 * theta))[1:]:
         rest = ms.equilibrium(scene, start=rest, values={drive: {"motor_angle": angle}})
     assert float(rest[slide].displacement) + 0.4 == pytest.approx(x, abs=1e-8)
-    found = []
-    for a_radian in (50, 100):
+    found, squares = [], []
+    for a_radian in (40, 50, 60, 70, 80, 100):
         steps = int(a_radian * theta)
         move = ms.simulate(
             scene,
@@ -101,10 +101,12 @@ def test_a_driven_slider_crank(theta, x, speed, torque):
             values={drive: {"motor_angle": lambda t: 10.0 * t}},
         )
         found.append([float(move[slide].rate[-1]), float(move[drive].motor_torque[-1])])
-    (rough, first), (fine, second) = found
-    assert fine == pytest.approx(speed, abs=1e-4)
-    assert (4 * fine - rough) / 3 == pytest.approx(speed, abs=1e-6)
-    assert (4 * second - first) / 3 == pytest.approx(torque, abs=1.2e-6)
+        squares.append(1.0 / steps**2)
+    assert found[-1][0] == pytest.approx(speed, abs=1e-4)
+    # By the squares of the steps and their squares; round-off in the closure's force, 1e-6 N m, is evened out.
+    powers = np.vander(squares, 3, increasing=True)
+    limit = np.linalg.lstsq(powers / np.abs(powers).max(axis=0), np.array(found), rcond=None)[0][0]
+    assert limit == pytest.approx([speed, torque], abs=1e-6)
 
 
 def test_gradients_by_a_motor_at_rest():

@@ -185,8 +185,8 @@ def test_activations_at_the_ends_of_their_range(law, ends):
             ms.equilibrium(scene, values={muscle: {"activation": end + np.sign(end - 0.5) * 1e-6}})
 
 
-def test_a_path_by_activation_passes_limit_points():
-    """A shallow arch that its muscle pulls through: the followed path turns, and agrees with equilibria where it ends."""
+def loaded_arch(force):
+    """A shallow arch, pinned at both ends, of muscle along it, under a force (N) downwards in its middle."""
     mesh = ms.meshes.box((1.0, 0.1, 0.02), cells=(16, 1, 1))
     points = mesh.rest_positions.copy()
     points[:, 2] += 0.03 * np.sin(np.pi * points[:, 0])
@@ -194,21 +194,50 @@ def test_a_path_by_activation_passes_limit_points():
         ms.TetMesh(points, mesh.tetrahedra),
         material=ms.StVenantKirchhoff(young_modulus=1e5, poisson_ratio=0.0),
     )
-    low = arch.mesh.tetrahedron_barycenters
-    ends = [arch.mesh.vertices_where(lambda x, at=at: np.abs(x[:, 0] - at) < 1e-9) for at in (0.0, 1.0)]
-    below = np.ones(len(low), bool)
-    muscle = ms.Muscle(arch, (1, 0, 0), elements=below, stiffness=1e5)
-    load = ms.PointLoad(arch.mesh.vertices_where(lambda x: np.abs(x[:, 0] - 0.5) < 1e-9), force=(0, 0, -6e-4))
-    scene = ms.Scene(arch, supports=[ms.Pin(each) for each in ends], loads=[load], actuators=[muscle])
+    first, middle, last = (
+        arch.mesh.vertices_where(lambda x, at=at: np.abs(x[:, 0] - at) < 1e-9) for at in (0.0, 0.5, 1.0)
+    )
+    muscle = ms.Muscle(arch, (1, 0, 0), stiffness=1e5)
+    load = ms.PointLoad(middle, force=(0, 0, -force))
+    scene = ms.Scene(arch, supports=[ms.Pin(first), ms.Pin(last)], loads=[load], actuators=[muscle])
+    return scene, muscle, int(middle[0])
+
+
+def test_a_path_by_activation_ends_where_equilibria_are():
+    """Under a small load the muscle pulls the arch straight."""
+    scene, muscle, _ = loaded_arch(6e-4)
     lengthened = {muscle: {"activation": -0.002}}
     start = ms.equilibrium(scene, values=lengthened)
     path = ms.follow(scene, start=start, values={muscle: {"activation": 0.02}}, progress=False)
     end = ms.equilibrium(scene, values={muscle: {"activation": 0.02}}, start=path.positions[-1])
-    assert path.parameters[-1] >= 1.0 - 1e-9
+    assert path.parameters[-1] >= 1.0 - 1e-9 and not path.critical
     assert path.equilibrium(len(path) - 1)[muscle].activation() == pytest.approx(
         -0.002 + 0.022 * path.parameters[-1]
     )
     assert end.positions == pytest.approx(path.equilibrium(len(path) - 1).positions, abs=2e-3)
+
+
+def test_a_path_by_activation_turns_round_where_the_arch_snaps():
+    """Under a large load the muscle shortens the arch until that carries the load no longer. The path passes this limit
+    point; equilibria stay before it next to the path, and behind it hang far below."""
+    scene, muscle, middle = loaded_arch(8e-3)
+
+    def activated(parameter):
+        return {muscle: {"activation": -0.002 + 0.022 * parameter}}
+
+    start = ms.equilibrium(scene, values=activated(0.0))
+    path = ms.follow(scene, start=start, values=activated(1.0), progress=False, until=lambda at, _: at < 0.0)
+    assert [each.kind for each in path.critical] == ["limit"]
+    limit, turned = path.critical[0].parameter, int(np.argmax(path.parameters))
+    assert 0.0 < limit < 1.0 and limit >= path.parameters.max() and path.parameters[-1] < 0.0
+    before, after = path.unstable_directions[: turned + 1], path.unstable_directions[turned + 1 :]
+    assert before[0] == 0 and (after == 1).all() and len(after) > 0
+    at_limit = path.critical[0].positions[middle, 2] - scene.mesh.rest_positions[middle, 2]
+    held, snapped = (
+        ms.equilibrium(scene, values=activated(limit + by), start=start).displacements[middle, 2]
+        for by in (-1e-3, 1e-3)
+    )
+    assert held > at_limit > -0.03 + 0.01 > snapped
 
 
 def test_vibrations_are_those_of_the_active_state():

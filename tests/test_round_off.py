@@ -5,6 +5,7 @@ import pytest
 
 import magshell as ms
 from magshell.bench.cases import cylinder_roof
+from magshell.bench.skeleton_scaling import tree
 
 
 @pytest.mark.parametrize("load_factor", [1e-4, 1e-3, 1e-2])
@@ -27,3 +28,25 @@ def test_fine_roof_takes_small_steps() -> None:
         progress=False,
     )
     assert path.unstable_directions[-1] == 0 and len(path) > 2
+
+
+@pytest.mark.parametrize("links", [50, 200])
+@pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=repr)
+def test_long_chains_of_links_move_at_the_usual_tolerance(links: int, integrator) -> None:
+    """The places of later links feel how exactly angles are read off places 10 m away, times the length of the chain."""
+    scene = tree(links, 1)
+    moves = [
+        ms.simulate(
+            scene,
+            steps=3,
+            time_step=1e-3,
+            integrator=integrator,
+            solver=ms.MixedNewton(tolerance=tolerance),
+            progress=False,
+        )
+        for tolerance in (1e-10, 1e-7)
+    ]
+    assert all(parts == 7 for parts in moves[0].halved.values())  # as the method begins
+    for joint in scene.joints[:: links // 5]:
+        angles, rough = (move[joint].angle[-1] for move in moves)
+        assert angles == pytest.approx(rough, abs=1e-10)

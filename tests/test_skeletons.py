@@ -180,6 +180,28 @@ def _held_with_a_velocity(link):
     return ms.Skeleton([link, moving], [ms.Ball(moving, link, origin=(0, 0, 1))])
 
 
+@pytest.mark.parametrize("driven", [False, True])
+def test_bones_that_joints_leave_no_freedom(driven):
+    """Fixed, or where a motor has them: as if the flesh were pinned there."""
+    mesh = ms.meshes.box((0.3, 0.04, 0.04), cells=(6, 1, 1))
+    bar = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=2e4, poisson_ratio=0.3), mass_density=1e3)
+    x = bar.mesh.rest_positions[:, 0] - bar.mesh.rest_positions[:, 0].min()
+    ends = [np.flatnonzero(x < 0.051), np.flatnonzero(x > 0.249)]
+    bones = [ms.Link(end, body=bar) for end in ends]
+    joints = [
+        ms.Revolute(bones[0], origin=(0, 0, 0), axis=(0, 1, 0), motor_angle=0.0)
+        if driven
+        else ms.Fixed(bones[0]),
+        ms.Fixed(bones[1]),
+    ]
+    skeletons = [ms.Skeleton([bone], [joint]) for bone, joint in zip(bones, joints, strict=True)]
+    pull = {"gravity": (0, 0, -G)}
+    held = ms.equilibrium(ms.Scene([bar, *skeletons], **pull))
+    pinned = ms.equilibrium(ms.Scene(bar, supports=[ms.Pin(np.concatenate(ends))], **pull))
+    assert np.abs(pinned.displacements).max() > 1e-4
+    np.testing.assert_allclose(held.positions, pinned.positions, atol=1e-12)
+
+
 def differences(function, at: np.ndarray, step: float) -> np.ndarray:
     gradient = np.zeros_like(at)
     for k in np.ndindex(at.shape):

@@ -6,14 +6,15 @@ namespace magshell::bindings {
 namespace {
 
 py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, const Array& by_positions,
-                              const Array& by_edge_rotations) {
+                              const Array& by_edge_rotations, const VectorXd& by_driving) {
     const Rows3 positions = to_rows3(by_positions);
     const VectorXd rotations = to_vector(by_edge_rotations);
     Gradient gradient;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        gradient = pull_back(model, equilibrium, model.bodies().gradient_by_state(positions, rotations));
+        gradient =
+            pull_back(model, equilibrium, model.bodies().gradient_by_state(positions, rotations), by_driving);
     }
     return py::make_tuple(values_to_user(model, gradient.values), gradient.controls);
 }
@@ -33,9 +34,9 @@ VectorXd by_values(Model& model, const VectorXd& q, const Controls& controls, co
 void register_adjoint(py::module_& module) {
     module.def(
         "pull_back", &pull_back_to_inputs, py::arg("model"), py::arg("equilibrium"), py::arg("by_positions"),
-        py::arg("by_edge_rotations"),
-        "The gradients by everything a solve takes, of a function of positions (n_v, 3) and edge rotations "
-        "(n_e,) with these gradients. The model must hold the values of that solve.");
+        py::arg("by_edge_rotations"), py::arg("by_driving") = VectorXd(),
+        "The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations "
+        "(n_e,) and what motors do (m,) with these gradients. The model must hold the values of that solve.");
     module.def("vjp", &by_values, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
                "adjoint . dg/dk at a state q, g the gradient of the energy and k every value, (n,).");
 }

@@ -3,8 +3,8 @@
 
 #include "bindings/arrays.h"
 #include "bindings/call_python.h"
+#include "bindings/controls.h"
 #include "bindings/watch.h"
-#include "magshell/core/errors.h"
 
 namespace magshell::bindings {
 namespace {
@@ -13,9 +13,7 @@ PathResult follow(Model& model, const VectorXd& start, const Model::Turns& turns
                   const Controls& to, const PathOptions& options, const std::vector<Index>& entries,
                   const py::object& until, const py::object& progress) {
     const Varying varying(model.registry(), entries);
-    const Index width = model.registry().controls.size() + varying.size();
-    if (from.size() != width || to.size() != width)
-        throw InvalidInput("controls must have shape (" + std::to_string(width) + ",)");
+    check_controls(model, varying, from, to);
     const Watch watch(progress);
     Until ends;
     if (!until.is_none())

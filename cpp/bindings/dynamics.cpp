@@ -179,9 +179,10 @@ MotionResult run(Model& model, const MotionInput& input, bool gradients, std::si
 }
 
 py::dict back(Model& model, const MotionInput& input, const MotionResult& motion, const Array& by_positions,
-              const Array& by_edge_rotations, const Array& by_velocities, const py::object& progress) {
+              const Array& by_edge_rotations, const Array& by_velocities, const Knots& by_driving,
+              const py::object& progress) {
     const Watch watch(progress);
-    std::vector<VectorXd> by_q, by_v;
+    GradientsByStates by;
     const VectorXd no_rotations = VectorXd::Zero(model.bodies().n_edges());
     const py::ssize_t n_v = model.nodes().n_user_vertices(), n_e = model.bodies().n_edges();
     for (py::ssize_t k = 0; k < static_cast<py::ssize_t>(motion.recorded.size()); ++k) {
@@ -189,15 +190,16 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
             return Rows3(Eigen::Map<const Rows3>(of.data(k, 0, 0), n_v, 3));
         };
         const VectorXd rotations = Eigen::Map<const VectorXd>(by_edge_rotations.data() + k * n_e, n_e);
-        by_q.push_back(model.bodies().gradient_by_state(rows(by_positions), rotations));
-        by_v.push_back(model.bodies().gradient_by_state(rows(by_velocities), no_rotations));
+        by.q.push_back(model.bodies().gradient_by_state(rows(by_positions), rotations));
+        by.v.push_back(model.bodies().gradient_by_state(rows(by_velocities), no_rotations));
+        if (by_driving.size() > 0) by.driving.push_back(by_driving.row(k).transpose());
     }
     MotionGradient gradient;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        gradient = pull_back(model, input, motion, by_q, by_v,
-                             [&](double at, double residual) { watch(at, residual); });
+        gradient =
+            pull_back(model, input, motion, by, [&](double at, double residual) { watch(at, residual); });
     }
     py::dict result;
     result["values"] = values_to_user(model, gradient.values);
@@ -279,7 +281,7 @@ void register_dynamics(py::module_& module) {
                py::arg("keep"), py::arg("progress") = py::none());
     module.def("pull_back_motion", &back, py::arg("model"), py::arg("input"), py::arg("motion"),
                py::arg("by_positions"), py::arg("by_edge_rotations"), py::arg("by_velocities"),
-               py::arg("progress") = py::none());
+               py::arg("by_driving") = Knots(), py::arg("progress") = py::none());
 }
 
 }  // namespace magshell::bindings

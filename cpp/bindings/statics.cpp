@@ -2,6 +2,7 @@
 #include "magshell/solve/statics.h"
 
 #include "bindings/arrays.h"
+#include "bindings/controls.h"
 #include "bindings/watch.h"
 #include "magshell/solve/modes.h"
 #include "magshell/solve/response.h"
@@ -10,12 +11,16 @@ namespace magshell::bindings {
 namespace {
 
 StaticsResult solve(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
-                    const Controls& to, const StaticsOptions& options, const py::object& progress) {
+                    const Controls& to, const StaticsOptions& options, const py::object& progress,
+                    const std::vector<Index>& entries) {
     const Watch watch(progress);
+    const Varying varying(model.registry(), entries);
+    check_controls(model, varying, from, to);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
-    return find_equilibrium(model, start, turns, from, to, options,
-                            [&](double at, double residual) { watch(at, residual); });
+    return find_equilibrium(
+        model, start, turns, from, to, options, [&](double at, double residual) { watch(at, residual); },
+        varying);
 }
 
 VectorXd change(Model& model, const StaticsResult& equilibrium, const Controls& to) {
@@ -116,7 +121,8 @@ void register_statics(py::module_& module) {
         .def_readonly("factorization", &StaticsResult::factorization);
 
     module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("turns"),
-               py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("progress") = py::none());
+               py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("progress") = py::none(),
+               py::arg("varying") = std::vector<Index>());
     module.def(
         "lowest_modes", &lowest_modes, py::arg("model"), py::arg("state"), py::arg("turns"),
         py::arg("controls"), py::arg("count"), py::arg("progress") = py::none(),

@@ -933,6 +933,7 @@ def find_equilibrium(
     to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: StaticsOptions,
     progress: typing.Any = None,
+    varying: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [],
 ) -> StaticsResult: ...
 def lowest_modes(
     model: Model,
@@ -1062,9 +1063,10 @@ def pull_back(
     equilibrium: StaticsResult,
     by_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
 ) -> tuple:
     """
-    The gradients by everything a solve takes, of a function of positions (n_v, 3) and edge rotations (n_e,) with these gradients. The model must hold the values of that solve.
+    The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations (n_e,) and what motors do (m,) with these gradients. The model must hold the values of that solve.
     """
 
 def pull_back_motion(
@@ -1074,6 +1076,7 @@ def pull_back_motion(
     by_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
     progress: typing.Any = None,
 ) -> dict: ...
 def sample_fields(

@@ -4,6 +4,7 @@
 
 #include "magshell/adjoint/viscous.h"
 #include "magshell/core/errors.h"
+#include "magshell/solve/driven_end.h"
 #include "magshell/solve/rotations.h"
 
 namespace magshell {
@@ -17,13 +18,12 @@ struct Viscous {
 class Backward {
   public:
     Backward(Newton& newton, const MotionInput& input, const MotionResult& motion,
-             const std::vector<VectorXd>& by_q, const std::vector<VectorXd>& by_v)
+             const GradientsByStates& by)
         : newton_(newton),
           model_(newton.model()),
           input_(input),
           motion_(motion),
-          by_q_(by_q),
-          by_v_(by_v),
+          by_(by),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
           scene_(model_.registry()) {
         scene_.controls = model_.no_controls();
@@ -86,18 +86,52 @@ class Backward {
     void back(Index step, const std::vector<SubstepRecord>& records) {
         progress_ = 1.0 - static_cast<double>(step + 1) / static_cast<double>(motion_.steps_done);
         const Substeps substeps = substeps_of(motion_.halved, step);
-        for (std::size_t k = substeps.size(); k-- > 0;) back(step, substeps[k], records[k]);
+        for (std::size_t k = substeps.size(); k-- > 0;)
+            back(step, substeps[k], records[k], k + 1 == substeps.size() ? by_driving(step + 1) : VectorXd());
         take_in(step);
     }
 
-    void back(Index step, const Substep& substep, const SubstepRecord& record) {
+    // What the loss says of the motors' forces in the state that so many steps led to; empty where it says nothing.
+    VectorXd by_driving(Index steps) const {
+        if (by_.driving.empty() || steps % input_.record_every != 0) return {};
+        const VectorXd& by = by_.driving[steps / input_.record_every];
+        return by.isZero(0.0) ? VectorXd() : by;
+    }
+
+    // By what a stage, or the state beside it where motors are looked at, started from.
+    struct BeforeStage {
+        VectorXd x_hat, v_hat;
+        double dt = 0.0;
+    };
+
+    // What lambda says, at a state with these rates, of inertia, of forces, and of where the stage started from.
+    void through_rates(const StepAlgebra& algebra, const VectorXd& lambda,
+                       const KinematicsGradient& by_forces, const VectorXd& v, const VectorXd& w,
+                       BeforeStage& by) {
+        const VectorXd &mass = input_.inertia.mass, &damping = input_.inertia.damping;
+        const double dt = algebra.dt(), adt = algebra.stage_time();
+        const VectorXd accelerated = lambda.cwiseProduct(w), moved = lambda.cwiseProduct(v);
+        g_.mass += accelerated;
+        g_.damping += moved;
+        // d/dt of M (x - x^ - a dt v^)/(a dt)^2 + Gamma (x - x^)/(a dt), with x^ and v^ fixed
+        by.dt -= (mass.dot(accelerated + moved / adt) + damping.dot(moved)) / dt;
+        by.x_hat -= algebra.weights().cwiseProduct(lambda);
+        by.v_hat -= mass.cwiseProduct(lambda) / adt;
+        if (!model_.has_forces()) return;  // - f(x, (x - x^)/(a dt), ...)
+        const VectorXd by_rate = by_forces.velocity + by_forces.acceleration / adt;
+        by.x_hat += by_rate / adt;
+        by.v_hat += by_forces.acceleration / adt;
+        by.dt += (by_rate.dot(v) + by_forces.acceleration.dot(w)) / dt;
+        g_.positions -= by_forces.begin;
+    }
+
+    void back(Index step, const Substep& substep, const SubstepRecord& record, const VectorXd& by_driving) {
         const double share = substep.share();
         const StepAlgebra algebra = stepper_.algebra(
             share * input_.time_step, stepper_.tableau_from(record.begin, substep.dissipative));
         const Tableau& tableau = algebra.tableau();
         const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
         const double dt = algebra.dt(), adt = algebra.stage_time();
-        const VectorXd &mass = input_.inertia.mass, &damping = input_.inertia.damping;
         const Index coordinates = model_.n_coordinates();
         const StepRates at(model_, algebra, record);
 
@@ -112,38 +146,34 @@ class Backward {
              by_strains_},
             {model_, model_.dampers(), damper_law, &StageRates::joints, algebra, record, controls, {}}};
         double by_dt = 0.0;
+        const VectorXd by_earlier = std::move(by_v_before_);
+        by_v_before_ = VectorXd();
+        BeforeStage by_end{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
+        if (by_driving.size() > 0)
+            back_through_motors(algebra, at, record, step, substep, by_driving, viscous, by_v.back(),
+                                by_w.back(), by_end);
         for (int i = n - 1; i >= 0; --i) {
             const VectorXd &v = at.all[first + i].v, &w = at.all[first + i].w;
             const VectorXd &by_vi = by_v[first + i] += by_w[first + i] / adt, &by_wi = by_w[first + i];
-            by_dt -= (by_wi.dot(w) + by_vi.dot(v)) / dt;
-            VectorXd by_v_hat = -by_wi / adt, by_x_hat = VectorXd::Zero(model_.size());
+            BeforeStage by{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
+            if (i == n - 1) by = std::move(by_end);
+            by.dt -= (by_wi.dot(w) + by_vi.dot(v)) / dt;
+            by.v_hat -= by_wi / adt;
             by_x.head(coordinates) += by_vi.head(coordinates) / adt;
-            by_x_hat.head(coordinates) = -by_vi.head(coordinates) / adt;
+            by.x_hat.head(coordinates) -= by_vi.head(coordinates) / adt;
 
             const auto [lambda, by_forces] =
                 back_through(algebra, at, i, record, step, substep, by_x, viscous);
-            const VectorXd accelerated = lambda.cwiseProduct(w), moved = lambda.cwiseProduct(v);
-            g_.mass += accelerated;
-            g_.damping += moved;
-            // d/dt of M (x - x^ - a dt v^)/(a dt)^2 + Gamma (x - x^)/(a dt), with x^ and v^ fixed
-            by_dt -= (mass.dot(accelerated + moved / adt) + damping.dot(moved)) / dt;
-            by_x_hat -= algebra.weights().cwiseProduct(lambda);
-            by_v_hat -= mass.cwiseProduct(lambda) / adt;
-            if (model_.has_forces()) {  // - f(x, (x - x^)/(a dt), ...)
-                const VectorXd by_rate = by_forces.velocity + by_forces.acceleration / adt;
-                by_x_hat += by_rate / adt;
-                by_v_hat += by_forces.acceleration / adt;
-                by_dt += (by_rate.dot(v) + by_forces.acceleration.dot(w)) / dt;
-                g_.positions -= by_forces.begin;
-            }
+            through_rates(algebra, lambda, by_forces, v, w, by);
 
-            g_.positions += by_x_hat;
-            g_.velocities += by_v_hat;
+            by_dt += by.dt;
+            g_.positions += by.x_hat;
+            g_.velocities += by.v_hat;
             for (int j = 0; j < first + i; ++j) {
                 const double a = tableau.a[i][j];
-                by_v[j] += (dt * a) * by_x_hat;
-                by_w[j] += (dt * a) * by_v_hat;
-                by_dt += a * (at.all[j].v.dot(by_x_hat) + at.all[j].w.dot(by_v_hat));
+                by_v[j] += (dt * a) * by.x_hat;
+                by_w[j] += (dt * a) * by.v_hat;
+                by_dt += a * (at.all[j].v.dot(by.x_hat) + at.all[j].w.dot(by.v_hat));
             }
             by_x.setZero(model_.size());
         }
@@ -173,24 +203,32 @@ class Backward {
             by_dt += viscous.joints.by_dt;
             if (tableau.begins_explicitly)
                 model_.damper_rates_vjp(record.begin.q, record.begin.v, viscous.joints.by_begin.d_rate,
-                                        g_.positions, g_.velocities);
+                                        g_.positions, g_.velocities, scene_);
         }
         g_.time_step += share * by_dt;
+        if (by_earlier.size() > 0) g_.velocities += by_earlier;
     }
 
-    // With the Hessian at a stage, which was evaluated last: by the factorization that was kept from nearby
-    // if there is one.
-    VectorXd solve(const StageState& stage, const Controls& controls, const Anchor& anchor,
+    // With the Hessian at a state, which was evaluated last: by a factorization from nearby if there is one.
+    VectorXd solve(const VectorXd& q, const Factor* nearby, const Controls& controls, const Anchor& anchor,
                    const VectorXd& rhs) {
         newton_.watch(0.0);
         VectorXd solution = rhs;
-        if (stage.factor &&
-            newton_.solve_nearby(stage.q, controls, anchor, *stage.factor, solution).converged)
-            return solution;
-        Eigen::MatrixXd no_moves(stage.q.size(), 0);
-        const FactorReport factor = newton_.factorize(stage.q, controls, false, anchor, no_moves);
+        if (nearby && newton_.solve_nearby(q, controls, anchor, *nearby, solution).converged) return solution;
+        Eigen::MatrixXd no_moves(q.size(), 0);
+        const FactorReport factor = newton_.factorize(q, controls, false, anchor, no_moves);
         if (!factor.succeeded) throw InvalidInput("the adjoint of a step: " + factor.reason);
         return newton_.solve_transposed(rhs);
+    }
+
+    // As a stage was solved for.
+    void set_stage(const SubstepRecord& record, int i, Index step, const Substep& substep,
+                   const Controls& controls, const Viscous& viscous) {
+        model_.take(controls);
+        model_.set_turns(record.stages[i].turns);
+        model_.begin_step(record.begin.q, input_.controls_at(step, substep.begin));
+        viscous.strains.set_history(i);
+        viscous.joints.set_history(i);
     }
 
     // lambda of a stage, and what its forces say of how it moved; adds what it says of the scene and of the controls.
@@ -202,39 +240,99 @@ class Backward {
         const ElasticAfterwards elastic_afterwards(model_);
         const double share = substep.begin + algebra.tableau().time(i) * substep.share();
         const Controls controls = input_.controls_at(step, share);
-        model_.take(controls);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
-        model_.set_turns(stage.turns);
-        model_.begin_step(record.begin.q, input_.controls_at(step, substep.begin));
-        viscous.strains.set_history(i);
-        viscous.joints.set_history(i);
+        set_stage(record, i, step, substep, controls, viscous);
         const Anchor anchor{&algebra.weights(), &target, &motion};
         newton_.evaluate(stage.q, controls, anchor);
         viscous.strains.before_solve(i, by_x, scene_);
         viscous.joints.before_solve(i, by_x, scene_);
-        const VectorXd lambda = solve(stage, controls, anchor, -by_x);
+        const VectorXd lambda = solve(stage.q, stage.factor.get(), controls, anchor, -by_x);
         viscous.strains.after_solve(i, lambda);
         viscous.joints.after_solve(i, lambda);
+        return {lambda, by_scene(stage.q, controls, anchor, step, substep, share, lambda, {}, by_x)};
+    }
 
+    // What the forces of motors at the end of a substep say: of the scene and the controls, of the state that they are
+    // looked up at, which is next to the last stage, and of the velocities behind its acceleration (solve/driven_end.h).
+    void back_through_motors(const StepAlgebra& algebra, const StepRates& at, const SubstepRecord& record,
+                             Index step, const Substep& substep, const VectorXd& by_driving, Viscous& viscous,
+                             VectorXd& by_v_last, VectorXd& by_w_last, BeforeStage& by) {
+        const int i = algebra.tableau().stages - 1;
+        const StageState& stage = record.stages[i];
+        const ElasticAfterwards elastic_afterwards(model_);
+        const Controls controls = input_.controls_at(step, substep.end);
+        const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
+        const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
+        set_stage(record, i, step, substep, controls, viscous);
+        const Anchor there{&algebra.weights(), &target, &motion};
+        const DrivenEnd end(newton_, input_.inertia, record.begin, algebra.dt(), stage.q, controls, there,
+                            at.all.back());
+        if (!end.found())
+            throw InvalidInput("what a motor does has no gradient where it was not found (NaN)");
+        const Anchor anchor = end.anchor();
+        const VectorXd& q = end.q();
+        newton_.evaluate(q, controls, anchor);
+        model_.assemble(q, controls, false);
+        if (model_.has_forces()) model_.assemble_forces(controls);
+        const VectorXd motors = model_.reduction().driving_motion(by_driving);
+        const VectorXd by_q = product(motors, algebra.weights());
+        VectorXd by_free = by_q;
+        model_.reduction().add_driving_change(newton_.gradient(q, anchor), by_driving, by_free);
+        const std::shared_ptr<Factor> nearby = newton_.factor();
+        const bool serves = nearby && nearby->pattern() == model_.reduction().pattern();
+        const VectorXd lambda = solve(q, serves ? nearby.get() : nullptr, controls, anchor, -by_free),
+                       all = lambda + motors;
+        viscous.strains.beside(i, q, all);
+        viscous.joints.beside(i, q, all);
+        const KinematicsGradient by_forces =
+            by_scene(q, controls, anchor, step, substep, substep.end, lambda, by_driving, by_q);
+        VectorXd v = VectorXd::Zero(model_.size());
+        v.head(model_.n_coordinates()) =
+            (q - at.x_hat[i]).head(model_.n_coordinates()) / algebra.stage_time();
+        through_rates(algebra, all, by_forces, v, (v - at.v_hat[i]) / algebra.stage_time(), by);
+        if (end.acceleration_change().size() == 0) return;
+        const VectorXd pull = input_.inertia.mass.cwiseProduct(all);
+        g_.mass += all.cwiseProduct(end.acceleration_change());
+        by_w_last -= pull;
+        by_v_last += end.share_last() * pull;
+        g_.velocities += end.share_begin() * pull;
+        by_v_before_ = end.share_before() * pull;
+        // Both substeps are shares of the time step: their ratio stays.
+        by.dt -= pull.dot(end.acceleration_change() + at.all.back().w) / algebra.dt();
+    }
+
+    // (K + W)^T along a motion of all unknowns, as assembled last.
+    VectorXd product(const VectorXd& along, const VectorXd& weights) const {
+        VectorXd forces(model_.size());
+        model_.multiply(along, forces);
+        model_.remainder().add_product(along, true, forces);
+        return forces + weights.cwiseProduct(along);
+    }
+
+    // Adds what an adjoint at the evaluated state says of the scene and of the controls, with the motion along what motors
+    // drive where the loss feels them; what it says of how the state moved.
+    KinematicsGradient by_scene(const VectorXd& q, const Controls& controls, const Anchor& anchor, Index step,
+                                const Substep& substep, double share, const VectorXd& lambda,
+                                const VectorXd& by_driving, const VectorXd& by_q) {
+        const Reduction& reduction = model_.reduction();
+        const VectorXd all =
+            by_driving.size() > 0 ? VectorXd(lambda + reduction.driving_motion(by_driving)) : lambda;
         scene_.controls.setZero();
-        model_.vjp(stage.q, controls, lambda, scene_);
+        model_.vjp(q, controls, all, scene_);
         KinematicsGradient by_forces;
-        if (model_.has_forces()) by_forces = model_.forces_vjp(controls, lambda, scene_);
-        if (model_.reduction().has_values()) {
+        if (model_.has_forces()) by_forces = model_.forces_vjp(controls, all, scene_);
+        if (reduction.has_values()) {
             // Once more: the factorization has turned the blocks of framed nodes.
-            model_.assemble(stage.q, controls, false);
+            model_.assemble(q, controls, false);
             if (model_.has_forces()) model_.assemble_forces(controls);
-            VectorXd reaction(model_.size());
-            model_.multiply(lambda, reaction);
-            model_.remainder().add_product(lambda, true, reaction);
-            reaction += by_x + algebra.weights().cwiseProduct(lambda);
-            model_.reduction().vjp(reaction, lambda, newton_.gradient(stage.q, anchor), controls, scene_);
+            const VectorXd reaction = product(lambda, *anchor.weights) + by_q;
+            reduction.vjp(reaction, lambda, newton_.gradient(q, anchor), controls, scene_, by_driving);
         }
         model_.varying().move_gradient(scene_);
         add_by_controls(step, share, scene_.controls);
         if (model_.has_forces()) add_by_controls(step, substep.begin, by_forces.begin_controls);
-        return {lambda, std::move(by_forces)};
+        return by_forces;
     }
 
     // What the controls at a share of a step do is that of the two knots that they lie between.
@@ -273,8 +371,8 @@ class Backward {
     void take_in(Index step) {
         if (step % input_.record_every != 0) return;
         const std::size_t k = step / input_.record_every;
-        g_.positions += by_q_[k];
-        g_.velocities += by_v_[k];
+        g_.positions += by_.q[k];
+        g_.velocities += by_.v[k];
     }
 
     MotionGradient g_;
@@ -282,11 +380,13 @@ class Backward {
     Model& model_;
     const MotionInput& input_;
     const MotionResult& motion_;
-    const std::vector<VectorXd>&by_q_, &by_v_;
+    const GradientsByStates& by_;
     Stepper stepper_;
     Gradient scene_;  // by all values; by the controls of the stage at hand
     // By the rates, and by the Maxwell branch, at the beginning of the last step taken back.
     VectorXd by_w_;
+    VectorXd
+        by_v_before_;  // by the velocity at the beginning of the step before that; empty where nothing asks
     ViscousGradient by_strains_;
     double progress_ = 0.0;
 };
@@ -294,8 +394,7 @@ class Backward {
 }  // namespace
 
 MotionGradient pull_back(Model& model, const MotionInput& input, const MotionResult& motion,
-                         const std::vector<VectorXd>& by_q, const std::vector<VectorXd>& by_v,
-                         const MotionWatch& watch) {
+                         const GradientsByStates& by, const MotionWatch& watch) {
     if (motion.keep == Keep::nothing)
         throw InvalidInput("the motion was computed without keeping its states");
     const WhileVarying varying(model, input.varying);
@@ -303,7 +402,7 @@ MotionGradient pull_back(Model& model, const MotionInput& input, const MotionRes
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(running ? running->progress() : 0.0, residual);
     });
-    Backward backward(newton, input, motion, by_q, by_v);
+    Backward backward(newton, input, motion, by);
     running = &backward;
     return backward.run();
 }

@@ -26,10 +26,15 @@ struct MotionGradient {
     int factorizations = 0;          // that it took, those of steps taken again included
 };
 
-/// By everything, from the gradients by the recorded states: their unknowns and their velocities. Throws
-/// InvalidInput where the motion was not kept for gradients.
+/// By the recorded states of a motion.
+struct GradientsByStates {
+    std::vector<VectorXd> q, v;     // their unknowns and velocities
+    std::vector<VectorXd> driving;  // what motors do, as Reduction::driving has it; empty where nothing asks
+};
+
+/// By everything, from the gradients by the recorded states. Throws InvalidInput where the motion was not kept for
+/// gradients.
 MotionGradient pull_back(Model& model, const MotionInput& input, const MotionResult& motion,
-                         const std::vector<VectorXd>& by_q, const std::vector<VectorXd>& by_v,
-                         const MotionWatch& watch = {});
+                         const GradientsByStates& by, const MotionWatch& watch = {});
 
 }  // namespace magshell

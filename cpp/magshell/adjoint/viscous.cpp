@@ -62,11 +62,26 @@ void ViscousAdjoint::before_solve(int i, VectorXd& by_q, Gradient& scene) {
 
 void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {
     if (idle()) return;
+    take_in(i, stages_[i].d, lambda);
+    if (law_.maxwell()) {
+        by_stage_time_[i] += by_ratio_[i] / law_.maxwell_time;
+        by_law.maxwell_time -= by_ratio_[i] * law_.ratio(step_.stage_time()) / law_.maxwell_time;
+    }
+    by_dt += step_.tableau().diagonal * by_stage_time_[i];
+    pass_on(i);
+}
+
+void ViscousAdjoint::beside(int i, const VectorXd& q, const VectorXd& lambda) {
+    if (!idle()) take_in(i, terms_.strains(q), lambda);
+}
+
+// d: the strains at the evaluated state.
+void ViscousAdjoint::take_in(int i, const StrainSet& d, const VectorXd& lambda) {
     const ViscousStage& stage = stages_[i];
     const double T = step_.stage_time(), beta = law_.stiffness_damping;
     // lambda . J^T C (scale d - shift)
     const StrainSet along = terms_.stresses(terms_.rates(lambda));
-    const double by_scale = along.dot(stage.d), by_d_share = -along.dot(stage.d_hat);
+    const double by_scale = along.dot(d), by_d_share = -along.dot(stage.d_hat);
     by_d_hat_[i].add(-beta / T, along);
     by_law.stiffness_damping += (by_scale + by_d_share) / T;
     by_stage_time_[i] -= beta / (T * T) * (by_scale + by_d_share);
@@ -76,11 +91,7 @@ void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {
         by_e_hat_[i].add(-relaxed, along);
         by_law.maxwell_modulus += by_relaxed / (1.0 + r);
         by_ratio_[i] -= by_relaxed * relaxed / (1.0 + r);
-        by_stage_time_[i] += by_ratio_[i] / law_.maxwell_time;
-        by_law.maxwell_time -= by_ratio_[i] * r / law_.maxwell_time;
     }
-    by_dt += step_.tableau().diagonal * by_stage_time_[i];
-    pass_on(i);
 }
 
 // d^_i = d + dt sum a_ij d'_j, and e^_i alike. What the step began with is passed on once all stages are done.

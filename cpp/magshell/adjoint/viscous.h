@@ -22,8 +22,10 @@ class ViscousAdjoint {
     void set_history(int i) const;
     /// At the evaluated stage: adds to by_q, and to the values of `scene`, what later rates say of its strains.
     void before_solve(int i, VectorXd& by_q, Gradient& scene);
-    /// At the evaluated stage: what lambda says of the history and of the law.
+    /// At the evaluated stage: what lambda says of the history and of the law. Before it, what it says at a state
+    /// beside that of stage i, which feels the same history.
     void after_solve(int i, const VectorXd& lambda);
+    void beside(int i, const VectorXd& q, const VectorXd& lambda);
 
     StrainSet by_d_begin;
     ViscousGradient by_begin;
@@ -31,6 +33,7 @@ class ViscousAdjoint {
     double by_dt = 0.0;
 
   private:
+    void take_in(int i, const StrainSet& d, const VectorXd& lambda);
     void pass_on(int i);
 
     const StrainRates& rates(std::size_t j) const { return rates_[j].*kind_; }

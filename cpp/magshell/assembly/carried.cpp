@@ -88,11 +88,13 @@ void Carried::find_places(const std::vector<const SystemMatrix*>& matrices, cons
         chunk.own.clear();
         chunk.beside.clear();
         chunk.places.assign(matrices.size(), {});
+        for (const Index other : chunk.later) chunk.beside[other] = {};
         for (Index j = 0; j < chunk.carrier->coordinates(); ++j) {
             const Index column = free_ + chunk.first + j;
             chunk.own.push_back(place_in(pattern, column, column));
             for (const Index other : chunk.later)
-                chunk.beside[other].push_back(place_in(pattern, column, free_ + chunks_[other].first));
+                if (chunks_[other].carrier->coordinates() > 0)
+                    chunk.beside[other].push_back(place_in(pattern, column, free_ + chunks_[other].first));
         }
     }
     for (std::size_t which = 0; which < matrices.size(); ++which)
@@ -112,6 +114,7 @@ void Carried::find_places(std::size_t which, const SystemMatrix& matrix, const s
     };
     const auto add_mixed = [&](Index free, Index carried, Index k) {
         const Index carrier = carrier_of_[carried];
+        if (chunks_[carrier].carrier->coordinates() == 0) return;  // it is where joints hold or drive it
         const Index to = place_in(pattern, reduced[free], free_ + chunks_[carrier].first);
         mixed.push_back({carrier, to, link(carried), k, row_of_[carried]});
     };
@@ -165,6 +168,7 @@ void Carried::add_matrix(std::size_t which, const SystemMatrix& full, double* va
             const LinkTwists& beside = chunks_[other].twists;
             const MatrixXd block = b.product(across.blocks(entries, beside, b), beside);
             const std::vector<Index>& to = chunk.beside.at(other);
+            if (to.empty()) continue;
             for (Index j = 0; j < n; ++j)
                 for (Index i = 0; i < chunks_[other].carrier->coordinates(); ++i)
                     values[to[j] + i] += block(i, j);
@@ -234,26 +238,60 @@ void Carried::add_driven_forces(const VectorXd& gradient, const VectorXd& move, 
     for (const Chunk& chunk : chunks_) {
         const Index n = chunk.carrier->coordinates(), m = chunk.carrier->driven();
         if (m == 0 || n == 0) continue;
-        const VectorXd pull =
-            chunk.carrier->curvature(at_, gradient).topRightCorner(n, m) * driven_part(chunk, move);
-        VectorXd own = chunk.carrier->gather(forces);
-        own += chunk.twists.motion(normal(chunk).solve(pull));
-        chunk.carrier->scatter(own, forces);
+        add_forces_of(chunk,
+                      chunk.carrier->curvature(at_, gradient).topRightCorner(n, m) * driven_part(chunk, move),
+                      forces);
+    }
+}
+
+void Carried::add_forces_of(const Chunk& chunk, const VectorXd& by_coordinates, VectorXd& forces) const {
+    VectorXd own = chunk.carrier->gather(forces);
+    own += chunk.twists.motion(normal(chunk).solve(by_coordinates));
+    chunk.carrier->scatter(own, forces);
+}
+
+VectorXd Carried::driven_rates(const Chunk& chunk, const VectorXd& all, Index& first) {
+    const Index m = chunk.carrier->driven();
+    if (m == 0) return {};
+    first += m;
+    return chunk.carrier->driven_units().cwiseProduct(all.segment(first - m, m));
+}
+
+VectorXd Carried::driving_motion(const VectorXd& by_driving) const {
+    VectorXd motion = VectorXd::Zero(at_.size());
+    Index first = 0;
+    for (const Chunk& chunk : chunks_)
+        if (const VectorXd z = driven_rates(chunk, by_driving, first); z.size() > 0)
+            chunk.carrier->scatter(chunk.twists.motion_from(chunk.carrier->coordinates(), z), motion);
+    return motion;
+}
+
+void Carried::add_driving_change(const VectorXd& gradient, const VectorXd& by_driving,
+                                 VectorXd& forces) const {
+    Index first = 0;
+    for (const Chunk& chunk : chunks_) {
+        const VectorXd z = driven_rates(chunk, by_driving, first);
+        const Index n = chunk.carrier->coordinates();
+        if (z.size() > 0 && n > 0)
+            add_forces_of(chunk, chunk.carrier->driving_change(at_, gradient, z).head(n), forces);
     }
 }
 
 void Carried::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
-                  Gradient& out) const {
+                  const VectorXd& by_driving, Gradient& out) const {
+    Index first = 0;
     for (const Chunk& chunk : chunks_) {
         const Carrier& carrier = *chunk.carrier;
         const Index n = carrier.coordinates(), m = carrier.driven();
         if (m == 0 && !carrier.placed()) continue;
         VectorXd z = VectorXd::Zero(n + m);
         if (n > 0) z.head(n) = free_part(chunk, lambda);
+        if (by_driving.size() > 0 && m > 0) z.tail(m) = driven_rates(chunk, by_driving, first);
         carrier.places_vjp(at_, by_state, z, gradient, out);
         if (m == 0) continue;
         VectorXd by_driven = driven_of(chunk, carrier.gather(by_state));
         if (n > 0) by_driven += carrier.curvature(at_, gradient).bottomLeftCorner(m, n) * z.head(n);
+        if (by_driving.size() > 0) by_driven += carrier.driving_change(at_, gradient, z.tail(m)).tail(m);
         carrier.driven_vjp(at_, by_driven, out);
     }
 }
@@ -307,6 +345,16 @@ void Carried::advance(VectorXd& q, const VectorXd& p) const {
         chunk.carrier->scatter(chunk.carrier->gather(from), q);
         chunk.carrier->advance(q, z);
     }
+}
+
+VectorXd Carried::rounding(const VectorXd& q) const {
+    VectorXd of_all = VectorXd::Zero(q.size());
+    for (const Chunk& chunk : chunks_) {
+        const VectorXd of_nodes = chunk.carrier->rounding(q);
+        for (std::size_t k = 0; k < chunk.carrier->nodes().size(); ++k)
+            of_all.segment<3>(3 * chunk.carrier->nodes()[k]).setConstant(of_nodes[static_cast<Index>(k)]);
+    }
+    return of_all;
 }
 
 void Carried::settle(VectorXd& q, VectorXd* v) const {

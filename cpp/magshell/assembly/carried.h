@@ -46,15 +46,20 @@ class Carried {
     /// Values may prescribe some coordinates of carriers, which are not among the unknowns then. Adds the motion that
     /// brings the nodes there; adds to the forces that a motion of all nodes causes what comes of how driven nodes curve
     /// away; and adds the gradients by those values, of a number whose gradient by all nodes is `by_state`, at an adjoint
-    /// lambda of all unknowns under a gradient g. driving: the forces [N], or moments [N m], that hold them, by g.
+    /// lambda of all unknowns under a gradient g. driving: the forces [N], or moments [N m], that hold them, by g. For the
+    /// gradients of a number by these: the motion B z at which their power is that number's; and forces that B^T makes what
+    /// such powers change by along the free coordinates, with g as it is.
     bool drives() const { return drives_; }
     /// Whether values say where joints are, which vjp adds to as well.
     bool placed() const { return placed_; }
     void set_values(const Values& values);
     void add_driven_increment(const VectorXd& q, VectorXd& increment) const;
     void add_driven_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const;
-    void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient, Gradient& out) const;
+    void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+             const VectorXd& by_driving, Gradient& out) const;
     VectorXd driving(const VectorXd& gradient) const;
+    VectorXd driving_motion(const VectorXd& by_driving) const;
+    void add_driving_change(const VectorXd& gradient, const VectorXd& by_driving, VectorXd& forces) const;
 
     /// The last numbers of a reduced vector: B^T f, and the diagonal of B^T w B.
     void pull_back(const VectorXd& full, VectorXd& reduced) const;
@@ -68,6 +73,8 @@ class Carried {
 
     /// Moves q, the nodes carried along what of p they can follow.
     void advance(VectorXd& q, const VectorXd& p) const;
+    /// See Carrier; of all unknowns, zero where nothing is carried.
+    VectorXd rounding(const VectorXd& q) const;
     void settle(VectorXd& q, VectorXd* v) const;
     void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
                     Gradient& out) const;
@@ -101,6 +108,10 @@ class Carried {
     VectorXd driven_part(const Chunk& chunk, const VectorXd& full) const;
     static const Eigen::LDLT<Eigen::MatrixXd>& normal(const Chunk& chunk);
     static VectorXd driven_of(const Chunk& chunk, const VectorXd& rows);
+    /// Adds forces on its nodes that B^T makes these of its free coordinates.
+    void add_forces_of(const Chunk& chunk, const VectorXd& by_coordinates, VectorXd& forces) const;
+    /// Rates [m] of what is driven in a chunk, from numbers of all motors in their units; `first` goes on to the next chunk.
+    static VectorXd driven_rates(const Chunk& chunk, const VectorXd& all, Index& first);
     VectorXd pull_back_free(const Chunk& chunk, const VectorXd& rows) const;
     void add_lower(const Chunk& chunk, const Eigen::MatrixXd& block, double* values) const;
 

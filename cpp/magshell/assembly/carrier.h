@@ -40,6 +40,11 @@ class Carrier {
     virtual VectorXd driven_increment(const VectorXd& /*q*/) const { return {}; }
     virtual VectorXd driven_units() const { return {}; }
     virtual void driven_vjp(const VectorXd& /*q*/, const VectorXd& /*by_driven*/, Gradient& /*out*/) const {}
+    /// How sum g . B z changes along all coordinates, at rates z of the driven ones alone, with g as it is.
+    virtual VectorXd driving_change(const VectorXd& /*q*/, const VectorXd& /*gradient*/,
+                                    const VectorXd& /*driven*/) const {
+        return {};
+    }
 
     /// Whether values say where its joints are; and adds the gradients by these, at q, of a number with this gradient by
     /// all nodes, with what they do to sum g . B z at the rates z of all coordinates under a gradient g.
@@ -58,6 +63,10 @@ class Carrier {
     /// empty.
     virtual void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
                             Gradient& out) const = 0;
+
+    /// What the rounding of coordinates that are read off nodes moves its nodes by at q [m], over the machine's epsilon,
+    /// where they are placed anew: more than their own rounding where arms are long. One number a node.
+    virtual VectorXd rounding(const VectorXd& q) const = 0;
 
     /// Its nodes' rows of a vector of all unknowns, and back.
     VectorXd gather(const VectorXd& full) const {

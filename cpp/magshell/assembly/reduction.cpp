@@ -158,8 +158,8 @@ Vec3 Reduction::rate(Index node, Index move, double progress) const {
 }
 
 void Reduction::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
-                    const Controls& controls, Gradient& out) const {
-    if (carried_) carried_->vjp(by_state, lambda, gradient, out);
+                    const Controls& controls, Gradient& out, const VectorXd& by_driving) const {
+    if (carried_) carried_->vjp(by_state, lambda, gradient, by_driving, out);
     const double t = progress(controls);
     std::vector<SupportMove> by_move(moves_.size());
     for (const HeldNode& h : held_)

@@ -61,9 +61,10 @@ class Reduction {
     VectorXd prescribed_rate(const Controls& controls) const;
 
     /// Adds the gradients by the moves and by their progress, given the gradient by what supports hold; and by what
-    /// carriers are driven to and where their joints are, at an adjoint lambda under the gradient of the energy, with inertia in a motion.
+    /// carriers are driven to and where their joints are, at an adjoint lambda under the gradient of the energy, with
+    /// inertia in a motion. by_driving: by what drives, empty where nothing is; by_state has what it says of the state.
     void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
-             const Controls& controls, Gradient& out) const;
+             const Controls& controls, Gradient& out, const VectorXd& by_driving = {}) const;
     /// Adds to the forces that prescribed increments cause, K p, what a curved way of carried nodes adds.
     void add_driven_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const {
         if (drives()) carried_->add_driven_forces(gradient, move, forces);
@@ -71,6 +72,13 @@ class Reduction {
     /// Forces [N] and moments [N m] that drive, one after another, where the gradient of the energy is this.
     VectorXd driving(const VectorXd& gradient) const {
         return drives() ? carried_->driving(gradient) : VectorXd();
+    }
+
+    /// Of a number with these gradients by driving(gradient): the motion of all nodes at which that gradient's power is the
+    /// number; adds to forces on free unknowns how this power changes along their curved ways. At the state linearized last.
+    VectorXd driving_motion(const VectorXd& by_driving) const { return carried_->driving_motion(by_driving); }
+    void add_driving_change(const VectorXd& gradient, const VectorXd& by_driving, VectorXd& forces) const {
+        carried_->add_driving_change(gradient, by_driving, forces);
     }
 
     /// Whether supports hold anything; and what of a vector of all unknowns lies along what they hold, three numbers for
@@ -109,6 +117,8 @@ class Reduction {
     VectorXd project(const VectorXd& full) const;
     /// Moves a state along p, a vector of all unknowns: by p itself where nothing carries.
     void advance(VectorXd& q, const VectorXd& p) const;
+    /// See Carrier; empty where nothing carries.
+    VectorXd rounding(const VectorXd& q) const { return carried_ ? carried_->rounding(q) : VectorXd(); }
     /// See Carrier: a start, and the way back from it.
     void settle(VectorXd& q, VectorXd* v) const {
         if (carried_) carried_->settle(q, v);

@@ -15,8 +15,8 @@ namespace {
 using Eigen::MatrixXd;
 
 constexpr int most_fits = 30;
-constexpr double fitted = 1e-14;    // of a length
-constexpr double rounding = 1e-14;  // likewise
+constexpr double fitted = 1e-14;     // of a length
+constexpr double round_off = 1e-14;  // likewise
 
 Vec3 across(const Vec3& axis) {
     Index smallest;
@@ -225,7 +225,7 @@ VectorXd SkeletonCarrier::driven_increment(const VectorXd& q) const {
             else
                 rounds = reach + std::abs(motor.target[0]);
         }
-        if (off.norm() > rounding * rounds) increment.segment(motor.first, n) = off.head(n);
+        if (off.norm() > round_off * rounds) increment.segment(motor.first, n) = off.head(n);
     }
     return increment;
 }
@@ -251,6 +251,40 @@ void SkeletonCarrier::driven_vjp(const VectorXd& q, const VectorXd& by_driven, G
         const Vec3 moment = frame(motor.link, poses).transpose() * by_units.segment<3>(motor.first);
         out.values.segment<3>(motor.slot.first) += transposed_jacobian_times(motor.target, moment);
     }
+}
+
+std::vector<Vec3> SkeletonCarrier::ball_couples(const VectorXd& q, const VectorXd& gradient,
+                                                const VectorXd& z, const std::vector<Column>& columns) const {
+    const VectorXd pull = twists(q).pull_back(gather(gradient));
+    std::vector<Vec3> couples(n_links(), Vec3::Zero());
+    for (Index k = 0; k < n_links(); ++k) {
+        if (joints_[k].kind != JointKind::ball) continue;
+        Vec3 rate, moment;
+        for (int c = 0; c < 3; ++c) {
+            const Index j = first_[k] + c, at = place_[j];
+            rate[c] = columns[j].share * z[at];
+            moment[c] = pull[at] / columns[j].share;
+        }
+        couples[k] = rate.cross(moment);
+    }
+    return couples;
+}
+
+VectorXd SkeletonCarrier::driving_change(const VectorXd& q, const VectorXd& gradient,
+                                         const VectorXd& driven) const {
+    VectorXd z = VectorXd::Zero(coordinates_);
+    z.tail(n_driven_) = driven;
+    VectorXd change = second_derivative(q, gradient).transpose() * z;
+    const std::vector<Column> columns = this->columns(poses(q));
+    const std::vector<Vec3> couples = ball_couples(q, gradient, z, columns);
+    for (const Motor& motor : driven_) {
+        if (joints_[motor.link].kind != JointKind::ball) continue;
+        for (Index above = joints_[motor.link].parent; above >= 0; above = joints_[above].parent)
+            for (Index a = first_[above]; a < first_[above] + joints_[above].freedom(); ++a)
+                if (columns[a].turns)
+                    change[place_[a]] -= columns[a].share * columns[a].axis.dot(couples[motor.link]);
+    }
+    return change;
 }
 
 SkeletonCarrier::Pose SkeletonCarrier::moved(Index link, const std::vector<Pose>& from,
@@ -295,6 +329,38 @@ void SkeletonCarrier::move_on(VectorXd& q, std::vector<Pose> from, const VectorX
 
 void SkeletonCarrier::advance(VectorXd& q, const VectorXd& z) const {
     move_on(q, poses(q), z);
+}
+
+// A link's pose is known from corners l apart whose places are rounded as far from the origin as they are: to some
+// epsilon |x|/l, of which four corners leave an eighth. The turn of its joint hands that on to all links after it, each at
+// the end of its arm; what several joints do adds up by chance.
+VectorXd SkeletonCarrier::rounding(const VectorXd& q) const {
+    const std::vector<Pose> poses = this->poses(q);
+    struct Sums {  // of w^2, w^2 o and w^2 |o|^2 over the joints on the way, w the rounding of a turn about o
+        double one = 0.0, square = 0.0;
+        Vec3 place = Vec3::Zero();
+    };
+    std::vector<Sums> all(n_links());
+    VectorXd moved(nodes().size());
+    for (Index k = 0; k < n_links(); ++k) {
+        const Joint& joint = joints_[k];
+        Sums& sums = all[k];
+        if (joint.parent >= 0) sums = all[joint.parent];
+        if (joint.kind == JointKind::revolute || joint.kind == JointKind::ball ||
+            joint.kind == JointKind::free) {
+            const double turn = 0.125 * poses[k].center.cwiseAbs().maxCoeff() / links_[k].length() + 1.0;
+            const Vec3 at = joint.kind == JointKind::free ? poses[k].center : joint_place(k, poses);
+            sums.one += turn * turn;
+            sums.place += turn * turn * at;
+            sums.square += turn * turn * at.squaredNorm();
+        }
+        for (Index n = 0; n < links_[k].size(); ++n) {
+            const Vec3 x = q.segment<3>(3 * links_[k].nodes()[n]);
+            moved[row_[k] + n] =
+                std::sqrt(std::max(0.0, sums.square - 2.0 * x.dot(sums.place) + x.squaredNorm() * sums.one));
+        }
+    }
+    return moved;
 }
 
 std::vector<SkeletonCarrier::Pose> SkeletonCarrier::first_fit(const VectorXd& q) const {

@@ -31,12 +31,15 @@ class SkeletonCarrier final : public Carrier {
     VectorXd driven_increment(const VectorXd& q) const override;
     VectorXd driven_units() const override;
     void driven_vjp(const VectorXd& q, const VectorXd& by_driven, Gradient& out) const override;
+    VectorXd driving_change(const VectorXd& q, const VectorXd& gradient,
+                            const VectorXd& driven) const override;
     bool placed() const override;
     void places_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z, const VectorXd& gradient,
                     Gradient& out) const override;
     LinkTwists twists(const VectorXd& q) const override;
     Eigen::MatrixXd curvature(const VectorXd& q, const VectorXd& gradient) const override;
     void advance(VectorXd& q, const VectorXd& z) const override;
+    VectorXd rounding(const VectorXd& q) const override;
     void settle(VectorXd& q, VectorXd* v) const override;
     void settle_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
                     Gradient& out) const override;
@@ -76,6 +79,10 @@ class SkeletonCarrier final : public Carrier {
                                const std::vector<Column>& columns) const;
     Vec3 axis_gradient(Index link, const Beyond& of, const Vec3& parent_rate, const VectorXd& z,
                        const std::vector<Pose>& poses, const std::vector<Column>& columns) const;
+    /// Of each ball joint, by its link, what its columns at the rates z do not turn along with the links before it: the
+    /// couple that this takes off sum g . B z. Zero where a ball joint is free and B^T g is zero.
+    std::vector<Vec3> ball_couples(const VectorXd& q, const VectorXd& gradient, const VectorXd& z,
+                                   const std::vector<Column>& columns) const;
     /// sum_i g_i d2x_i/dz2, where columns of turns of one joint do not turn with it.
     Eigen::MatrixXd second_derivative(const VectorXd& q, const VectorXd& gradient) const;
     void move_on(VectorXd& q, std::vector<Pose> from, const VectorXd& z) const;

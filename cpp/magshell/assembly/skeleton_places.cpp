@@ -7,8 +7,8 @@
 //   axis of a turn s    dx = u x (x - o),       d(B z) = u' x (x - o) + u x (B z - B z at o)
 //                       u = R_p (sin s da + (1 - cos s) a x da),   u' = w_p x u + s' R_p (cos s da + sin s a x da)
 //
-// Axes are unit vectors, so da is across a. Columns of ball joints further on are taken as turned along, which changes B by
-// combinations of its own columns: nothing where B^T g is zero. What acts in a joint knows its axis too, but with u, and
+// Axes are unit vectors, so da is across a. Columns of ball joints further on stay along the world's axes, which takes a
+// couple off that is nothing where B^T g is zero. What acts in a joint knows its axis too, but with u, and
 // with s and its rate fixed, its coordinate and that one's rate stay as they are.
 #include <algorithm>
 #include <cmath>
@@ -35,11 +35,13 @@ std::vector<SkeletonCarrier::Beyond> SkeletonCarrier::beyond(const VectorXd& q, 
                                                              const std::vector<Pose>& poses,
                                                              const std::vector<Column>& columns) const {
     const VectorXd motion = twists(q).motion(z);
+    const std::vector<Vec3> couples = ball_couples(q, gradient, z, columns);
     std::vector<Beyond> all(n_links());
     for (Index k = 0; k < n_links(); ++k) {
         Beyond& own = all[k];
         own.center = poses[k].center;
         own.velocity = Vec3::Zero();
+        own.twist = -couples[k];
         for (Index n = row_[k]; n < row_[k] + RigidNodes::corners; ++n)
             own.velocity += motion.segment<3>(3 * n) / RigidNodes::corners;
         if (joints_[k].parent >= 0) own.rate = all[joints_[k].parent].rate;

@@ -174,8 +174,8 @@ StrainSet Model::damper_rates(const VectorXd& q, const VectorXd& v) const {
 }
 
 void Model::damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates, VectorXd& by_q,
-                             VectorXd& by_v) const {
-    if (damper_term_) damper_term_->rates_vjp(q.data(), v.data(), by_rates.of_terms.front(), by_q, by_v);
+                             VectorXd& by_v, Gradient& out) const {
+    if (damper_term_) damper_term_->rates_vjp(q.data(), v.data(), by_rates.of_terms.front(), by_q, by_v, out);
 }
 
 const ElasticTerm& Model::elastic_term(Index sheet, std::string_view name) const {

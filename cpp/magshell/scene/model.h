@@ -134,10 +134,10 @@ class Model {
     const ViscousTerms& elastic() const { return elastic_; }
     ViscousTerms& dampers() { return dampers_; }
     const ViscousTerms& dampers() const { return dampers_; }
-    /// How fast dampers are drawn at q, as nodes move by v; and the way back.
+    /// How fast dampers are drawn at q, as nodes move by v; and the way back, to values as well.
     StrainSet damper_rates(const VectorXd& q, const VectorXd& v) const;
     void damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates, VectorXd& by_q,
-                          VectorXd& by_v) const;
+                          VectorXd& by_v, Gradient& out) const;
     /// Whether some states have no energy, as of solids turned inside out; then, of a step p from q, the largest
     /// share up to which there is one, and what is wrong with a state, in words.
     bool refuses_states() const { return !refusing_.empty(); }

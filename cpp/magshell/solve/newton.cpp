@@ -85,8 +85,13 @@ double Newton::relative_residual(const VectorXd& q, const Anchor& anchor, bool w
     VectorXd magnitude = model_.residual().magnitude;
     if (anchor.weights) magnitude += anchor.weights->cwiseProduct(q - *anchor.target).cwiseAbs();
     VectorXd cancelling = model_.cancelling_forces(q);
-    // In the inertia of a short step, positions cancel.
+    // In the inertia of a short step, positions cancel; links at the end of long arms know theirs less exactly.
     if (anchor.weights) cancelling += anchor.weights->cwiseProduct(q).cwiseAbs();
+    if (const VectorXd rounding = with_floor ? reduction.rounding(q) : VectorXd(); rounding.size() > 0) {
+        const double reach = q.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+        if (reach > 0.0) cancelling += model_.cancelling_forces(q).cwiseProduct(rounding) / reach;
+        if (anchor.weights) cancelling += anchor.weights->cwiseProduct(rounding).cwiseAbs();
+    }
     model_.add_cancelling_forces_here(anchor.motion != nullptr, cancelling);
     if (!with_floor) cancelling.setZero();
     return std::max(

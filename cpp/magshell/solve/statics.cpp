@@ -24,6 +24,7 @@ class Statics {
         : newton_(newton), from_(from), to_(to), options_(options), result_(result), wary_(goes_warily()) {}
 
     bool run() {
+        controls_at(0.0);
         result_.reason = newton_.model().refusal(result_.state);
         if (!result_.reason.empty() || !(options_.away_from.empty() ? load() : go_elsewhere())) return false;
         return result_.stable || !options_.require_stable || descend(1.0);
@@ -38,6 +39,13 @@ class Statics {
                model.reduction().prescribed_increment(result_.state, to_).isZero(0.0);
     }
 
+    // On the way, with what varies in place.
+    Controls controls_at(double progress) {
+        Controls there = interpolate(from_, to_, progress);
+        newton_.model().take(there);
+        return there;
+    }
+
     bool load() {
         if (options_.start_at_rest && from_ == to_ && newton_.still_holds(result_.state, to_))
             accept(result_.state, to_, 1.0, newton_.relative_residual(result_.state, {}));
@@ -50,7 +58,7 @@ class Statics {
         while (result_.progress < 1.0) {
             step = std::min(step, longest_step);
             const double target = std::min(1.0, result_.progress + step);
-            const Controls controls = interpolate(from_, to_, target);
+            const Controls controls = controls_at(target);
             VectorXd trial = result_.state;
             NewtonReport report =
                 wary_ ? newton_.solve_wary(trial, controls) : newton_.solve(trial, controls);
@@ -88,6 +96,7 @@ class Statics {
 
     bool go_elsewhere() {
         constexpr int times_longer = 3;  // than Newton's way to an equilibrium that is near
+        controls_at(1.0);
         VectorXd trial = result_.state;
         const NewtonReport report =
             solve_away_from(newton_, trial, to_, {options_.away_from, options_.away_length},
@@ -109,7 +118,7 @@ class Statics {
     bool plain_steps(double target) {
         if (!newton_.options().mixed) return false;
         VectorXd trial = result_.state;
-        const Controls controls = interpolate(from_, to_, target);
+        const Controls controls = controls_at(target);
         const NewtonReport report = newton_.solve_plain(trial, controls);
         if (report.converged)
             accept(trial, controls, target, report.residual);
@@ -143,7 +152,7 @@ class Statics {
         constexpr int attempts = 5;
         for (int k = 0; k < attempts; ++k) {
             VectorXd trial = result_.state;
-            const Controls controls = interpolate(from_, to_, target);
+            const Controls controls = controls_at(target);
             const RelaxationReport report =
                 relax(newton_, trial, controls, options_.max_relaxation_steps, options_.start_at_rest);
             result_.relaxation_steps += report.steps;
@@ -180,7 +189,8 @@ class Statics {
 
 StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Turns& turns,
                                const Controls& from, const Controls& to, const StaticsOptions& options,
-                               const StaticsWatch& watch) {
+                               const StaticsWatch& watch, const Varying& varying) {
+    const WhileVarying while_varying(model, varying);
     model.set_turns(turns);
     StaticsResult result;
     result.state = start;
@@ -197,6 +207,8 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model:
         result.outcome = Outcome::interrupted;
         result.reason = "interrupted";
     }
+    for (Controls* each : {&result.controls, &result.failed.controls})
+        each->conservativeResize(std::max<Index>(0, each->size() - varying.size()));
     result.iterations = newton.iterations();
     result.factorizations = newton.factorizations();
     result.failed_factorizations = newton.failed_factorizations();

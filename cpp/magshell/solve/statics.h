@@ -51,9 +51,10 @@ struct StaticsResult {
 /// Called now and then with the progress of the controls and the residual; throws Interrupted to stop.
 using StaticsWatch = std::function<void(double progress, double residual)>;
 
-/// From an equilibrium `start` at `from`, with the terms' turns there, to one at `to`.
+/// From an equilibrium `start` at `from`, with the terms' turns there, to one at `to`; the numbers of what varies on the
+/// way follow the others in both, and not in the result's.
 StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Turns& turns,
                                const Controls& from, const Controls& to, const StaticsOptions& options,
-                               const StaticsWatch& watch = {});
+                               const StaticsWatch& watch = {}, const Varying& varying = {});
 
 }  // namespace magshell

@@ -1,8 +1,8 @@
 #include "magshell/solve/stepper.h"
 
-#include <limits>
 #include <utility>
 
+#include "magshell/solve/driven_end.h"
 #include "magshell/solve/landing.h"
 
 namespace magshell {
@@ -80,36 +80,6 @@ std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, 
     std::vector<StageRates> rates = {state.rates};
     rates.front().joints.d = model.damper_rates(state.q, state.v);
     return rates;
-}
-
-// Along a prescribed path the acceleration of a stage is of first order only; that through three ends of steps is of
-// second. In a first step there are but two. What is stiff has been solved for with the stage's own acceleration, so it is
-// of first order as well, and the forces f of both do not balance: but it does no work where everything follows the motors
-// as stiffness has it, so the power of f along that is what they do: f_d - K_fd^T K_ff^-1 f_f.
-VectorXd Stepper::driving(const MotionState& begin, double dt, const VectorXd& q, const Controls& controls,
-                          const Anchor& anchor, const StageRates& last) {
-    Model& model = newton_.model();
-    VectorXd force = newton_.gradient(q, anchor);
-    if (begin.dt_before > 0.0) {
-        const double r = dt / begin.dt_before;
-        const VectorXd w = ((1.0 + 2.0 * r) / (1.0 + r) * last.v - (1.0 + r) * begin.v +
-                            r * r / (1.0 + r) * begin.v_before) /
-                           dt;
-        force += inertia_.mass.cwiseProduct(w - last.w);
-        VectorXd following = force, pull(q.size());
-        const std::shared_ptr<Factor> nearby = newton_.factor();
-        const bool serves = nearby && nearby->pattern() == model.reduction().pattern();
-        if (!serves || !newton_.solve_nearby(q, controls, anchor, *nearby, following).converged) {
-            Eigen::MatrixXd no_moves(q.size(), 0);
-            if (!newton_.factorize(q, controls, false, anchor, no_moves).succeeded)
-                return std::numeric_limits<double>::quiet_NaN() * model.reduction().driving(force);
-            following = newton_.solve_transposed(force);
-        }
-        model.multiply(following, pull);
-        model.remainder().add_product(following, true, pull);
-        force -= pull + anchor.weights->cwiseProduct(following);
-    }
-    return model.reduction().driving(force);
 }
 
 StepRates::StepRates(const Model& model, const StepAlgebra& step, const SubstepRecord& substep)
@@ -193,7 +163,8 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<co
         StageRates& now = rates.emplace_back();
         step.finish_stage(q, x_hat, v_hat, coordinates, now);
         if (i + 1 == tableau.stages && model.reduction().drives())
-            driving = this->driving(state, dt, q, controls[i + 1], anchor, now);
+            driving = DrivenEnd(newton_, inertia_, state, dt, q, controls[i + 1], anchor, now)
+                          .driving(controls[i + 1]);
         if (viscosity_.any()) {
             viscous.finish(viscosity_, T, model.elastic().strains(q), now.elastic);
             e = std::move(viscous.e);

@@ -86,9 +86,6 @@ class Stepper {
     const StepAlgebra& algebra(double dt, const Tableau& tableau);
 
   private:
-    /// What motors do at the end of a step, once its last stage is solved and `last` holds its rates.
-    VectorXd driving(const MotionState& begin, double dt, const VectorXd& q, const Controls& controls,
-                     const Anchor& anchor, const StageRates& last);
     /// A stage, by other means where the first fail.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor);
 

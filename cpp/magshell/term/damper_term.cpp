@@ -4,8 +4,6 @@
 
 namespace magshell {
 
-using Corners = JointForm::Corners;
-
 DamperTerm::DamperTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest,
                        const SystemMatrix& matrix, Registry& registry) {
     for (const Input& input : joints) {
@@ -24,7 +22,8 @@ DamperTerm::DamperTerm(const std::vector<Input>& joints, const std::vector<Vec3>
             continue;
         }
         for (int a = 0; a < 3; ++a)
-            for (int b = 0; b < 3; ++b) add(JointForm::product(links, Vec3(Vec3::Unit(a)), Vec3(Vec3::Unit(b))), 0.5);
+            for (int b = 0; b < 3; ++b)
+                add(JointForm::product(links, Vec3(Vec3::Unit(a)), Vec3(Vec3::Unit(b))), 0.5);
     }
     last_turn_.assign(each_.size(), 0.0);
     now_.resize(each_.size());
@@ -110,12 +109,53 @@ Strains DamperTerm::rates(const double* q, const double* v) const {
     return out;
 }
 
+// The coordinate itself does not feel the axis. Its rate does where nodes move as no turn about it moves them, which
+// velocities of finite steps have in them.
+//
+//   revolute   C = tr M - a . M a,  S = w . a,  s' = (C S' - S C')/(C^2 + S^2)     M_ij = e_i of the parent . e_j of the child
+//   prismatic  s' is linear in a
+Vec3 DamperTerm::rate_by_axis(const Each& each, const double* q, const Corners& v) const {
+    const Corners at = each.links.positions(q);
+    Vec3 by_axis;
+    if (each.length) {
+        Joint along = each.joint;
+        for (int c = 0; c < 3; ++c) {
+            along.axis = Vec3::Unit(c);
+            by_axis[c] = JointForm(along, each.links).at(at).first.cwiseProduct(v).sum();
+        }
+    } else {
+        Mat3 m, rate;
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) {
+                const JointForm::Local product =
+                    JointForm::product(each.links, Vec3(Vec3::Unit(i)), Vec3(Vec3::Unit(j))).at(at);
+                m(i, j) = product.value;
+                rate(i, j) = product.first.cwiseProduct(v).sum();
+            }
+        const auto twist = [](const Mat3& of) {
+            return Vec3(of(2, 1) - of(1, 2), of(0, 2) - of(2, 0), of(1, 0) - of(0, 1));
+        };
+        const Vec3 a = each.joint.axis, w = twist(m), w_rate = twist(rate);
+        const Vec3 by_c = -(m + m.transpose()) * a, by_c_rate = -(rate + rate.transpose()) * a;
+        const double c = m.trace() - a.dot(m * a), s = w.dot(a), c_rate = rate.trace() - a.dot(rate * a),
+                     s_rate = w_rate.dot(a), size = c * c + s * s, own = (c * s_rate - s * c_rate) / size;
+        by_axis = (s_rate * by_c + c * w_rate - c_rate * w - s * by_c_rate) / size -
+                  2.0 * own / size * (c * by_c + s * w);
+    }
+    return by_axis - each.joint.axis.dot(by_axis) * each.joint.axis;
+}
+
 void DamperTerm::rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q,
-                           VectorXd& by_v) const {
+                           VectorXd& by_v, Gradient& out) const {
     for (Index k = 0; k < elements(); ++k) {
-        const JointForm::Local at = local(each_[k], q);
-        each_[k].links.add_to(by_rates.number(k, 0) * at.first, by_v);
-        each_[k].links.add_to(by_rates.number(k, 0) * at.second(each_[k].links.gather(v)), by_q);
+        const Each& each = each_[k];
+        const JointForm::Local at = local(each, q);
+        const Corners along = each.links.gather(v);
+        const double by = by_rates.number(k, 0);
+        each.links.add_to(by * at.first, by_v);
+        each.links.add_to(by * at.second(along), by_q);
+        if (each.axis.size() > 0 && by != 0.0)
+            out.values.segment<3>(each.axis.first) += by * rate_by_axis(each, q, along);
     }
 }
 

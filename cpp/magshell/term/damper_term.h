@@ -46,15 +46,16 @@ class DamperTerm final : public ElasticTerm {
     Strains stresses(const Strains& strains) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
 
-    /// ds/dt at q, as the nodes move by v; and the gradients by q and v of a number that knows its own by them.
+    /// ds/dt at q, as the nodes move by v; and the gradients by q, v and values of a number that knows its own by them.
     Strains rates(const double* q, const double* v) const;
-    void rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q,
-                   VectorXd& by_v) const;
+    void rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q, VectorXd& by_v,
+                   Gradient& out) const;
 
     /// The magnitude of forces that cancel in a stage, with coordinates larger than at rest by `beyond` [m].
     void add_cancelling_stage_forces(double beyond, VectorXd& out) const;
 
   private:
+    using Corners = JointForm::Corners;
     struct Each {  // a scalar
         LinkPair links;
         JointForm form;
@@ -70,6 +71,8 @@ class DamperTerm final : public ElasticTerm {
         return each_[k].form.value(at, last_turn_[k]);
     }
     double stress_by_damping(std::size_t k, double strain) const;
+    /// d(ds/dt) by the axis.
+    Vec3 rate_by_axis(const Each& each, const double* q, const Corners& v) const;
     JointForm::Local local(const Each& each, const double* q) const {
         return each.form.at(each.links.positions(q));
     }

@@ -71,19 +71,19 @@ class JointResult:
         return (axis * velocity).sum(-1) + turned
 
     @property
-    def motor_torque(self) -> np.ndarray:
+    def motor_torque(self):
         """(...) N m, with which the motor of a Revolute turns its child about the axis, against its parent; (..., 3) of a
-        Ball, axes of the world. In a motion NaN in the state that it starts from. It has no gradient."""
+        Ball, axes of the world. In a motion NaN in the state that it starts from."""
         if self.joint._kind == "ball":
             return self._motor("ball", "motor_rotation")
         return self._motor("revolute", "motor_angle")
 
     @property
-    def motor_force(self) -> np.ndarray:
+    def motor_force(self):
         """(...) N, likewise of a Prismatic, along the axis."""
         return self._motor("prismatic", "motor_displacement")
 
-    def _motor(self, kind: str, value: str) -> np.ndarray:
+    def _motor(self, kind: str, value: str):
         if self.joint._kind != kind or not self.joint.driven:
             raise ValueError(f"only a {kind.capitalize()} with a {value} has a motor")
         return self._result._driving[..., motor_rows(self._result.scene._bodies.skeletons, self.joint)]

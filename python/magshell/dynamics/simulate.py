@@ -227,7 +227,7 @@ def _warn(result: Trajectory) -> None:
 
 def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     scene, model, values = asked.inputs.scene, asked.inputs.scene._model, asked.inputs.values
-    points, edge_rotations, velocities = _outputs(asked, found)
+    points, edge_rotations, velocities, driving = _outputs(asked, found)
     rigid, n_v = bool(scene.rigid_parts), scene.mesh.n_vertices
     recorded = len(found.kinetic_energy)
     ended = asked.clock.after(found.steps_done)
@@ -279,7 +279,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         _held_forces=found.held_forces(model),
         _own_points=points[:, n_v:] if rigid else None,
         _own_velocities=velocities[:, n_v:] if rigid else None,
-        _driving=found.driving(),
+        _driving=driving,
     )
 
 
@@ -292,9 +292,14 @@ def _by_name(names: list[str], by_term: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _outputs(asked: MotionInputs, found):
-    """Positions, edge rotations, velocities; with the points of rigid parts."""
+    """Positions, edge rotations, velocities, with the points of rigid parts; and what motors do."""
     inputs, model = asked.inputs, asked.inputs.scene._model
-    arrays = found.positions(model), found.edge_rotations(model), found.velocities(model)
+    arrays = (
+        found.positions(model),
+        found.edge_rotations(model),
+        found.velocities(model),
+        found.driving(),
+    )
     if not inputs.leaves:
         return tuple(like(array, *inputs.given) for array in arrays)
     from ..adjoint.autograd import solved

@@ -96,6 +96,10 @@ class Snapshot:
         return None if self.motion._own_velocities is None else self.motion._own_velocities[self.index]
 
     @property
+    def _driving(self):
+        return self.motion._driving[self.index]
+
+    @property
     def _load_factors(self) -> np.ndarray:
         return self.motion._load_factors[self.index]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -134,6 +135,12 @@ class Inputs:
         if not self.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
         return quantity("applied_flux_density", "T", given, (3,))
+
+    def with_values(self, values: Values) -> Inputs:
+        """The same but for the values of the scene."""
+        there = copy.copy(self)
+        there.values = values
+        return there
 
     @contextmanager
     def in_core(self):

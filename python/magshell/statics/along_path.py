@@ -23,11 +23,7 @@ class AlongPath:
         self._layout = inputs.scene._value_layout
         self._after = inputs.values
         self._before = inputs.values if start is None else start._values
-        differ = [
-            key
-            for key in self._layout
-            if not np.array_equal(self._part(self._before, key), self._part(self._after, key))
-        ]
+        differ = _differing(self._layout, self._before, self._after)
         can = _keys_that_move(inputs)
         if fixed := [name for owner, name in differ if (owner, name) not in can]:
             raise ValueError(
@@ -60,6 +56,20 @@ class AlongPath:
 
     def _part(self, values: Values, key: tuple[str, str]) -> np.ndarray:
         return self._layout.of(values.numbers, *key)
+
+
+def all_can_move(inputs: Inputs, start) -> bool:
+    """Whether all values that `start` has elsewhere can vary on the way from there."""
+    can = _keys_that_move(inputs)
+    return all(key in can for key in _differing(inputs.scene._value_layout, start._values, inputs.values))
+
+
+def _differing(layout, before: Values, after: Values) -> list[tuple[str, str]]:
+    return [
+        key
+        for key in layout
+        if not np.array_equal(layout.of(before.numbers, *key), layout.of(after.numbers, *key))
+    ]
 
 
 def _keys_that_move(inputs: Inputs) -> dict[tuple[str, str], object]:

@@ -61,6 +61,7 @@ class Equilibrium:
     _controls: Any = field(repr=False)
     _values: Any = field(repr=False)
     _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
+    _driving: Any = field(repr=False, default=None)  # (m,) N m or N, of motors in joints, in the core's order
 
     def __copy__(self) -> Equilibrium:
         return self  # nothing of it changes
@@ -94,12 +95,6 @@ class Equilibrium:
 
     def _state_at(self, index: int) -> np.ndarray:
         return self._state
-
-    @property
-    def _driving(self) -> np.ndarray:
-        """Of the motors of joints, in the core's order, N m or N."""
-        with self._values.in_core():
-            return self.scene._model.driving(self._state, self._controls, self._turns)
 
     @property
     def _obstacles(self) -> tuple:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -85,8 +84,7 @@ class Path:
         options = MixedNewton()._options()
         options.require_stable = False
         point = self._points[index]
-        inputs = copy.copy(self._inputs)
-        inputs.values = self._moving.values(self.parameters[index])
+        inputs = self._inputs.with_values(self._moving.values(self.parameters[index]))
         return solve(inputs, point.state, point.turns, controls, controls, options).equilibrium
 
     def strains(self, index: int = -1) -> Strains:
@@ -112,6 +110,15 @@ class Path:
     def _own_points(self) -> np.ndarray:
         """(n, 10 a rigid part, 3) m, of the rigid parts."""
         return self._at_points(self.scene._model.points)[:, self.scene.mesh.n_vertices :]
+
+    @property
+    def _driving(self) -> np.ndarray:
+        """(n, m) N m or N, of motors in joints."""
+        model, rows = self.scene._model, []
+        for k, (point, controls) in enumerate(zip(self._points, self._controls, strict=True)):
+            with self._values_at(k).in_core():
+                rows.append(model.driving(point.state, controls, point.turns))
+        return np.array(rows)
 
     def _at_points(self, what: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """(n, ...), of each point's state."""

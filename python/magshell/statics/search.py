@@ -23,6 +23,7 @@ from ..scene.inputs import Inputs
 from ..scene.replacements import SHELL_NAMES, requested
 from ..scene.scene import Scene
 from ..surroundings.contact_inputs import check_apart
+from .along_path import AlongPath, all_can_move
 from .diagnosis import why_not
 from .equilibrium import Equilibrium
 from .start import starting_point
@@ -73,6 +74,9 @@ def find(
     search = Search() if search is None else search
     inputs = inputs_of(scene, arguments, search.at_rest)
     state, turns, from_, at_rest = starting_point(scene, start, inputs)
+    moving = None
+    if isinstance(start, Equilibrium) and not at_rest and all_can_move(inputs, start):
+        moving, at_rest = AlongPath(inputs, start), True
     options = search.options()
     options.start_at_rest = at_rest
     options.keep_factor = keep_factor
@@ -81,7 +85,7 @@ def find(
     options.smallest_step /= max(filling, 1.0)
     with inputs.in_core():
         check_apart(scene, state)
-    return solve(inputs, state, turns, from_, inputs.controls, options, search.progress)
+    return solve(inputs, state, turns, from_, inputs.controls, options, search.progress, moving)
 
 
 def inputs_of(scene: Scene, arguments: dict, at_rest: bool = False) -> Inputs:
@@ -106,13 +110,28 @@ def inputs_of(scene: Scene, arguments: dict, at_rest: bool = False) -> Inputs:
     )
 
 
-def solve(inputs: Inputs, state: np.ndarray, turns: list, from_, to, options, progress=None) -> Solution:
-    """The core's search for an equilibrium at the controls `to`, from a state at `from_`."""
-    scene = inputs.scene
+def solve(
+    inputs: Inputs,
+    state: np.ndarray,
+    turns: list,
+    from_,
+    to,
+    options,
+    progress=None,
+    moving: AlongPath | None = None,
+) -> Solution:
+    """The core's search for an equilibrium at the controls `to`, from a state at `from_`; moving: values that go along."""
+    scene, entries = inputs.scene, []
+    if moving is not None:
+        from_, to = np.concatenate([from_, moving.before]), np.concatenate([to, moving.after])
+        entries = moving.entries
     options.keep_factor = options.keep_factor or bool(inputs.leaves)
     began = time.perf_counter()
     with inputs.in_core():
-        found = _core.find_equilibrium(scene._model, state, turns, from_, to, options, progress)
+        found = _core.find_equilibrium(scene._model, state, turns, from_, to, options, progress, entries)
+        if moving is not None and found.progress < 1.0:
+            inputs = inputs.with_values(moving.values(found.progress))
+    with inputs.in_core():
         energies = _energies(scene, found)
         result = _result(scene, inputs, found, energies, time.perf_counter() - began)
     log.debug(
@@ -147,7 +166,7 @@ def _energies(scene: Scene, found) -> dict[str, float] | None:
 
 
 def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_time: float) -> Equilibrium:
-    points, edge_rotations = _outputs(inputs, found)
+    points, edge_rotations, driving = _outputs(inputs, found)
     n_v = scene.mesh.n_vertices
     strain = largest_of(scene, found.state, inputs.values.whole.thickness)
     return Equilibrium(
@@ -178,13 +197,19 @@ def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_tim
         _controls=found.controls,
         _values=inputs.values,
         _own_points=points[n_v:] if scene.rigid_parts else None,
+        _driving=driving,
     )
 
 
 def _outputs(inputs: Inputs, found):
-    """Positions, points of rigid parts among them, and edge rotations; tensors where an input asks for a gradient."""
-    model = inputs.scene._model
-    arrays = np.ascontiguousarray(model.points(found.state)), model.edge_rotations(found.state)
+    """Positions, points of rigid parts among them, edge rotations, and what motors do; tensors where an input asks for a
+    gradient."""
+    model, driven = inputs.scene._model, any(joint.driven for joint in inputs.scene.joints)
+    arrays = (
+        np.ascontiguousarray(model.points(found.state)),
+        model.edge_rotations(found.state),
+        model.driving(found.state, found.controls, found.turns) if driven else np.zeros(0),
+    )
     if not inputs.leaves:
         return tuple(like(array, *inputs.given) for array in arrays)
     from ..adjoint.autograd import solved
