@@ -32,7 +32,7 @@ class ProjectiveDynamics:
         the reach and the minimal distance together from each other, by vertices and faces and by edges that cross.
         Stiffness, smoothing and sticking speed do not count. Such motions have no gradient: forces jump where points touch,
         stick or slip. It takes supports that hold vertices entirely, no rigid parts, no points on faces (`face_samples`)
-        and one coefficient of friction.
+        and one coefficient of friction. Where fine surfaces lie flat on each other, a step takes hundreds of rounds.
 
     Gradients are those of the solved step, by the exact Hessian: as of every integrator, and as exact as the tolerance.
 
