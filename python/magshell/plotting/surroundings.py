@@ -34,7 +34,8 @@ def obstacle_solids(states: list[State], size: float) -> list[Solid]:
     for state in states:
         for points, faces in state.magnets:
             key = (points.tobytes(), None)
-            shown.setdefault(key, replace(sheet(points, faces, colors.rgb(colors.MAGNET)), around=True))
+            surface = sheet(points, faces, colors.rgb(colors.MAGNET))
+            shown.setdefault(key, replace(surface, around=True, smooth=False))  # blocks have sharp edges
     return list(shown.values())
 
 

@@ -11,10 +11,12 @@ from ..fields.adapters import MagpylibField
 from ..fields.field import AppliedField
 from ..fields.magnets import CuboidMagnet, CylinderMagnet, Magnet
 from ..fields.placed import PlacedField
+from ..mesh.triangle_mesh import TriangleMesh
 from ..obstacles import Box, Capsule, Sphere
 from .bones import joined
 
 _AROUND = 32  # cells around what is round
+_HALVED = 3  # times: the edges of a block's faces
 _WIRE = 0.015  # the radius of a wire, in the extent of what it runs along
 Surface = tuple[np.ndarray, np.ndarray]
 
@@ -32,7 +34,7 @@ def surfaces_of(field: AppliedField) -> list[Surface]:
 
 def _own_surface(magnet: Magnet) -> Surface:
     if isinstance(magnet, CuboidMagnet):
-        return Box(magnet.dimensions).surface()
+        return _block(magnet.dimensions)
     if isinstance(magnet, CylinderMagnet):
         return _ring(0.0, magnet.radius, magnet.height)
     raise TypeError(f"no picture of a {type(magnet).__name__}")
@@ -52,6 +54,14 @@ def _of_source(source) -> list[Surface]:
 def _placed(surface: Surface, center: np.ndarray, rotation: np.ndarray) -> Surface:
     points, faces = surface
     return Rotation.from_rotvec(np.array(rotation)).apply(points) + center, faces
+
+
+def _block(edges) -> Surface:
+    """Of small faces: painters sort faces by their middles."""
+    mesh = TriangleMesh(*Box(edges).surface())
+    for _ in range(_HALVED):
+        mesh = mesh.refined()
+    return np.array(mesh.rest_positions), mesh.faces
 
 
 def _ring(inner: float, outer: float, height: float, start: float = 0.0, end: float = 360.0) -> Surface:
@@ -100,7 +110,7 @@ def _circle(diameter: float) -> np.ndarray:
 
 _SIDES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
 _BY_NAME = {
-    "Cuboid": lambda it: Box(it.dimension).surface(),
+    "Cuboid": lambda it: _block(it.dimension),
     "Cylinder": lambda it: _ring(0.0, 0.5 * it.dimension[0], it.dimension[1]),
     "CylinderSegment": lambda it: _ring(*it.dimension),
     "Sphere": lambda it: Sphere(0.5 * it.diameter).surface(),
