@@ -67,6 +67,18 @@ def test_magpylibs_magnets():
     np.testing.assert_allclose(surfaces_of(placed)[0][0], surfaces[0][0] + (1.0, 0, 0))
 
 
+def test_a_result_has_them_where_its_solve_had_them():
+    magnet = ms.CylinderMagnet(0.005, 0.01, (0, 0, 1e3), center=(0.01, 0.005, -0.02))
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=magnet)
+    moved = {magnet: {"center": (0.01, 0.005, -0.05)}}
+    [state] = states_of(ms.equilibrium(scene, remanent_magnetization=(0, 0, 1e3), values=moved))
+    assert state.magnets[0][0][:, 2].mean() == pytest.approx(-0.05)
+    closer = states_of(ms.equilibrium(scene, remanent_magnetization=(0, 0, 1e3)))[0]
+    place = np.array([[0.01, 0.005, 0.0]])
+    assert np.linalg.norm(closer.sources(place)) > 5.0 * np.linalg.norm(state.sources(place))
+
+
 def test_a_picture_has_them_once():
     magnet = ms.CylinderMagnet(0.005, 0.01, (0, 0, 1e6), center=(0.01, 0.005, -0.02))
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6)

@@ -143,7 +143,7 @@ def states_of(
         mesh = what.scene.mesh
         if not what.scene.bodies and positions is None:
             mesh, merged["positions"] = _skeletons_alone(what)
-        states = _states(mesh, merged, what.scene.fields, own["strengths"], own["titles"])
+        states = _states(mesh, merged, _fields_of(what), own["strengths"], own["titles"])
         states = _with_tendons(what, _with_bones(what, states, positions), positions)
         states = _with_elements(what, states, positions)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
@@ -158,6 +158,12 @@ def states_of(
         raise ValueError("there is nothing to draw: the list is empty")
     kinds = "a mesh, a Shell, a Solid, a Scene, a result, or a list of them"
     raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
+
+
+def _fields_of(result) -> tuple:
+    """As its solve had them; of a motion in which they move, where they are without."""
+    values = getattr(result, "_values", None)
+    return tuple(field if values is None else values.current(field) for field in result.scene.fields)
 
 
 def _with_bones(result, states: list[State], positions) -> list[State]:
