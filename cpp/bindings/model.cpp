@@ -195,7 +195,8 @@ void register_model(py::module_& module) {
                 return m.reduction().prescribed_increment(q, controls);
             },
             py::arg("q"), py::arg("controls"),
-            "How far from a state what motors and supports prescribe at these controls is, of all unknowns, (n,); zero "
+            "How far from a state what motors and supports prescribe at these controls is, of all unknowns, "
+            "(n,); zero "
             "elsewhere.")
         .def(
             "prescribed_rate",

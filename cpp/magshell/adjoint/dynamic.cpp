@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "magshell/adjoint/stretches.h"
 #include "magshell/adjoint/viscous.h"
 #include "magshell/core/errors.h"
 #include "magshell/solve/driven_end.h"
@@ -35,9 +36,12 @@ class Backward {
         take_in(motion_.steps_done);
         Index end = motion_.steps_done;
         for (std::size_t k = motion_.steps.size(); k-- > 0;) back(--end, motion_.steps[k]);
+        const Stretches stretches(
+            motion_.leaf, [this](Index begin, Index end, MotionState& state) { forward(begin, end, state); },
+            [this](Index begin, Index end, const MotionState& state) { leaf(begin, end, state); });
         Index free = motion_.slots - static_cast<Index>(motion_.checkpoints.size()) + 1;
         for (auto at = motion_.checkpoints.rbegin(); at != motion_.checkpoints.rend(); ++at, ++free) {
-            stretch(at->first, end, at->second, free);
+            stretches.back(at->first, end, at->second, free);
             end = std::min(end, at->first);
         }
         back_to_start();
@@ -50,26 +54,6 @@ class Backward {
     double progress() const { return progress_; }
 
   private:
-    // Steps begin .. end, from the state at begin, with so many checkpoints to spare.
-    void stretch(Index begin, Index end, const MotionState& at_begin, Index slots) {
-        if (begin >= end) return;
-        const Index ahead = next_checkpoint(end - begin, motion_.leaf, slots);
-        MotionState state = at_begin;
-        if (ahead > 0) {
-            forward(begin, begin + ahead, state);
-            stretch(begin + ahead, end, state, slots - 1);
-            stretch(begin, begin + ahead, at_begin, slots);
-            return;
-        }
-        if (end - begin > motion_.leaf) {  // no checkpoint left: all the way again for every leaf
-            forward(begin, end - motion_.leaf, state);
-            leaf(end - motion_.leaf, end, state);
-            stretch(begin, end - motion_.leaf, at_begin, slots);
-            return;
-        }
-        leaf(begin, end, state);
-    }
-
     void forward(Index begin, Index end, MotionState& state) {
         for (Index step = begin; step < end; ++step)
             repeat_step(stepper_, input_, step, substeps_of(motion_.halved, step), state, nullptr);
