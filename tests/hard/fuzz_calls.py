@@ -215,7 +215,7 @@ def _solves(s: Sample) -> Iterator[Call]:
     places = {"positions": s.positions, "edge_rotations": np.zeros(n_e), "body": None}
     yield Call("energies", ms.energies, {**magnetic, **replaced, **places})
     quick = ms.MixedNewton(max_iterations=10, max_relaxation_steps=5)
-    search = dict(start=s.positions, require_stable=True, at_rest=False, solver=quick, progress=None)
+    search = dict(start=s.positions, require_stable=True, at_rest=False, solver=quick, progress=False)
     yield Call("equilibrium", ms.equilibrium, {**magnetic, **replaced, **search})
     yield Call(
         "equilibrium of cases",

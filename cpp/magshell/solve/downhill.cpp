@@ -63,7 +63,8 @@ class Downhill : private Relaxing {
         rate_ = 0.0;
         report_.falling.resize(0);
         report_.residual = residual;
-        report_.converged = at_rest_ || ends();
+        // Under the floor of round-off a sheet may still be far from rest: Newton's step tells.
+        report_.converged = newton_.relative_residual(q_, {}, false) <= newton_.options().tolerance || ends();
         return !report_.converged;
     }
 

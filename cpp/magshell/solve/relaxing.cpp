@@ -54,24 +54,35 @@ double Relaxing::length(const VectorXd& p) const {
 }
 
 double Relaxing::leave_saddle(const Mode& mode) {
-    constexpr double told = 1e-6;  // a force along the mode, over what it could be: less is round-off
-    const VectorXd saddle = q_, force = -model_.reduction().project(newton_.gradient(q_, {}));
-    const double along = force.dot(mode.shape);
-    const double sign = along < -told * force.norm() * mode.shape.norm() ? -1.0 : 1.0;
-    double reached = energy_;
+    constexpr double told = 1e-6;        // by which share one side has to be deeper
+    constexpr double round_off = 1e-12;  // of an energy
+    const VectorXd saddle = q_;
+    struct Side {
+        VectorXd q;
+        double energy;
+    };
+    const auto down = [&](double sign) {
+        Side side{saddle, energy_};
+        for (double amplitude = settled_; amplitude < model_.extent(); amplitude *= 2.0) {
+            VectorXd trial = saddle;
+            const VectorXd push = sign * amplitude * mode.shape;
+            if (model_.has_body_contact() && model_.largest_share(saddle, push) < 1.0) break;
+            model_.reduction().advance(trial, push);
+            const double energy = model_.energy(trial, controls_);
+            // The first push may be too small for the energy to tell, but must be made.
+            if (amplitude > settled_ && !(energy < side.energy)) break;
+            side = {trial, energy};
+        }
+        return side;
+    };
     ++report_.saddles_left;
-    for (double amplitude = settled_; amplitude < model_.extent(); amplitude *= 2.0) {
-        VectorXd trial = saddle;
-        const VectorXd push = sign * amplitude * mode.shape;
-        if (model_.has_body_contact() && model_.largest_share(saddle, push) < 1.0) break;
-        model_.reduction().advance(trial, push);
-        const double energy = model_.energy(trial, controls_);
-        // The first push may be too small for the energy to tell, but must be made.
-        if (amplitude > settled_ && !(energy < reached)) break;
-        reached = energy;
-        q_ = trial;
-    }
-    return reached;
+    const Side one = down(1.0);
+    // What touches ends every push early, on either side: there depths tell little.
+    const Side other = model_.has_body_contact() ? one : down(-1.0);
+    const bool deeper =
+        one.energy - other.energy > told * (energy_ - one.energy) + round_off * std::abs(energy_);
+    q_ = deeper ? other.q : one.q;
+    return deeper ? other.energy : one.energy;
 }
 
 }  // namespace magshell

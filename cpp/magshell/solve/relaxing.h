@@ -22,8 +22,8 @@ class Relaxing {
     bool is_sensible(double rate) const;
     double length(const VectorXd& p) const;  // [m], of what moves most
     bool lowers(double energy) const { return energy <= energy_ + 1e-12 * std::abs(energy_); }
-    /// Pushes q along the mode, to the side to which the forces push, as far as the energy falls, and at least a little;
-    /// the energy there.
+    /// Pushes q along the mode as far as the energy falls, and at least a little, to the side where it falls deeper; the
+    /// energy there.
     double leave_saddle(const Mode& mode);
 
     Newton& newton_;

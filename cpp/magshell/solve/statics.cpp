@@ -167,7 +167,9 @@ class Statics {
                 return false;
             }
             accept(trial, controls, target, report.residual);
-            if (!check_stability() || result_.stable) return result_.stable;
+            if (!check_stability()) return false;
+            if (result_.stable) polish();
+            if (result_.stable) return true;
             if (result_.unstable_directions == 0) {
                 result_.reason = "the equilibrium is neutral: its Hessian is singular";
                 return false;
@@ -175,6 +177,21 @@ class Statics {
         }
         result_.reason = "every equilibrium that was found is a saddle";
         return false;
+    }
+
+    // One more step, which the factorization that told stability makes cheap, where it brings forces closer to balance.
+    void polish() {
+        if (newton_.model().has_body_contact()) return;
+        const double before = newton_.relative_residual(result_.state, {}, false);
+        VectorXd trial = result_.state;
+        newton_.model().reduction().advance(trial,
+                                            newton_.solve_with_factor(-newton_.gradient(result_.state, {})));
+        newton_.evaluate(trial, result_.controls, {});
+        const double after = newton_.relative_residual(trial, {}, false);
+        if (!(after < before)) return;
+        result_.state = trial;
+        result_.turns = newton_.model().turns();
+        result_.residual = std::min(result_.residual, after);
     }
 
     Newton& newton_;

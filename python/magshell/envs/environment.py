@@ -124,7 +124,7 @@ class Environment(gymnasium.Env):
         self.render_mode, self._width, self._view = render_mode, checked_width(render_width), view
         self.metadata = {
             "render_modes": ["rgb_array"],
-            "render_fps": max(1, round(1.0 / (self.time_step * self.steps_per_action))),
+            "render_fps": max(1, round(min(1e9, 1.0 / (self.time_step * self.steps_per_action)))),
         }
         size = sum(each.size for each in self.actuators)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float64)

@@ -66,6 +66,8 @@ def episodes(
     numbers = list(range(len(rows))) if seeds is None else [int(each) for each in seeds]
     if len(numbers) != len(rows):
         raise ValueError(f"seeds must be one a policy, {len(rows)}, got {len(numbers)}")
+    if numbers and min(numbers) < 0:
+        raise ValueError(f"seeds must not be negative, got {min(numbers)}")
     if executor is None:
         return [_episode(make, *each) for each in zip(rows, numbers, strict=True)]
     futures = [executor.submit(_episode, make, *each) for each in zip(rows, numbers, strict=True)]

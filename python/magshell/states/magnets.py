@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ..fields.adapters import MagpylibField
 from ..fields.field import AppliedField
@@ -53,7 +53,7 @@ def _of_source(source) -> list[Surface]:
 
 def _placed(surface: Surface, center: np.ndarray, rotation: np.ndarray) -> Surface:
     points, faces = surface
-    return Rotation.from_rotvec(np.array(rotation)).apply(points) + center, faces
+    return scipy.spatial.transform.Rotation.from_rotvec(np.array(rotation)).apply(points) + center, faces
 
 
 def _block(edges) -> Surface:
