@@ -151,6 +151,11 @@ NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const An
     return iterate(q, controls, anchor, options_.max_iterations, false);
 }
 
+bool Newton::negligible(const VectorXd& step) const {
+    return step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>() <=
+           negligible_move * model_.length_scale();
+}
+
 NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls) {
     return iterate(q, controls, {}, options_.max_iterations, options_.mixed, true);
 }

@@ -64,6 +64,9 @@ class Newton {
     /// controls want them, in the first iteration and with its linearization.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
 
+    /// Whether a factorization before a step serves after it as well, for gradients too.
+    bool negligible(const VectorXd& step) const;
+
     /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
     /// As solve(), and given up as soon as the matrix has unstable directions that it had not at the beginning, and steps

@@ -183,15 +183,16 @@ class Statics {
     void polish() {
         if (newton_.model().has_body_contact()) return;
         const double before = newton_.relative_residual(result_.state, {}, false);
+        const VectorXd p = newton_.solve_with_factor(-newton_.gradient(result_.state, {}));
         VectorXd trial = result_.state;
-        newton_.model().reduction().advance(trial,
-                                            newton_.solve_with_factor(-newton_.gradient(result_.state, {})));
+        newton_.model().reduction().advance(trial, p);
         newton_.evaluate(trial, result_.controls, {});
         const double after = newton_.relative_residual(trial, {}, false);
         if (!(after < before)) return;
         result_.state = trial;
         result_.turns = newton_.model().turns();
         result_.residual = std::min(result_.residual, after);
+        if (!newton_.negligible(p)) check_stability();
     }
 
     Newton& newton_;
