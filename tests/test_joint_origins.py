@@ -112,3 +112,16 @@ def test_a_motion_does_not_go_on_from_other_joints():
         ms.simulate(scene, start=rest, **options)
     move = ms.simulate(scene, start=rest, values={hinge: {"origin": (0.05, 0.0, 0.01)}}, **options)
     assert np.abs(move[hinge].angle - float(rest[hinge].angle)).max() < 1e-9
+
+
+def test_a_start_goes_along_with_the_place_of_a_motor():
+    """No force tells of it: the tool hangs on a motor, wherever that is."""
+    arm, tool = (ms.Link(mass=m, inertia=0.01, center=(x, 0, 0)) for m, x in ((2.0, ARM), (0.5, 0.6)))
+    hinge = ms.Revolute(arm, origin=(0, 0, 0), axis=(0, 1, 0), spring_stiffness=SPRING)
+    motor = ms.Revolute(tool, arm, origin=(0.5, 0, 0), axis=(0, 0, 1), motor_angle=0.4)
+    scene = ms.Scene(ms.Skeleton([arm, tool], [hinge, motor]))  # no weight: nothing but the motor knows
+    rest = ms.equilibrium(scene)
+    moved = {motor: {"origin": (0.45, 0.02, 0.0)}}
+    fresh = ms.equilibrium(scene, values=moved)[tool].center
+    assert np.abs(fresh - rest[tool].center).max() > 5e-3
+    np.testing.assert_allclose(ms.equilibrium(scene, values=moved, start=rest)[tool].center, fresh, atol=1e-12)

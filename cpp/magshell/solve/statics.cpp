@@ -5,6 +5,7 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/deflation.h"
+#include "magshell/solve/put_in_joints.h"
 #include "magshell/solve/relaxation.h"
 
 namespace magshell {
@@ -25,6 +26,7 @@ class Statics {
 
     bool run() {
         controls_at(0.0);
+        put_in_joints(newton_.model(), result_.state);
         result_.reason = newton_.model().refusal(result_.state);
         if (!result_.reason.empty() || !(options_.away_from.empty() ? load() : go_elsewhere())) return false;
         return result_.stable || !options_.require_stable || descend(1.0);
