@@ -124,4 +124,6 @@ def test_a_start_goes_along_with_the_place_of_a_motor():
     moved = {motor: {"origin": (0.45, 0.02, 0.0)}}
     fresh = ms.equilibrium(scene, values=moved)[tool].center
     assert np.abs(fresh - rest[tool].center).max() > 5e-3
-    np.testing.assert_allclose(ms.equilibrium(scene, values=moved, start=rest)[tool].center, fresh, atol=1e-12)
+    np.testing.assert_allclose(
+        ms.equilibrium(scene, values=moved, start=rest)[tool].center, fresh, atol=1e-12
+    )
