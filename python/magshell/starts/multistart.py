@@ -112,7 +112,7 @@ def _drive(state: _State, executor: Executor, task: Callable, bar) -> None:
             running[number] = executor.submit(*task(number, call_off))
             running[number].add_done_callback(lambda future, number=number: done.put((number, future)))
         for _ in running:
-            number, future = done.get()
+            number, future = _next(done)
             state.take(number, _outcome(future))
             bar.update()
             bar.set_postfix_str(state.summary())
@@ -128,6 +128,15 @@ def _drive(state: _State, executor: Executor, task: Callable, bar) -> None:
                 and not future.exception()
             ):
                 state.take(number, _outcome(future))
+
+
+def _next(done: queue.SimpleQueue[tuple[int, Future]]) -> tuple[int, Future]:
+    """The next one that ends. A Ctrl-C that comes just as the wait begins would be seen at its end only: it is a short one."""
+    while True:
+        try:
+            return done.get(timeout=0.2)
+        except queue.Empty:
+            continue
 
 
 class _State:
