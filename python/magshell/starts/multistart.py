@@ -131,7 +131,7 @@ def _drive(state: _State, executor: Executor, task: Callable, bar) -> None:
 
 
 def _next(done: queue.SimpleQueue[tuple[int, Future]]) -> tuple[int, Future]:
-    """The next one that ends. A Ctrl-C that comes just as the wait begins would be seen at its end only: it is a short one."""
+    """The next one that ends. A Ctrl-C that comes just as a wait begins is seen at its end only, so waits are short."""
     while True:
         try:
             return done.get(timeout=0.2)
