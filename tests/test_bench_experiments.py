@@ -70,6 +70,31 @@ def test_episodes_and_the_motion_with_a_gradient_are_the_same() -> None:
     assert float(value) == pytest.approx(task.objective(actions), rel=1e-12)
 
 
+class Away(Task):
+    """The distance from a place in the box: a cone, of which a gradient tells nothing about how far it is."""
+
+    name, unknowns, goal = "away", 6, 0.01
+    place = np.linspace(-0.6, 0.6, 6)
+    middle = np.full(6, 0.1)
+
+    def __init__(self, squared):
+        self.squared = squared
+
+    def objective(self, unknowns):
+        return float(np.linalg.norm(unknowns - self.place))
+
+    def differentiable(self, unknowns):
+        square = ((unknowns - unknowns.new_tensor(self.place)) ** 2).sum()
+        return square if self.squared else square**0.5
+
+
+def test_gradients_descend_the_square_of_a_distance_and_the_distance_is_counted() -> None:
+    run, plain = (methods.run(methods.SEARCHES["L-BFGS"], Away(squared), 50, 1) for squared in (True, False))
+    start = Away(True).start(1)
+    assert run["best"][0] == plain["best"][0] == pytest.approx(Away(True).objective(start))
+    assert run["best"][-1] <= 0.01 and 2 * len(run["best"]) <= len(plain["best"])
+
+
 class Hop:
     """A robot of two steps: its way is what its controls say, or it fails."""
 
@@ -93,7 +118,8 @@ class Hop:
 def test_a_robots_miss_and_its_failures() -> None:
     task = RobotTask("hop", Hop(), "magnetic_strip")
     assert task.unknowns == 6 and task.objective(np.full(6, 0.25)) == 0.0
-    assert float(task.differentiable(torch.zeros(6))) == pytest.approx(0.75**0.5)
+    assert task.objective(np.zeros(6)) == pytest.approx(0.75**0.5)
+    assert float(task.differentiable(torch.zeros(6))) == pytest.approx(0.75) and task.squared
     assert task.lost(0.75) == 0.25
     task._robot.fails = True
     assert task.objective(np.zeros(6)) == 2.0

@@ -30,8 +30,7 @@ def draw(results: dict, setting: dict) -> Figure:
         _curves(places[k], task, looks, "simulations")
         if both:
             _curves(of_time[k], task, looks, "seconds")
-        runs = f"mean and range of {task['seeds']} runs" if task["seeds"] > 1 else "one run"
-        panel_title(places[k], name, f"{task['unknowns']} unknowns, {runs}")
+        panel_title(places[k], name, f"{task['unknowns']} unknowns, {_told(task)}")
     if memory:
         _memory(places[len(tasks)], memory)
     unused = places[panels:] if not both else axes[1:, -1] if memory and rows > 1 else []
@@ -55,6 +54,14 @@ def draw(results: dict, setting: dict) -> Figure:
         )
     note(figure, f"lowest objective so far; {machine(setting)}")
     return figure
+
+
+def _told(task: dict) -> str:
+    """How many runs the curves are of; methods may have different numbers of them."""
+    counts = {len(found["runs"]) for found in task["methods"].values() if found.get("runs")} or {0}
+    fewest, most = min(counts), max(counts)
+    many = str(most) if fewest == most else f"{fewest} to {most}"
+    return "one run" if most == 1 else f"mean and range of {many} runs"
 
 
 def _looks(tasks: dict) -> dict:
@@ -83,7 +90,7 @@ def _curves(axes, task: dict, looks: dict, of_what: str) -> None:
     if task["goal"]:
         axes.axhline(task["goal"], color=FAINT, linewidth=0.8, linestyle=":")
     axes.set(xscale="log", yscale="log")
-    axes.set_xlabel("simulations" if of_what == "simulations" else "time / s", fontsize=9)
+    axes.set_xlabel("simulations" if of_what == "simulations" else "time of the processor / s", fontsize=9)
 
 
 def _filled(values: list, length: int) -> np.ndarray:
