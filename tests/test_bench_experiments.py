@@ -11,6 +11,7 @@ import magshell as ms
 from magshell.bench.__main__ import main
 from magshell.bench.baselines import methods
 from magshell.bench.baselines.counted import BudgetSpent, Counted
+from magshell.bench.baselines.kept import Kept
 from magshell.bench.baselines.tasks import RobotTask, StripTask, Task
 from magshell.bench.experiments import beside_ours
 
@@ -204,6 +205,15 @@ def test_runs_are_kept_and_gone_on_with(tmp_path, capsys, monkeypatch) -> None:
     told = capsys.readouterr().out
     assert main([*chosen, "--runs", str(path), "--known"]) == 0
     assert ran == [1] and capsys.readouterr().out == told
+
+
+def test_processes_that_share_a_file_keep_each_others_runs(tmp_path) -> None:
+    path = tmp_path / "runs.json"
+    one, other = Kept(path), Kept(path)
+    for kept, seed in ((one, 0), (other, 1), (one, 2)):
+        kept.run("bowl", "L-BFGS", seed, 4, lambda seed=seed: {"best": [float(seed)], "seconds": [0.0]})
+    again = Kept(path)
+    assert [again.known("bowl", "L-BFGS", seed, 4)["best"] for seed in range(3)] == [[0.0], [1.0], [2.0]]
 
 
 def test_files_of_runs_that_are_none(tmp_path) -> None:

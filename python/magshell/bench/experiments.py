@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--runs",
         type=writable_path,
         metavar="PATH",
-        help="keep every run there as it ends; those that are there already are taken from it",
+        help="keep every run there as it ends; those that are there already are taken from it; two processes may share it",
     )
     parser.add_argument(
         "--known", action="store_true", help="with --runs: print what is there of these runs, and run nothing"
@@ -202,7 +202,9 @@ def beside_ours(method: str, task: dict) -> str:
 
 def _needed(best: list[float], goal: float | None) -> int:
     """Simulations until the goal, or else until near what came out at last."""
-    return len(best) if goal else 1 + next(k for k, value in enumerate(best) if value <= (1 + NEAR) * best[-1])
+    return (
+        len(best) if goal else 1 + next(k for k, value in enumerate(best) if value <= (1 + NEAR) * best[-1])
+    )
 
 
 def _number(value: float) -> str:

@@ -17,7 +17,7 @@ class BudgetSpent(Exception):
 class Counted:
     """objective: of unknowns (n,) in -1 to 1. goal: a value at which a search may end.
 
-    best: (k,), the lowest value so far, one a simulation; seconds: (k,), of the processor since the first began: other programs do not count.
+    best: (k,), the lowest value so far, one a simulation; seconds: (k,), of the processor since the first began.
     """
 
     objective: Callable[[np.ndarray], float]

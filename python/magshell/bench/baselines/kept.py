@@ -12,7 +12,7 @@ _KEYS = ("task", "method", "seed", "budget")
 
 
 class Kept:
-    """path: of a JSON file, which may not be there yet; None: nothing is kept."""
+    """path: of a JSON file, which may not be there yet; None: nothing is kept. Processes with other parts may share it."""
 
     def __init__(self, path: Path | None):
         self._path = path
@@ -28,6 +28,8 @@ class Kept:
         if key not in self._runs:
             self._runs[key] = make()
             if self._path is not None:
+                if self._path.exists():  # another process may have kept some there
+                    self._runs = _read(self._path) | self._runs
                 rows = [dict(zip(_KEYS, each, strict=True)) | run for each, run in self._runs.items()]
                 text = "[\n" + ",\n".join(map(json.dumps, rows)) + "\n]\n"
                 replace_file(self._path, lambda file: file.write(text.encode()))
