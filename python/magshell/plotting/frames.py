@@ -65,7 +65,7 @@ class Scenery:
     def _surroundings(self, states: list[State]) -> tuple[np.ndarray, float]:
         """Where fields that vary in space are drawn, and the flux density [T] of full length."""
         some = spread(states, SAMPLES)
-        if not self.options.field or not any(state.sources for state in some):
+        if not self.options.field or not any(state.has_sources for state in some):
             return np.zeros((0, 3)), 0.0
         points = glyphs.halo(some, self.size)
         return points, glyphs.sources_glyphs(some, [points] * len(some), self.size)[1]
@@ -103,7 +103,7 @@ class Scenery:
             factor, unit = self._field_unit
             magnitude = f"{np.linalg.norm(state.flux_density) / factor:.1f} {unit}"
             panel.labels.append(field_label(self._below, magnitude))
-        if self._full_length and state.sources:
+        if self._full_length and state.has_sources:
             [around], _ = glyphs.sources_glyphs([state], [self._points], self.size, self._full_length)
             if around is not None:
                 panel.solids.append(arrows(around.starts, around.vectors, around.radius, colors.FIELD))

@@ -287,7 +287,7 @@ def _distinct(vectors: list[np.ndarray]) -> list[np.ndarray]:
 
 def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> list[tuple[str, str]]:
     """Arrows of the fields that vary in space, and what the legend says."""
-    points = [glyphs.halo(group, size) if group[-1].sources else np.zeros((0, 3)) for group in groups]
+    points = [glyphs.halo(group, size) if group[-1].has_sources else np.zeros((0, 3)) for group in groups]
     around, strong = glyphs.sources_glyphs([group[-1] for group in groups], points, size)
     for panel, chosen in zip(panels, around, strict=True):
         if chosen is not None:
