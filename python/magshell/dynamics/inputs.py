@@ -100,7 +100,7 @@ class MotionInputs:
         return self._knots[name][self._recorded_knots(count)]
 
     def varied(self, count: int) -> dict[tuple, np.ndarray]:
-        """Likewise {(actuator or shell, name): its values} of what varies."""
+        """Likewise {(actuator, shell or field, name): its values} of what varies."""
         at = self._recorded_knots(count)
         return {key: rows[at] for key, rows in self._in_time.varied.items()}
 

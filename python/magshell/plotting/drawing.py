@@ -68,7 +68,7 @@ def plot(
     color_label, color_range: the text, with the unit, and the ends of the colour bar.
     arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
     show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it. Its magnets and wires,
-        magpylib's too, are drawn where the solve had them; those that move during a motion where the scene has them.
+        magpylib's too, are drawn where they were in each state.
     rest: the rest shape as a faint outline. mesh_lines: the edges of the mesh.
     contacts: the forces of all contacts, friction included, as arrows from the vertices on which they act, over everything.
     titles: one a state; that a sheet passes through itself is added, where there are at most 20,000 faces to look at.

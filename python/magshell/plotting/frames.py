@@ -21,10 +21,11 @@ from .panels import (
     size_of,
     sources_key,
 )
-from .picture import paint, paint_panel, screen_of
+from .picture import paint, paint_panel, screen_of, title_height
 from .playing import SAMPLES, spread
 from .solids import arrows
 from .surroundings import box_of, obstacle_solids
+from .texts import Ruler
 from .view import View
 
 DPI = 140
@@ -65,7 +66,7 @@ class Scenery:
     def _surroundings(self, states: list[State]) -> tuple[np.ndarray, float]:
         """Where fields that vary in space are drawn, and the flux density [T] of full length."""
         some = spread(states, SAMPLES)
-        if not self.options.field or not any(state.sources for state in some):
+        if not self.options.field or not any(state.has_sources for state in some):
             return np.zeros((0, 3)), 0.0
         points = glyphs.halo(some, self.size)
         return points, glyphs.sources_glyphs(some, [points] * len(some), self.size)[1]
@@ -103,7 +104,7 @@ class Scenery:
             factor, unit = self._field_unit
             magnitude = f"{np.linalg.norm(state.flux_density) / factor:.1f} {unit}"
             panel.labels.append(field_label(self._below, magnitude))
-        if self._full_length and state.sources:
+        if self._full_length and state.has_sources:
             [around], _ = glyphs.sources_glyphs([state], [self._points], self.size, self._full_length)
             if around is not None:
                 panel.solids.append(arrows(around.starts, around.vectors, around.radius, colors.FIELD))
@@ -116,6 +117,7 @@ class Reel:
         self._figure = paint(first, width, 1, backend, DPI).figure
         self._axes = self._figure.axes[0]
         self._window = np.array([*self._axes.get_xlim(), *self._axes.get_ylim()])
+        self._title, self._ruler = title_height(self._axes), Ruler(DPI)
         self._screens = screen_of(self._axes, backend, samples=False)
 
     def __enter__(self) -> Reel:
@@ -128,7 +130,8 @@ class Reel:
     def image(self, drawing: Drawing) -> np.ndarray:
         """(height, width, 3) uint8, both even, as films want them."""
         self._axes.clear()
-        paint_panel(self._axes, drawing.panels[0], drawing, self._window, self._screen)
+        panel, room = drawing.panels[0], (self._title, self._ruler)
+        paint_panel(self._axes, panel, drawing, self._window, self._screen, *room)
         self._figure.canvas.draw()
         image = np.asarray(self._figure.canvas.buffer_rgba())[:, :, :3]
         odd = [(0, image.shape[k] % 2) for k in (0, 1)]

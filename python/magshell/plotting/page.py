@@ -159,7 +159,7 @@ def _that_fit(count: int, numbers: int, size_limit: float) -> tuple[str, list[in
 
 def _sources(states: list[State], size: float) -> tuple[list[glyphs.Glyphs | None], float]:
     """Fields that vary in space, around each state; around a motion at places that stay."""
-    if not any(state.sources for state in states):
+    if not any(state.has_sources for state in states):
         return [None] * len(states), 0.0
     if states[0].time is None:
         points = [glyphs.halo([state], size) for state in states]

@@ -233,8 +233,10 @@ def _uniform_fields(
         return
     scale = LONGEST_FIELD * size / strongest
     right, up, eye = view.axes
-    points = np.concatenate([view.project(s.positions) for panel in panels for s in panel.solids])
-    left, middle = points[:, 0].min(), (points.min(axis=0) + points.max(axis=0)) / 2.0
+    solids = [solid for panel in panels for solid in panel.solids]
+    some = ([view.project(s.positions) for s in solids if s.around is around] for around in (False, True))
+    low, high = box_of(*some)
+    left, middle = low[0], (low + high) / 2.0
     for panel, group in zip(panels, groups, strict=True):
         fields = _distinct([s.flux_density for s in group if s.flux_density is not None])
         place = left - 0.07 * size
@@ -287,7 +289,7 @@ def _distinct(vectors: list[np.ndarray]) -> list[np.ndarray]:
 
 def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> list[tuple[str, str]]:
     """Arrows of the fields that vary in space, and what the legend says."""
-    points = [glyphs.halo(group, size) if group[-1].sources else np.zeros((0, 3)) for group in groups]
+    points = [glyphs.halo(group, size) if group[-1].has_sources else np.zeros((0, 3)) for group in groups]
     around, strong = glyphs.sources_glyphs([group[-1] for group in groups], points, size)
     for panel, chosen in zip(panels, around, strict=True):
         if chosen is not None:
