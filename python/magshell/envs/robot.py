@@ -69,7 +69,8 @@ class Robot:
         return weights @ moved
 
     def miss(self, motion: Trajectory, target=None):
-        """How far from the target, (3,) m, the center of mass ends, over the way there."""
+        """How far from the target, (3,) m, the center of mass ends, over the way there. By gradient minimize its square,
+        which has no kink at the target."""
         goal = np.array(self.target if target is None else target, dtype=float)
         way = self.way(motion)
         away = way - (goal if isinstance(way, np.ndarray) else way.new_tensor(goal))

@@ -17,7 +17,7 @@ class BudgetSpent(Exception):
 class Counted:
     """objective: of unknowns (n,) in -1 to 1. goal: a value at which a search may end.
 
-    best: (k,), the lowest value so far, one a simulation; seconds: (k,), of the clock on the wall since the first began.
+    best: (k,), the lowest value so far, one a simulation; seconds: (k,), of the processor since the first began: other programs do not count.
     """
 
     objective: Callable[[np.ndarray], float]
@@ -30,7 +30,7 @@ class Counted:
     def begin(self) -> None:
         """A simulation begins: the clock runs from the first on."""
         if self._began is None:
-            self._began = time.perf_counter()
+            self._began = time.process_time()
 
     def __call__(self, unknowns) -> float:
         self.begin()
@@ -42,7 +42,7 @@ class Counted:
         if not np.isfinite(value):
             raise ValueError(f"the objective must be finite, got {value}")
         self.best.append(min(value, self.best[-1]) if self.best else value)
-        self.seconds.append(time.perf_counter() - self._began)
+        self.seconds.append(time.process_time() - self._began)
         if len(self.best) >= self.budget or (self.goal is not None and self.best[-1] <= self.goal):
             raise BudgetSpent
         return value

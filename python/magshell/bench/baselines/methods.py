@@ -40,7 +40,8 @@ def _by_gradient(make: Callable, task, counted: Counted, seed: int) -> None:
     def objective():
         counted.begin()
         value = task.differentiable(x.clamp(-1.0, 1.0))
-        counted.counted(float(value.detach()))
+        shown = float(value.detach())
+        counted.counted(shown**0.5 if task.squared else shown)
         return value
 
     def with_gradient():

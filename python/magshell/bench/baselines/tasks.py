@@ -11,11 +11,12 @@ _NOISE = 0.05  # of unknowns in -1 to 1: how far the starts of the seeds are apa
 
 class Task:
     """unknowns: how many, each in -1 to 1. objective(unknowns) -> float; differentiable: the same of a tensor, with a
-    gradient. goal: where a search may end."""
+    gradient, or its square. goal: where a search may end."""
 
     name: str
     unknowns: int
     goal: float | None = None
+    squared = False  # differentiable is: a distance has a kink at its goal, which models of curvature do not know
     learned = (
         False  # whether it is an environment too: then with `actions` an episode, `environment` and `lost`
     )
@@ -34,7 +35,7 @@ class Task:
 class BridgeTask(Task):
     """[Qiao21] Figure 3: the miss of the mean node, over the sag that is asked for. Needs examples/."""
 
-    goal = 0.01
+    goal, squared = 0.01, True
 
     def __init__(self, name: str):
         from _bridges import shape, task
@@ -49,10 +50,10 @@ class BridgeTask(Task):
         return 2 * (self._task.start - self._low) / (self._high - self._low) - 1
 
     def objective(self, unknowns) -> float:
-        return float(self._task.loss(self._moduli(unknowns))) ** 0.5
+        return float(self.differentiable(unknowns)) ** 0.5
 
     def differentiable(self, unknowns):
-        return self._task.loss(self._moduli(unknowns)) ** 0.5
+        return self._task.loss(self._moduli(unknowns))
 
     def _moduli(self, unknowns):
         low, high = self._low, self._high
@@ -112,7 +113,7 @@ class StripTask(Task):
 class RobotTask(Task):
     """[Qiao21] Figure 4: controls of a robot in every step; how far from the target it ends, over the way there."""
 
-    learned, goal = True, 0.01
+    learned, goal, squared = True, 0.01, True
     searches = ("L-BFGS", "CMA-ES")  # as [Qiao21]'s; some others would need n + 1 motions before they begin
 
     _FAILED = 2.0  # the miss where a motion fails: as an episode that ends where it began, and is fined
@@ -136,11 +137,14 @@ class RobotTask(Task):
 
     def objective(self, unknowns) -> float:
         try:
-            return float(self.differentiable(unknowns))
+            return float(self._miss(unknowns))
         except ms.NotConverged:
             return self._FAILED
 
     def differentiable(self, unknowns):
+        return self._miss(unknowns) ** 2
+
+    def _miss(self, unknowns):
         return self._robot.miss(self._robot.motion(unknowns.reshape(self.actions, -1)))
 
 
