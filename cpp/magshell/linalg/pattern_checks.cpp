@@ -64,7 +64,7 @@ void check_points(const SparsePattern& pattern, const std::vector<Vec3>& points)
         if (!points[j].allFinite()) throw InvalidInput("points[" + text(j) + "] is not finite");
 }
 
-void check_finite(const LargeVector<double>& values) {
+void check_finite(std::span<const double> values) {
     bool all_finite = true;  // without a branch, so that the usual case is one vectorized pass
     for (std::size_t k = 0; k < values.size(); ++k)
         all_finite &= std::abs(values[k]) <= std::numeric_limits<double>::max();
