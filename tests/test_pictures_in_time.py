@@ -68,7 +68,9 @@ def test_between_two_states_it_is_on_the_way(motion):
 
 
 def test_what_is_coloured_and_written_has_the_field_of_then(motion, tmp_path):
-    picture = ms.plot(motion, color="magnetic_energy", states=[0, -1], backend="matplotlib", width=500)
+    picture = ms.plot(
+        motion, color="magnetic_energy", states=[0, -1], width=500, style=ms.Style(backend="matplotlib")
+    )
     assert len(picture.figure.axes) == 3
     meshio = pytest.importorskip("meshio")
     ms.write_series(tmp_path / "motion.pvd", motion)
@@ -81,7 +83,13 @@ def test_what_is_coloured_and_written_has_the_field_of_then(motion, tmp_path):
 def test_a_movie_moves_it(motion, tmp_path):
     image = pytest.importorskip("PIL.Image")
     path = ms.animate(
-        motion, tmp_path / "a.gif", width=400, fps=1, speed=2e-3, backend="matplotlib", progress=False
+        motion,
+        tmp_path / "a.gif",
+        width=400,
+        fps=1,
+        speed=2e-3,
+        progress=False,
+        style=ms.Style(backend="matplotlib"),
     )
     with image.open(path) as film:
         first, last = (

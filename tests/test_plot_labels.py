@@ -69,7 +69,7 @@ SCENES = {
     ),
     "three kinds of arrows": lambda fallen: (
         fallen,
-        {"states": [-1], "contacts": True, "color": "contact_pressure"},
+        {"states": [-1], "color": "contact_pressure", "style": ms.Style(contacts=True, backend="matplotlib")},
     ),
     "nine panels": lambda _: (
         MESH,
@@ -100,14 +100,13 @@ SCENES = {
         MESH,
         {
             "positions": bent(1.5),
-            "color": np.linspace(-1.2345e-5, 1.2345e-5, MESH.n_faces),
-            "color_label": LONG,
+            "color": ms.Color(np.linspace(-1.2345e-5, 1.2345e-5, MESH.n_faces), label=LONG),
             "titles": [SENTENCE],
         },
     ),
     "texts without a space": lambda _: (
         MESH,
-        {"color": ANGLES, "color_label": "n" * 120, "titles": ["m" * 500]},
+        {"color": ms.Color(ANGLES, label="n" * 120), "titles": ["m" * 500]},
     ),
     "numbers alike": lambda _: (MESH, {"color": np.linspace(1e6 + 0.125, 1e6 + 0.25, MESH.n_faces)}),
     "axes over each other": lambda _: (MESH, {"view": (0, -45)}),
@@ -132,13 +131,13 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_no_texts_cross(fallen, name, width):
     what, options = SCENES[name](fallen)
-    picture = ms.plot(what, **options, width=width, backend="matplotlib")
+    picture = ms.plot(what, **{"style": ms.Style(backend="matplotlib"), **options}, width=width)
     assert wrong_texts(picture.figure) == []
     assert len(texts(picture.figure)) >= 4  # of the axes and the scale bar at least
 
 
 def test_what_looks_sees_them():
-    picture = ms.plot(MESH, width=800, backend="matplotlib")
+    picture = ms.plot(MESH, width=800, style=ms.Style(backend="matplotlib"))
     picture.figure.text(0.5, 0.5, "one")
     picture.figure.text(0.5, 0.5, "another")
     picture.figure.text(0.99, 0.5, "outside")
@@ -149,7 +148,7 @@ def test_what_looks_sees_them():
 
 def test_every_state_that_has_room_is_named():
     what, options = SCENES["nine states over each other"](None)
-    picture = ms.plot(what, **options, width=1600, backend="matplotlib")
+    picture = ms.plot(what, **options, width=1600, style=ms.Style(backend="matplotlib"))
     said = [text for text, _ in texts(picture.figure)]
     assert {f"state {k}" for k in range(9)} <= set(said)
 
@@ -159,7 +158,9 @@ def test_nothing_of_a_title_or_a_unit_is_lost_in_breaking():
     for width in (400, 900):
         said = [
             text.replace("\n", " ")
-            for text, _ in texts(ms.plot(what, **options, width=width, backend="matplotlib").figure)
+            for text, _ in texts(
+                ms.plot(what, **options, width=width, style=ms.Style(backend="matplotlib")).figure
+            )
         ]
         assert SENTENCE in said and LONG in said
 
@@ -192,7 +193,9 @@ def test_a_floor_and_a_field_leave_the_sheet_large():
     """The field's arrow stood beside the floor, however large that was."""
     floor = ms.obstacles.Box((5.0, 5.0, 0.02), center=(0, 0, -0.03))
     bare, floored = (
-        ms.plot(MESH, obstacles=each, **FIELD, width=800, backend="matplotlib").figure.axes[0].get_xlim()
+        ms.plot(MESH, obstacles=each, **FIELD, width=800, style=ms.Style(backend="matplotlib"))
+        .figure.axes[0]
+        .get_xlim()
         for each in ((), floor)
     )
     assert np.ptp(floored) < 1.5 * np.ptp(bare)

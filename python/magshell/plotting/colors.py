@@ -304,9 +304,9 @@ def _range(values: list[np.ndarray]) -> tuple[float, float]:
 def _limits(given, default: tuple[float, float]) -> tuple[float, float]:
     if given is None:
         return default
-    low, high = quantity("color_range", "the color's unit", given, (2,)).tolist()
+    low, high = quantity("the range of a color", "its unit", given, (2,)).tolist()
     if low >= high:
-        raise ValueError(f"color_range must rise, got ({low:g}, {high:g})")
+        raise ValueError(f"the range of a color must rise, got ({low:g}, {high:g})")
     return low, high
 
 

@@ -13,6 +13,8 @@ from .panels import (
     Drawing,
     Options,
     Panel,
+    contact_solid,
+    contacts_key,
     field_arrow,
     field_label,
     magnetization_key,
@@ -20,6 +22,7 @@ from .panels import (
     sheet_solids,
     size_of,
     sources_key,
+    strongest_contact,
 )
 from .picture import paint, paint_panel, screen_of, title_height
 from .playing import SAMPLES, spread
@@ -40,6 +43,8 @@ class Scenery:
         self.scalar, self.view, self.unit, self.options = scalar, view, unit, options
         self.size = size_of(states)
         self.strongest = glyphs.largest(states)
+        some = spread(states, SAMPLES) if options.contacts else []
+        self._strongest_contact = strongest_contact(some)
         self._points, self._full_length = self._surroundings(states)
         low, high = self._bounds(states)
         self._prepare_uniform_field(states, low, high)
@@ -53,11 +58,14 @@ class Scenery:
         panel = Panel(title, sheet_solids(state, shades, self.view, self.size, self.options))
         panel.solids += obstacle_solids([state], self.size)
         panel.solids += self._magnetization(state)
+        if self._strongest_contact:
+            panel.solids.append(contact_solid(state, self._strongest_contact, self.size))
         self._add_fields(panel, state)
         return Drawing([panel], self.view, self.unit, self.scalar, self._legend(), self._hold)
 
     def _legend(self) -> list[tuple[str, str]]:
         shown = [magnetization_key(self.strongest)] if self.options.arrows and self.strongest else []
+        shown += [contacts_key(self._strongest_contact)] if self._strongest_contact else []
         return shown + ([sources_key(self._full_length)] if self._full_length else [])
 
     def _magnetization(self, state: State) -> list:

@@ -194,6 +194,8 @@ def _write(axes, label: Label, drawing: Drawing, window, room: Room, ruler: Rule
 
     area = room.area.high
     point = (drawing.view.project(label.point)[:2] - window[::2]) / (window[1] - window[0]) * area[0]
+    if drawing.view.frame and ((point < 0) | (point > area)).any():
+        return  # what it is about is not seen
     text, points = ruler.fitted(label.text, TEXT, area[0], area[1])
     size = ruler.size(text, points)
     found = room.take(size, places_around(point, size, label.towards))
@@ -222,7 +224,7 @@ def _with_room(drawing: Drawing, inches: float, ruler: Ruler) -> np.ndarray:
     left, right, bottom, top = drawing.window
     for _ in range(2):  # the room for text is in inches, which the first pass finds the scale for
         scale = (right - left) / inches
-        for panel in drawing.panels:
+        for panel in [] if drawing.view.frame else drawing.panels:
             for label in panel.labels:
                 point = drawing.view.project(label.point)[:2] / scale
                 size = np.minimum(ruler.size(label.text, TEXT), 0.6 * inches)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from ..obstacles import Obstacle
 from ..scene.scene import Scene
 from ..statics.equilibria import Equilibria
 from ..statics.path import Path
+from .around import surroundings_of
 from .bones import bones_at_rest, bones_of, joined, mesh_of, shapes_at_rest, shapes_of
 from .contact_loads import ContactLoads, contact_loads
 from .magnets import surfaces_of
@@ -155,7 +156,7 @@ def states_of(
     if is_result and not isinstance(what, Equilibria):
         own = _held_by(what)
         merged = {name: own.get(name) if value is None else value for name, value in given.items()}
-        around = _surroundings(what)
+        around = surroundings_of(what)
         merged = _with_own(merged, what.scene, around.obstacles[0])
         mesh = what.scene.mesh
         if not what.scene.bodies and positions is None:
@@ -178,30 +179,6 @@ def states_of(
         raise ValueError("there is nothing to draw: the list is empty")
     kinds = "a mesh, a Shell, a Solid, a Scene, a result, or a list of them"
     raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
-
-
-class _Surroundings(NamedTuple):
-    """What is around the bodies in each state of a result, where it is then; once where a result does not say.
-
-    Obstacles of a motion move by themselves, with the time of a state.
-    """
-
-    fields: list[tuple[AppliedField, ...]]
-    obstacles: list[tuple[Obstacle, ...]]
-
-
-def _surroundings(result) -> _Surroundings:
-    scene = result.scene
-    if not hasattr(result, "_values_at"):
-        return _Surroundings([scene.fields], [scene.obstacles])
-    count = len(result) if isinstance(result, Trajectory | Path) else 1
-    values = [result._values_at(k) for k in range(count)]
-    return _Surroundings(
-        *(
-            [tuple(map(each.current, objects)) for each in values]
-            for objects in (scene.fields, scene.obstacles)
-        )
-    )
 
 
 def _with_bones(result, states: list[State], positions) -> list[State]:
