@@ -6,6 +6,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/given_away.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
 #include "magshell/linalg/build_info.h"
@@ -123,8 +124,8 @@ class SharedFactor {
     mutable std::shared_mutex mutex_;
 };
 
-std::optional<py::tuple> loaded(Index size, const IndexArray& column_starts, const IndexArray& rows, const Array& values,
-                  const VectorXd& forces) {
+std::optional<py::tuple> loaded(Index size, const IndexArray& column_starts, const IndexArray& rows,
+                                const Array& values, const VectorXd& forces) {
     const SparsePattern pattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")};
     check_pattern(pattern);
     if (values.ndim() != 1 || values.size() != rows.size() || forces.size() != size)
@@ -135,12 +136,9 @@ std::optional<py::tuple> loaded(Index size, const IndexArray& column_starts, con
         part = loaded_part(pattern, {values.data(), static_cast<std::size_t>(values.size())}, forces);
     }
     if (!part) return std::nullopt;
-    const auto indices = [](const std::vector<Index>& each) {
-        return py::array_t<Index>(static_cast<py::ssize_t>(each.size()), each.data());
-    };
-    return py::make_tuple(indices(part->unknowns), indices(part->pattern.column_starts),
-                          indices(part->pattern.rows),
-                          Array(static_cast<py::ssize_t>(part->values.size()), part->values.data()));
+    return py::make_tuple(given_away(std::move(part->unknowns)),
+                          given_away(std::move(part->pattern.column_starts)),
+                          given_away(std::move(part->pattern.rows)), given_away(std::move(part->values)));
 }
 
 std::string describe(const FactorReport& report) {
@@ -200,8 +198,10 @@ void register_linalg(py::module_& module) {
 
     module.def("loaded_part", &loaded, py::arg("size"), py::arg("column_starts"), py::arg("rows"),
                py::arg("values"), py::arg("forces"),
-               "Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its unknowns, column_starts, "
-               "rows and values. Nothing but zeros couples it with the rest. None where it is all of them, or no force acts.");
+               "Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its "
+               "unknowns, column_starts, "
+               "rows and values. Nothing but zeros couples it with the rest. None where it is all of them, "
+               "or no force acts.");
 
     module.def("factor_backends", [] {
         std::vector<std::string> built;

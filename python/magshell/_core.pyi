@@ -444,6 +444,11 @@ class Model:
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
     ) -> tuple: ...
+    @property
+    def last_gradient(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (n,), at the state that was evaluated last, as by hessian().
+        """
     def linearize(self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
         """
         How nodes of links and rigid parts move, at a state: evaluations begin with it.

@@ -21,9 +21,10 @@ class Coupled {
         return unknown;
     }
 
+    bool is_known(Index first_of_one, Index other) const { return above_[other] == first_of_one; }
+
     /// Returns the first of both.
     Index join(Index first_of_one, Index other) {
-        if (above_[other] == first_of_one) return first_of_one;  // most are known to be
         const Index first_of_other = first(other);
         const auto [before, after] = std::minmax(first_of_one, first_of_other);
         above_[after] = before;
@@ -40,7 +41,9 @@ std::vector<char> loaded(const SparsePattern& pattern, std::span<const double> v
     for (Index j = 0; j < pattern.size; ++j) {
         Index first = coupled.first(j);
         for (Index k = pattern.column_starts[j] + 1; k < pattern.column_starts[j + 1]; ++k)
-            if (values[k] != 0.0) first = coupled.join(first, pattern.rows[k]);
+            // Both at once: either by itself is as good as random, and most of what is coupled is known to be.
+            if ((values[k] != 0.0) & !coupled.is_known(first, pattern.rows[k]))
+                first = coupled.join(first, pattern.rows[k]);
     }
     std::vector<char> is_loaded(pattern.size, false);
     for (Index j = 0; j < pattern.size; ++j)
@@ -67,14 +70,22 @@ std::optional<LoadedPart> loaded_part(const SparsePattern& pattern, std::span<co
     }
     part.pattern.size = count;
     part.pattern.column_starts.push_back(0);
+    std::size_t most = 0;
+    for (const Index j : part.unknowns) most += pattern.column_starts[j + 1] - pattern.column_starts[j];
+    part.pattern.rows.resize(most);
+    part.values.resize(most);
+    Index to = 0;
     for (const Index j : part.unknowns) {
         for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
-            if (number[pattern.rows[k]] < 0) continue;
-            part.pattern.rows.push_back(number[pattern.rows[k]]);
-            part.values.push_back(values[k]);
+            const Index row = number[pattern.rows[k]];
+            part.pattern.rows[to] = row;  // without a branch, which would be as good as random
+            part.values[to] = values[k];
+            to += row >= 0;
         }
-        part.pattern.column_starts.push_back(static_cast<Index>(part.pattern.rows.size()));
+        part.pattern.column_starts.push_back(to);
     }
+    part.pattern.rows.resize(to);
+    part.values.resize(to);
     return part;
 }
 

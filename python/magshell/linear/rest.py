@@ -58,6 +58,7 @@ class RestStiffness:
         self.rest = self._model.rest_state()
         refuse_what_acts(inputs)
         *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())
+        self._at_rest = self._model.last_gradient
         self._whole: _Factorized | None = None
 
     @property
@@ -104,8 +105,7 @@ class RestStiffness:
         unloaded = layout.zeros()
         moved = model.prescribed_rate(unloaded) * layout.of(inputs.controls, "scene", "motion_factor")
         moved = moved + model.driven_increment(self.rest, unloaded)
-        at_rest = model.gradient(self.rest, unloaded) if at_rest is None else at_rest
-        forces = at_rest - model.gradient(self.rest, inputs.controls)
+        forces = (self._at_rest if at_rest is None else at_rest) - model.gradient(self.rest, inputs.controls)
         if moved.any():
             forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved
         return moved + model.expand(self._answer(model.reduce(forces)))
@@ -117,11 +117,13 @@ def pulling_joints(inputs: Inputs) -> dict:
     return {own: joint.resting for own, joint in joints.items() if joint.resting is not joint}
 
 
-def forces_at_rest(inputs: Inputs) -> np.ndarray:
-    """g(0) of all unknowns at the rest shape, without what pulls in joints: so that this is a load."""
+def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
+    """g(0) of all unknowns at the rest shape, without what pulls in joints: so that this is a load. None where nothing
+    pulls."""
+    if not (pulling := pulling_joints(inputs)):
+        return None
     scene = inputs.scene
-    pulling = pulling_joints(inputs)
-    with inputs.values.with_objects(pulling).in_core() if pulling else inputs.in_core():
+    with inputs.values.with_objects(pulling).in_core():
         return scene._model.gradient(scene._model.rest_state(), scene._control_layout.zeros())
 
 
