@@ -91,8 +91,7 @@ def picture(result: dict) -> ms.Picture:
     return ms.plot(
         rest.scene.mesh,
         positions=rest.positions,
-        color=1e3 * rest.positions[:, 2],
-        color_label="z [mm]",
+        color=ms.Color(1e3 * rest.positions[:, 2], label="z [mm]"),
         view=(40, -82),
         width=3200,
     )

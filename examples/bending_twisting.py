@@ -139,8 +139,8 @@ def bent_picture(result: dict) -> ms.Picture:
         titles=[f"{1e3 * state['field']:g} mT" for state in states],
         view=(10, -40),
         columns=3,
-        arrows=12,
         width=2000,
+        style=ms.Style(arrows=12),
     )
 
 
@@ -157,7 +157,7 @@ def twisted_picture(result: dict, moments=(0.0, 0.5, 1.0, 1.5, 2.0, 2.2, 2.5, 3.
         titles=[f"{time:.1f} s, {360 * TURNS * min(time / TURNING, 1):.0f}°" for time in motion.times[shown]],
         view=(22, -60),
         columns=3,
-        arrows=20,
+        style=ms.Style(arrows=20),
     )
 
 

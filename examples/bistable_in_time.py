@@ -177,7 +177,7 @@ def picture(result: dict) -> ms.Picture:
         titles=[f"{time:.3f} s, {1e3 * RAMP * time:.2f} mT" for time in motion.times[shown]],
         view=(10, -86),
         columns=2,
-        arrows=False,
+        style=ms.Style(arrows=False),
     )
 
 
@@ -194,10 +194,10 @@ def movie(result: dict, path, before=0.15, after=0.3, fps=25) -> Path:
         remanent_magnetization=result["sheet"].remanent_magnetization,
         applied_flux_density=[(0, 0, RAMP * time) for time in motion.times[shown]],
         view=(10, -86),
-        arrows=False,
         width=800,
         fps=fps,
         progress=False,
+        style=ms.Style(arrows=False),
     )
 
 

@@ -166,7 +166,12 @@ def pictures(result: dict) -> dict[str, ms.Picture]:
     common = {"remanent_magnetization": magnetization, "color": "magnetization"}
     return {
         "magnetization": ms.plot(
-            mesh, **common, arrows=260, view=(90, -90), titles=["remanent magnetization"], width=1400
+            mesh,
+            **common,
+            view=(90, -90),
+            titles=["remanent magnetization"],
+            width=1400,
+            style=ms.Style(arrows=260),
         ),
         "states": ms.plot(
             mesh,
@@ -175,9 +180,9 @@ def pictures(result: dict) -> dict[str, ms.Picture]:
             titles=["(a) relaxed", "(b) curled down", "(c) curled up", "(d) shaking its arms"],
             view=(24, -75),
             columns=2,
-            arrows=120,
             width=2000,
             **common,
+            style=ms.Style(arrows=120),
         ),
         "shaking": ms.plot(
             mesh,
@@ -186,9 +191,9 @@ def pictures(result: dict) -> dict[str, ms.Picture]:
             titles=[f"field towards {np.degrees(AZIMUTHS[k]):.0f}°" for k in chosen],
             view=(34, -75),
             columns=3,
-            arrows=80,
             width=2400,
             **common,
+            style=ms.Style(arrows=80),
         ),
     }
 

@@ -102,8 +102,7 @@ def picture(result: dict) -> ms.Picture:
     return ms.plot(
         mesh,
         positions=np.stack([positions for _, positions in shapes]),
-        color=[1e3 * positions[:, 2] for _, positions in shapes],
-        color_label="z [mm]",
+        color=ms.Color([1e3 * positions[:, 2] for _, positions in shapes], label="z [mm]"),
         titles=[title for title, _ in shapes],
         columns=len(VARIANTS),
         view=(42, -72),

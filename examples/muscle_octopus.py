@@ -83,7 +83,7 @@ def summary(result: dict) -> str:
 
 def write(result: dict, out: Path) -> None:
     ms.Picture(plot(result)).save(out / "muscle_octopus.png", dpi=160)
-    active = {"color": "activation", "color_range": (0, 1)}
+    active = {"color": ms.Color("activation", range=(0, 1))}
     report.picture(result["motion"], VIEW, **active).save(out / "muscle_octopus_swims.png")
     report.movie(result["motion"], out / "muscle_octopus.gif", VIEW, speed=1.0, fps=25.0, width=500, **active)
 

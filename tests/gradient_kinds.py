@@ -272,18 +272,18 @@ MAKERS = {
     "in motion, euler": lambda: moving(ms.ImplicitEuler(), "hinge"),
     "in motion, tr_bdf2": lambda: moving(ms.TRBDF2()),
     "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),
-    "in motion, sdirk3": lambda: moving(ms.SDIRK3(), "hinge", keep="checkpoints", memory_budget=2e4),
+    "in motion, sdirk3": lambda: moving(ms.SDIRK3(), "hinge", keep=ms.Keep("checkpoints", memory_budget=2e4)),
     "from an equilibrium": let_go,
     "actuated at rest": actuated_at_rest,
     "actuated in motion": lambda: actuated_in_motion(ms.TRBDF2(), keep="factors"),
     "at rest, with a rigid part": rigid_at_rest,
     "in motion, with rigid parts, euler": lambda: rigid_in_motion(ms.ImplicitEuler(), {"inertia": 1.1e-6}),
     "in motion, with rigid parts, tr_bdf2": lambda: rigid_in_motion(
-        ms.TRBDF2(), keep="checkpoints", memory_budget=2e4, stiffness_damping=1e-3
+        ms.TRBDF2(), keep=ms.Keep("checkpoints", memory_budget=2e4), stiffness_damping=1e-3
     ),
     "at rest, with a skeleton": skeleton_at_rest,
     "in motion, with a skeleton": lambda: skeleton_in_motion(
-        ms.TRBDF2(), keep="checkpoints", memory_budget=2e4
+        ms.TRBDF2(), keep=ms.Keep("checkpoints", memory_budget=2e4)
     ),
     "a thrown skeleton": thrown_skeleton,
     "at rest, with a driven skeleton": driven_skeleton_at_rest,

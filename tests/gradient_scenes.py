@@ -21,7 +21,7 @@ SETTINGS = {"scene", "values", "solver", "progress"}
 SETTINGS_OF = {
     ms.equilibrium: SETTINGS
     | {"require_stable", "at_rest", "start"},  # wherever the search began: a tensor is refused
-    ms.simulate: SETTINGS | {"steps", "integrator", "record_every", "memory_budget", "keep"},
+    ms.simulate: SETTINGS | {"steps", "integrator", "record_every", "keep"},
 }
 
 

@@ -16,7 +16,7 @@ from magshell.states.state import states_of, with_times
 image = pytest.importorskip("PIL.Image")
 
 MESH = ms.meshes.rectangle(0.05, 0.01, cells=(6, 2))
-SMALL = {"backend": "matplotlib", "width": 400, "progress": False}
+SMALL = {"style": ms.Style(backend="matplotlib"), "width": 400, "progress": False}
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +175,7 @@ def test_without_ffmpeg_the_error_says_what_to_install(tmp_path, monkeypatch) ->
         ({"times": [0.0]}, r"times \[s\] must be 3 numbers"),
         ({"times": [0.0, 1.0, 0.5]}, "must not fall, but 1 is followed by 0.5"),
         ({"color": "colour"}, "color must be"),
-        ({"arrows": -1}, "arrows must be"),
+        ({"style": 3}, "style must be an ms.Style, got 3"),
     ],
 )
 def test_bad_input_is_refused(tmp_path, arguments, message) -> None:

@@ -324,6 +324,6 @@ def test_steps_taken_again_for_gradients_are_those_taken(lagged):
         return move.positions.detach().numpy(), velocities.grad.numpy()
 
     kept, by_kept = by_velocities(keep="stages")
-    again, by_again = by_velocities(keep="checkpoints", memory_budget=2e4)
+    again, by_again = by_velocities(keep=ms.Keep("checkpoints", memory_budget=2e4))
     np.testing.assert_array_equal(kept, again)
     assert np.abs(by_kept - by_again).max() < 1e-6 * np.abs(by_kept).max()

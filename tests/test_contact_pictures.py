@@ -10,7 +10,8 @@ from magshell.plotting import colors
 from magshell.plotting.drawing import plot
 from magshell.states.state import states_of
 
-SMALL = {"width": 400, "backend": "matplotlib"}
+SMALL = {"width": 400, "style": ms.Style(backend="matplotlib")}
+FORCES = ms.Style(contacts=True, backend="matplotlib")
 
 
 def ball_on_sheet():
@@ -85,7 +86,7 @@ def test_files_have_it(fallen, tmp_path):
 
 def test_pictures_show_pressure_and_forces(fallen):
     _, motion = fallen
-    with_forces = plot(motion, states=[8], contacts=True, color="contact_pressure", **SMALL)
+    with_forces = plot(motion, states=[8], color="contact_pressure", **{**SMALL, "style": FORCES})
     without = plot(motion, states=[8], color="contact_pressure", **SMALL)
     red = colors.rgb(colors.CONTACT)
 
@@ -109,7 +110,14 @@ def test_the_arrows_forces_balance(fallen):
 
 def test_a_film_and_a_page_take_the_pressure(fallen, tmp_path):
     _, motion = fallen
-    ms.animate(motion, tmp_path / "a.gif", color="contact_pressure", width=400, backend="matplotlib", fps=4)
+    ms.animate(
+        motion,
+        tmp_path / "a.gif",
+        color="contact_pressure",
+        width=400,
+        fps=4,
+        style=FORCES,
+    )
     ms.write_page(motion, tmp_path / "a.html", color="contact_pressure")
     assert "contact pressure" in (tmp_path / "a.html").read_text()
 
@@ -118,8 +126,8 @@ def test_what_has_no_contacts_is_refused():
     sheet = ms.Scene(ms.Shell(PLATE, **SOFT), supports=[ms.Clamp(PLATE.edges_at(x=0.0))])
     for what in (PLATE, ms.equilibrium(sheet)):
         with pytest.raises(ValueError, match="scene with contacts"):
-            plot(what, contacts=True, **SMALL)
+            plot(what, **{**SMALL, "style": FORCES})
         with pytest.raises(ValueError, match="scene with contacts"):
             plot(what, color="contact_pressure", **SMALL)
     with pytest.raises(ValueError, match="contacts must be True or False"):
-        plot(PLATE, contacts=3, **SMALL)
+        ms.Style(contacts=3)

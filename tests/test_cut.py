@@ -13,7 +13,7 @@ from magshell.states.state import states_of
 from magshell.states.units import length_unit
 
 VIEW = View(25.0, -60.0)
-SMALL = {"width": 400, "backend": "matplotlib"}
+SMALL = {"width": 400, "style": ms.Style(backend="matplotlib")}
 SIZE = np.array([0.1, 0.02, 0.03])
 
 
@@ -130,7 +130,14 @@ def test_numbers_at_vertices_are_those_between(pressed):
 @pytest.mark.parametrize("color", ["auto", "von_mises_stress", None])
 def test_pictures_of_what_is_cut(pressed, color):
     whole = ms.plot(pressed, color=color, **SMALL)
-    cut = ms.plot(pressed, color=color, cut="y", mesh_lines=True, rest=True, view=(25, -60), **SMALL)
+    cut = ms.plot(
+        pressed,
+        color=color,
+        cut="y",
+        view=(25, -60),
+        width=400,
+        style=ms.Style(mesh_lines=True, rest=True, backend="matplotlib"),
+    )
     shots = []
     for picture in (whole, cut):
         picture.figure.canvas.draw()

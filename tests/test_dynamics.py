@@ -244,7 +244,6 @@ BAD = [
     ({"integrator": "bdf2"}, "integrator must be"),
     ({"solver": "newton"}, "solver must be"),
     ({"record_every": 0}, "record_every"),
-    ({"memory_budget": -1}, "memory_budget"),
     ({"keep": "all"}, "keep must be"),
     ({"remanent_magnetization": None}, "remanent_magnetization"),
 ]

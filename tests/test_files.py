@@ -34,7 +34,7 @@ def write_figure(path):
 
 def write_gif(path):
     moved = MESH.rest_positions + np.array([0.0, 0.01])[:, None, None]
-    ms.animate(MESH, path, positions=moved, backend="matplotlib", width=400, progress=False)
+    ms.animate(MESH, path, positions=moved, width=400, progress=False, style=ms.Style(backend="matplotlib"))
 
 
 def write_checkpoint(path):
@@ -49,7 +49,7 @@ WRITERS = {
     "mesh.vtu": write_vtu,
     "mesh.ply": lambda path: ms.write_mesh(path, MESH),
     "page.html": lambda path: ms.write_page(MESH, path),
-    "plot.png": lambda path: ms.plot(MESH, backend="matplotlib", width=400).save(path),
+    "plot.png": lambda path: ms.plot(MESH, width=400, style=ms.Style(backend="matplotlib")).save(path),
     "figure.png": write_figure,
     "movie.gif": write_gif,
     "sheet.stl": lambda path: ms.write_surface(path, MESH),

@@ -153,7 +153,9 @@ def test_what_is_kept_does_not_matter(record_every, extra):
     budgets = {"stages": 1.2e6, "checkpoints": 2e4}
     found = {}
     for keep, budget in budgets.items():
-        move, _, found[keep] = driven(60, memory_budget=budget, record_every=record_every, **extra)
+        move, _, found[keep] = driven(
+            60, keep=ms.Keep(memory_budget=budget), record_every=record_every, **extra
+        )
         assert move.keep == keep
         assert move.bytes <= budget
     move, _, found["factors"] = driven(60, keep="factors", record_every=record_every, **extra)

@@ -221,7 +221,8 @@ def test_power_of_a_motor(budget):
 
     def solve(given):
         angles = 0.3 + given[0] * shape**2 + given[1] * shape**3
-        move = motion(scene, hinge, ball, ms.TRBDF2(), {hinge: {"motor_angle": angles}}, memory_budget=budget)
+        keep = ms.Keep(memory_budget=budget)
+        move = motion(scene, hinge, ball, ms.TRBDF2(), {hinge: {"motor_angle": angles}}, keep=keep)
         return (move[hinge].motor_torque[1:] ** 2).sum()
 
     given = torch.tensor([0.4, -0.2], dtype=torch.float64, requires_grad=True)

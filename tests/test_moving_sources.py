@@ -308,7 +308,11 @@ def test_all_that_moves_at_once_from_checkpoints():
     before = ms.equilibrium(ms.Scene(SHEET, supports=[clamp], field=[CUBE, PAIR]), **MAGNETIZED).positions
     alone = ms.Scene(SHEET, supports=[clamp], field=[CUBE, PAIR])
     found = []
-    for kept in ({"keep": "stages"}, {"keep": "factors"}, {"keep": "checkpoints", "memory_budget": 3e4}):
+    for kept in (
+        {"keep": "stages"},
+        {"keep": "factors"},
+        {"keep": ms.Keep("checkpoints", memory_budget=3e4)},
+    ):
         magnet = torch.tensor(ends(approach, steps, 2e-3), requires_grad=True)
         lift = torch.tensor(1e-4 * np.arange(steps + 1)[:, None] * np.ones(3), requires_grad=True)
         values = {block: path, CUBE: {"center": magnet}, clamp: {"displacement": lift}}

@@ -83,7 +83,7 @@ def test_a_page_holds_the_mesh_and_its_states(mesh, path_, tmp_path) -> None:
 def test_arrows_and_scalars(mesh, path_, tmp_path) -> None:
     color = np.arange(mesh.n_faces)
     data = Page(
-        ms.write_page(mesh, tmp_path / "a.html", color=color, color_label="number", **path_).read_text()
+        ms.write_page(mesh, tmp_path / "a.html", color=ms.Color(color, label="number"), **path_).read_text()
     ).data
     assert [scalar["label"] for scalar in data["scalars"]] == [
         "number",
@@ -181,8 +181,9 @@ def test_a_page_needs_no_network(mesh, path_, tmp_path) -> None:
 )
 def test_names_are_text_and_nothing_else(mesh, path_, tmp_path, words) -> None:
     plain = Page(ms.write_page(mesh, tmp_path / "a.html", **path_, color=np.arange(mesh.n_faces)).read_text())
-    named = {"title": words, "titles": [words, "b", "c"], "color_label": words}
-    path = ms.write_page(mesh, tmp_path / "b.html", **path_, color=np.arange(mesh.n_faces), **named)
+    color = ms.Color(np.arange(mesh.n_faces), label=words)
+    named = {"title": words, "titles": [words, "b", "c"], "color": color}
+    path = ms.write_page(mesh, tmp_path / "b.html", **path_, **named)
     page = Page(path.read_text())
     assert page.heading == words and page.data["states"][0]["title"] == words
     assert page.data["scalars"][0]["label"] == words

@@ -86,6 +86,6 @@ def test_a_picture_has_them_once():
     states = states_of(scene)
     [solid] = obstacle_solids(states * 2, 0.02)
     assert solid.around and volume((solid.positions, solid.faces)) == pytest.approx(np.pi * 25e-8, rel=0.01)
-    picture = ms.plot(scene, backend="matplotlib", width=500)
-    without = ms.plot(sheet, backend="matplotlib", width=500)
+    picture = ms.plot(scene, width=500, style=ms.Style(backend="matplotlib"))
+    without = ms.plot(sheet, width=500, style=ms.Style(backend="matplotlib"))
     assert repr(picture) != repr(without)  # there is room for it

@@ -194,7 +194,7 @@ def test_gradients_are_those_of_implicit_euler():
         return [leaf.grad.numpy() for leaf in leaves.values()]
 
     for keep in ("stages", "checkpoints"):
-        mine = gradient(TIGHT, keep=keep, memory_budget=2e9 if keep == "stages" else 5e4)
+        mine = gradient(TIGHT, keep=ms.Keep(keep, memory_budget=2e9 if keep == "stages" else 5e4))
         newton = gradient(ms.ImplicitEuler(), solver=NEWTON, keep=keep)
         for found, expected in zip(mine, newton, strict=True):
             assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()

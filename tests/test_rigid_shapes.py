@@ -156,7 +156,7 @@ def test_pictures_show_it(tmp_path):
     part = ms.Rigid.of(cube(), 2e3)
     scene = on_plate(part)
     motion = ms.simulate(scene, steps=2, time_step=1e-3)
-    small = {"width": 400, "backend": "matplotlib"}
+    small = {"width": 400, "style": ms.Style(backend="matplotlib")}
     for what in (scene, motion, ms.Scene(part, allow_rigid_motions=True)):
         assert ms.plot(what, **small).figure is not None
     from magshell.states.state import states_of

@@ -260,5 +260,7 @@ def test_a_picture_says_so():
     beside = crossing.rest_positions + np.where(np.arange(50)[:, None] < 25, 0.0, 2.0)
     states = states_of(crossing, positions=np.stack([crossing.rest_positions, beside]))
     assert noted_crossings(["a", ""], states) == ["a, passes through itself", ""]
-    picture = ms.plot(crossing, positions=states[0].positions, backend="matplotlib", width=400)
+    picture = ms.plot(
+        crossing, positions=states[0].positions, width=400, style=ms.Style(backend="matplotlib")
+    )
     assert "passes through itself" in [axes.get_title() for axes in picture.figure.axes]

@@ -225,9 +225,9 @@ def test_pictures_and_pages_are_coloured_by_them(tmp_path):
         scalar = scalar_of(states, color, None, None, length_unit(0.1))
         largest = np.take_along_axis(pair, np.abs(pair).argmax(axis=1)[:, None], 1)[:, 0]
         assert scalar.values[0] == pytest.approx(largest) and color.replace("_", " ") in scalar.label
-        ms.plot(rest, color=color, width=400, backend="matplotlib")
+        ms.plot(rest, color=color, width=400, style=ms.Style(backend="matplotlib"))
         ms.write_page(rest, tmp_path / "rest.html", color=color)
     with pytest.raises(ValueError, match=r"volume_ratio.*solids of a result, which has none"):
-        ms.plot(rest, color="volume_ratio", width=400, backend="matplotlib")
+        ms.plot(rest, color="volume_ratio", width=400, style=ms.Style(backend="matplotlib"))
     with pytest.raises(ValueError, match=r"bending_moment.*shells of a result"):
-        ms.plot(shell, color="bending_moment", width=400, backend="matplotlib")
+        ms.plot(shell, color="bending_moment", width=400, style=ms.Style(backend="matplotlib"))

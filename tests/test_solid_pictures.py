@@ -13,7 +13,7 @@ from magshell.plotting.surfaces import on_surfaces, scalar_on_surfaces
 from magshell.states.state import states_of
 from magshell.states.units import length_unit
 
-SMALL = {"width": 400, "backend": "matplotlib"}
+SMALL = {"width": 400, "style": ms.Style(backend="matplotlib")}
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,9 @@ def test_colours_are_those_of_the_tetrahedra_behind(scenes, name):
 @pytest.mark.parametrize("color", ["auto", "displacement", "volume_ratio", "von_mises_stress", None])
 def test_a_picture_has_the_solid_in_it(scenes, name, color):
     _, rest, _ = scenes[name]
-    picture = ms.plot(rest, color=color, rest=True, mesh_lines=True, **SMALL)
+    picture = ms.plot(
+        rest, color=color, width=400, style=ms.Style(rest=True, mesh_lines=True, backend="matplotlib")
+    )
     picture.figure.canvas.draw()
     pixels = np.asarray(picture.figure.canvas.buffer_rgba())[..., :3]
     assert (pixels.min(axis=2) < 250).mean() > 0.1

@@ -145,9 +145,9 @@ CASES = {
     "tr_bdf2, plane": Case(integrator=ms.TRBDF2()),
     "sdirk3, plane, points on faces": Case(integrator=ms.SDIRK3(), contact={"face_samples": 1}),
     "sdirk2, ball, points on faces": Case(ball, ms.SDIRK2(), contact={"face_samples": 3, "offset": 5e-5}),
-    "euler, ground, checkpoints": Case(ground, options={"keep": "checkpoints", "memory_budget": 1e4}),
+    "euler, ground, checkpoints": Case(ground, options={"keep": ms.Keep("checkpoints", memory_budget=1e4)}),
     "tr_bdf2, moving box, checkpoints": Case(
-        box, ms.TRBDF2(), swaying, options={"keep": "checkpoints", "memory_budget": 3e4}
+        box, ms.TRBDF2(), swaying, options={"keep": ms.Keep("checkpoints", memory_budget=3e4)}
     ),
     "sdirk2, moving box, lagged, factors": Case(
         box, ms.SDIRK2(), swaying, {"lagged_friction": True}, options={"keep": "factors"}
@@ -156,7 +156,7 @@ CASES = {
     "euler, water": Case(None, water=True),
     "sdirk3, water": Case(None, ms.SDIRK3(), water=True, options={"keep": "factors"}),
     "tr_bdf2, water and plane, checkpoints": Case(
-        integrator=ms.TRBDF2(), water=True, options={"keep": "checkpoints", "memory_budget": 3e4}
+        integrator=ms.TRBDF2(), water=True, options={"keep": ms.Keep("checkpoints", memory_budget=3e4)}
     ),
     "sdirk2, water and moving box, points on faces": Case(
         box, ms.SDIRK2(), swaying, {"face_samples": 1}, True

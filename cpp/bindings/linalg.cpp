@@ -6,11 +6,14 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/given_away.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
 #include "magshell/linalg/build_info.h"
 #include "magshell/linalg/factor.h"
+#include "magshell/linalg/loaded_part.h"
 #include "magshell/linalg/low_rank_factor.h"
+#include "magshell/linalg/pattern_checks.h"
 #include "magshell/linalg/residual.h"
 
 namespace magshell::bindings {
@@ -121,6 +124,23 @@ class SharedFactor {
     mutable std::shared_mutex mutex_;
 };
 
+std::optional<py::tuple> loaded(Index size, const IndexArray& column_starts, const IndexArray& rows,
+                                const Array& values, const VectorXd& forces) {
+    const SparsePattern pattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")};
+    check_pattern(pattern);
+    if (values.ndim() != 1 || values.size() != rows.size() || forces.size() != size)
+        throw InvalidInput("values must be as many as rows, and forces as many as unknowns");
+    std::optional<LoadedPart> part;
+    {
+        const py::gil_scoped_release release;
+        part = loaded_part(pattern, {values.data(), static_cast<std::size_t>(values.size())}, forces);
+    }
+    if (!part) return std::nullopt;
+    return py::make_tuple(given_away(std::move(part->unknowns)),
+                          given_away(std::move(part->pattern.column_starts)),
+                          given_away(std::move(part->pattern.rows)), given_away(std::move(part->values)));
+}
+
 std::string describe(const FactorReport& report) {
     std::string text =
         "<FactorReport: " + (report.succeeded ? std::string("succeeded") : "failed, " + report.reason);
@@ -175,6 +195,13 @@ void register_linalg(py::module_& module) {
         py::arg("ordering") = "best", py::arg("points") = py::none(),
         "Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, "
         "diagonal present. points (n, 3): where the unknowns are, which makes for better orderings.");
+
+    module.def("loaded_part", &loaded, py::arg("size"), py::arg("column_starts"), py::arg("rows"),
+               py::arg("values"), py::arg("forces"),
+               "Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its "
+               "unknowns, column_starts, "
+               "rows and values. Nothing but zeros couples it with the rest. None where it is all of them, "
+               "or no force acts.");
 
     module.def("factor_backends", [] {
         std::vector<std::string> built;

@@ -5,6 +5,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/given_away.h"
 #include "bindings/scene_input.h"
 #include "bindings/strains.h"
 #include "magshell/core/errors.h"
@@ -59,7 +60,7 @@ py::list term_energies(Model& model, const VectorXd& q, const Model::Turns& turn
 // The lower triangle as (size, column starts, rows, values): of all unknowns, or of the free ones.
 py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, bool reduced) {
     LargeVector<double> values;
-    std::vector<Index> starts, rows;
+    SparsePattern pattern;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
@@ -69,15 +70,14 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
         if (reduced) {
             model.reduce_matrix(values);
             model.reduction().add_curvature(model.residual().gradient, values);
-            starts = model.reduction().pattern()->column_starts;
-            rows = model.reduction().pattern()->rows;
+            pattern = *model.reduction().pattern();
         } else {
-            merge(model.matrix(), model.contact_matrix(), starts, rows, values);
+            merge(model.matrix(), model.contact_matrix(), pattern.column_starts, pattern.rows, values);
         }
     }
-    return py::make_tuple(starts.size() - 1, py::array_t<Index>(starts.size(), starts.data()),
-                          py::array_t<Index>(rows.size(), rows.data()),
-                          py::array_t<double>(values.size(), values.data()));
+    const std::size_t size = pattern.column_starts.size() - 1;
+    return py::make_tuple(size, given_away(std::move(pattern.column_starts)),
+                          given_away(std::move(pattern.rows)), given_away(std::move(values)));
 }
 
 std::vector<Index> recut_faces(const Model& model) {
@@ -274,7 +274,10 @@ void register_model(py::module_& module) {
             },
             py::arg("q"), py::call_guard<py::gil_scoped_release>(),
             "How nodes of links and rigid parts move, at a state: evaluations begin with it.")
-        .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true);
+        .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true)
+        .def_property_readonly(
+            "last_gradient", [](Model& model) { return model.residual().gradient; },
+            "(n,), at the state that was evaluated last, as by hessian().");
 }
 
 }  // namespace magshell::bindings

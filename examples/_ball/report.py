@@ -31,15 +31,12 @@ def draw_snapshots(axes, row: dict) -> None:
     picture = ms.plot(
         motion,
         states=frames,
-        color=[_heights(row, frame) for frame in frames],
-        color_label="height [cm]",
+        color=ms.Color([_heights(row, frame) for frame in frames], label="height [cm]"),
         titles=[f"{1e3 * motion.times[frame]:.0f} ms" for frame in frames],
-        mesh_lines=True,
-        arrows=False,
-        show_field=False,
         view=VIEW,
         columns=len(frames),
         width=2200,
+        style=ms.Style(mesh_lines=True, arrows=False, show_field=False),
     )
     paste(axes, picture)
 
@@ -74,12 +71,10 @@ def movie(row: dict, path: Path, **options) -> Path:
         path,
         positions=row["motion"].positions,
         times=row["motion"].times,
-        color=[_heights(row, frame) for frame in range(len(row["motion"]))],
-        color_label="height [cm]",
-        mesh_lines=True,
-        arrows=False,
+        color=ms.Color([_heights(row, frame) for frame in range(len(row["motion"]))], label="height [cm]"),
         view=VIEW,
         **{"width": 700, "speed": 0.1, **options},
+        style=ms.Style(mesh_lines=True, arrows=False),
     )
 
 

@@ -43,8 +43,10 @@ def picture(found: Found) -> ms.Picture:
     return ms.plot(
         [motion],
         states=[0, len(motion) - 1],
-        color=[_of_faces(task.bridge.mesh, np.log10(moduli))] * 2,
-        color_label="log10 of Young's modulus over the start's",
+        color=ms.Color(
+            [_of_faces(task.bridge.mesh, np.log10(moduli))] * 2,
+            label="log10 of Young's modulus over the start's",
+        ),
         titles=["at rest", f"after {1e3 * motion.times[-1]:.0f} ms"],
         view=VIEW,
     )

@@ -7,8 +7,10 @@ from pathlib import Path
 from _robots import report
 from _robots.report import COLORS
 
+import magshell as ms
+
 VIEW = (108, -90)  # from above: y is up
-LOOK = {"color": "volume_ratio", "color_label": "volume over that at rest", "obstacles": []}
+LOOK = {"color": ms.Color("volume_ratio", label="volume over that at rest"), "obstacles": []}
 
 
 def draw_controls(axes, result: dict) -> None:

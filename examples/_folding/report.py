@@ -29,12 +29,11 @@ def _draw(axes, result: dict, name: str, frames) -> None:
     picture = ms.plot(
         [result["states"][frame] for frame in frames],
         titles=[f"field at {result['angles'][frame]:.0f} degrees" for frame in frames],
-        arrows=12,
-        show_field=False,
         obstacles=[],
         view=VIEWS[name],
         columns=len(frames),
         width=2200,
+        style=ms.Style(arrows=12, show_field=False),
     )
     paste(axes, picture)
 
@@ -61,7 +60,11 @@ def draw_angles(axes, result: dict, name: str) -> None:
 
 def movie(result: dict, path: Path, **options) -> Path:
     return ms.animate(
-        result["states"], path, view=(12, -72), arrows=12, **{"width": 700, "fps": 8, **options}
+        result["states"],
+        path,
+        view=(12, -72),
+        **{"width": 700, "fps": 8, **options},
+        style=ms.Style(arrows=12),
     )
 
 

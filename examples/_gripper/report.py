@@ -26,14 +26,12 @@ def draw_lift(axes, result: dict) -> None:
         motion,
         states=frames,
         titles=[f"{motion.times[frame]:.2f} s" for frame in frames],
-        color=[_which(result["gripper"])] * len(frames),
-        color_label="sheet 0, ball 1",
+        color=ms.Color([_which(result["gripper"])] * len(frames), label="sheet 0, ball 1"),
         obstacles=[],
-        arrows=False,
-        show_field=False,
         view=VIEW,
         columns=len(frames),
         width=2200,
+        style=ms.Style(arrows=False, show_field=False),
     )
     paste(axes, picture)
 
@@ -44,9 +42,9 @@ def draw_design(axes, result: dict) -> None:
         gripper.mesh,
         remanent_magnetization=result["design"]["remanent_magnetization"],
         color="magnetization",
-        arrows=200,
         view=(50, -70),
         width=1500,
+        style=ms.Style(arrows=200),
     )
     paste(axes, picture)
 
@@ -74,7 +72,11 @@ def draw_motion(axes, result: dict) -> None:
 
 def movie(lift: dict, path: Path, **options) -> Path:
     return ms.animate(
-        lift["motion"], path, arrows=False, view=VIEW, **{"width": 600, "speed": 0.1, **options}
+        lift["motion"],
+        path,
+        view=VIEW,
+        **{"width": 600, "speed": 0.1, **options},
+        style=ms.Style(arrows=False),
     )
 
 

@@ -112,13 +112,16 @@ def draw_hands(result: dict, width: int = 2400):
     for row, (gesture, entry) in zip(axes, result.items(), strict=True):
         linear = entry["designs"]["linear"]
         mesh = linear.body.solid.mesh.surface
-        rest = dict(remanent_magnetization=linear.remanent_magnetization, arrows=220, show_field=False)
+        rest = dict(
+            remanent_magnetization=linear.remanent_magnetization,
+            style=ms.Style(arrows=220, show_field=False),
+        )
         _paint(row[0], mesh, mesh.rest_positions, width // 4, **rest)
         shown = (linear, entry["converged"]["linear"], entry["converged"]["quadratic"])
         for axis, state in zip(row[1:], shown, strict=True):
             surface = state.body.solid.mesh.surface
             at = state.positions[state.body.solid.mesh.surface_vertices]
-            _paint(axis, surface, at, width // 4, show_field=False)
+            _paint(axis, surface, at, width // 4, style=ms.Style(show_field=False))
             _mark(axis, state)
             axis.text(
                 0.02, 0.02, f"{1e3 * state.miss:.2f} mm", transform=axis.transAxes, fontsize=9, color=RED

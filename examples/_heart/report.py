@@ -82,7 +82,7 @@ def _colors(design: Design) -> dict:
     mesh, skin = design.task.solid.mesh, design.task.solid.skin
     strength = np.zeros(mesh.n_faces)
     strength[skin.faces] = 1e-3 * np.linalg.norm(design.remanent_magnetization, axis=1)
-    return {"color": strength, "color_label": "$|M_r|$ [kA/m]", "arrows": ARROWS}
+    return {"color": ms.Color(strength, label="$|M_r|$ [kA/m]"), "style": ms.Style(arrows=ARROWS)}
 
 
 def summary(result: dict) -> str:

@@ -24,9 +24,7 @@ def draw_modulus(axes, result: dict) -> None:
     picture = ms.plot(
         mesh,
         positions=np.stack([mesh.rest_positions, mesh.rest_positions]),
-        color=[np.log10(truth) - 6, found - 6],
-        color_label="log10 of Y [MPa]",
-        color_range=(-0.1, 1.05),
+        color=ms.Color([np.log10(truth) - 6, found - 6], label="log10 of Y [MPa]", range=(-0.1, 1.05)),
         titles=["true", "found"],
         view=(90, -90),
         width=1500,

@@ -78,9 +78,9 @@ def draw_towers(axes, result: dict) -> None:
     positions = [result["found"]["positions"][frame] for frame in frames]
     picture = ms.plot(
         [ms.TriangleMesh(each, result["mesh"].faces) for each in positions],
-        color=[1e3 * each[:, 2] for each in positions],
-        color_label="height [mm]",
-        color_range=(0.0, 1e3 * result["height"]),
+        color=ms.Color(
+            [1e3 * each[:, 2] for each in positions], label="height [mm]", range=(0.0, 1e3 * result["height"])
+        ),
         titles=[
             f"target {k + 1}: ({x:.0f}, {y:.0f}, {z:.0f}) mm" for k, (x, y, z) in enumerate(1e3 * targets)
         ],

@@ -19,7 +19,8 @@ PAPER = {"iterations": 95, "seconds": 3.9e2, "objective": -2.8}  # [Chen22] Tabl
 def draw_design(axes, found: dict) -> None:
     """The flat sheet from above, each vertex in the colour of the height it comes to."""
     mesh = kirigami().mesh
-    _paste(axes, _picture(mesh, found, rest=True, view=(90, -90), arrows=mesh.n_faces, show_field=False))
+    style = ms.Style(arrows=mesh.n_faces, show_field=False)
+    _paste(axes, _picture(mesh, found, rest=True, view=(90, -90), style=style))
 
 
 def draw_tower(axes, found: dict, standing: dict) -> None:
@@ -29,8 +30,7 @@ def draw_tower(axes, found: dict, standing: dict) -> None:
         {**found, **standing},
         rest=False,
         view=(12, -60),
-        arrows=0,
-        show_field=True,
+        style=ms.Style(arrows=0),
         obstacles=ms.obstacles.Box((0.044, 0.044, 1e-3), center=(0, 0, -1e-3)),  # of the floor, so much
     )
     _paste(axes, picture)
@@ -42,9 +42,11 @@ def _picture(mesh: ms.TriangleMesh, found: dict, rest: bool, **options) -> ms.Pi
         positions=mesh.rest_positions if rest else found["positions"],
         remanent_magnetization=found["remanent_magnetization"],
         applied_flux_density=FIELD,
-        color=1e3 * found["positions"][:, 2],
-        color_label="height of the tower [mm]",
-        color_range=(0.0, 1e3 * found["height"]),
+        color=ms.Color(
+            1e3 * found["positions"][:, 2],
+            label="height of the tower [mm]",
+            range=(0.0, 1e3 * found["height"]),
+        ),
         width=1100,
         **options,
     )

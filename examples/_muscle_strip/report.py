@@ -15,7 +15,12 @@ SIDE = (8, -90)
 
 def draw_bent(axes, bent: dict) -> None:
     picture = ms.plot(
-        bent["rest"], color="fibre_stretch", rest=True, view=SIDE, width=1800, titles=["upper muscle pulls"]
+        bent["rest"],
+        color="fibre_stretch",
+        view=SIDE,
+        width=1800,
+        titles=["upper muscle pulls"],
+        style=ms.Style(rest=True),
     )
     paste(axes, picture)
 
@@ -26,8 +31,7 @@ def draw_swimming(axes, swims: dict) -> None:
     states = ms.plot(
         move.scene.mesh,
         positions=move.positions[frames],
-        color=[on_faces(swims, k) for k in frames],
-        color_label="activation",
+        color=ms.Color([on_faces(swims, k) for k in frames], label="activation"),
         titles=[f"{move.times[k]:.2f} s" for k in frames],
         view=SIDE,
         columns=len(frames),

@@ -76,7 +76,7 @@ def picture(who: Crawler, motion: ms.Trajectory, shown: int = 9) -> ms.Picture:
     chosen = np.linspace(len(motion) - 1 - a_turn, len(motion) - 1, shown).round().astype(int)
     mesh, drawn = _on_the_floor(who, motion, chosen)
     titles = [f"{time:.3f} s" for time in motion.times[chosen]]
-    return ms.plot(mesh, **drawn, titles=titles, view=VIEW, columns=3, arrows=False)
+    return ms.plot(mesh, **drawn, titles=titles, view=VIEW, columns=3, style=ms.Style(arrows=False))
 
 
 def movie(who: Crawler, motion: ms.Trajectory, path: Path, title: str, **options) -> Path:
@@ -87,10 +87,10 @@ def movie(who: Crawler, motion: ms.Trajectory, path: Path, title: str, **options
         **drawn,
         times=motion.times,
         title=title,
-        arrows=False,
         view=VIEW,
         progress=False,
-        **({"width": 800, "speed": 0.1, "fps": 20.0} | options),
+        **{"width": 800, "speed": 0.1, "fps": 20.0} | options,
+        style=ms.Style(arrows=False),
     )
 
 

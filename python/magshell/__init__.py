@@ -51,9 +51,10 @@ from .mesh.tet_mesh import TetMesh
 from .mesh.triangle_mesh import TriangleMesh
 from .mesh.welding import Weld, weld
 from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
+from .methods.keep import Keep
 from .methods.projective_dynamics import ProjectiveDynamics
 from .methods.solvers import MixedNewton, Newton
-from .plotting import Picture, animate, plot, write_page
+from .plotting import Color, Picture, Style, View, animate, plot, write_page
 from .scene.reactions import Reaction
 from .scene.scene import Scene
 from .scene.touching import Touching
@@ -97,6 +98,7 @@ __all__ = [
     "Cells",
     "Clamp",
     "Closure",
+    "Color",
     "Contact",
     "Corotated",
     "CriticalPoint",
@@ -118,6 +120,7 @@ __all__ = [
     "Interrupted",
     "Joint",
     "JointResult",
+    "Keep",
     "LargeStrainWarning",
     "LinearResponse",
     "Link",
@@ -159,6 +162,7 @@ __all__ = [
     "StVenantKirchhoff",
     "StableNeoHookean",
     "Strains",
+    "Style",
     "SurfaceTension",
     "SymmetryPlane",
     "Tendon",
@@ -169,6 +173,7 @@ __all__ = [
     "TriangleMesh",
     "UniformField",
     "VibrationModes",
+    "View",
     "WarmStart",
     "Water",
     "Weld",

@@ -444,6 +444,11 @@ class Model:
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
     ) -> tuple: ...
+    @property
+    def last_gradient(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (n,), at the state that was evaluated last, as by hessian().
+        """
     def linearize(self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
         """
         How nodes of links and rigid parts move, at a state: evaluations begin with it.
@@ -911,6 +916,17 @@ def drag_gradients(
 ) -> dict:
     """
     For each face the gradient of multiplier . f by what describes the water; f is the force on the face, multipliers are (n, 3).
+    """
+
+def loaded_part(
+    size: typing.SupportsInt | typing.SupportsIndex,
+    column_starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> tuple | None:
+    """
+    Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its unknowns, column_starts, rows and values. Nothing but zeros couples it with the rest. None where it is all of them, or no force acts.
     """
 
 def factor_backends() -> list[str]: ...

@@ -254,8 +254,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         **replaced,
         "integrator": ms.TRBDF2(),
         "record_every": 1,
-        "memory_budget": 1e6,
-        "keep": "stages",
+        "keep": ms.Keep("stages", memory_budget=1e6),
         "solver": quick,
         "progress": False,
     }
@@ -349,13 +348,27 @@ def _files(s: Sample) -> Iterator[Call]:
         },
         cost=3,
     )
+    painted = ms.Style(backend="matplotlib")
     look = {
         "remanent_magnetization": None,
         "applied_flux_density": None,
-        "color_label": None,
-        "color_range": None,
         "view": None,
     }
+    yield Call("Keep", ms.Keep, {"what": "stages", "memory_budget": 1e6})
+    yield Call("View", ms.View, {"elevation": 20.0, "azimuth": 30.0, "frame": [(0, 0, 0), (1, 1, 1)]})
+    color = {"values": np.zeros(n_f), "label": "u", "range": (0.0, 1.0), "scale": "diverging"}
+    yield Call(
+        "Color", lambda **a: ms.plot(s.mesh, color=ms.Color(**a), width=400, style=painted), color, cost=30
+    )
+    style = {
+        "arrows": 3,
+        "show_field": True,
+        "rest": True,
+        "mesh_lines": True,
+        "contacts": False,
+        "backend": "matplotlib",
+    }
+    yield Call("Style", ms.Style, style)
     yield Call(
         "plot",
         ms.plot,
@@ -366,7 +379,7 @@ def _files(s: Sample) -> Iterator[Call]:
             "color": np.zeros(n_f),
             "width": 400,
             "columns": 1,
-            "backend": "matplotlib",
+            "style": painted,
         },
         cost=30,
     )
@@ -387,7 +400,7 @@ def _files(s: Sample) -> Iterator[Call]:
             "fps": 5.0,
             "speed": 1.0,
             "width": 400,
-            "backend": "matplotlib",
+            "style": painted,
             "progress": False,
         },
         cost=60,

@@ -9,6 +9,7 @@
 #pragma once
 
 #include "magshell/energy/six_node_rows.h"
+#include "magshell/strain/from_first.h"
 #include "magshell/strain/six_nodes.h"
 
 namespace magshell {
@@ -22,11 +23,12 @@ class BendingSix {
         Pack scale[9];
     };
 
-    explicit BendingSix(const Pack3 x[6]) {
+    explicit BendingSix(const Pack3 places[6]) {
+        const std::array<Pack3, 6> x = from_first<6>(places);
         for (int p = 0; p < points; ++p) {
             Normal& at = at_[p];
-            at.a1 = combination(first(p), x);
-            at.a2 = combination(second(p), x);
+            at.a1 = combination(first(p), x.data());
+            at.a2 = combination(second(p), x.data());
             const Pack3 across = cross(at.a1, at.a2);
             at.inverse_area = Pack(1.0) / sqrt(squared_norm(across));
             at.n = at.inverse_area * across;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "magshell/energy/six_node_rows.h"
+#include "magshell/strain/from_first.h"
 #include "magshell/strain/six_nodes.h"
 
 namespace magshell {
@@ -12,7 +13,8 @@ namespace magshell {
 /// d[3 i + k] is the sum over these of weight |sum_a by_node[a] x_a|^2: one for a Gauss point, three for a mean.
 class MembraneSix {
   public:
-    explicit MembraneSix(const Pack3 x[6]) {
+    explicit MembraneSix(const Pack3 places[6]) {
+        const std::array<Pack3, 6> x = from_first<6>(places);
         for (int i = 0; i < 3; ++i) {
             for (int g = 0; g < 2; ++g) {
                 each_along(i, g, [&](int a, double c) { add(on_edge_[i][g], c, x[a]); });

@@ -34,7 +34,9 @@ void SixNodeFace::measure_area() {
     }
 }
 
-SixNodeFace::SixNodeFace(const std::array<Vec3, 6>& rest) {
+SixNodeFace::SixNodeFace(std::array<Vec3, 6> rest) {
+    const Vec3 first = rest[0];  // far from the origin differences keep their digits
+    for (Vec3& place : rest) place -= first;
     for (int p = 0; p < 6; ++p) {
         const six_nodes::Point& point = six_nodes::inside[p];
         for (int i = 0; i < 3; ++i) {

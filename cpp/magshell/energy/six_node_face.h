@@ -22,7 +22,7 @@ Eigen::Matrix<double, 3, 9> membrane_interpolation(const std::array<double, 3>& 
 
 class SixNodeFace {
   public:
-    explicit SixNodeFace(const std::array<Vec3, 6>& rest);
+    explicit SixNodeFace(std::array<Vec3, 6> rest);
     /// From its tangents at the points inside.
     SixNodeFace(const std::array<std::array<Vec3, 3>, 6>& tangents, const std::array<double, 9>& scale);
 

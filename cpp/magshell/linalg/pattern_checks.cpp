@@ -13,6 +13,17 @@ std::string text(Index number) {
     return std::to_string(number);
 }
 
+// Whether a column whose bounds are right is sorted, begins with its diagonal entry and ends within the matrix: without a
+// branch, so that the usual case is one vectorized pass.
+bool is_column(const SparsePattern& pattern, Index j) {
+    const Index first = pattern.column_starts[j], last = pattern.column_starts[j + 1] - 1;
+    const Index* rows = pattern.rows.data();
+    if (first > last || rows[first] != j || rows[last] >= pattern.size) return false;
+    bool ascends = true;
+    for (Index k = first; k < last; ++k) ascends &= rows[k] < rows[k + 1];
+    return ascends;
+}
+
 }  // namespace
 
 void check_pattern(const SparsePattern& pattern) {
@@ -34,6 +45,7 @@ void check_pattern(const SparsePattern& pattern) {
             throw InvalidInput("column_starts[" + text(j + 1) + "] = " + text(starts[j + 1]) +
                                " exceeds the " + std::to_string(rows.size()) + " rows given");
         }
+        if (is_column(pattern, j)) continue;
         Index previous = -1;
         for (Index k = starts[j]; k < starts[j + 1]; ++k) {
             const auto where = [&] {
@@ -64,7 +76,7 @@ void check_points(const SparsePattern& pattern, const std::vector<Vec3>& points)
         if (!points[j].allFinite()) throw InvalidInput("points[" + text(j) + "] is not finite");
 }
 
-void check_finite(const LargeVector<double>& values) {
+void check_finite(std::span<const double> values) {
     bool all_finite = true;  // without a branch, so that the usual case is one vectorized pass
     for (std::size_t k = 0; k < values.size(); ++k)
         all_finite &= std::abs(values[k]) <= std::numeric_limits<double>::max();

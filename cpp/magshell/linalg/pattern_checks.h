@@ -1,6 +1,8 @@
 // What every backend checks the same way.
 #pragma once
 
+#include <span>
+
 #include "magshell/linalg/factor.h"
 
 namespace magshell {
@@ -12,7 +14,7 @@ void check_pattern(const SparsePattern& pattern);
 void check_points(const SparsePattern& pattern, const std::vector<Vec3>& points);
 
 /// Throws InvalidInput naming the first value that is not finite.
-void check_finite(const LargeVector<double>& values);
+void check_finite(std::span<const double> values);
 
 /// Throws InvalidInput when there is no factorization, or the right-hand side has the wrong number of rows.
 void check_solvable(const FactorReport& report, Index size, const Eigen::Ref<Eigen::MatrixXd>& rhs);

@@ -57,7 +57,7 @@ class Tube final : public Obstacle {
     std::vector<Vec4> coefficients_;  // c_{i-1} ... c_{i+2} belong to the segment from knot i on
     // Of center and radius, several a segment, a column a coordinate: the search through them is most of the work.
     Eigen::Array<double, Eigen::Dynamic, 4> samples_;
-    double last_;                     // knot; the first is 0
+    double last_;  // knot; the first is 0
     std::array<Ray, 2> rays_;
 };
 

@@ -126,7 +126,7 @@ void CoulombContact::push(VectorXd& move) {
 void CoulombContact::settle(const VectorXd& q, VectorXd& move) {
     constexpr int most_rounds = 50, most_sweeps = 200;
     constexpr double settled = 1e-4;  // of the first sweep: the next round moves the nodes anyway
-    push(move);  // closest points have moved
+    push(move);                       // closest points have moved
     for (int round = 0; round < most_rounds; ++round) {
         // Those that push, and those that would go in.
         std::vector<std::size_t> active;

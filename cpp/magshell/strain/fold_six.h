@@ -12,6 +12,7 @@
 
 #include "magshell/energy/symmetric3.h"
 #include "magshell/strain/fold_angle.h"
+#include "magshell/strain/from_first.h"
 #include "magshell/strain/six_nodes.h"
 
 namespace magshell {
@@ -80,10 +81,12 @@ class FoldSix {
         return Pack(alone) + right_is_face_ * Pack(wing(a) - alone);
     }
 
-    static Fold angle_of(const Pack3 x[9], const Pack& right_is_face, int point) {
+    static Fold angle_of(const Pack3 places[9], const Pack& right_is_face, int point) {
         const std::array<double, 3>& t = tangents_[point];
         const std::array<double, 6>& u = wings_[point];
-        Pack3 tangent = Pack(t[0]) * x[0], shared = Pack(u[0]) * x[0];
+        std::array<Pack3, 9> x = from_first<9>(places);
+        x[6] = places[6] - right_is_face * places[0];  // a direction has no place
+        Pack3 tangent = {Pack(0.0), Pack(0.0), Pack(0.0)}, shared = tangent;
         for (int a = 1; a < 3; ++a) {
             tangent += Pack(t[a]) * x[a];
             shared += Pack(u[a]) * x[a];

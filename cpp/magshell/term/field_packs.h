@@ -1,11 +1,19 @@
 // The applied field as magnetic kernels take it.
 #pragma once
 
+#include <vector>
+
 #include "magshell/assembly/lanes.h"
 #include "magshell/energy/magnetic.h"
 #include "magshell/field/applied_field.h"
 
 namespace magshell {
+
+/// The field at all points of a pack of elements.
+template <int points>
+struct PointFields {
+    Magnetic::Field at[points];
+};
 
 /// Puts sample n in a lane, with a flux density that is the same everywhere [T]. Order as in AppliedField::add_samples.
 inline void set_field(Magnetic::Field& field, int lane, const FieldSamples& samples, Index n, int order,
@@ -16,6 +24,19 @@ inline void set_field(Magnetic::Field& field, int lane, const FieldSamples& samp
             if (order >= 1) field.gradient.at[3 * r + c].set(lane, samples.gradient[n](r, c));
             if (order >= 2) field.curvature.at[3 * r + c].set(lane, samples.curvature[n](r, c));
         }
+}
+
+/// Those of every pack, from samples that stand one element after another.
+template <int points, class Loop>
+std::vector<PointFields<points>> in_packs(const Loop& loop, const FieldSamples& samples, int order,
+                                          const Vec3& everywhere) {
+    std::vector<PointFields<points>> packs(loop.packs());
+    for (Index pack = 0; pack < loop.packs(); ++pack)
+        for (int p = 0; p < points; ++p)
+            for (int lane = 0; lane < Pack::width; ++lane)
+                set_field(packs[pack].at[p], lane, samples, loop.element(pack, lane) * points + p, order,
+                          everywhere);
+    return packs;
 }
 
 }  // namespace magshell

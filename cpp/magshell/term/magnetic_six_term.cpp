@@ -2,8 +2,6 @@
 
 #include <Eigen/LU>
 
-#include "magshell/term/field_packs.h"
-
 namespace magshell {
 
 MagneticSixTerm::MagneticSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
@@ -11,12 +9,10 @@ MagneticSixTerm::MagneticSixTerm(const SixNodeSheet& sheet, Index body, const Ch
     : sheet_(sheet),
       body_(body),
       loop_(sheet.own_nodes, chunks, matrix),
-      sources_(sources),
+      field_(sources, registry),
       magnetization_(registry.values.add(sheet.owner, "remanent_magnetization", "A/m", sheet.n_faces(), 3,
                                          &sheet.faces)),
       thickness_(registry.values.add(sheet.owner, "thickness", "m", sheet.n_faces(), 1, &sheet.faces)),
-      flux_density_(registry.controls.add("scene", "applied_flux_density", "T", 1, 3)),
-      field_factor_(registry.controls.add("scene", "field_factor", "1", 1, 1)),
       elements_(loop_.packs()) {}
 
 Mat3 MagneticSixTerm::rest_frame(Index face, int point) const {
@@ -78,26 +74,16 @@ void MagneticSixTerm::place(const double* q, std::vector<Vec3>& places,
 
 std::vector<MagneticSixTerm::Fields> MagneticSixTerm::sample(const double* q, const Controls& controls,
                                                              int order) const {
-    const double factor = controls[field_factor_.first];
-    if (sources_.empty() || factor == 0.0) return {};
+    if (!field_.varies(controls)) return {};
     std::vector<Vec3> places, moments;
     place(q, places, moments);
-    FieldSamples samples;
-    samples.reset(places.size(), order);
-    sources_.add_samples(places, moments, order, factor, samples);
-    const Vec3 everywhere = uniform(controls);
-    std::vector<Fields> packs(loop_.packs());
-    for (Index pack = 0; pack < loop_.packs(); ++pack)
-        for (int p = 0; p < points; ++p)
-            for (int lane = 0; lane < Pack::width; ++lane)
-                set_field(packs[pack].at[p], lane, samples, loop_.element(pack, lane) * points + p, order,
-                          everywhere);
-    return packs;
+    return in_packs<points>(loop_, field_.sample(places, moments, order, controls), order,
+                            field_.uniform(controls));
 }
 
 double MagneticSixTerm::energy(const double* q, const Controls& controls) const {
     const std::vector<Fields> fields = sample(q, controls, 0);
-    const Pack3 everywhere = broadcast(uniform(controls));
+    const Pack3 everywhere = broadcast(field_.uniform(controls));
     return loop_.sum([&](Index pack) {
         Pack3 x[6];
         loop_.gather(pack, q, x);
@@ -111,7 +97,7 @@ double MagneticSixTerm::energy(const double* q, const Controls& controls) const 
 
 void MagneticSixTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
     const std::vector<Fields> fields = sample(q, controls, 1);
-    const Pack3 everywhere = broadcast(uniform(controls)), none = broadcast(Vec3::Zero());
+    const Pack3 everywhere = broadcast(field_.uniform(controls)), none = broadcast(Vec3::Zero());
     loop_.scatter_packs([&](Index pack) {
         Pack3 x[6], g[6];
         loop_.gather(pack, q, x);
@@ -133,8 +119,9 @@ void MagneticSixTerm::prepare_assembly(const double* q, const Controls& controls
 void MagneticSixTerm::assemble(const Chunk& chunk, const double* q, const Controls& controls, bool,
                                SystemMatrix& out) const {
     const bool varies = !fields_.empty();
-    if (!varies && (!normal_magnetization_ || uniform(controls).isZero(0.0))) return;
-    const Pack3 everywhere = broadcast(uniform(controls));
+    const Vec3 uniform = field_.uniform(controls);
+    if (!varies && (!normal_magnetization_ || uniform.isZero(0.0))) return;
+    const Pack3 everywhere = broadcast(uniform);
     ElementLoop<6>::over_packs(chunk, [&](Index pack) {
         Pack3 x[6];
         Pack33 h[21] = {};
@@ -153,13 +140,11 @@ void MagneticSixTerm::assemble(const Chunk& chunk, const double* q, const Contro
 //
 //   D = - V_p (M' . B + M . G v),   M' = alpha a_1' + beta a_2' + gamma n'.
 void MagneticSixTerm::vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) {
-    const double factor = controls[field_factor_.first];
-    const Vec3 everywhere = uniform(controls);
+    const double factor = field_.factor(controls);
+    const Vec3 everywhere = field_.uniform(controls);
     std::vector<Vec3> places, magnetizations;
     place(q, places, magnetizations);
-    FieldSamples samples;
-    samples.reset(places.size(), 1);
-    sources_.add_samples(places, magnetizations, 1, 1.0, samples);
+    const FieldSamples samples = field_.at_factor_one(places, magnetizations);
 
     FieldProbe probe;  // - V_p (M', M, v)
     probe.flux.resize(places.size()), probe.moment.resize(places.size()),
@@ -195,12 +180,7 @@ void MagneticSixTerm::vjp(const double* q, const Controls& controls, const doubl
             }
         }
     });
-    for (std::size_t n = 0; n < places.size(); ++n) {
-        out.controls.segment<3>(flux_density_.first) += probe.flux[n];
-        out.controls[field_factor_.first] += probe.flux[n].dot(samples.flux[n]) +
-                                             probe.moment[n].dot(samples.gradient[n] * probe.direction[n]);
-    }
-    sources_.add_vjp(places, probe, factor, out);
+    field_.add_vjp(places, probe, samples, controls, out);
 }
 
 std::size_t MagneticSixTerm::bytes() const {

@@ -4,7 +4,8 @@
 #include "magshell/assembly/element_loop.h"
 #include "magshell/body/six_node_sheet.h"
 #include "magshell/energy/magnetic_six.h"
-#include "magshell/term/field_sources.h"
+#include "magshell/term/felt_field.h"
+#include "magshell/term/field_packs.h"
 #include "magshell/term/term.h"
 
 namespace magshell {
@@ -31,11 +32,8 @@ class MagneticSixTerm final : public Term {
     struct Points {
         MagneticSix::Element at[points];
     };
-    struct Fields {
-        Magnetic::Field at[points];
-    };
+    using Fields = PointFields<points>;
 
-    Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
     /// (a~_1, a~_2, n~) at a point of a face.
     Mat3 rest_frame(Index face, int point) const;
     /// The places and the magnetizations [A/m] of the points, one face after another.
@@ -46,9 +44,8 @@ class MagneticSixTerm final : public Term {
     const SixNodeSheet& sheet_;
     const Index body_;
     const ElementLoop<6> loop_;
-    const FieldSources& sources_;
-    Slot magnetization_, thickness_;    // values
-    Slot flux_density_, field_factor_;  // controls
+    const FeltField field_;
+    Slot magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     std::vector<Points> elements_;
     std::vector<Fields> fields_;  // sampled for the assembly at hand; empty in a uniform field

@@ -3,6 +3,7 @@
 #include "magshell/assembly/element_loop.h"
 #include "magshell/energy/magnetic_solid.h"
 #include "magshell/strain/tetrahedron_shapes.h"
+#include "magshell/term/felt_field.h"
 #include "magshell/term/field_packs.h"
 
 namespace magshell {
@@ -16,9 +17,7 @@ class MagneticSolidTerm final : public Term {
     struct Points {
         Point at[points];
     };
-    struct Fields {
-        Magnetic::Field at[points];
-    };
+    using Fields = PointFields<points>;
 
   public:
     MagneticSolidTerm(const Solid& solid, const std::vector<Nodes>& nodes, Index body,
@@ -27,11 +26,9 @@ class MagneticSolidTerm final : public Term {
         : solid_(solid),
           body_(body),
           loop_(nodes, chunks, matrix),
-          sources_(sources),
+          field_(sources, registry),
           magnetization_(registry.values.add(solid.owner, "remanent_magnetization", "A/m", solid.n_elements(),
                                              3, &solid.elements)),
-          flux_density_(registry.controls.add("scene", "applied_flux_density", "T", 1, 3)),
-          field_factor_(registry.controls.add("scene", "field_factor", "1", 1, 1)),
           elements_(loop_.packs()) {
         for (int p = 0; p < points; ++p) shapes_[p] = shapes_at(Element(), p);
     }
@@ -57,7 +54,7 @@ class MagneticSolidTerm final : public Term {
 
     double energy(const double* q, const Controls& controls) const override {
         const std::vector<Fields> fields = sample(q, controls, 0);
-        const Pack3 everywhere = broadcast(uniform(controls));
+        const Pack3 everywhere = broadcast(field_.uniform(controls));
         return loop_.sum([&](Index pack) {
             Pack3 x[N];
             loop_.gather(pack, q, x);
@@ -71,7 +68,7 @@ class MagneticSolidTerm final : public Term {
 
     void evaluate(const double* q, const Controls& controls, Residual& out) override {
         const std::vector<Fields> fields = sample(q, controls, 1);
-        const Pack3 everywhere = broadcast(uniform(controls)), none = broadcast(Vec3::Zero());
+        const Pack3 everywhere = broadcast(field_.uniform(controls)), none = broadcast(Vec3::Zero());
         loop_.scatter_packs([&](Index pack) {
             Pack3 x[N], g[N];
             loop_.gather(pack, q, x);
@@ -107,14 +104,12 @@ class MagneticSolidTerm final : public Term {
     //
     // is linear in the magnetization and in the field.
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override {
-        const Vec3 everywhere = uniform(controls);
-        const double factor = controls[field_factor_.first];
+        const Vec3 everywhere = field_.uniform(controls);
+        const double factor = field_.factor(controls);
         std::vector<Vec3> places, magnetizations, rates, turns;
         at_points(q, places, magnetizations);
         at_points(lambda, rates, turns);
-        FieldSamples samples;
-        samples.reset(places.size(), 1);
-        sources_.add_samples(places, magnetizations, 1, 1.0, samples);
+        const FieldSamples samples = field_.at_factor_one(places, magnetizations);
         FieldProbe probe;  // - V_p (F' M, F M, v)
         probe.direction = rates;
         for (Index t = 0; t < solid_.n_elements(); ++t) {
@@ -130,20 +125,15 @@ class MagneticSolidTerm final : public Term {
                     rest.volume[p] * (g.transpose() * (along.transpose() * flux + x.transpose() * flux_rate));
                 probe.flux.push_back(-rest.volume[p] * turns[n]);
                 probe.moment.push_back(-rest.volume[p] * magnetizations[n]);
-                out.controls.segment<3>(flux_density_.first) += probe.flux[n];
-                out.controls[field_factor_.first] +=
-                    probe.flux[n].dot(samples.flux[n]) + probe.moment[n].dot(samples.gradient[n] * rates[n]);
             }
             out.values.segment<3>(magnetization_.at(t)) += by_magnetization;
         }
-        sources_.add_vjp(places, probe, factor, out);
+        field_.add_vjp(places, probe, samples, controls, out);
     }
 
     std::size_t bytes() const override { return loop_.bytes() + bytes_of(elements_) + bytes_of(fields_); }
 
   private:
-    Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
-
     RestElement<Element> rest_of(Index element) const {
         Vec3 x[N];
         for (int k = 0; k < N; ++k) x[k] = solid_.rest(element, k);
@@ -182,29 +172,18 @@ class MagneticSolidTerm final : public Term {
 
     // The applied field at every point, in packs; none where it is uniform. Order as in AppliedField::add_samples.
     std::vector<Fields> sample(const double* q, const Controls& controls, int order) const {
-        const double factor = controls[field_factor_.first];
-        if (sources_.empty() || factor == 0.0) return {};
+        if (!field_.varies(controls)) return {};
         std::vector<Vec3> places, moments;
         at_points(q, places, moments);
-        FieldSamples samples;
-        samples.reset(places.size(), order);
-        sources_.add_samples(places, moments, order, factor, samples);
-        const Vec3 everywhere = uniform(controls);
-        std::vector<Fields> packs(loop_.packs());
-        for (Index pack = 0; pack < loop_.packs(); ++pack)
-            for (int p = 0; p < points; ++p)
-                for (int lane = 0; lane < Pack::width; ++lane)
-                    set_field(packs[pack].at[p], lane, samples, loop_.element(pack, lane) * points + p, order,
-                              everywhere);
-        return packs;
+        return in_packs<points>(loop_, field_.sample(places, moments, order, controls), order,
+                                field_.uniform(controls));
     }
 
     const Solid& solid_;
     const Index body_;
     const ElementLoop<N> loop_;
-    const FieldSources& sources_;
-    Slot magnetization_;                // values
-    Slot flux_density_, field_factor_;  // controls
+    const FeltField field_;
+    Slot magnetization_;
     std::array<double, N> shapes_[points];
     std::vector<Points> elements_;
     std::vector<Fields> fields_;  // sampled for the assembly at hand; empty in a uniform field

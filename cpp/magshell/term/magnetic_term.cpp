@@ -23,12 +23,10 @@ MagneticTerm::MagneticTerm(const Surface& surface, Index body, const FaceLoop& l
     : surface_(surface),
       body_(body),
       loop_(loop),
-      sources_(sources),
+      field_(sources, registry),
       magnetization_(registry.values.add(surface.owner, "remanent_magnetization", "A/m", surface.n_faces(), 3,
                                          &surface.faces)),
       thickness_(registry.values.add(surface.owner, "thickness", "m", surface.n_faces(), 1, &surface.faces)),
-      flux_density_(registry.controls.add("scene", "applied_flux_density", "T", 1, 3)),
-      field_factor_(registry.controls.add("scene", "field_factor", "1", 1, 1)),
       elements_(loop.packs()) {}
 
 bool MagneticTerm::set_values(const Values& values) {
@@ -70,14 +68,11 @@ void MagneticTerm::place(const double* q, std::vector<Vec3>& points,
 
 std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Controls& controls,
                                                   int order) const {
-    const Index n = surface_.n_faces();
+    if (!field_.varies(controls)) return {};
     std::vector<Vec3> points, moments;
     place(q, points, moments);
-    FieldSamples samples;
-    samples.reset(n, order);
-    sources_.add_samples(points, moments, order, controls[field_factor_.first], samples);
-
-    const Vec3 everywhere = uniform(controls);
+    const FieldSamples samples = field_.sample(points, moments, order, controls);
+    const Vec3 everywhere = field_.uniform(controls);
     std::vector<Magnetic::Field> packs(loop_.packs());
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane)
@@ -86,22 +81,19 @@ std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Control
 }
 
 double MagneticTerm::energy(const double* q, const Controls& controls) const {
-    const bool varies = sampled(controls);
-    const std::vector<Magnetic::Field> fields =
-        varies ? sample(q, controls, 0) : std::vector<Magnetic::Field>();
-    const Pack3 everywhere = broadcast(uniform(controls));
+    const std::vector<Magnetic::Field> fields = sample(q, controls, 0);
+    const Pack3 everywhere = broadcast(field_.uniform(controls));
     return loop_.sum([&](Index pack) {
         Pack3 x[3];
         loop_.gather(pack, q, x);
-        return Magnetic(x).energy(elements_[pack], varies ? fields[pack].flux : everywhere);
+        return Magnetic(x).energy(elements_[pack], fields.empty() ? everywhere : fields[pack].flux);
     });
 }
 
 void MagneticTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
-    const bool varies = sampled(controls);
-    const std::vector<Magnetic::Field> fields =
-        varies ? sample(q, controls, 1) : std::vector<Magnetic::Field>();
-    const Pack3 everywhere = broadcast(uniform(controls));
+    const std::vector<Magnetic::Field> fields = sample(q, controls, 1);
+    const bool varies = !fields.empty();
+    const Pack3 everywhere = broadcast(field_.uniform(controls));
     loop_.scatter_packs([&](Index pack) {
         Pack3 x[3], g[3];
         loop_.gather(pack, q, x);
@@ -116,15 +108,15 @@ void MagneticTerm::evaluate(const double* q, const Controls& controls, Residual&
 }
 
 void MagneticTerm::prepare_assembly(const double* q, const Controls& controls) {
-    fields_.clear();
-    if (sampled(controls)) fields_ = sample(q, controls, 2);
+    fields_ = sample(q, controls, 2);
 }
 
 void MagneticTerm::assemble(const Chunk& chunk, const double* q, const Controls& controls, bool,
                             SystemMatrix& out) const {
     const bool varies = !fields_.empty();
-    if (!varies && (!normal_magnetization_ || uniform(controls).isZero(0.0))) return;
-    const Pack3 everywhere = broadcast(uniform(controls));
+    const Vec3 uniform = field_.uniform(controls);
+    if (!varies && (!normal_magnetization_ || uniform.isZero(0.0))) return;
+    const Pack3 everywhere = broadcast(uniform);
     FaceLoop::over_packs(chunk, [&](Index pack) {
         Pack3 x[3];
         Pack33 h[6];
@@ -143,13 +135,11 @@ void MagneticTerm::assemble(const Chunk& chunk, const double* q, const Controls&
 // is linear in (alpha, beta, gamma), in the thickness and in the field.
 void MagneticTerm::vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) {
     const Index n = surface_.n_faces();
-    const double factor = controls[field_factor_.first];
-    const Vec3 everywhere = uniform(controls);
+    const double factor = field_.factor(controls);
+    const Vec3 everywhere = field_.uniform(controls);
     std::vector<Vec3> points, magnetizations;
     place(q, points, magnetizations);
-    FieldSamples samples;
-    samples.reset(n, 1);
-    sources_.add_samples(points, magnetizations, 1, 1.0, samples);
+    const FieldSamples samples = field_.at_factor_one(points, magnetizations);
 
     FieldProbe probe;  // - A~ h (M', M, v)
     probe.flux.resize(n), probe.moment.resize(n), probe.direction.resize(n);
@@ -181,16 +171,11 @@ void MagneticTerm::vjp(const double* q, const Controls& controls, const double* 
             probe.direction[f] = v;
         }
     });
-    for (Index f = 0; f < n; ++f) {
-        out.controls.segment<3>(flux_density_.first) += probe.flux[f];
-        out.controls[field_factor_.first] += probe.flux[f].dot(samples.flux[f]) +
-                                             probe.moment[f].dot(samples.gradient[f] * probe.direction[f]);
-    }
-    sources_.add_vjp(points, probe, factor, out);
+    field_.add_vjp(points, probe, samples, controls, out);
 }
 
 std::size_t MagneticTerm::bytes() const {
-    return bytes_of(elements_) + bytes_of(thicknesses_);
+    return bytes_of(elements_) + bytes_of(thicknesses_) + bytes_of(fields_);
 }
 
 }  // namespace magshell

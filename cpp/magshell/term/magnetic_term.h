@@ -7,7 +7,7 @@
 #include "magshell/assembly/face_loop.h"
 #include "magshell/body/surface.h"
 #include "magshell/energy/magnetic.h"
-#include "magshell/term/field_sources.h"
+#include "magshell/term/felt_field.h"
 #include "magshell/term/term.h"
 
 namespace magshell {
@@ -30,21 +30,16 @@ class MagneticTerm final : public Term {
     std::size_t bytes() const override;
 
   private:
-    bool sampled(const Controls& controls) const {
-        return !sources_.empty() && controls[field_factor_.first] != 0.0;
-    }
-    Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
     /// The barycenters and the magnetizations [A/m] there, by face.
     void place(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
-    /// The applied field at every barycenter, in packs. Order as in AppliedField::add_samples.
+    /// The applied field at every barycenter, in packs; none where it is uniform. Order as in AppliedField::add_samples.
     std::vector<Magnetic::Field> sample(const double* q, const Controls& controls, int order) const;
 
     const Surface& surface_;
     const Index body_;
     const FaceLoop& loop_;
-    const FieldSources& sources_;
-    Slot magnetization_, thickness_;    // values
-    Slot flux_density_, field_factor_;  // controls
+    const FeltField field_;
+    Slot magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     std::vector<Magnetic::Element> elements_;
     std::vector<Magnetic::Field> fields_;  // sampled for the assembly at hand; empty in a uniform field

@@ -4,9 +4,7 @@ namespace magshell {
 
 MomentTerm::MomentTerm(const std::vector<Magnet>& magnets, const Nodes& nodes, const FieldSources& sources,
                        const SystemMatrix& matrix, Registry& registry)
-    : sources_(sources),
-      flux_density_(registry.controls.add("scene", "applied_flux_density", "T", 1, 3)),
-      field_factor_(registry.controls.add("scene", "field_factor", "1", 1, 1)) {
+    : field_(sources, registry) {
     for (const Magnet& magnet : magnets) {
         Chunk& chunk = chunks_.emplace_back();
         chunk.corners = magnet.corners;
@@ -54,11 +52,8 @@ FieldSamples MomentTerm::sample(const double* q, const Controls& controls, int o
         points.push_back(sum(chunk.b, x));
         moments.push_back(sum(chunk.alpha, x));
     }
-    FieldSamples samples;
-    samples.reset(points.size(), 2);
-    const double factor = controls[field_factor_.first];
-    if (!sources_.empty() && factor != 0.0) sources_.add_samples(points, moments, order, factor, samples);
-    for (Vec3& flux : samples.flux) flux += uniform(controls);
+    FieldSamples samples = field_.sample(points, moments, order, controls);
+    for (Vec3& flux : samples.flux) flux += field_.uniform(controls);
     return samples;
 }
 
@@ -82,7 +77,7 @@ void MomentTerm::evaluate(const double* q, const Controls& controls, Residual& o
 }
 
 void MomentTerm::finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const {
-    if (sources_.empty() || controls[field_factor_.first] == 0.0) return;
+    if (!field_.varies(controls)) return;
     std::vector<Vec3> points, moments;
     const FieldSamples field = sample(q, controls, 2, points, moments);
     for (std::size_t n = 0; n < chunks_.size(); ++n) {
@@ -111,10 +106,6 @@ void MomentTerm::finish_assembly(const double* q, const Controls& controls, Syst
 void MomentTerm::vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) {
     std::vector<Vec3> points, moments;
     const FieldSamples field = sample(q, controls, 2, points, moments);
-    const double factor = controls[field_factor_.first];
-    FieldSamples alone;
-    alone.reset(points.size(), 1);
-    sources_.add_samples(points, moments, 1, 1.0, alone);
     FieldProbe probe;  // - (mu', mu, v)
     for (std::size_t n = 0; n < chunks_.size(); ++n) {
         const Chunk& chunk = chunks_[n];
@@ -129,13 +120,11 @@ void MomentTerm::vjp(const double* q, const Controls& controls, const double* la
         }
         out.values.segment<3>(chunk.moment.first) += by_moment;
         out.values.segment<3>(chunk.center.first) += by_center;
-        out.controls.segment<3>(flux_density_.first) -= turn;
-        out.controls[field_factor_.first] -= turn.dot(alone.flux[n]) + moments[n].dot(alone.gradient[n] * v);
         probe.flux.push_back(-turn);
         probe.moment.push_back(-moments[n]);
         probe.direction.push_back(v);
     }
-    sources_.add_vjp(points, probe, factor, out);
+    field_.add_vjp(points, probe, field_.at_factor_one(points, moments), controls, out);
 }
 
 }  // namespace magshell

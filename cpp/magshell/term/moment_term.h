@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "magshell/body/nodes.h"
-#include "magshell/term/field_sources.h"
+#include "magshell/term/felt_field.h"
 #include "magshell/term/term.h"
 
 namespace magshell {
@@ -46,15 +46,13 @@ class MomentTerm final : public Term {
         std::array<std::array<SystemMatrix::Slot, 4>, 4> slots;  // row above column
     };
 
-    Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
     static Each at_corners(const Chunk& chunk, const double* from);
     static Vec3 sum(const std::array<double, 4>& weights, const Each& of);
-    /// Of the sources, with the uniform chunk in `flux`; points and moments as they are at q.
+    /// Of the sources, with the uniform part in `flux`; points and moments as they are at q.
     FieldSamples sample(const double* q, const Controls& controls, int order, std::vector<Vec3>& points,
                         std::vector<Vec3>& moments) const;
 
-    const FieldSources& sources_;
-    Slot flux_density_, field_factor_;
+    const FeltField field_;
     std::vector<Chunk> chunks_;
 };
 

@@ -17,6 +17,9 @@ class Owner:
         for name in self._replaceable:
             numbers[label, name] = getattr(self, name)
 
+    def _check_in_time(self, name: str, rows: np.ndarray) -> None:
+        """Raises ValueError where it cannot have one of the numbers (n, ...) over time."""
+
     def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
         """By its values, from the core's gradient; a row for each of its parts."""
         return {name: gradient.value(label, name) for name in self._replaceable}

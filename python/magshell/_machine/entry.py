@@ -9,9 +9,26 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from ..errors import Interrupted
-from .keywords import as_keywords
+from .keywords import as_keywords, check_known
 
 F = TypeVar("F", bound=Callable)
+
+
+def grouped(**groups: type) -> Callable[[F], F]:
+    """A function as users call it, some of whose parameters take groups: dataclasses made once and handed to many calls.
+    A keyword that it does not have is told with the group that has it, or with those that are most like it."""
+
+    def decorated(function: F) -> F:
+        known = tuple(inspect.signature(function).parameters)
+
+        @functools.wraps(function)
+        def called(*arguments, **named):
+            check_known(function.__name__, named, known, groups)
+            return function(*arguments, **named)
+
+        return called
+
+    return decorated
 
 
 def solve_entry(function: F) -> F:

@@ -48,6 +48,21 @@ def as_keywords(scene, named: dict, known) -> dict:
     return {**named, **controls, "values": kept or None}
 
 
+def check_known(function: str, named, known, groups: dict[str, type]) -> None:
+    """Raises TypeError on a keyword that a function does not have: with the group that has it, {parameter: dataclass},
+    or the keywords that are most like it."""
+    for name in named:
+        if name in known:
+            continue
+        for parameter, group in groups.items():
+            for field in group.__dataclass_fields__:
+                if name in (field, f"{parameter}_{field}"):
+                    there = f"{parameter}=ms.{group.__name__}({field}=...)"
+                    raise TypeError(f"{function}() has no keyword {name!r}: it is said by {there}")
+        nearest = ", ".join(nearest_first(name, known).split(", ")[:3])
+        raise TypeError(f"{function}() has no keyword {name!r}; most like it are: {nearest}")
+
+
 def nearest_first(name, names) -> str:
     """The names that there are, the one most like `name` in front."""
     from difflib import SequenceMatcher  # for errors alone

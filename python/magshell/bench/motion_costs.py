@@ -132,8 +132,7 @@ def _forward_and_back(scene: ms.Scene, steps: int, integrator, keep: str) -> tup
         integrator=integrator,
         remanent_magnetization=magnetization,
         applied_flux_density=field,
-        keep=keep,
-        memory_budget=budget(scene, integrator, steps),
+        keep=ms.Keep(keep, memory_budget=budget(scene, integrator, steps)),
     )
     done = time.process_time()
     (move.positions[-1] ** 2).sum().backward()

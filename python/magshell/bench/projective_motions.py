@@ -171,8 +171,7 @@ def _grown(cells, steps: int, keep: str) -> dict:
             values={solid: {"young_modulus": young}},
             integrator=ms.ProjectiveDynamics(tolerance=1e-8),
             record_every=count,
-            keep=keep,
-            memory_budget=2e6 if keep == "checkpoints" else 2e9,
+            keep=ms.Keep(keep, memory_budget=2e6 if keep == "checkpoints" else 2e9),
             progress=False,
         )
         done = time.process_time()

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..bodies.actuator import Actuator
 from ..bodies.shell import Shell
+from ..fields.field import AppliedField
 from ..obstacles import Obstacle
 from ..scene.courses import Course
 from ..surroundings.supports import Support
@@ -17,7 +18,7 @@ class InTime:
     """What of a scene's values changes during one motion.
 
     entries: of the core's values, those that follow the other controls; rows: (knots, m), theirs. poses: {number of an
-    obstacle: its poses at the knots (knots, 4, 3)}. varied: {(actuator or shell, name): (knots, ...)}.
+    obstacle: its poses at the knots (knots, 4, 3)}. varied: {(actuator, shell or field, name): (knots, ...)}.
     """
 
     def __init__(self, asked, courses: list[Course]):
@@ -26,7 +27,7 @@ class InTime:
         self._places: dict[tuple[int, str], list[slice]] = {}
         self.entries: list[int] = []
         self.poses: dict[int, np.ndarray] = {}
-        self.varied: dict[tuple[Actuator | Shell, str], np.ndarray] = {}
+        self.varied: dict[tuple[Actuator | Shell | AppliedField, str], np.ndarray] = {}
         for course in courses:
             course.check(asked.steps)
         of_values = [each for each in courses if not isinstance(each.owner, Obstacle)]
@@ -39,7 +40,7 @@ class InTime:
             numbers = np.reshape(
                 asked.inputs.take(course.name, at_knots, _Values(self, course)), (asked.knots, -1)
             )
-            if isinstance(course.owner, Actuator | Shell):
+            if isinstance(course.owner, Actuator | Shell | AppliedField):
                 now = self.varied[course.owner, course.name] = numbers.reshape(-1, *course.row)
                 course.owner._check_in_time(course.name, now)
             rows += [numbers] * self._add(course, numbers.shape[1])

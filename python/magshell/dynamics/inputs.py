@@ -41,7 +41,6 @@ class MotionInputs:
         steps,
         time_step,
         record_every,
-        memory_budget,
         keep,
         start,
         velocities,
@@ -57,10 +56,7 @@ class MotionInputs:
         self.inputs, self.integrator = inputs, integrator
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
         check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
-        memory_budget = not_negative("memory_budget", "bytes", memory_budget)
-        if keep not in (None, "stages", "checkpoints", "factors"):
-            raise ValueError(f'keep must be "stages", "checkpoints", "factors" or None, got {keep!r}')
-        self.keep = getattr(_core.Keep, keep or "nothing")
+        self.keep, self.memory_budget = getattr(_core.Keep, keep.what or "nothing"), int(keep.memory_budget)
         self.given_time_step, self._outside = time_step, None
         self.time_step = positive("time_step", "s", inputs.take("time_step", time_step))
         self._mass = inputs.values.masses
@@ -100,7 +96,7 @@ class MotionInputs:
         return self._knots[name][self._recorded_knots(count)]
 
     def varied(self, count: int) -> dict[tuple, np.ndarray]:
-        """Likewise {(actuator or shell, name): its values} of what varies."""
+        """Likewise {(actuator, shell or field, name): its values} of what varies."""
         at = self._recorded_knots(count)
         return {key: rows[at] for key, rows in self._in_time.varied.items()}
 

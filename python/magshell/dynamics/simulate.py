@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._checks.tensors import detached, dtype_like, like
-from .._machine.entry import solve_entry
+from .._machine.entry import grouped, solve_entry
 from .._machine.log import log
 from .._machine.progress import SolveBar
 from ..adjoint.dynamic import MotionAdjoint
@@ -19,6 +19,7 @@ from ..bodies.shell import Shell
 from ..bodies.strains import StrainHistory, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler, Integrator
+from ..methods.keep import Keep, kept
 from ..methods.solvers import MixedNewton, Newton
 from ..scene.courses import over_time
 from ..scene.inputs import Inputs
@@ -29,6 +30,7 @@ from .inputs import MotionInputs
 from .trajectory import MotionState, Trajectory
 
 
+@grouped(solver=MixedNewton, keep=Keep)
 @solve_entry
 def simulate(
     scene: Scene,
@@ -56,8 +58,7 @@ def simulate(
     values: dict | None = None,
     integrator: Integrator | None = None,
     record_every: int = 1,
-    memory_budget: float = 2e9,
-    keep: str | None = None,
+    keep: str | Keep | None = None,
     solver: Newton | None = None,
     progress: bool = True,
 ) -> Trajectory:
@@ -88,10 +89,8 @@ def simulate(
         A method of higher order makes an impact bounce, and each of its steps there is much work, unless the steps resolve
         it.
     record_every: steps between the states that come back, the start first.
-    memory_budget: bytes that may be kept for gradients: all states if they fit; else checkpoints, between which the
-        steps are taken again on the way back, some of them several times.
-    keep: "stages" or "checkpoints", whatever the budget says; "factors": all states with their factorizations, which
-        pays where several gradients are taken of one motion.
+    keep: for gradients; "stages" (all states), "checkpoints", "factors", or an ms.Keep, which says how many bytes it may
+        take. By default all states if they fit into 2 GB, else checkpoints.
     solver: of a step; MixedNewton() by default, of which the load steps are not used. ProjectiveDynamics needs none.
     progress: show a bar once the motion has taken two seconds.
 
@@ -158,8 +157,7 @@ def simulate(
         steps=steps,
         time_step=time_step,
         record_every=record_every,
-        memory_budget=memory_budget,
-        keep=keep,
+        keep=kept(keep),
         start=start,
         velocities=velocities,
         damping=damping,
@@ -179,7 +177,7 @@ def simulate(
     with inputs.in_core(), SolveBar("simulate", progress) as bar:
         check_apart(scene, asked.start.state)
         found = _core.simulate(
-            scene._model, asked.core, bool(inputs.leaves), int(memory_budget), asked.keep, _advance(bar)
+            scene._model, asked.core, bool(inputs.leaves), asked.memory_budget, asked.keep, _advance(bar)
         )
     result = _with_strains(_trajectory(asked, found, time.perf_counter() - began))
     log.debug(

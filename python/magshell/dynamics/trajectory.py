@@ -17,6 +17,7 @@ from ..bodies.of_body import result_of
 from ..bodies.shell import Shell
 from ..bodies.solid_result import told_strains
 from ..bodies.strains import StrainHistory, Strains, strains_of
+from ..fields.field import AppliedField
 from ..mesh.crossings import told
 from ..methods.clock import Clock, clock_of
 from ..methods.integrators import Integrator
@@ -145,7 +146,7 @@ class Trajectory:
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
     _load_factors: np.ndarray = field(repr=False)
-    _varied: dict = field(repr=False)  # {(actuator or shell, name): (n, ...)}, of the recorded states
+    _varied: dict = field(repr=False)  # {(actuator, shell or field, name): (n, ...)}, of the recorded states
     _thickness: np.ndarray = field(repr=False)
     _values: Any = field(repr=False)
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
@@ -187,8 +188,8 @@ class Trajectory:
         return self.positions - self.positions.new_tensor(np.array(rest))
 
     def _values_at(self, index: int):
-        """With actuators, and growth, as they were then."""
-        then: dict[Actuator | Shell, dict] = {}
+        """With actuators, growth and field sources as they were then."""
+        then: dict[Actuator | Shell | AppliedField, dict] = {}
         for (owner, name), rows in self._varied.items():
             then.setdefault(owner, {})[name] = rows[index]
         now = {each: self._values.current(each).replaced(**named) for each, named in then.items()}

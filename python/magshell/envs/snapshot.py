@@ -84,10 +84,6 @@ class Snapshot:
     # What results of single bodies and pictures look at.
 
     @property
-    def _obstacles(self) -> tuple:
-        return self.motion._obstacles
-
-    @property
     def _own_points(self):
         return None if self.motion._own_points is None else self.motion._own_points[self.index]
 

@@ -113,6 +113,7 @@ def linear_buckling(
         raise ValueError(f"modes must be below the {model.free_size} unknowns of the scene, got {modes}")
     with inputs.in_core():
         stiffness = RestStiffness(inputs)
+        stiffness.factorize()
         response = stiffness.response(inputs)
         displacement = float(np.abs(model.points(response)).max())
         change = _stiffness_change(scene, stiffness, response, displacement, inputs)

@@ -60,7 +60,10 @@ def linear_response(
     the stiffness they add; supports that move do so at the rate they start with. Torques, springs, servos and limits that
     pull in joints at rest are loads too, and motors move. Controls and values as in ms.equilibrium.
 
-    Raises ValueError on bad input, and where the supports leave the sheet a motion without stiffness; Interrupted.
+    What no stiffness couples with a load stays at rest, and costs nothing: of a flat sheet in a coordinate plane, bending
+    where it is loaded across, stretching where it is loaded in its plane.
+
+    Raises ValueError on bad input, and where the supports leave a motion without stiffness to what is loaded; Interrupted.
 
     remanent_magnetization, applied_flux_density, load_factor, gravity_factor, field_factor, motion_factor: as in
     `equilibrium`.

@@ -13,11 +13,38 @@ _ROUND_OFF = 1e-9  # of a muscle's strength
 _SMALL = 20000  # unknowns, for which the better of two orderings takes longer than it saves one factorization
 
 
-class RestStiffness:
-    """The Hessian K at the rest shape without controls, factorized once. Works on the free unknowns, (n,).
+class _Factorized:
+    """A positive definite matrix, given as to _core.analyze. Raises ValueError where it is none."""
 
-    Raises ValueError where K is not positive definite: the scene is not held, or not stable at rest; where actuators are
-    springs of their own, which are no part of K; and as `refuse_what_acts`.
+    def __init__(
+        self, size: int, starts: np.ndarray, rows: np.ndarray, values: np.ndarray, points: np.ndarray
+    ):
+        self._values = values
+        self._factor = _analysed(size, starts, rows, points)
+        report = self._factor.factorize(values)
+        if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
+            raise ValueError(
+                f"the stiffness at rest is not positive definite ({report.negative_pivots} negative and "
+                f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: hold the sheet by supports"
+            )
+
+    def solve(self, forces: np.ndarray) -> np.ndarray:
+        """Refined once with a residual of more digits: where stiffnesses differ by 1e6, the order of elimination would
+        decide what is left of the soft ones' digits."""
+        solution = self._factor.solve(forces)
+        return solution + self._factor.solve(self._factor.residual(self._values, solution, forces))
+
+
+def _analysed(size: int, starts: np.ndarray, rows: np.ndarray, points: np.ndarray) -> _core.Factor:
+    return _core.analyze(size, starts, rows, points=points, ordering="amd" if size <= _SMALL else "best")
+
+
+class RestStiffness:
+    """The Hessian K at the rest shape without controls. Works on the free unknowns, (n,). What is solved with is factorized
+    once: the whole K, or what a load is coupled with.
+
+    Raises ValueError where actuators are springs of their own, which are no part of K, and as `refuse_what_acts`; once
+    something is factorized, where that is not positive definite: the scene is not held, or not stable at rest.
     """
 
     def __init__(self, inputs: Inputs):
@@ -31,14 +58,8 @@ class RestStiffness:
         self.rest = self._model.rest_state()
         refuse_what_acts(inputs)
         *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())
-        self._factor = self._analysed()
-        report = self._factor.factorize(self._values)
-        if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
-            raise ValueError(
-                f"the stiffness at rest is not positive definite ({report.negative_pivots} negative and "
-                f"{report.perturbed_pivots} zero pivots of {self._pattern[0]}), "
-                "and linear theory needs that: hold the sheet by supports"
-            )
+        self._at_rest = self._model.last_gradient
+        self._whole: _Factorized | None = None
 
     @property
     def matrix(self) -> scipy.sparse.csc_array:
@@ -51,17 +72,29 @@ class RestStiffness:
 
     def negative_directions(self, change: np.ndarray) -> int:
         """How many negative eigenvalues K plus a change of its values has, by another factorization."""
-        return self._analysed().factorize(self._values + change).negative_pivots
+        factor = _analysed(*self._pattern, self._model.free_points)
+        return factor.factorize(self._values + change).negative_pivots
 
-    def _analysed(self) -> _core.Factor:
-        ordering = "amd" if self._pattern[0] <= _SMALL else "best"
-        return _core.analyze(*self._pattern, points=self._model.free_points, ordering=ordering)
+    def factorize(self) -> None:
+        """The whole K, whatever a load is coupled with."""
+        if self._whole is None:
+            self._whole = _Factorized(*self._pattern, self._values, self._model.free_points)
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
-        """u (n,) of K u = forces (n,), refined once with a residual of more digits: where stiffnesses differ by 1e6, the
-        order of elimination would decide what is left of the soft ones' digits."""
-        solution = self._factor.solve(forces)
-        return solution + self._factor.solve(self._factor.residual(self._values, solution, forces))
+        """u (n,) of K u = forces (n,)."""
+        self.factorize()
+        return self._whole.solve(forces)
+
+    def _answer(self, forces: np.ndarray) -> np.ndarray:
+        """The same, where not even the rest of K need be regular if nothing couples it with a force: it stays at rest."""
+        part = _core.loaded_part(*self._pattern, self._values, forces) if self._whole is None else None
+        if part is None:
+            return self.solve(forces)
+        unknowns, starts, rows, values = part
+        points = self._model.free_points[unknowns]
+        answer = np.zeros_like(forces)
+        answer[unknowns] = _Factorized(len(unknowns), starts, rows, values, points).solve(forces[unknowns])
+        return answer
 
     def response(self, inputs: Inputs, at_rest: np.ndarray | None = None) -> np.ndarray:
         """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports and motors move.
@@ -72,11 +105,10 @@ class RestStiffness:
         unloaded = layout.zeros()
         moved = model.prescribed_rate(unloaded) * layout.of(inputs.controls, "scene", "motion_factor")
         moved = moved + model.driven_increment(self.rest, unloaded)
-        at_rest = model.gradient(self.rest, unloaded) if at_rest is None else at_rest
-        forces = at_rest - model.gradient(self.rest, inputs.controls)
+        forces = (self._at_rest if at_rest is None else at_rest) - model.gradient(self.rest, inputs.controls)
         if moved.any():
             forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved
-        return moved + model.expand(self.solve(model.reduce(forces)))
+        return moved + model.expand(self._answer(model.reduce(forces)))
 
 
 def pulling_joints(inputs: Inputs) -> dict:
@@ -85,10 +117,13 @@ def pulling_joints(inputs: Inputs) -> dict:
     return {own: joint.resting for own, joint in joints.items() if joint.resting is not joint}
 
 
-def forces_at_rest(inputs: Inputs) -> np.ndarray:
-    """g(0) of all unknowns at the rest shape, without what pulls in joints: so that this is a load."""
+def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
+    """g(0) of all unknowns at the rest shape, without what pulls in joints: so that this is a load. None where nothing
+    pulls."""
+    if not (pulling := pulling_joints(inputs)):
+        return None
     scene = inputs.scene
-    with inputs.values.with_objects(pulling_joints(inputs)).in_core():
+    with inputs.values.with_objects(pulling).in_core():
         return scene._model.gradient(scene._model.rest_state(), scene._control_layout.zeros())
 
 

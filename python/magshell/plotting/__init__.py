@@ -4,5 +4,7 @@ from .animation import animate
 from .drawing import plot
 from .page import write_page
 from .picture import Picture
+from .style import Color, Style
+from .view import View
 
-__all__ = ["Picture", "animate", "plot", "write_page"]
+__all__ = ["Color", "Picture", "Style", "View", "animate", "plot", "write_page"]

@@ -8,23 +8,27 @@ from typing import Any
 import numpy as np
 
 from .._checks.quantity import quantity
+from .._machine.entry import grouped
 from .._machine.progress import SolveBar
 from ..states.state import State, states_of, with_times
 from ..states.units import length_unit
 from . import backend as backends
 from . import films
-from .colors import Scalar, scalar_of
+from .colors import Scalar
+from .drawing import check_contacts
 from .frames import Reel, Scenery
-from .limits import arrow_count, checked_width
+from .limits import checked_width
 from .panels import Drawing, Options, size_of
 from .playing import Moment, between, moments, same_faces, speed_of, spoken, spread, state_at
+from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
-from .view import view_of
+from .view import View, view_of
 
 SLOWEST, FASTEST = 0.01, 1000.0  # frames a second that the formats can hold
 PALETTE_FRAMES = 12  # that a GIF's colours are chosen from
 
 
+@grouped(color=Color, view=View, style=Style)
 def animate(
     what,
     path,
@@ -38,16 +42,10 @@ def animate(
     speed: float | None = None,
     fps: float = 25.0,
     color: Any = "auto",
-    color_label: str | None = None,
-    color_range=None,
-    arrows: bool | int = True,
-    show_field: bool = True,
-    rest: bool = False,
-    mesh_lines: bool = False,
     title: str | None = None,
     view=None,
     width: int = 1000,
-    backend: str | None = None,
+    style: Style | None = None,
     progress: bool = True,
 ) -> Path:
     """Writes a movie of a motion, a .gif or an .mp4, with the field's arrow as it changes.
@@ -72,18 +70,18 @@ def animate(
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     >>> rising = np.stack([mesh.rest_positions + np.array([0, 0, height]) for height in (0, 0.01)])
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     ms.animate(mesh, f"{folder}/rise.gif", positions=rising, width=400, backend="matplotlib").name
+    ...     ms.animate(mesh, f"{folder}/rise.gif", positions=rising, width=400, style=ms.Style(backend="matplotlib")).name
     'rise.gif'
     """
     fps = float(quantity("fps", "1/s", fps, ()))
     if not SLOWEST <= fps <= FASTEST:
         raise ValueError(f"fps [1/s] must be positive, from {SLOWEST:g} to {FASTEST:g}, got {fps:g}")
     width = checked_width(width)
-    count = arrow_count(arrows)
+    style = style_of(style)
     path = films.checked_path(path, fps)
     if path.suffix.lower() == ".gif":
         fps = 100 / round(100 / fps)  # what the format can hold
-    painter = backends.choose(backend)
+    painter = backends.choose(style.backend)
     states = states_of(
         what,
         positions=positions,
@@ -98,9 +96,10 @@ def animate(
     states = with_times(states, times)
     speed = speed_of(states, speed)
     unit = length_unit(size_of(states))
-    scalar = scalar_on_surfaces(scalar_of(states, color, color_label, color_range, unit), states)
+    scalar = scalar_on_surfaces(colored(states, color, unit), states)
     states = on_surfaces(states)
-    options = Options(count, show_field, rest, mesh_lines)
+    check_contacts(style, states)
+    options = Options.of(style)
     scenery = Scenery(states, scalar, view_of(states, view), unit, options)
     shown = moments(states, fps, speed)
 

@@ -155,7 +155,7 @@ def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
     """- (F_0 M_r) . B at the barycenters, per rest volume, [Chen22] (24)."""
     densities = []
     for state in states:
-        if not state.is_magnetized or (state.flux_density is None and state.sources is None):
+        if not state.is_magnetized or (state.flux_density is None and not state.has_sources):
             raise ValueError("color='magnetic_energy' needs a magnetized sheet in a field, in every state")
         densities.append(
             -np.einsum("fi,fi->f", state.magnetization, state.flux_density_at(state.barycenters))
@@ -304,9 +304,9 @@ def _range(values: list[np.ndarray]) -> tuple[float, float]:
 def _limits(given, default: tuple[float, float]) -> tuple[float, float]:
     if given is None:
         return default
-    low, high = quantity("color_range", "the color's unit", given, (2,)).tolist()
+    low, high = quantity("the range of a color", "its unit", given, (2,)).tolist()
     if low >= high:
-        raise ValueError(f"color_range must rise, got ({low:g}, {high:g})")
+        raise ValueError(f"the range of a color must rise, got ({low:g}, {high:g})")
     return low, high
 
 

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from .._checks.arrays import index_array
-from .._checks.scalars import flag
+from .._machine.entry import grouped
 from ..mesh.crossings import AFFORDABLE_FACES
 from ..states.state import State, states_of
 from ..states.units import length_unit
 from . import backend as backends
-from .colors import scalar_of
 from .cuts import checked_cut, section
-from .limits import arrow_count, check_columns, checked_width
+from .limits import check_columns, checked_width
 from .panels import Options, draw, size_of
 from .picture import Picture, paint
 from .playing import spread
+from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
-from .view import view_of
+from .view import View, view_of
 
 MOST_STATES = 9  # of a path, unless asked for more
 
 
+@grouped(color=Color, view=View, style=Style)
 def plot(
     what,
     *,
@@ -34,13 +36,6 @@ def plot(
     obstacles=None,
     states=None,
     color: Any = "auto",
-    color_label: str | None = None,
-    color_range=None,
-    arrows: bool | int = True,
-    show_field: bool = True,
-    rest: bool = False,
-    mesh_lines: bool = False,
-    contacts: bool = False,
     titles=None,
     overlay: bool = False,
     fade: bool = False,
@@ -48,7 +43,7 @@ def plot(
     view=None,
     cut=None,
     width: int = 1600,
-    backend: str | None = None,
+    style: Style | None = None,
 ) -> Picture:
     """A picture of a sheet, its magnetization and the field; of several, side by side or over each other.
 
@@ -65,34 +60,31 @@ def plot(
         with muscles "activation", "fibre_stretch" or "fibre_tension",
         an array with a number a face or a vertex, a list of such arrays, one a state, or None for plain sheets.
         "auto": magnetization if it varies, else displacement.
-    color_label, color_range: the text, with the unit, and the ends of the colour bar.
-    arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
-    show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it. Its magnets and wires,
-        magpylib's too, are drawn where the solve had them; those that move during a motion where the scene has them.
-    rest: the rest shape as a faint outline. mesh_lines: the edges of the mesh.
-    contacts: the forces of all contacts, friction included, as arrows from the vertices on which they act, over everything.
+        An ms.Color has a text for the colour bar, its ends and its scale.
     titles: one a state; that a sheet passes through itself is added, where there are at most 20,000 faces to look at.
     overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light shows a motion.
     columns: of panels, by default what fits best.
-    view: (elevation, azimuth) in degrees of the eye, as in matplotlib; by default what suits the sheet.
+    view: (elevation, azimuth) in degrees of the eye, as in matplotlib; by default what suits the sheet. An ms.View says also
+        what the window holds.
     cut: a plane that opens solids (and cuts sheets): "x", "y" or "z" through the middle of the rest shape, ("x", 0.05) at
         that place [m], or a point [m] and a normal, (3,) each. What is on the eye's side of it, in every state as it is,
         is taken away; the section has the colours of the tetrahedra for what they have, of displacements and numbers at
-        vertices those between, and is grey where a color is one of faces. mesh_lines: with the tetrahedra's edges.
+        vertices those between, and is grey where a color is one of faces; with the mesh's lines, the tetrahedra's edges.
     width: pixels, 400 to 8000; a picture has at most 16 million of them.
-    backend: "pyvista" or "matplotlib"; by default the environment variable MAGSHELL_PLOT, else pyvista where
-        it can render off the screen, else matplotlib.
+    style: an ms.Style: arrows of magnetization, field and contacts, the rest shape, the mesh's lines, who paints.
+
+    Magnets and wires of fields, magpylib's too, are drawn where they were in each state.
 
     Raises ValueError on bad input, ImportError without matplotlib.
 
     >>> import magshell as ms
-    >>> ms.plot(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), backend="matplotlib", width=800)
+    >>> ms.plot(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), width=800, style=ms.Style(backend="matplotlib"))
     Picture(800 x 343 pixels, painted by matplotlib)
     """
     width = checked_width(width)
     check_columns(columns, width)
-    count = arrow_count(arrows)
-    painter = backends.choose(backend)
+    style = style_of(style)
+    painter = backends.choose(style.backend)
     drawn = states_of(
         what,
         positions=positions,
@@ -104,18 +96,22 @@ def plot(
     drawn = _chosen(drawn, states)
     titles = noted_crossings(checked_titles(titles, drawn), drawn)
     unit = length_unit(size_of(drawn))
-    scalar = scalar_of(drawn, color, color_label, color_range, unit, cut is not None)
-    scalar = scalar_on_surfaces(scalar, drawn)
+    scalar = scalar_on_surfaces(colored(drawn, color, unit, cut is not None), drawn)
     whole, drawn = drawn, on_surfaces(drawn)
     seen = view_of(drawn, view)
     plane = checked_cut(cut, whole, seen)
     sections = () if plane is None else tuple(section(state, plane) for state in whole)
     groups = [drawn] if overlay or fade else [[state] for state in drawn]
-    if flag("contacts", contacts) and not any(state.loads for state in drawn):
-        raise ValueError("contacts are drawn of a result of a scene with contacts: there is none")
-    options = Options(count, show_field, rest, mesh_lines, fade, plane, sections, contacts)
+    check_contacts(style, drawn)
+    options = replace(Options.of(style), fade=fade, cut=plane, sections=sections)
     drawing = draw(groups, titles, scalar, seen, unit, options)
     return paint(drawing, width, columns, painter)
+
+
+def check_contacts(style: Style, states: list[State]) -> None:
+    """Raises ValueError where contacts are asked for and there are none."""
+    if style.contacts and not any(state.loads for state in states):
+        raise ValueError("contacts are drawn of a result of a scene with contacts: there is none")
 
 
 def checked_titles(titles, states: list[State]) -> list[str]:

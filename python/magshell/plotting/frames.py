@@ -13,6 +13,8 @@ from .panels import (
     Drawing,
     Options,
     Panel,
+    contact_solid,
+    contacts_key,
     field_arrow,
     field_label,
     magnetization_key,
@@ -20,11 +22,13 @@ from .panels import (
     sheet_solids,
     size_of,
     sources_key,
+    strongest_contact,
 )
-from .picture import paint, paint_panel, screen_of
+from .picture import paint, paint_panel, screen_of, title_height
 from .playing import SAMPLES, spread
 from .solids import arrows
 from .surroundings import box_of, obstacle_solids
+from .texts import Ruler
 from .view import View
 
 DPI = 140
@@ -39,6 +43,8 @@ class Scenery:
         self.scalar, self.view, self.unit, self.options = scalar, view, unit, options
         self.size = size_of(states)
         self.strongest = glyphs.largest(states)
+        some = spread(states, SAMPLES) if options.contacts else []
+        self._strongest_contact = strongest_contact(some)
         self._points, self._full_length = self._surroundings(states)
         low, high = self._bounds(states)
         self._prepare_uniform_field(states, low, high)
@@ -52,11 +58,14 @@ class Scenery:
         panel = Panel(title, sheet_solids(state, shades, self.view, self.size, self.options))
         panel.solids += obstacle_solids([state], self.size)
         panel.solids += self._magnetization(state)
+        if self._strongest_contact:
+            panel.solids.append(contact_solid(state, self._strongest_contact, self.size))
         self._add_fields(panel, state)
         return Drawing([panel], self.view, self.unit, self.scalar, self._legend(), self._hold)
 
     def _legend(self) -> list[tuple[str, str]]:
         shown = [magnetization_key(self.strongest)] if self.options.arrows and self.strongest else []
+        shown += [contacts_key(self._strongest_contact)] if self._strongest_contact else []
         return shown + ([sources_key(self._full_length)] if self._full_length else [])
 
     def _magnetization(self, state: State) -> list:
@@ -65,7 +74,7 @@ class Scenery:
     def _surroundings(self, states: list[State]) -> tuple[np.ndarray, float]:
         """Where fields that vary in space are drawn, and the flux density [T] of full length."""
         some = spread(states, SAMPLES)
-        if not self.options.field or not any(state.sources for state in some):
+        if not self.options.field or not any(state.has_sources for state in some):
             return np.zeros((0, 3)), 0.0
         points = glyphs.halo(some, self.size)
         return points, glyphs.sources_glyphs(some, [points] * len(some), self.size)[1]
@@ -103,7 +112,7 @@ class Scenery:
             factor, unit = self._field_unit
             magnitude = f"{np.linalg.norm(state.flux_density) / factor:.1f} {unit}"
             panel.labels.append(field_label(self._below, magnitude))
-        if self._full_length and state.sources:
+        if self._full_length and state.has_sources:
             [around], _ = glyphs.sources_glyphs([state], [self._points], self.size, self._full_length)
             if around is not None:
                 panel.solids.append(arrows(around.starts, around.vectors, around.radius, colors.FIELD))
@@ -116,6 +125,7 @@ class Reel:
         self._figure = paint(first, width, 1, backend, DPI).figure
         self._axes = self._figure.axes[0]
         self._window = np.array([*self._axes.get_xlim(), *self._axes.get_ylim()])
+        self._title, self._ruler = title_height(self._axes), Ruler(DPI)
         self._screens = screen_of(self._axes, backend, samples=False)
 
     def __enter__(self) -> Reel:
@@ -128,7 +138,8 @@ class Reel:
     def image(self, drawing: Drawing) -> np.ndarray:
         """(height, width, 3) uint8, both even, as films want them."""
         self._axes.clear()
-        paint_panel(self._axes, drawing.panels[0], drawing, self._window, self._screen)
+        panel, room = drawing.panels[0], (self._title, self._ruler)
+        paint_panel(self._axes, panel, drawing, self._window, self._screen, *room)
         self._figure.canvas.draw()
         image = np.asarray(self._figure.canvas.buffer_rgba())[:, :, :3]
         odd = [(0, image.shape[k] % 2) for k in (0, 1)]

@@ -119,7 +119,7 @@ def sources_glyphs(
 ) -> tuple[list[Glyphs | None], float]:
     """Arrows of each state's fields that vary in space, at its points, and the flux density [T] of full length."""
     sampled = [
-        (at, state.flux_density_at(at)) if state.sources else (at[:0], at[:0])
+        (at, state.flux_density_at(at)) if state.has_sources else (at[:0], at[:0])
         for state, at in zip(states, points, strict=True)
     ]
     if full_length is None:

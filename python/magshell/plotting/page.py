@@ -6,6 +6,7 @@ import base64
 import html
 import json
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from .._machine.files import replace_file
 from ..states.state import State, states_of, with_times
 from ..states.units import LengthUnit, length_unit, prefixed, with_unit
@@ -22,10 +24,12 @@ from .drawing import checked_titles
 from .limits import arrow_count
 from .panels import outline, size_of
 from .playing import SAMPLES, same_faces, speed_of, spread
+from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
-from .view import view_of
+from .view import View, view_of
 
 
+@grouped(color=Color, view=View, style=Style)
 def write_page(
     what,
     path,
@@ -36,14 +40,12 @@ def write_page(
     applied_flux_density=None,
     field=None,
     color=None,
-    color_label: str | None = None,
-    color_range=None,
-    arrows: bool | int = True,
     titles=None,
     view=None,
     title: str = "magshell",
     speed: float | None = None,
     size_limit: float = 10e6,
+    style: Style | None = None,
 ) -> Path:
     """Writes a page that shows a sheet from every side, with its magnetization and the field, offline.
 
@@ -59,6 +61,8 @@ def write_page(
         changes) if they fit, else in 16 bits (half of it, to 1/65000 of the sheet's size), else as many as fit, evenly
         spread; the page says how many there were. The mesh takes about 85 bytes a vertex, the viewer 25 kB.
 
+    style: as in `plot`; what it says of the rest shape and the mesh's lines, the reader can change. A page has no contacts.
+
     Raises ValueError on bad input, FileNotFoundError without the folder.
 
     >>> import magshell as ms, tempfile
@@ -70,7 +74,14 @@ def write_page(
     path = Path(path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"a page is saved as .html, got {path.name!r}")
-    count = arrow_count(arrows)
+    style = style_of(style)
+    count = arrow_count(style.arrows)
+    if style.contacts:
+        raise ValueError(
+            "a page does not show contacts: leave them out of its style; ms.plot and ms.animate do"
+        )
+    if isinstance(view, View) and view.frame is not None:
+        raise ValueError("a page shows all of it, and its reader zooms: leave the frame out of its view")
     if not isinstance(title, str):
         raise ValueError(f"title must be a string, got {title!r:.60}")
     if not path.parent.is_dir():
@@ -88,13 +99,12 @@ def write_page(
     speed = speed_of(states, speed)
     size = size_of(states)
     unit = length_unit(size)
-    scalars = [
-        scalar_on_surfaces(scalar, states)
-        for scalar in _scalars(states, color, color_label, color_range, unit)
-    ]
+    scalars = [scalar_on_surfaces(scalar, states) for scalar in _scalars(states, color, unit)]
     states = on_surfaces(states)
     mesh = states[0].mesh
     titles = checked_titles(titles, states)
+    if not style.show_field:
+        states = [replace(state, flux_density=None, fields=()) for state in states]
     fields = _sources(states, size)
     numbers = 3 * mesh.n_vertices + 6 * count + sum(len(s.values[0]) for s in scalars if not _is_constant(s))
     numbers += max((6 * len(field.starts) for field in fields[0] if field is not None), default=0)
@@ -111,6 +121,7 @@ def write_page(
         "scalars": [_scalar(s, kept, dtype) for s in scalars],
         "states": _states(states, kept, titles, fields, count, dtype),
         "recorded": len(states),
+        "shown": {"rest": style.rest, "edges": style.mesh_lines},
         "speed": None if states[0].time is None else speed,
     }
     template = files(__package__).joinpath("page.html").read_text(encoding="utf-8")
@@ -123,9 +134,9 @@ def write_page(
     return path
 
 
-def _scalars(states: list[State], color, label, limits, unit: LengthUnit) -> list[Scalar]:
+def _scalars(states: list[State], color, unit: LengthUnit) -> list[Scalar]:
     """What the reader can choose from; the first is shown first."""
-    chosen = [] if color is None else [scalar_of(states, color, label, limits, unit)]
+    chosen = [] if color is None else [colored(states, color, unit)]
     if any(state.is_magnetized for state in states):
         chosen.append(scalar_of(states, "magnetization", None, None, unit))
     if any(state.displacements.any() for state in states):
@@ -159,7 +170,7 @@ def _that_fit(count: int, numbers: int, size_limit: float) -> tuple[str, list[in
 
 def _sources(states: list[State], size: float) -> tuple[list[glyphs.Glyphs | None], float]:
     """Fields that vary in space, around each state; around a motion at places that stay."""
-    if not any(state.sources for state in states):
+    if not any(state.has_sources for state in states):
         return [None] * len(states), 0.0
     if states[0].time is None:
         points = [glyphs.halo([state], size) for state in states]

@@ -13,7 +13,9 @@ from ..states.units import LengthUnit, with_unit
 from . import colors, glyphs
 from .colors import Scalar, rgb
 from .cuts import Cut, Section, cut_edges, opened, section_solid
+from .limits import arrow_count
 from .solids import Solid, arrows, ribbons, sheet
+from .style import Style
 from .surroundings import box_of, obstacle_solids
 from .view import View
 
@@ -63,6 +65,9 @@ class Drawing:
     def window(self) -> np.ndarray:
         """(left, right, bottom, top), m, on the screen: holds the bodies of every panel, and of what is around them as much
         as leaves them large."""
+        if self.view.corners is not None:
+            framed = self.view.project(self.view.corners)[:, :2]
+            return np.stack([framed.min(axis=0), framed.max(axis=0)], axis=1).ravel()
         held = [] if self.hold is None else [self.hold]
         solids = [solid for panel in self.panels for solid in panel.solids]
         held += [solid.positions for solid in solids if not solid.around]
@@ -84,6 +89,12 @@ class Options:
     cut: Cut | None = None
     sections: tuple[Section, ...] = ()  # one a state, where there is a cut
     contacts: bool = False  # their forces as arrows
+
+    @classmethod
+    def of(cls, style: Style) -> Options:
+        """What a caller asks for."""
+        count = arrow_count(style.arrows)
+        return cls(count, style.show_field, style.rest, style.mesh_lines, contacts=style.contacts)
 
 
 def draw(
@@ -233,8 +244,10 @@ def _uniform_fields(
         return
     scale = LONGEST_FIELD * size / strongest
     right, up, eye = view.axes
-    points = np.concatenate([view.project(s.positions) for panel in panels for s in panel.solids])
-    left, middle = points[:, 0].min(), (points.min(axis=0) + points.max(axis=0)) / 2.0
+    solids = [solid for panel in panels for solid in panel.solids]
+    some = ([view.project(s.positions) for s in solids if s.around is around] for around in (False, True))
+    low, high = box_of(*some)
+    left, middle = low[0], (low + high) / 2.0
     for panel, group in zip(panels, groups, strict=True):
         fields = _distinct([s.flux_density for s in group if s.flux_density is not None])
         place = left - 0.07 * size
@@ -287,7 +300,7 @@ def _distinct(vectors: list[np.ndarray]) -> list[np.ndarray]:
 
 def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> list[tuple[str, str]]:
     """Arrows of the fields that vary in space, and what the legend says."""
-    points = [glyphs.halo(group, size) if group[-1].sources else np.zeros((0, 3)) for group in groups]
+    points = [glyphs.halo(group, size) if group[-1].has_sources else np.zeros((0, 3)) for group in groups]
     around, strong = glyphs.sources_glyphs([group[-1] for group in groups], points, size)
     for panel, chosen in zip(panels, around, strict=True):
         if chosen is not None:
@@ -297,23 +310,31 @@ def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> lis
 
 def _contacts(panels: list[Panel], groups: list[list[State]], size: float, options: Options):
     """Adds the forces of contacts, and returns what the legend says of them: nothing where nothing touches."""
-    of_groups = [[glyphs.contact_forces(state) for state in group] for group in groups]
-    strongest = max(
-        (
-            float(np.linalg.norm(each.forces, axis=1).max(initial=0.0))
-            for group in of_groups
-            for each in group
-        ),
-        default=0.0,
-    )
+    strongest = strongest_contact([state for group in groups for state in group])
     if strongest == 0.0:
         return []
-    for panel, group, found in zip(panels, groups, of_groups, strict=True):
-        for each, paleness in zip(found, _paleness(len(group), options), strict=True):
-            vectors = LONGEST_CONTACT * size / strongest * each.forces
-            drawn = arrows(each.places, vectors, 0.003 * size, colors.CONTACT, 0.5 * size)
-            panel.solids += _pale([drawn], paleness)
-    return [(f"contact force, up to {with_unit(strongest, 'N')}", colors.CONTACT)]
+    for panel, group in zip(panels, groups, strict=True):
+        for state, paleness in zip(group, _paleness(len(group), options), strict=True):
+            panel.solids += _pale([contact_solid(state, strongest, size)], paleness)
+    return [contacts_key(strongest)]
+
+
+def strongest_contact(states: list[State]) -> float:
+    """N, the largest force of contacts on a vertex."""
+    forces = [glyphs.contact_forces(state).forces for state in states]
+    return max((float(np.linalg.norm(each, axis=1).max(initial=0.0)) for each in forces), default=0.0)
+
+
+def contact_solid(state: State, strongest: float, size: float) -> Solid:
+    """The forces of contacts in a state as arrows."""
+    found = glyphs.contact_forces(state)
+    vectors = LONGEST_CONTACT * size / strongest * found.forces
+    return arrows(found.places, vectors, 0.003 * size, colors.CONTACT, 0.5 * size)
+
+
+def contacts_key(strongest: float) -> tuple[str, str]:
+    """What the legend says about arrows of contact forces."""
+    return f"contact force, up to {with_unit(strongest, 'N')}", colors.CONTACT
 
 
 def magnetization_key(strongest: float) -> tuple[str, str]:

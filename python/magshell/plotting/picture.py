@@ -1,4 +1,4 @@
-"""A finished picture: the panels in rows, and under them axes, scale bar, arrows' legend and colour bar."""
+"""A finished picture: the panels in rows, and under them the legend. Texts have their own room, and cross none."""
 
 from __future__ import annotations
 
@@ -11,18 +11,25 @@ import numpy as np
 
 from .._checks.scalars import positive
 from .._machine.files import replace_file
-from ..states.units import round_below
-from . import colors, polygons, vtk
-from .colors import Scalar, scale_colors
+from . import colors, legend, polygons, vtk
+from .legend import TEXT
 from .limits import check_pixels
 from .panels import Drawing, Label, Panel
+from .placing import NEAR, Box, Room, beside, places_around
+from .texts import Ruler
 
 DPI = 200
-LEGEND, TITLE, MARGIN = 0.72, 0.26, 0.08  # inches
+MARGIN = 0.08  # inches
+TITLE, TITLE_GAP, TITLE_LINES = (
+    0.26,
+    0.055,
+    3,
+)  # inches of a line and below it, which is part of it; lines at most
 FLATTEST, TALLEST = 0.16, 1.1  # of a panel's height to its width
-TEXT = 8.0  # points
-NARROWEST = 0.8  # inches, of a colour bar
-ENOUGH, NARROW = 6.2, 3.4  # inches that a legend with everything takes, and one without arrows or colours
+SPREAD, MOST_SPREAD = (
+    0.08,
+    12,
+)  # inches between the points that stand for what texts should not cover; a side of a face
 _WITHOUT_WINDOWS = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}  # of matplotlib's backends
 
 
@@ -87,12 +94,14 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: 
     count = len(drawing.panels)
     columns = columns or _best_columns(count, drawing.window)
     rows = -(-count // columns)
-    inches = width / dpi
-    window = _with_room(drawing, (inches - 2 * MARGIN) / columns)
+    inches, ruler = width / dpi, Ruler(dpi)
     panel_width = (inches - 2 * MARGIN) / columns
+    window = _with_room(drawing, panel_width, ruler)
     panel_height = panel_width * (window[3] - window[2]) / (window[1] - window[0])
-    title = TITLE if any(panel.title for panel in drawing.panels) else 0.0
-    height = rows * (panel_height + title) + LEGEND + 2 * MARGIN
+    scale = panel_width / (window[1] - window[0])
+    strip = legend.arranged(drawing, inches, scale, ruler)
+    title = _title_height(drawing, panel_width, ruler)
+    height = rows * (panel_height + title) + strip.height + 2 * MARGIN
     check_pixels(
         width,
         height * dpi,
@@ -107,9 +116,9 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: 
         bottom = height - MARGIN - (row + 1) * (panel_height + title)
         axes = figure.add_axes((left / inches, bottom / height, panel_width / inches, panel_height / height))
         with screen_of(axes, backend) as screen:
-            paint_panel(axes, panel, drawing, window, screen)
-    strip = figure.add_axes((0.0, 0.0, 1.0, LEGEND / height))
-    _legend(strip, drawing, inches, panel_width / (window[1] - window[0]))
+            paint_panel(axes, panel, drawing, window, screen, title, ruler)
+    axes = figure.add_axes((0.0, 0.0, 1.0, strip.height / height))
+    legend.write(axes, drawing, strip, inches, scale, ruler)
     return Picture(figure, backend)
 
 
@@ -127,8 +136,11 @@ def screen_of(axes, backend: str, samples: bool = True) -> Iterator[vtk.Screen |
         screen.close()
 
 
-def paint_panel(axes, panel: Panel, drawing: Drawing, window, screen: vtk.Screen | None) -> None:
-    """Into axes that have their place in the figure, by pyvista if there is a screen."""
+def paint_panel(
+    axes, panel: Panel, drawing: Drawing, window, screen: vtk.Screen | None, title: float, ruler: Ruler
+) -> None:
+    """Into axes that have their place in the figure, with so many inches for a title above them, by pyvista if there is a
+    screen."""
     axes.set_axis_off()
     axes.set_xlim(window[0], window[1])
     axes.set_ylim(window[2], window[3])
@@ -136,44 +148,89 @@ def paint_panel(axes, panel: Panel, drawing: Drawing, window, screen: vtk.Screen
         vtk.paint(axes, panel, drawing.view, window, screen)
     else:
         polygons.paint(axes, panel, drawing.view)
+    box = axes.get_window_extent()
+    size = np.array([box.width, box.height]) / axes.figure.dpi
     if panel.title:
-        axes.set_title(panel.title, fontsize=TEXT + 1, color=colors.OUTLINE, pad=4)
+        text, points = ruler.fitted(panel.title, TEXT + 1, size[0] - MARGIN, title - TITLE_GAP)
+        axes.set_title(text, fontsize=points, color=colors.OUTLINE, pad=72 * TITLE_GAP)
+    room = Room(
+        Box(np.zeros(2), size), _drawn(panel, drawing, window, size) if panel.labels else np.zeros((0, 2))
+    )
     for label in panel.labels:
-        _write(axes, label, drawing)
+        _write(axes, label, drawing, window, room, ruler)
 
 
-def _write(axes, label: Label, drawing: Drawing) -> None:
+def _drawn(panel: Panel, drawing: Drawing, window, size: np.ndarray) -> np.ndarray:
+    """Points (n, 2), inches in the panel, spread over the bodies and arrows in it."""
+    bodies = [each for each in panel.solids if len(each.faces) and not each.around]
+    corners = [drawing.view.project(each.positions)[each.faces][:, :, :2] for each in bodies]
+    if not corners:
+        return np.zeros((0, 2))
+    corners = (np.concatenate(corners) - window[::2]) / (window[1] - window[0]) * size[0]
+    longest = np.ptp(corners, axis=1).max()
+    count = int(np.clip(np.ceil(longest / SPREAD), 1, MOST_SPREAD))
+    shares = np.array([(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]) / count
+    return np.einsum("ks,fsi->fki", shares, corners).reshape(-1, 2)
+
+
+def title_height(axes) -> float:
+    """Inches that a title has above axes at the top of a figure."""
+    figure = axes.figure
+    return figure.get_size_inches()[1] - axes.get_window_extent().y1 / figure.dpi - MARGIN
+
+
+def _title_height(drawing: Drawing, panel_width: float, ruler: Ruler) -> float:
+    """Inches above each panel, for the title with the most lines."""
+    texts = [panel.title for panel in drawing.panels if panel.title]
+    if not texts:
+        return 0.0
+    lines = [ruler.broken(text, TEXT + 1, panel_width - MARGIN).count("\n") + 1 for text in texts]
+    return TITLE_GAP + min(max(lines), TITLE_LINES) * (TITLE - TITLE_GAP)
+
+
+def _write(axes, label: Label, drawing: Drawing, window, room: Room, ruler: Ruler) -> None:
+    """Beside its point, or where there is room for it, with a line to the point if that is farther off."""
     from matplotlib.patheffects import withStroke
 
+    area = room.area.high
+    point = (drawing.view.project(label.point)[:2] - window[::2]) / (window[1] - window[0]) * area[0]
+    if drawing.view.frame and ((point < 0) | (point > area)).any():
+        return  # what it is about is not seen
+    text, points = ruler.fitted(label.text, TEXT, area[0], area[1])
+    size = ruler.size(text, points)
+    found = room.take(size, places_around(point, size, label.towards))
+    if found is None:
+        return
+    corner, nearest = found.low - point, np.clip(point, found.low, found.high) - point
+    if np.linalg.norm(nearest) > 2 * NEAR:
+        ends = np.array([point, point + nearest]) / area
+        axes.plot(*ends.T, color=label.color, linewidth=0.5, alpha=0.6, transform=axes.transAxes)
     axes.annotate(
-        label.text,
-        drawing.view.project(label.point)[:2],
-        xytext=(4 * label.towards[0], 4 * label.towards[1]),
+        text,
+        tuple(point / area),
+        xycoords="axes fraction",
+        xytext=tuple(72 * corner),
         textcoords="offset points",
-        ha=_side(label.towards[0], "right", "left"),
-        va=_side(label.towards[1], "top", "bottom"),
-        fontsize=TEXT,
+        ha="left",
+        va="bottom",
+        fontsize=points,
         color=label.color,
         path_effects=[withStroke(linewidth=2.5, foreground="white")],
     )
 
 
-def _side(towards: float, behind: str, ahead: str) -> str:
-    return "center" if abs(towards) < 0.5 else ahead if towards > 0 else behind
-
-
-def _with_room(drawing: Drawing, inches: float) -> np.ndarray:
+def _with_room(drawing: Drawing, inches: float, ruler: Ruler) -> np.ndarray:
     """The window of a panel this wide, with room for its labels' text and of a bearable shape."""
     left, right, bottom, top = drawing.window
     for _ in range(2):  # the room for text is in inches, which the first pass finds the scale for
         scale = (right - left) / inches
-        for panel in drawing.panels:
+        for panel in [] if drawing.view.frame else drawing.panels:
             for label in panel.labels:
-                x, y, _depth = drawing.view.project(label.point)
-                long, high = scale * 0.075 * len(label.text), scale * 0.22
-                x, y = x + 0.5 * long * label.towards[0], y + 0.5 * high * label.towards[1]
-                left, right = min(left, x - long / 2), max(right, x + long / 2)
-                bottom, top = min(bottom, y - high / 2), max(top, y + high / 2)
+                point = drawing.view.project(label.point)[:2] / scale
+                size = np.minimum(ruler.size(label.text, TEXT), 0.6 * inches)
+                middle = beside(point, size, np.array(label.towards))
+                (x0, y0), (x1, y1) = scale * (middle - 0.55 * size), scale * (middle + 0.55 * size)
+                left, right, bottom, top = min(left, x0), max(right, x1), min(bottom, y0), max(top, y1)
     width, height = right - left, top - bottom
     extra = max(FLATTEST * width - height, 0.0) / 2
     bottom, top = bottom - extra, top + extra
@@ -191,98 +248,3 @@ def _best_columns(count: int, window: np.ndarray) -> int:
         return abs(np.log(columns * shape / rows / 2.0)) + 2.0 * (rows * columns / count - 1.0)
 
     return min(range(1, count + 1), key=cost)
-
-
-def _legend(axes, drawing: Drawing, inches: float, inches_per_meter: float) -> None:
-    """In inches: the axes' triad, the scale bar, the meaning of the arrows, the colour bar. All of it is smaller where the
-    picture is too narrow for them."""
-    full = drawing.arrows and drawing.scalar is not None
-    shrunk = min(1.0, inches / (ENOUGH if full else NARROW))
-    inches, inches_per_meter, text_size = inches / shrunk, inches_per_meter / shrunk, TEXT * shrunk
-    axes.set_axis_off()
-    _set_inches(axes, inches, shrunk)
-    _triad(axes, drawing, np.array([0.36, 0.32]), text_size)
-    bar = round_below(min(1.2, 0.2 * inches) / inches_per_meter)
-    x = 0.85
-    end = x + bar * inches_per_meter
-    axes.plot([x, end], [0.36, 0.36], color=colors.OUTLINE, linewidth=2.0, solid_capstyle="butt")
-    text = f"{round(bar / drawing.unit.meters, 9):g} {drawing.unit.name}"
-    axes.text((x + end) / 2, 0.28, text, ha="center", va="top", fontsize=text_size, color=colors.OUTLINE)
-    x = max(end, x + 0.5) + 0.35
-    for row, (text, color) in enumerate(drawing.arrows):
-        y = 0.36 + (0.11 - 0.22 * row if len(drawing.arrows) > 1 else 0.0)
-        axes.annotate(
-            "",
-            (x + 0.3, y),
-            (x, y),
-            arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0},
-        )
-        written = axes.text(
-            x + 0.38, y, text, ha="left", va="center", fontsize=text_size, color=colors.OUTLINE
-        )
-        end = max(end, written.get_window_extent().x1 / axes.figure.dpi / shrunk)
-    if drawing.scalar is not None:
-        _color_bar(axes, drawing.scalar, inches, inches - end - 0.45, text_size, shrunk)
-
-
-def _set_inches(axes, inches: float, shrunk: float) -> None:
-    axes.set_xlim(0.0, inches)
-    axes.set_ylim(0.0, LEGEND / shrunk)
-
-
-def _triad(axes, drawing: Drawing, origin: np.ndarray, text_size: float) -> None:
-    for name, tip in zip("xyz", 0.24 * drawing.view.axes[:2].T, strict=True):
-        if np.linalg.norm(tip) < 0.03:  # it points at the eye
-            continue
-        axes.annotate(
-            "",
-            origin + tip,
-            origin,
-            arrowprops={
-                "arrowstyle": "-|>",
-                "color": colors.OUTLINE,
-                "linewidth": 0.9,
-                "shrinkA": 0,
-                "shrinkB": 0,
-                "mutation_scale": 6,
-            },
-        )
-        place = origin + tip * (1 + 0.07 / np.linalg.norm(tip))
-        axes.text(*place, name, ha="center", va="center", fontsize=text_size - 1, color=colors.OUTLINE)
-
-
-def _color_bar(axes, scalar: Scalar, inches: float, room: float, text_size: float, shrunk: float) -> None:
-    """At the right end; room: inches that nothing else has, of which it takes what it needs to be read at least."""
-    from matplotlib.ticker import MaxNLocator
-
-    low, high = scalar.limits
-    width = max(min(2.4, 0.32 * inches, room), NARROWEST)
-    left, right = inches - width - 0.3, inches - 0.3
-    shades = scale_colors(scalar.scale, np.linspace(low, high, 256), (low, high))
-    axes.imshow(shades[None], extent=(left, right, 0.30, 0.42), aspect="auto", interpolation="bilinear")
-    _set_inches(axes, inches, shrunk)
-    ticks = [0, 90, 180, 270, 360] if scalar.scale == "cyclic" else MaxNLocator(4).tick_values(low, high)
-    for tick in ticks:
-        if low - 1e-9 * (high - low) <= tick <= high + 1e-9 * (high - low):
-            x = left + (tick - low) / (high - low) * width
-            axes.plot([x, x], [0.27, 0.30], color=colors.OUTLINE, linewidth=0.7)
-            axes.text(
-                x,
-                0.25,
-                f"{round(tick, 12):g}",
-                ha="center",
-                va="top",
-                fontsize=text_size - 1,
-                color=colors.OUTLINE,
-            )
-    label = axes.text(
-        (left + right) / 2,
-        0.47,
-        scalar.label,
-        ha="center",
-        va="bottom",
-        fontsize=text_size,
-        color=colors.OUTLINE,
-    )
-    if label.get_window_extent().x1 / axes.figure.dpi / shrunk > inches - 0.05:  # it is longer than the bar
-        label.set(x=inches - 0.05, ha="right")

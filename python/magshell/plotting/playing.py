@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._checks.scalars import positive
+from ..scene.courses import names_in_time, values_between
 from ..states.state import State
 from ..states.units import clock
 from .limits import check_frames
@@ -86,7 +87,36 @@ def state_at(states: list[State], moment: Moment) -> State:
         flux_density = between(start.flux_density, end.flux_density, moment.share)
     positions = between(start.positions, end.positions, moment.share)
     title = clock(max(abs(states[0].time), abs(states[-1].time)))(moment.time)
-    return replace(nearer, positions=positions, flux_density=flux_density, time=moment.time, title=title)
+    moved = {
+        name: tuple(_surfaces_between(getattr(start, name), getattr(end, name), moment.share))
+        for name in ("bones", "tendons", "shapes")
+    }
+    moved |= {
+        name: tuple(_moved(getattr(start, name), getattr(end, name), moment.share))
+        for name in ("fields", "obstacles")
+    }
+    return replace(
+        nearer, positions=positions, flux_density=flux_density, time=moment.time, title=title, **moved
+    )
+
+
+def _surfaces_between(starts, ends, share: float):
+    """Of two states of one body: points (n, 3) and faces each; those of the nearer state where they are others."""
+    if [len(points) for points, _ in starts] != [len(points) for points, _ in ends]:
+        return starts if share < 0.5 else ends
+    return [(between(a, b, share), faces) for (a, faces), (b, _) in zip(starts, ends, strict=True)]
+
+
+def _moved(starts, ends, share: float):
+    """Field sources or obstacles between two places; those of the nearer state where they are others."""
+    if [_form(each) for each in starts] != [_form(each) for each in ends]:
+        return starts if share < 0.5 else ends
+    pairs = zip(starts, ends, strict=True)
+    return [a if a is b else b.replaced(**values_between(a, b, share)) for a, b in pairs]
+
+
+def _form(each) -> tuple:
+    return type(each), *(np.shape(getattr(each, name)) for name in names_in_time(each))
 
 
 def between(start: np.ndarray, end: np.ndarray, share: float) -> np.ndarray:

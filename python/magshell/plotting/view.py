@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +13,39 @@ from ..states.state import State
 
 @dataclass(frozen=True)
 class View:
-    """Degrees: elevation above the xy-plane, azimuth of the eye from x towards y. z points up."""
+    """From where a picture is seen, and how much it shows: `view` of ms.plot, ms.animate and ms.write_page.
+
+    elevation, azimuth: degrees, of the eye above the xy-plane and from x towards y, as in matplotlib. z points up. A pair of
+    them is short for a View. frame: m, (2, 3), two opposite corners of a box that the window holds, and no more, so that
+    several pictures have one window, or show a part; by default all bodies.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> end = ms.View(30, -60, frame=[(0.08, 0, 0), (0.1, 0.02, 0.01)])
+    >>> ms.plot(mesh, view=end, width=800, style=ms.Style(backend="matplotlib"))
+    Picture(800 x 596 pixels, painted by matplotlib)
+    """
 
     elevation: float
     azimuth: float
+    frame: Any = None
+
+    def __post_init__(self):
+        for name in ("elevation", "azimuth"):
+            object.__setattr__(self, name, float(quantity(name, "degrees", getattr(self, name), ())))
+        if self.frame is None:
+            return
+        frame = quantity("frame", "m", self.frame, (2, 3))
+        object.__setattr__(self, "frame", tuple(map(tuple, frame.tolist())))
+        if not np.ptp(self.project(self.corners)[:, :2], axis=0).max() > 0.0:
+            raise ValueError("frame [m] must be two opposite corners of a box, got one place twice")
+
+    @property
+    def corners(self) -> np.ndarray | None:
+        """(8, 3) m, of the frame, or None."""
+        if self.frame is None:
+            return None
+        return np.stack(np.meshgrid(*np.transpose(self.frame), indexing="ij"), axis=-1).reshape(-1, 3)
 
     @property
     def axes(self) -> np.ndarray:
@@ -33,7 +63,9 @@ class View:
 
 
 def view_of(states: list[State], view) -> View:
-    """The view asked for as (elevation, azimuth), or one that suits the sheets."""
+    """The view asked for, a View or (elevation, azimuth), or one that suits the sheets."""
+    if isinstance(view, View):
+        return view
     if view is not None:
         return View(*quantity("view", "degrees", view, (2,)).tolist())
     return _default(np.concatenate([s.mesh.rest_positions for s in states]))

@@ -15,6 +15,7 @@ from ..bodies.joint import Joint
 from ..bodies.shell import Shell
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
+from ..surroundings.supports import Support
 
 _JUMPING = (AppliedField, Joint, Actuator, Shell)  # their values may change at once, others move
 
@@ -115,6 +116,17 @@ def row_in_time(owner, name: str) -> tuple[int, ...] | None:
 def changes_at_once(owner) -> bool:
     """Whether values of an object may jump during a motion; others move."""
     return isinstance(owner, _JUMPING)
+
+
+def values_between(before, after, share: float) -> dict[str, np.ndarray]:
+    """The values that may move of an object that is `before`, and then `after`, a share of the way: on straight lines."""
+    at = [each._move.as_arguments() if isinstance(each, Support) else vars(each) for each in (before, after)]
+    named = {}
+    for name in names_in_time(after):
+        ends = [np.zeros(3) if each[name] is None and name != "center" else each[name] for each in at]
+        if all(end is not None for end in ends):
+            named[name] = (1.0 - share) * ends[0] + share * ends[1]
+    return named
 
 
 def names_in_time(owner) -> tuple[str, ...]:

@@ -96,7 +96,7 @@ def write_series(
     if velocities is not None:
         row = (states[0].mesh.n_vertices, 3)
         more["vertex"]["velocity"] = quantity("velocities", "m/s", detached(velocities), (len(states), *row))
-    in_field = any(state.flux_density is not None or state.sources is not None for state in states)
+    in_field = any(state.flux_density is not None or state.has_sources for state in states)
     magnetized = any(state.is_magnetized for state in states)
     digits = len(str(len(states) - 1))
     names = [f"{path.stem}/{path.stem}_{k:0{digits}}.vtu" for k in range(len(states))]

@@ -18,7 +18,7 @@ from ..bodies.solid import Solid
 from ..bodies.solid_states import SolidStates
 from ..bodies.spans import magnetized_rows
 from ..dynamics.trajectory import Trajectory
-from ..fields.field import UniformField
+from ..fields.field import AppliedField, UniformField
 from ..mesh.face_shapes import sides
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.tet_mesh import TetMesh
@@ -27,6 +27,7 @@ from ..obstacles import Obstacle
 from ..scene.scene import Scene
 from ..statics.equilibria import Equilibria
 from ..statics.path import Path
+from .around import surroundings_of
 from .bones import bones_at_rest, bones_of, joined, mesh_of, shapes_at_rest, shapes_of
 from .contact_loads import ContactLoads, contact_loads
 from .magnets import surfaces_of
@@ -40,10 +41,10 @@ class State:
 
     positions: (n_v, 3), m. remanent_magnetization: (n_f, 3), A/m, at rest, or None.
     flux_density: (3,), T, the uniform field, or None without one.
-    sources: B(points (n, 3) [m]) -> (n, 3) [T] of the fields that vary in space, or None without any.
+    fields: those that vary in space, with their sources where they are; strength: the factor on them.
     title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
     bones, tendons: surfaces of links and of tendons inside, vertices (n, 3) m and faces (m, 3) each. shapes: of free rigid
-        parts, likewise. magnets: of the fields' magnets and wires.
+        parts, likewise.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
     loads: () -> ContactLoads of a result of a scene with contacts, or None without any.
     """
@@ -52,7 +53,8 @@ class State:
     positions: np.ndarray
     remanent_magnetization: np.ndarray | None = None
     flux_density: np.ndarray | None = None
-    sources: Callable[[np.ndarray], np.ndarray] | None = None
+    fields: tuple[AppliedField, ...] = ()
+    strength: float = 1.0
     title: str = ""
     time: float | None = None
     obstacles: tuple[Obstacle, ...] = ()
@@ -63,7 +65,6 @@ class State:
     tendons: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     loads: Callable[[], ContactLoads] | None = None
     shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
-    magnets: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     @property
     def contact_pressures(self) -> np.ndarray | None:
@@ -94,12 +95,28 @@ class State:
         """(n_f, 3), m."""
         return self.positions[self.mesh.faces].mean(axis=1)
 
+    @property
+    def has_sources(self) -> bool:
+        """Whether there is a field that varies in space."""
+        return bool(self.fields) and self.strength != 0.0
+
+    @property
+    def magnets(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Surfaces of the fields' magnets and wires, vertices (n, 3) m and faces (m, 3) each."""
+        return (
+            [surface for field in self.fields for surface in surfaces_of(field)] if self.has_sources else []
+        )
+
+    def sources(self, points: np.ndarray) -> np.ndarray:
+        """B, (n, 3), T, of the fields that vary in space at points (n, 3), m."""
+        return self.strength * np.sum([field.flux_density(points) for field in self.fields], axis=0)
+
     def flux_density_at(self, points: np.ndarray) -> np.ndarray:
         """All of B, (n, 3), T, at points (n, 3), m."""
         total = np.zeros_like(points)
         if self.flux_density is not None:
             total = total + self.flux_density
-        if self.sources is not None:
+        if self.has_sources:
             total = total + self.sources(points)
         return total
 
@@ -131,19 +148,23 @@ def states_of(
     if isinstance(what, Scene):
         bones, shapes = bones_at_rest(what), shapes_at_rest(what)
         if (bones or shapes) and not what.bodies:
-            return _states(mesh_of([*bones, *shapes]), _with_own(given, what), what.fields)
-        states = _states(what.mesh, _with_own(given, what), what.fields)
+            return _states(mesh_of([*bones, *shapes]), _with_own(given, what), [what.fields])
+        states = _states(what.mesh, _with_own(given, what), [what.fields])
         tendons = tuple(tendons_at_rest(what))
         return [replace(state, bones=tuple(bones), shapes=tuple(shapes), tendons=tendons) for state in states]
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
     if is_result and not isinstance(what, Equilibria):
         own = _held_by(what)
         merged = {name: own.get(name) if value is None else value for name, value in given.items()}
-        merged = _with_own(merged, what.scene, getattr(what, "_obstacles", None))
+        around = surroundings_of(what)
+        merged = _with_own(merged, what.scene, around.obstacles[0])
         mesh = what.scene.mesh
         if not what.scene.bodies and positions is None:
             mesh, merged["positions"] = _skeletons_alone(what)
-        states = _states(mesh, merged, _fields_of(what), own["strengths"], own["titles"])
+        states = _states(mesh, merged, around.fields, own["strengths"], own["titles"])
+        if obstacles is None and len(around.obstacles) == len(states):
+            pairs = zip(states, around.obstacles, strict=True)
+            states = [replace(state, obstacles=each) for state, each in pairs]
         states = _with_tendons(what, _with_bones(what, states, positions), positions)
         states = _with_elements(what, states, positions)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
@@ -158,12 +179,6 @@ def states_of(
         raise ValueError("there is nothing to draw: the list is empty")
     kinds = "a mesh, a Shell, a Solid, a Scene, a result, or a list of them"
     raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
-
-
-def _fields_of(result) -> tuple:
-    """As its solve had them; of a motion in which they move, where they are without."""
-    values = getattr(result, "_values", None)
-    return tuple(field if values is None else values.current(field) for field in result.scene.fields)
 
 
 def _with_bones(result, states: list[State], positions) -> list[State]:
@@ -265,17 +280,18 @@ def _field_factor(result) -> float:
 
 
 def _states(
-    mesh: TriangleMesh, given: dict[str, Any], fields=(), strengths=(1.0,), titles=("",)
+    mesh: TriangleMesh, given: dict[str, Any], fields=((),), strengths=(1.0,), titles=("",)
 ) -> list[State]:
+    """fields, strengths, titles: one a state, or one for all."""
     frames = _positions(mesh, given["positions"])
     count = len(frames)
     magnetization = _magnetization(mesh, given["remanent_magnetization"])
-    sources = [f for f in _listed(given["field"]) or fields if not isinstance(f, UniformField)]
-    magnets = tuple(surface for field in sources for surface in surfaces_of(field))
     flux_densities = _flux_densities(given["applied_flux_density"], count)
     obstacles = _obstacles(given["obstacles"])
-    strengths, titles = (
-        list(each) if len(each) == count else [each[0]] * count for each in (strengths, titles)
+    if own := _listed(given["field"]):
+        fields = [own]
+    fields, strengths, titles = (
+        list(each) if len(each) == count else [each[0]] * count for each in (fields, strengths, titles)
     )
     return [
         State(
@@ -283,12 +299,14 @@ def _states(
             frame,
             magnetization,
             flux,
-            _sum_of(sources, strength) if sources and strength else None,
+            tuple(each for each in sources if not isinstance(each, UniformField)),
+            strength,
             title,
             obstacles=obstacles,
-            magnets=magnets if strength else (),
         )
-        for frame, flux, strength, title in zip(frames, flux_densities, strengths, titles, strict=True)
+        for frame, flux, sources, strength, title in zip(
+            frames, flux_densities, fields, strengths, titles, strict=True
+        )
     ]
 
 
@@ -351,13 +369,6 @@ def _obstacles(values) -> tuple[Obstacle, ...]:
         if not isinstance(each, Obstacle):
             raise ValueError(f"obstacles must be obstacles of ms.obstacles, got a {type(each).__name__}")
     return listed
-
-
-def _sum_of(fields, strength: float) -> Callable[[np.ndarray], np.ndarray]:
-    def flux_density(points: np.ndarray) -> np.ndarray:
-        return strength * np.sum([field.flux_density(points) for field in fields], axis=0)
-
-    return flux_density
 
 
 def _listed(value) -> tuple:

@@ -6,7 +6,7 @@ import copy
 
 import numpy as np
 
-from ..scene.courses import names_in_time
+from ..scene.courses import names_in_time, values_between
 from ..scene.inputs import Inputs
 from ..scene.values import Values
 from ..surroundings.supports import Support
@@ -47,7 +47,7 @@ class AlongPath:
         there._now, there.replaced = dict(self._after._now), dict(self._after.replaced)
         for owner in self._owners.values():
             ends = [values.current(owner) for values in (self._before, self._after)]
-            named = _between(*ends, parameter)
+            named = values_between(*ends, parameter)
             there._now[owner] = ends[1].replaced(**named)
             there.replaced[owner] = {**there.replaced.get(owner, {}), **named}
         if any(isinstance(owner, Support) for owner in self._owners.values()):
@@ -79,14 +79,3 @@ def _keys_that_move(inputs: Inputs) -> dict[tuple[str, str], object]:
     for k, move in enumerate(scene._constraints.moves):
         can |= {(f"move {k}", name): move.support for name in names_in_time(move.support)}
     return can
-
-
-def _between(before, after, parameter: float) -> dict[str, np.ndarray]:
-    """The values of an object between two."""
-    at = [each._move.as_arguments() if isinstance(each, Support) else vars(each) for each in (before, after)]
-    named = {}
-    for name in names_in_time(after):
-        ends = [np.zeros(3) if each[name] is None and name != "center" else each[name] for each in at]
-        if all(end is not None for end in ends):
-            named[name] = (1.0 - parameter) * ends[0] + parameter * ends[1]
-    return named

@@ -97,11 +97,6 @@ class Equilibrium:
         return self._state
 
     @property
-    def _obstacles(self) -> tuple:
-        """Of the scene, where they were."""
-        return tuple(self._values.current(each) for each in self.scene.obstacles)
-
-    @property
     def energy(self) -> float:
         """The potential energy, J."""
         return sum(self.energies.values())

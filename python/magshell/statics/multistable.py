@@ -10,7 +10,7 @@ import numpy as np
 from .. import _core
 from .._checks.arrays import count
 from .._checks.scalars import flag, positive
-from .._machine.entry import solve_entry
+from .._machine.entry import grouped, solve_entry
 from .._machine.log import log
 from .._machine.progress import told
 from ..errors import Interrupted, NotConverged
@@ -33,6 +33,7 @@ _HARDLY_MOVED = 1e-3  # of the size: no displacement to go by
 _USUAL = 0.05  # of the size, then
 
 
+@grouped(solver=MixedNewton)
 @solve_entry
 def equilibria(
     scene: Scene,

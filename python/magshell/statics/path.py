@@ -12,7 +12,7 @@ import numpy as np
 from .. import _core
 from .._checks.arrays import count, number
 from .._checks.scalars import positive
-from .._machine.entry import solve_entry
+from .._machine.entry import grouped, solve_entry
 from .._machine.log import log
 from .._machine.progress import SolveBar
 from ..bodies.caps import warn_of_caps
@@ -175,6 +175,7 @@ class Path:
         return "\n".join(lines)
 
 
+@grouped(solver=MixedNewton)
 @solve_entry
 def follow(
     scene: Scene,

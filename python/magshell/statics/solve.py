@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._machine.entry import solve_entry
+from .._machine.entry import grouped, solve_entry
 from .._machine.progress import told
 from ..methods.solvers import MixedNewton, Newton
 from ..scene.scene import Scene
@@ -17,6 +17,7 @@ from .equilibrium import Equilibrium
 from .search import Search, find
 
 
+@grouped(solver=MixedNewton)
 @solve_entry
 def equilibrium(
     scene: Scene,

@@ -1,0 +1,21 @@
+// Numbers that the core has no more use for, as a numpy array that owns them: large ones are not copied.
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "bindings/bindings.h"
+
+namespace magshell::bindings {
+
+template <class Vector>
+py::array_t<typename Vector::value_type> given_away(Vector numbers) {
+    auto owned = std::make_unique<Vector>(std::move(numbers));
+    const auto size = static_cast<py::ssize_t>(owned->size());
+    const auto* data = owned->data();
+    const py::capsule owner(owned.get(), [](void* each) { delete static_cast<Vector*>(each); });
+    owned.release();
+    return py::array_t<typename Vector::value_type>(size, data, owner);
+}
+
+}  // namespace magshell::bindings

@@ -1,0 +1,19 @@
+// Places seen from the first of them: what is made of differences alone keeps its digits far from the origin, and a flat
+// face along the axes stays flat to the last bit.
+#pragma once
+
+#include <array>
+
+#include "magshell/energy/symmetric3.h"
+
+namespace magshell {
+
+template <int count>
+std::array<Pack3, count> from_first(const Pack3 x[count]) {
+    std::array<Pack3, count> seen;
+    seen[0] = {Pack(0.0), Pack(0.0), Pack(0.0)};
+    for (int a = 1; a < count; ++a) seen[a] = x[a] - x[0];
+    return seen;
+}
+
+}  // namespace magshell
