@@ -23,7 +23,7 @@ class View:
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     >>> end = ms.View(30, -60, frame=[(0.08, 0, 0), (0.1, 0.02, 0.01)])
     >>> ms.plot(mesh, view=end, width=800, style=ms.Style(backend="matplotlib"))
-    Picture(800 x 596 pixels, painted by matplotlib)
+    Picture(800 x 803 pixels, painted by matplotlib)
     """
 
     elevation: float
