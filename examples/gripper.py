@@ -45,23 +45,23 @@ def main(cell: float = 1.5e-3, iterations: int = 6, steps: int = 150) -> dict:
     """The design's and the motion's numbers, in SI units. cell: m, of the sheet's mesh."""
     gripper = Gripper(cell)
     found = designed(gripper, iterations)
+    to_print = printed(gripper, found["remanent_magnetization"], iterations)
     return {
         "gripper": gripper,
         "design": found,
+        "printed": to_print,
         "lift": closing_and_lift(gripper, found["remanent_magnetization"], steps),
+        "lift_printed": closing_and_lift(gripper, to_print.remanent_magnetization.numpy(), steps),
         "without": closing_and_lift(gripper, BEGIN * gripper.outwards, steps),
     }
 
 
 def designed(gripper: Gripper, iterations: int) -> dict:
     """The search; the objective is in mm2."""
-    wanted = torch.from_numpy(gripper.wrapped)
-    at_rest = ms.WarmStart(gripper.closing)
+    miss = Miss(gripper)
 
     def objective(share: torch.Tensor) -> torch.Tensor:
-        magnetization = {gripper.sheet: {"remanent_magnetization": LIMIT * share}}
-        shape = at_rest(applied_flux_density=FIELD, values=magnetization)
-        return 1e6 * ((shape.positions[: len(wanted)] - wanted) ** 2).sum(1).mean()
+        return miss(LIMIT * share)
 
     share = torch.from_numpy(BEGIN / LIMIT * gripper.outwards).requires_grad_()
     began = time.process_time()
@@ -78,6 +78,36 @@ def designed(gripper: Gripper, iterations: int) -> dict:
         "objective": best.objective,
         "seconds": time.process_time() - began,
     }
+
+
+def printed(gripper: Gripper, begin: np.ndarray, iterations: int) -> ms.PrintableMinimum:
+    """Every face in one of six directions, at full strength."""
+    miss = Miss(gripper)
+    ink = ms.Ink(LIMIT, np.vstack([np.eye(3), -np.eye(3)]), levels=(1,))
+    return ms.minimize_printable(
+        miss,
+        begin,
+        ink,
+        max_iterations=iterations,
+        blocks=6,
+        stage_iterations=4,
+        exchanges=0,
+        stateful=[miss.at_rest],
+        progress=False,
+    )
+
+
+class Miss:
+    """Mean squared distance from the wrapped shape, mm2, of a magnetization, (n_f, 3) A/m."""
+
+    def __init__(self, gripper: Gripper):
+        self.sheet, self.wanted = gripper.sheet, torch.from_numpy(gripper.wrapped)
+        self.at_rest = ms.WarmStart(gripper.closing)
+
+    def __call__(self, remanent_magnetization: torch.Tensor) -> torch.Tensor:
+        magnetization = {self.sheet: {"remanent_magnetization": remanent_magnetization}}
+        shape = self.at_rest(applied_flux_density=FIELD, values=magnetization)
+        return 1e6 * ((shape.positions[: len(self.wanted)] - self.wanted) ** 2).sum(1).mean()
 
 
 def plot(result: dict):
