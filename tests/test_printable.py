@@ -214,3 +214,33 @@ def test_what_was_found_is_handed_back(error, raised):
     assert isinstance(left, ms.PrintableMinimum)
     assert mixed(left.remanent_magnetization).item() == pytest.approx(left.objective)
     assert left.objective < mixed(torch.full((24, 3), 0.1, dtype=torch.float64)).item()
+
+
+def test_the_way_back_may_jump():
+    """An objective with a memory: once the first face points back, designs on the way there are refused; only its state
+    leads back. What it says at the end is said from where it is."""
+
+    class Memory:
+        def __init__(self):
+            self.side = 1.0
+
+        def state_dict(self):
+            return {"side": self.side}
+
+        def load_state_dict(self, state):
+            self.side = state["side"]
+
+        def __call__(self, m):
+            first = m[0, 0].item()
+            if self.side > 0 and first < -0.5:
+                self.side = -1.0
+            elif self.side < 0 and first > -0.5:
+                raise ms.EquilibriumJumped("it stays on its side")
+            return ((m - self.side * torch.tensor([0.6, 0, 0])) ** 2).sum() + 0.1 * (m[0, 0] + 0.45) ** 2
+
+    memory = Memory()
+    ink = ms.Ink(1.0, [(-1, 0, 0), (0, 1, 0)], levels=(1,))
+    start = np.tile((-0.1, 0.0, 0.0), (6, 1))
+    found = ms.minimize_printable(memory, start, ink, stateful=[memory], progress=False)
+    assert found.not_printable == 0
+    assert memory(found.remanent_magnetization).item() == pytest.approx(found.objective)

@@ -182,7 +182,7 @@ def printable(remanent_magnetization, ink, areas=None, sharpness=None):
 
     >>> import magshell as ms
     >>> ink = ms.Ink(5.0, directions=[(1, 0, 0), (-1, 0, 0)])
-    >>> float(ms.objectives.printable([(3.0, 4.0, 0)], ink))
+    >>> round(float(ms.objectives.printable([(3.0, 4.0, 0)], ink)), 9)
     0.64
     """
     torch = require_torch("objectives.printable")

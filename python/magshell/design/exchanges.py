@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ..errors import DesignRejected
@@ -14,17 +12,18 @@ _MEMORY = 0.8  # of the mean curvature, at each trial
 _SAME = 1e-12  # in squares of the strength
 
 
-def exchange(faces: PrintedFaces, sample: Callable, count: int, tell: Callable) -> float:
+def exchange(search, count: int) -> float:
     """Changes the face that promises most, `count` times, also where the objective rises for a while (a tabu search), and
     leaves the faces at the lowest design seen. Returns its objective.
 
-    sample: (objective, gradient (n_f, 3) by shares of the strength in world axes) of the faces. tell: called after each
-    trial.
+    search: has the faces, sample(): (objective, gradient (n_f, 3) by shares of the strength in world axes) of them, kept()
+    and back_to() for all that belongs to a design, and a bar.
 
     The objective is taken to be quadratic in each face, with one curvature for all: the mean of what the trials showed.
     """
-    value, gradient = sample()
-    lowest, best = value, faces.kept()
+    faces = search.faces
+    value, gradient = search.sample()
+    lowest, best = value, search.kept()
     resting = np.zeros(len(faces.held), dtype=int)  # until which trial
     rest = min(_RESTS, len(resting) // 4)
     curvature = None
@@ -39,7 +38,7 @@ def exchange(faces: PrintedFaces, sample: Callable, count: int, tell: Callable) 
             before, amount = faces.kept(), amounts[face, choice]
             faces.put(np.array([face]), np.array([choice // _levels(faces)]), amount)
             try:
-                found, gradient = sample()
+                found, gradient = search.sample()
             except DesignRejected:
                 faces.restore(before)
                 resting[face] = count
@@ -48,10 +47,10 @@ def exchange(faces: PrintedFaces, sample: Callable, count: int, tell: Callable) 
                 curvature = shown if curvature is None else _MEMORY * curvature + (1 - _MEMORY) * shown
                 resting[face], value = trial + 1 + rest, found
                 if value < lowest:
-                    lowest, best = value, faces.kept()
-            tell()
+                    lowest, best = value, search.kept()
+            search.bar.update()
     finally:
-        faces.restore(best)
+        search.back_to(best)
     return lowest
 
 

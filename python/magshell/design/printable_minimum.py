@@ -34,11 +34,9 @@ class PrintableMinimum:
     """What `minimize_printable` found.
 
     remanent_magnetization: (n_f, 3) A/m, a tensor of what can be printed. objective: of it.
-    directions: (n_f,) which of the ink's; shares: (n_f,) of the ink's strength, 0 to 1.
     free_objective: before anything was rounded, with any magnetization between the ink's. rounded_at_once: of that design
     with each face at the nearest that can be printed; None where that could not be evaluated.
-    distances: (n_f,) shares of the strength, how far each face is from what can be printed; round-off, but for a search
-    that was cut short. history: a PrintableStage each. reason: why it ended.
+    history: a PrintableStage each. reason: why it ended.
     """
 
     ink: Ink
@@ -51,6 +49,8 @@ class PrintableMinimum:
 
     @property
     def distances(self) -> np.ndarray:
+        """(n_f,) shares of the strength: how far each face is from what can be printed. Round-off, but for a search that was
+        cut short."""
         return self.ink.distances(self.remanent_magnetization.numpy())
 
     @property
@@ -60,10 +60,12 @@ class PrintableMinimum:
 
     @property
     def directions(self) -> np.ndarray:
+        """(n_f,) which of the ink's directions each face is printed with."""
         return self.ink.choices(self.remanent_magnetization.numpy())[0]
 
     @property
     def shares(self) -> np.ndarray:
+        """(n_f,) which share of the ink's strength each face is printed with."""
         return self.ink.choices(self.remanent_magnetization.numpy())[1]
 
     def __repr__(self) -> str:

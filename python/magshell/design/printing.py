@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable, Sequence
 
@@ -128,20 +129,21 @@ class _Search:
         self.offering = offering(objective, stateful)
         self.history: list[PrintableStage] = []
         self.evaluations, self.began = 0, time.perf_counter()
-        self.at_once: float | None = None
+        self.at_once: float | None = None  # of the free design, rounded
+        self.rounded: tuple = ()
         self.scale = 0.0  # of the pull, in units of the objective
 
     def free(self, iterations: int) -> None:
         self.relax("free", 0.0, iterations)
-        free, value, distance = self.faces.kept(), self.history[-1].objective, self.history[-1].distance
+        free, value, distance = self.kept(), self.history[-1].objective, self.history[-1].distance
         self.faces.hold(np.arange(len(self.faces.held)))
-        self.rounded = self.faces.kept()
         try:
             self.at_once = self.value()
+            self.rounded = self.kept()
         except DesignRejected as error:
             log.info("minimize_printable: rounded at once, the design cannot be evaluated: %s", error)
         finally:
-            self.faces.restore(free)
+            self.back_to(free)
         loss = abs(value) if self.at_once is None else max(self.at_once - value, 0.0)
         self.scale = loss / distance if distance > 0.0 else 0.0
 
@@ -161,12 +163,8 @@ class _Search:
             self.hold(self.faces.surest(size))
             self.relax("hold", 0.0, iterations)
         if self.at_once is not None and self.at_once < self.history[-1].objective:
-            kept = self.faces.kept()
-            self.faces.restore(self.rounded)
-            try:
-                self.relax("hold", 0.0, iterations)
-            except DesignRejected:
-                self.faces.restore(kept)
+            self.back_to(self.rounded)
+            self.relax("hold", 0.0, iterations)
 
     def hold(self, faces: np.ndarray) -> None:
         """As many of these as can be held without a jump; of a single one, the jump is taken."""
@@ -190,19 +188,22 @@ class _Search:
     def exchange(self, trials: int, iterations: int) -> None:
         if trials == 0:
             return
-        before, reached = self.faces.kept(), self.history[-1].objective
-        lowest = exchange(self.faces, self.sample, trials, self.bar.update)
+        before, reached = self.kept(), self.history[-1].objective
+        lowest = exchange(self, trials)
         if lowest < reached:
-            try:
-                self.relax("exchange", 0.0, iterations)
-            except DesignRejected as error:  # the way back to the lowest is another than that to it
-                log.info("minimize_printable: the exchanges are taken back: %s", error)
-            else:
-                if self.history[-1].objective < reached:
-                    return
-        self.faces.restore(before)
-        with jumps_accepted(self.offering):
-            self.note("exchange", 0.0, self.value())
+            self.relax("exchange", 0.0, iterations)
+            return
+        self.back_to(before)
+        self.note("exchange", 0.0, reached)
+
+    def kept(self) -> tuple:
+        """A design and the states that objects have at it: the way back to it need not be the way there."""
+        return self.faces.kept(), [copy.deepcopy(each.state_dict()) for each in self.stateful]
+
+    def back_to(self, kept: tuple) -> None:
+        self.faces.restore(kept[0])
+        for each, state in zip(self.stateful, kept[1], strict=True):
+            each.load_state_dict(copy.deepcopy(state))
 
     def relax(self, name: str, weight: float, iterations: int) -> None:
         """Optimizes what is free, with a pull of this weight."""
@@ -268,17 +269,19 @@ class _Search:
         return answer.objective
 
     def value(self) -> float:
+        from ..optim.sample import Trial  # late, as torch is
+
         torch = require_torch("minimize_printable")
-        with torch.no_grad():
-            return float(self.evaluate(torch.from_numpy(self.faces.magnetization)))
+        return Trial(lambda: self.evaluate(torch.from_numpy(self.faces.magnetization)), []).objective
 
     def sample(self) -> tuple[float, np.ndarray]:
         """The objective, and its gradient by shares of the strength in world axes, (n_f, 3)."""
+        from ..optim.sample import Trial
+
         torch = require_torch("minimize_printable")
         magnetization = torch.from_numpy(self.faces.magnetization).requires_grad_()
-        value = self.evaluate(magnetization)
-        (gradient,) = torch.autograd.grad(value, magnetization)
-        return float(value.detach()), self.faces.ink.strength * gradient.numpy()
+        found = Trial(lambda: self.evaluate(magnetization), [magnetization]).differentiate()
+        return found.objective, self.faces.ink.strength * found.gradient.reshape(-1, 3)
 
     def result(self, reason: str) -> PrintableMinimum | None:
         """What there is; None before there is a design."""
