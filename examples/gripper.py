@@ -11,7 +11,7 @@ What comes out:
 
 - The search comes from 1.04 to 0.13 mm rms in 6 iterations and 3.5 s of processor time, for 288 faces.
 - A printer that knows six directions and one strength does as well: from that design, with every face fully magnetized along
-  an axis, ms.minimize_printable comes to 0.12 mm in 66 evaluations. Rounded at once it would be 0.18. It lifts the ball, too.
+  an axis, ms.minimize_printable comes to 0.12 mm in 66 evaluations; rounded at once it would be 0.18. It lifts the ball.
 - The sheet's middle rises by 20 mm and the ball by 19.8. With the magnetization that the search began with, which is
   along the arms everywhere, they hang straight down and the ball stays where it is.
 - Sheet and ball press on each other with 23 mN at most; the ball weighs about 4. They never come nearer than 0.298 mm, where
@@ -120,7 +120,7 @@ def plot(result: dict):
     grid = figure.add_gridspec(2, 3, height_ratios=(0.8, 1))
     draw_lift(figure.add_subplot(grid[0, :]), result)
     draw_design(figure.add_subplot(grid[1, 0]), result)
-    draw_convergence(figure.add_subplot(grid[1, 1]), result["design"])
+    draw_convergence(figure.add_subplot(grid[1, 1]), result)
     draw_motion(figure.add_subplot(grid[1, 2]), result)
     for axes in figure.axes[-2:]:
         axes.spines[["top", "right"]].set_visible(False)

@@ -49,8 +49,10 @@ def draw_design(axes, result: dict) -> None:
     paste(axes, picture)
 
 
-def draw_convergence(axes, design: dict) -> None:
-    axes.plot(np.sqrt(design["history"]), "o-", color=BLUE)
+def draw_convergence(axes, result: dict) -> None:
+    axes.plot(np.sqrt(result["design"]["history"]), "o-", color=BLUE)
+    axes.axhline(result["printed"].objective ** 0.5, ls="--", color=GREEN, label="printed, six directions")
+    axes.legend(frameon=False, loc="upper right", fontsize=8)
     axes.set(xlabel="iteration", ylabel="rms distance from the wrapped shape [mm]", ylim=(0, None))
 
 

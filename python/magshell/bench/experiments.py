@@ -202,7 +202,9 @@ def beside_ours(method: str, task: dict) -> str:
 
 def _needed(best: list[float], goal: float | None) -> int:
     """Simulations until the goal, or else until near what came out at last."""
-    return len(best) if goal else 1 + next(k for k, value in enumerate(best) if value <= (1 + NEAR) * best[-1])
+    return (
+        len(best) if goal else 1 + next(k for k, value in enumerate(best) if value <= (1 + NEAR) * best[-1])
+    )
 
 
 def _number(value: float) -> str:

@@ -16,7 +16,9 @@ class Task:
     name: str
     unknowns: int
     goal: float | None = None
-    squared = False  # differentiable is: a distance has a kink at its goal, which models of curvature do not know
+    squared = (
+        False  # differentiable is: a distance has a kink at its goal, which models of curvature do not know
+    )
     learned = (
         False  # whether it is an environment too: then with `actions` an episode, `environment` and `lost`
     )
