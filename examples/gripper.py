@@ -9,11 +9,13 @@ only friction and the arms below its equator hold the ball.
 
 What comes out:
 
-- The search comes from 1.38 to 0.41 mm rms in 6 iterations and 3.4 s of processor time, for 288 faces.
-- The sheet's middle rises by 20 mm and the ball by 19.9. With the magnetization that the search began with, which is
+- The search comes from 1.04 to 0.13 mm rms in 6 iterations and 3.5 s of processor time, for 288 faces.
+- A printer that knows six directions and one strength does as well: from that design, with every face fully magnetized along
+  an axis, ms.minimize_printable comes to 0.12 mm in 66 evaluations; rounded at once it would be 0.18. It lifts the ball.
+- The sheet's middle rises by 20 mm and the ball by 19.8. With the magnetization that the search began with, which is
   along the arms everywhere, they hang straight down and the ball stays where it is.
-- Sheet and ball press on each other with 21 mN at most; the ball weighs about 4. They never come nearer than 0.298 mm, where
-  0.25, half the thickness, is what always stays between them. A step takes 12 ms of processor time, and 1.7 times that with
+- Sheet and ball press on each other with 23 mN at most; the ball weighs about 4. They never come nearer than 0.298 mm, where
+  0.25, half the thickness, is what always stays between them. A step takes 13 ms of processor time, and 1.7 times that with
   the contact of the arms with each other.
 - The magnetization found is largest next to the middle.
 - The arms cannot pass through each other: the sheet has an ms.SelfContact. These do not meet; arms of 18 mm whose ends
@@ -45,23 +47,23 @@ def main(cell: float = 1.5e-3, iterations: int = 6, steps: int = 150) -> dict:
     """The design's and the motion's numbers, in SI units. cell: m, of the sheet's mesh."""
     gripper = Gripper(cell)
     found = designed(gripper, iterations)
+    to_print = printed(gripper, found["remanent_magnetization"], iterations)
     return {
         "gripper": gripper,
         "design": found,
+        "printed": to_print,
         "lift": closing_and_lift(gripper, found["remanent_magnetization"], steps),
+        "lift_printed": closing_and_lift(gripper, to_print.remanent_magnetization.numpy(), steps),
         "without": closing_and_lift(gripper, BEGIN * gripper.outwards, steps),
     }
 
 
 def designed(gripper: Gripper, iterations: int) -> dict:
     """The search; the objective is in mm2."""
-    wanted = torch.from_numpy(gripper.wrapped)
-    at_rest = ms.WarmStart(gripper.closing)
+    miss = Miss(gripper)
 
     def objective(share: torch.Tensor) -> torch.Tensor:
-        magnetization = {gripper.sheet: {"remanent_magnetization": LIMIT * share}}
-        shape = at_rest(applied_flux_density=FIELD, values=magnetization)
-        return 1e6 * ((shape.positions[: len(wanted)] - wanted) ** 2).sum(1).mean()
+        return miss(LIMIT * share)
 
     share = torch.from_numpy(BEGIN / LIMIT * gripper.outwards).requires_grad_()
     began = time.process_time()
@@ -80,6 +82,36 @@ def designed(gripper: Gripper, iterations: int) -> dict:
     }
 
 
+def printed(gripper: Gripper, begin: np.ndarray, iterations: int) -> ms.PrintableMinimum:
+    """Every face in one of six directions, at full strength."""
+    miss = Miss(gripper)
+    ink = ms.Ink(LIMIT, np.vstack([np.eye(3), -np.eye(3)]), levels=(1,))
+    return ms.minimize_printable(
+        miss,
+        begin,
+        ink,
+        max_iterations=iterations,
+        blocks=6,
+        stage_iterations=4,
+        exchanges=0,
+        stateful=[miss.at_rest],
+        progress=False,
+    )
+
+
+class Miss:
+    """Mean squared distance from the wrapped shape, mm2, of a magnetization, (n_f, 3) A/m."""
+
+    def __init__(self, gripper: Gripper):
+        self.sheet, self.wanted = gripper.sheet, torch.from_numpy(gripper.wrapped)
+        self.at_rest = ms.WarmStart(gripper.closing)
+
+    def __call__(self, remanent_magnetization: torch.Tensor) -> torch.Tensor:
+        magnetization = {self.sheet: {"remanent_magnetization": remanent_magnetization}}
+        shape = self.at_rest(applied_flux_density=FIELD, values=magnetization)
+        return 1e6 * ((shape.positions[: len(self.wanted)] - self.wanted) ** 2).sum(1).mean()
+
+
 def plot(result: dict):
     """The magnetization found, the search, the arms closing and lifting, and the heights of ball and sheet."""
     from matplotlib import pyplot as plt
@@ -88,7 +120,7 @@ def plot(result: dict):
     grid = figure.add_gridspec(2, 3, height_ratios=(0.8, 1))
     draw_lift(figure.add_subplot(grid[0, :]), result)
     draw_design(figure.add_subplot(grid[1, 0]), result)
-    draw_convergence(figure.add_subplot(grid[1, 1]), result["design"])
+    draw_convergence(figure.add_subplot(grid[1, 1]), result)
     draw_motion(figure.add_subplot(grid[1, 2]), result)
     for axes in figure.axes[-2:]:
         axes.spines[["top", "right"]].set_visible(False)

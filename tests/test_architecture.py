@@ -39,6 +39,7 @@ ROOMS = [
     "errors",
     "_machine",
     "_checks",
+    "ink",
     "objectives",
     "parametrize",
     "mesh",

@@ -23,7 +23,11 @@ OF_OTHER_NAMES = {  # what the message calls them
     "index": "range indices",
     "count": "the number of threads|count",
 }
-NOT_NUMBERS = {("multistart", "starts"), ("Path.equilibrium", "index")}  # anything; Python's own indices
+NOT_NUMBERS = {  # anything; Python's own indices; a truth as well as a count
+    ("multistart", "starts"),
+    ("Path.equilibrium", "index"),
+    ("Style", "arrows"),
+}
 SLOW = 30  # pictures and films
 
 

@@ -21,16 +21,29 @@ def test_the_search_closes_the_arms(result, example) -> None:
     assert np.abs(design["remanent_magnetization"]).max() <= example.LIMIT
 
 
+def test_six_printable_directions_meet_the_target(example, result) -> None:
+    """Rounded, to 0.3 mm: every face fully magnetized along an axis."""
+    printed = result["printed"]
+    assert printed.objective**0.5 < 0.3  # mm rms
+    assert printed.not_printable == 0
+    m = np.sort(np.abs(printed.remanent_magnetization.numpy()), axis=1)
+    np.testing.assert_allclose(m, np.tile([0, 0, example.LIMIT], (len(m), 1)), atol=1e-6)
+    again = example.Miss(result["gripper"])(printed.remanent_magnetization)  # from the rest shape
+    assert again.item() ** 0.5 < 0.3
+
+
 def test_ball_is_lifted_by_what_was_found_only(result) -> None:
     raised = {
-        name: result[name]["ball_height"][-1] - result[name]["ball_height"][0] for name in ("lift", "without")
+        name: result[name]["ball_height"][-1] - result[name]["ball_height"][0]
+        for name in ("lift", "lift_printed", "without")
     }
     assert raised["lift"] > 18e-3
+    assert raised["lift_printed"] > 18e-3
     assert raised["without"] < 1e-3
 
 
 def test_nothing_passes(result) -> None:
-    for name in ("lift", "without"):
+    for name in ("lift", "lift_printed", "without"):
         assert result[name]["crossings"] == 0
         assert result[name]["gaps"].min() > result[name]["least_gap"]
     assert result["lift"]["forces"].max() > 4.3e-3  # N: more than the ball's weight

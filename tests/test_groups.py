@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
+from magshell.plotting.view import view_of
 
 pytest.importorskip("matplotlib")
 
@@ -39,9 +40,9 @@ def limits(picture) -> np.ndarray:
         ),
         (
             lambda: ms.simulate(SCENE, steps=1, timestep=1e-3),
-            "no keyword 'timestep'; most like it are: time_step,",
+            "no keyword 'timestep'; it has, most like it first: time_step,",
         ),
-        (lambda: ms.plot(MESH, colour=None), "no keyword 'colour'; most like it are: color,"),
+        (lambda: ms.plot(MESH, colour=None), "no keyword 'colour'; it has, most like it first: color,"),
     ],
 )
 def test_a_keyword_that_is_elsewhere_is_told_where(call, words):
@@ -79,6 +80,35 @@ def test_pictures_with_one_frame_have_one_window():
     np.testing.assert_array_equal(limits(low), limits(high))
     own = [limits(ms.plot(MESH, positions=each, view=(20, -60), width=500, style=PLAIN)) for each in LIFTED]
     assert np.abs(own[1] - own[0]).max() > 0.01
+
+
+@pytest.mark.parametrize("name, right, up", [("top", 0, 1), ("front", 0, 2), ("side", 1, 2)])
+def test_usual_views_have_names(name, right, up):
+    """The axes of the world that go to the right and upwards."""
+    axes = view_of([], name).axes
+    np.testing.assert_allclose(axes[:2], np.eye(3)[[right, up]], atol=1e-12)
+    with pytest.raises(ValueError, match="'top', 'front', 'side', got 'above'"):
+        ms.plot(MESH, view="above", style=PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (
+            lambda: ms.Shell(MESH, thickness=1e-3, modulus=1e6),
+            r"Shell\(\) has no keyword 'modulus'; .*first: young_modulus",
+        ),
+        (lambda: ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, density=1e3), "first: mass_density"),
+        (lambda: ms.Scene(SHEET, support=[]), r"Scene\(\) has no keyword 'support'; .*first: supports"),
+        (
+            lambda: ms.meshes.rectangle(0.1, 0.1, cell=(2, 2)),
+            "rectangle.* has no keyword 'cell'; .*first: cells",
+        ),
+    ],
+)
+def test_a_keyword_that_is_misspelt_is_told_the_nearest(call, words):
+    with pytest.raises(TypeError, match=words):
+        call()
 
 
 def test_a_frame_shows_a_part(tmp_path):

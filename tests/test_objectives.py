@@ -17,7 +17,8 @@ AMPLITUDE = torch.randn(6, dtype=torch.float64)
 EDGE_FACES = np.array([[0, 1], [1, 2], [3, -1], [2, 5], [-1, 4]], dtype=np.int32)
 IMAGE = torch.rand(4, 5, dtype=torch.float64)
 REST = torch.rand(6, 3, dtype=torch.float64)
-DIRECTIONS = np.array([[1.0, 0, 0], [0, 2.0, 0], [-1.0, 0, 0], [0, 0, 1.0]])
+INK = ms.Ink(2.0, [[1.0, 0, 0], [0, 2.0, 0], [-1.0, 0, 0], [0, 0, 1.0]])
+TWO_LEVELS = ms.Ink(2.0, INK.directions, levels=(0.5, 1.0))
 
 
 @pytest.mark.parametrize(
@@ -39,8 +40,9 @@ DIRECTIONS = np.array([[1.0, 0, 0], [0, 2.0, 0], [-1.0, 0, 0], [0, 0, 1.0]])
         (lambda y: objectives.total_variation(y, EDGE_FACES), AMPLITUDE),
         (lambda m: objectives.cap(m, 0.8), VECTORS),
         (lambda m: objectives.cap(m, 0.8, sharpness=8), VECTORS),
-        (lambda m: objectives.printable(m, DIRECTIONS), VECTORS),
-        (lambda m: objectives.printable(m, DIRECTIONS, sharpness=3.0), VECTORS),
+        (lambda m: objectives.printable(m, INK), VECTORS),
+        (lambda m: objectives.printable(m, INK, areas=REST[:, 0], sharpness=3.0), VECTORS),
+        (lambda m: objectives.printable(m, TWO_LEVELS), VECTORS),
         (lambda v: parametrize.from_regions(v, [0, 2, 2, 1]), VECTORS[:3]),
         (lambda a: parametrize.along(a, VECTORS), AMPLITUDE),
         (lambda s: parametrize.log_scaled(s, 1.0, 100.0), AMPLITUDE.sigmoid()),
@@ -58,7 +60,7 @@ def test_derivatives(function, at):
     [
         lambda m: objectives.total_variation(m, EDGE_FACES),
         lambda m: objectives.cap(m, 1e5, sharpness=8).sum(),
-        lambda m: objectives.printable(m, DIRECTIONS),
+        lambda m: objectives.printable(m, INK),
         lambda m: objectives.magnitude(m),
         lambda m: parametrize.capped(m, 1e5).sum(),
         lambda m: parametrize.project_to_cap(m, 1e5).sum(),
@@ -154,11 +156,6 @@ def test_cap_and_its_aggregate():
     assert (parametrize.capped(1e3 * m, 4e5).norm(dim=1) <= 4e5).all()
 
 
-def test_printable_measures_to_the_nearest_ray():
-    m = torch.tensor([[3.0, 4.0, 0.0], [0.0, 0.0, -2.0], [-5.0, 0.0, 0.0]], dtype=torch.float64)
-    assert objectives.printable(m, DIRECTIONS).item() == pytest.approx(9 + 4 + 0)
-
-
 def test_parametrisations():
     assert parametrize.from_regions(torch.tensor([1.0, 5.0]), [1, 0, 1]).tolist() == [5, 1, 5]
     unsigned = np.array([1, 0, 1], dtype=np.uint64)
@@ -185,7 +182,8 @@ def test_parametrisations():
         (lambda: objectives.total_variation(VECTORS, EDGE_FACES, smoothing=0), "smoothing"),
         (lambda: objectives.cap(VECTORS, -1.0), "limit"),
         (lambda: objectives.cap(VECTORS, 1.0, sharpness=1), "sharpness"),
-        (lambda: objectives.printable(VECTORS, [[0.0, 0, 0]]), "directions must not be zero"),
+        (lambda: objectives.printable(VECTORS, [[1.0, 0, 0]]), "ink must be an ms.Ink, got list"),
+        (lambda: objectives.printable(VECTORS, INK, areas=np.zeros(6)), "areas must not be negative"),
         (lambda: parametrize.from_regions(VECTORS, [0, 6]), "regions must lie in 0 ... 5"),
         (lambda: parametrize.along(AMPLITUDE, VECTORS[:2]), "directions must have shape"),
         (lambda: parametrize.log_scaled(AMPLITUDE, 0.0, 1.0), "positive and in order"),

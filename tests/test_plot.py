@@ -1,8 +1,6 @@
 """Pictures hold what they should, on either backend; bad input is refused with a reason."""
 
-import importlib.util
 import io
-import sys
 
 import numpy as np
 import pytest
@@ -373,44 +371,3 @@ def test_a_picture_goes_to_a_png_in_a_folder_that_exists(mesh, tmp_path) -> None
         picture.save(tmp_path / "a.jpg")
     with pytest.raises(RuntimeError, match="no display"):
         picture.show()
-
-
-# Choosing a backend
-
-
-def test_the_environment_chooses(mesh, monkeypatch) -> None:
-    monkeypatch.setenv(backends.VARIABLE, "matplotlib")
-    assert ms.plot(mesh, width=400).backend == "matplotlib"
-    monkeypatch.setenv(backends.VARIABLE, "gnuplot")
-    with pytest.raises(ValueError, match="environment variable MAGSHELL_PLOT must be"):
-        ms.plot(mesh)
-
-
-@pytest.mark.parametrize(
-    ("program", "reason"),
-    [
-        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "died of signal 11"),
-        ("print('blank')", "came out blank"),
-        ("raise RuntimeError('no GL')", "RuntimeError: no GL"),
-    ],
-)
-def test_a_driver_that_fails_leaves_matplotlib(monkeypatch, program, reason) -> None:
-    if importlib.util.find_spec("pyvista") is None:
-        pytest.skip("pyvista is not installed")
-    monkeypatch.delenv(backends.VARIABLE, raising=False)
-    monkeypatch.setattr(backends, "_PROBE", program)
-    backends.why_not_pyvista.cache_clear()
-    try:
-        assert backends.choose() == "matplotlib"
-        with pytest.raises(RuntimeError, match=reason):
-            backends.choose("pyvista")
-    finally:
-        backends.why_not_pyvista.cache_clear()
-
-
-@pytest.mark.parametrize("backend", [None, "matplotlib", "pyvista"])
-def test_without_a_library_the_extra_is_named(mesh, monkeypatch, backend) -> None:
-    """However it is missing: not installed, or installed without what it needs itself."""
-    monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
-    with pytest.raises(ImportError, match=r'pip install "magshell\[plot\]"'):
-        ms.plot(mesh, style=ms.Style(backend=backend))

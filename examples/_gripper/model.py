@@ -45,7 +45,7 @@ class Gripper:
             mass_density=5e2,
             element="linear",
         )
-        self.held_edges = self.mesh.edges_where(lambda x: np.abs(x[:, :2]).max(axis=1) < 0.8 * HALF_WIDTH)
+        self.held_edges = self.mesh.edges_where(lambda x: np.abs(x[:, :2]).max(axis=1) < 0.6 * HALF_WIDTH)
 
     @cached_property
     def outwards(self) -> np.ndarray:

@@ -11,7 +11,7 @@ import magshell as ms
 
 from .lift import CLOSED, END, RISE
 
-BLUE, RED, GREY = "#20639b", "#c8442d", "#777777"
+BLUE, RED, GREEN, GREY = "#20639b", "#c8442d", "#3c8d5a", "#777777"
 VIEW = (10, -70)
 
 
@@ -49,17 +49,25 @@ def draw_design(axes, result: dict) -> None:
     paste(axes, picture)
 
 
-def draw_convergence(axes, design: dict) -> None:
-    axes.plot(np.sqrt(design["history"]), "o-", color=BLUE)
+def draw_convergence(axes, result: dict) -> None:
+    axes.plot(np.sqrt(result["design"]["history"]), "o-", color=BLUE)
+    axes.axhline(result["printed"].objective ** 0.5, ls="--", color=GREEN, label="printed, six directions")
+    axes.legend(frameon=False, loc="upper right", fontsize=8)
     axes.set(xlabel="iteration", ylabel="rms distance from the wrapped shape [mm]", ylim=(0, None))
 
 
 def draw_motion(axes, result: dict) -> None:
-    for name, color, label in (("lift", BLUE, "ball, found"), ("without", RED, "ball, start of the search")):
+    curves = (
+        ("lift", BLUE, "-", "ball, found"),
+        ("lift_printed", GREEN, "--", "ball, printed"),
+        ("without", RED, "-", "ball, start of the search"),
+    )
+    for name, color, style, label in curves:
         each = result[name]
         axes.plot(
             each["motion"].times,
             1e3 * (each["ball_height"] - each["ball_height"][0]),
+            style,
             color=color,
             label=label,
         )
@@ -81,17 +89,27 @@ def movie(lift: dict, path: Path, **options) -> Path:
 
 
 def summary(result: dict) -> str:
-    design, lift, without = (result[name] for name in ("design", "lift", "without"))
-    raised = [1e3 * (each["ball_height"][-1] - each["ball_height"][0]) for each in (lift, without)]
+    design, printed, lift, without = (result[name] for name in ("design", "printed", "lift", "without"))
+    raised = [
+        1e3 * (each["ball_height"][-1] - each["ball_height"][0])
+        for each in (lift, result["lift_printed"], without)
+    ]
     return "\n".join(
         [
             f"A gripper of {result['gripper'].mesh.n_faces} faces",
             f"  rms distance from the wrapped shape: {design['history'][0] ** 0.5:.2f} mm at first, "
             f"{design['objective'] ** 0.5:.2f} mm after {len(design['history']) - 1} iterations, {design['seconds']:.1f} s",
-            f"  the ball is raised by {raised[0]:.1f} mm; with the magnetization that the search began with by "
-            f"{raised[1]:.1f}",
+            f"  with every face in one of six directions, at full strength: {printed.objective**0.5:.2f} mm; rounded at "
+            f"once {_millimeters(printed.rounded_at_once)}; {printed.not_printable} faces cannot be printed",
+            f"  the ball is raised by {raised[0]:.1f} mm, by {raised[1]:.1f} with what is printed; with the magnetization "
+            f"that the search began with by {raised[2]:.1f}",
             f"  contact: {1e3 * lift['forces'].max():.0f} mN at most, {1e3 * lift['gaps'].min():.3f} mm apart at least "
             f"(least {1e3 * lift['least_gap']:.3f}); {lift['crossings']} faces pass; "
             f"{1e3 * lift['seconds'] / len(lift['motion']):.0f} ms a step",
         ]
     )
+
+
+def _millimeters(square: float | None) -> str:
+    """Of an objective, mm2, that may not have been there."""
+    return "nothing" if square is None else f"{square**0.5:.2f} mm"

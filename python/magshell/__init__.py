@@ -25,6 +25,8 @@ from .bodies.strains import Strains
 from .bodies.ties import Tie
 from .design.minimize import minimize
 from .design.minimum import Minimum
+from .design.printable_minimum import PrintableMinimum, PrintableStage
+from .design.printing import minimize_printable
 from .dynamics.simulate import simulate
 from .dynamics.trajectory import MotionState, Trajectory
 from .errors import (
@@ -42,6 +44,7 @@ from .fields.adapters import CustomField, MagpylibField
 from .fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .fields.magnets import CuboidMagnet, CylinderMagnet
 from .fields.placed import PlacedField
+from .ink import Ink
 from .linear.buckling import Buckling, linear_buckling
 from .linear.response import LinearResponse, linear_response
 from .linear.vibration import VibrationModes, vibration_modes
@@ -117,6 +120,7 @@ __all__ = [
     "Fixed",
     "Guccione",
     "ImplicitEuler",
+    "Ink",
     "Interrupted",
     "Joint",
     "JointResult",
@@ -144,6 +148,8 @@ __all__ = [
     "PlacedField",
     "PointLoad",
     "Pressure",
+    "PrintableMinimum",
+    "PrintableStage",
     "Prismatic",
     "Projective",
     "ProjectiveDynamics",
@@ -192,6 +198,7 @@ __all__ = [
     "load",
     "meshes",
     "minimize",
+    "minimize_printable",
     "multistart",
     "num_threads",
     "objectives",

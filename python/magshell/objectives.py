@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from ._checks.quantity import quantity
 from ._checks.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
+from .ink import Ink
 
 
 def shape_matching(positions, target, vertices=None, weights=None):
@@ -170,32 +171,37 @@ def cap(remanent_magnetization, limit, sharpness=None):
     return (largest * powers ** (1 / sharpness) - 1)[None]
 
 
-def printable(remanent_magnetization, directions, sharpness=None):
-    """Sum of squared distances of magnetizations from their nearest printable ray [A2/m2].
+def printable(remanent_magnetization, ink, areas=None, sharpness=None):
+    """Mean squared distance of magnetizations from what an ink can print, over the square of its strength: 0 where all
+    can be printed, 1 where none is magnetized and all must be fully.
 
-    remanent_magnetization: (n_f, 3) A/m. directions: (k, 3), of any length but zero; no magnetization at all can be
-    printed too. The distance is to the ray that starts at zero.
-    sharpness: replaces the minimum over the rays by a smooth one, in 1 / (A2/m2).
+    Without a unit, and the same for any mesh and any strength: multiply it by what the objective may lose.
+    remanent_magnetization: (n_f, 3) A/m. ink: an `ms.Ink`. areas: (n_f,) m2, of which the mean takes account; by default
+    all faces count alike.
+    sharpness: replaces the minimum over what can be printed by a smooth one, which is lower; 100 is close to it.
 
     >>> import magshell as ms
-    >>> float(ms.objectives.printable([(3.0, 4.0, 0)], directions=[(1, 0, 0), (-1, 0, 0)]))
-    16.0
+    >>> ink = ms.Ink(5.0, directions=[(1, 0, 0), (-1, 0, 0)])
+    >>> round(float(ms.objectives.printable([(3.0, 4.0, 0)], ink)), 9)
+    0.64
     """
     torch = require_torch("objectives.printable")
-    remanent_magnetization = real_tensor("remanent_magnetization", remanent_magnetization, ("n_f", 3))
-    rays = real_tensor("directions", directions, ("k", 3)).to(remanent_magnetization)
-    if len(rays) == 0:
-        raise ValueError("directions must hold at least one")
-    if sharpness is not None:
-        sharpness = positive_number("sharpness", "m2/A2", sharpness)
-    lengths = torch.linalg.vector_norm(rays, dim=1, keepdim=True)
-    if not (lengths > 0).all():
-        raise ValueError("directions must not be zero")
-    along = (remanent_magnetization @ (rays / lengths).T).clamp(min=0)
-    squares = (remanent_magnetization**2).sum(-1, keepdim=True) - along**2
+    if not isinstance(ink, Ink):
+        raise ValueError(f"ink must be an ms.Ink, got {type(ink).__name__}")
+    squares = ink.squares(remanent_magnetization)
+    if len(squares) == 0:
+        raise ValueError("remanent_magnetization has no faces")
     if sharpness is None:
-        return squares.min(dim=1).values.sum()
-    return -(torch.logsumexp(-sharpness * squares, dim=1) / sharpness).sum()
+        squares = squares.min(dim=1).values
+    else:
+        sharpness = positive_number("sharpness", "1", sharpness)
+        squares = -torch.logsumexp(-sharpness * squares, dim=1) / sharpness
+    if areas is None:
+        return squares.mean()
+    areas = _like(areas, squares, "areas", squares.shape, axes=1)
+    if not (areas.detach().sum() > 0 and (areas.detach() >= 0).all()):
+        raise ValueError("areas must not be negative, and not all zero")
+    return (areas * squares).sum() / areas.sum()
 
 
 def _weighted_sum(squares, weights, name="weights"):

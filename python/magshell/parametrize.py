@@ -1,8 +1,11 @@
-"""From the few numbers that are optimized to the values of every face: small functions of torch tensors."""
+"""From the few numbers that are optimized to the values of every face: small functions of torch tensors; and the axes of
+the faces."""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ._checks.quantity import quantity
 from ._checks.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
@@ -118,6 +121,64 @@ def project_to_cap(vectors, limit):
     return vectors * torch.where(
         longer, limit / torch.where(longer, squares, torch.ones_like(squares)) ** 0.5, 1.0
     )
+
+
+def frames_along(mesh, direction):
+    """Axes of each face for directions that follow it, (n_f, 3, 3) as the `frames` of `ms.Ink`: rows are the direction as
+    far as it lies in the face, the one across within the face, and the face's normal.
+
+    mesh: a TriangleMesh. direction: (3,), or one a face, (n_f, 3); of any length.
+    Raises ValueError where it has no part in a face.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(1, 1, cells=(1, 1))
+    >>> ms.parametrize.frames_along(mesh, (1, 0, 5)).tolist()[0]
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    normals = _of_faces(mesh, "face_normals")
+    given = quantity("direction", "1", detached(direction), ("...", 3))
+    if given.shape not in ((3,), normals.shape):
+        raise ValueError(f"direction must have shape (3,) or {normals.shape}, got {given.shape}")
+    given = np.broadcast_to(given, normals.shape)
+    along = given - (given * normals).sum(axis=1, keepdims=True) * normals
+    lengths = np.linalg.norm(along, axis=1, keepdims=True)
+    lost = ~(lengths > 1e-9 * np.linalg.norm(given, axis=1, keepdims=True))
+    if lost.any():
+        raise ValueError(f"the direction has no part in the plane of face {int(lost.argmax())}")
+    along = along / lengths
+    return np.stack([along, np.cross(normals, along), normals], axis=1)
+
+
+def radial_frames(mesh, center=None, axis=None):
+    """Axes of each face for "radially in or out", (n_f, 3, 3) as the `frames` of `ms.Ink`: rows are outwards within the
+    face, around, and the face's normal.
+
+    mesh: a TriangleMesh. center: (3,) m, by default the mean of the faces' barycenters. axis: (3,), where outwards is
+    away from the line through the center along it; None: away from the center.
+    Raises ValueError where outwards has no part in a face, as in the one at the center.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.disk(1.0, cells=2)
+    >>> bool((ms.parametrize.radial_frames(mesh)[:, 0] * mesh.face_barycenters).sum(axis=1).min() > 0)
+    True
+    """
+    centers = _of_faces(mesh, "face_barycenters")
+    origin = centers.mean(axis=0) if center is None else quantity("center", "m", detached(center), (3,))
+    outwards = centers - origin
+    if axis is not None:
+        given = quantity("axis", "1", detached(axis), (3,))
+        if not given.any():
+            raise ValueError("axis must not be zero")
+        along = given / np.linalg.norm(given)
+        outwards = outwards - (outwards @ along)[:, None] * along
+    return frames_along(mesh, outwards)
+
+
+def _of_faces(mesh, name: str) -> np.ndarray:
+    """(n_f, 3)"""
+    if not hasattr(mesh, "face_normals"):
+        raise ValueError(f"mesh must be a TriangleMesh, got {type(mesh).__name__}")
+    return np.array(getattr(mesh, name))
 
 
 def _bounds(lower, upper) -> tuple[float, float]:

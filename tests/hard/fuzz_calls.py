@@ -357,17 +357,9 @@ def _files(s: Sample) -> Iterator[Call]:
     yield Call("Keep", ms.Keep, {"what": "stages", "memory_budget": 1e6})
     yield Call("View", ms.View, {"elevation": 20.0, "azimuth": 30.0, "frame": [(0, 0, 0), (1, 1, 1)]})
     color = {"values": np.zeros(n_f), "label": "u", "range": (0.0, 1.0), "scale": "diverging"}
-    yield Call(
-        "Color", lambda **a: ms.plot(s.mesh, color=ms.Color(**a), width=400, style=painted), color, cost=30
-    )
-    style = {
-        "arrows": 3,
-        "show_field": True,
-        "rest": True,
-        "mesh_lines": True,
-        "contacts": False,
-        "backend": "matplotlib",
-    }
+    yield Call("Color", lambda **a: ms.plot(s.mesh, color=ms.Color(**a), style=painted), color, cost=30)
+    shown = ("show_field", "rest", "mesh_lines")
+    style = {"arrows": 3, **dict.fromkeys(shown, True), "contacts": False, "backend": "matplotlib"}
     yield Call("Style", ms.Style, style)
     yield Call(
         "plot",

@@ -15,6 +15,8 @@ NOT_CALLED = {
     "MuscleResult": "a result",
     "LinearResponse": "a result",
     "Minimum": "a result",
+    "PrintableMinimum": "a result",
+    "PrintableStage": "a result",
     "Multistart": "a result",
     "MultistartFailed": "an error",
     "NoGradient": "an error",

@@ -58,7 +58,47 @@ def _objectives(s: Sample) -> Iterator[Call]:
     yield Call(
         "objectives.printable",
         objectives.printable,
-        {"remanent_magnetization": vectors, "directions": np.eye(3), "sharpness": 4.0},
+        {
+            "remanent_magnetization": vectors,
+            "ink": ms.Ink(1.0, np.eye(3)),
+            "areas": np.ones(n_f),
+            "sharpness": 4.0,
+        },
+    )
+    yield Call(
+        "Ink",
+        ms.Ink,
+        {
+            "strength": 1.0,
+            "directions": np.eye(3),
+            "levels": (0, 1),
+            "frames": np.tile(np.eye(3), (n_f, 1, 1)),
+        },
+    )
+    yield Call(
+        "parametrize.frames_along", parametrize.frames_along, {"mesh": s.mesh, "direction": (1, 0.1, 0.2)}
+    )
+    yield Call(
+        "parametrize.radial_frames",
+        parametrize.radial_frames,
+        {"mesh": s.mesh, "center": (-9.0, 0.1, 0.2), "axis": (0, 0, 1)},
+    )
+    yield Call(
+        "minimize_printable",
+        ms.minimize_printable,
+        {
+            "objective": lambda m: (m**2).sum(),
+            "remanent_magnetization": vectors,
+            "ink": ms.Ink(1.0, np.eye(3)),
+            "max_iterations": 2,
+            "weights": (0.1,),
+            "blocks": 2,
+            "stage_iterations": 1,
+            "exchanges": 1,
+            "tolerance": 1e-3,
+            "stateful": (),
+            "progress": False,
+        },
     )
     yield Call(
         "parametrize.from_regions",

@@ -20,10 +20,11 @@ def grouped(**groups: type) -> Callable[[F], F]:
 
     def decorated(function: F) -> F:
         known = tuple(inspect.signature(function).parameters)
+        name = function.__qualname__.removesuffix(".__init__")
 
         @functools.wraps(function)
         def called(*arguments, **named):
-            check_known(function.__name__, named, known, groups)
+            check_known(name, named, known, groups)
             return function(*arguments, **named)
 
         return called

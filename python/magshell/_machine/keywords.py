@@ -59,8 +59,10 @@ def check_known(function: str, named, known, groups: dict[str, type]) -> None:
                 if name in (field, f"{parameter}_{field}"):
                     there = f"{parameter}=ms.{group.__name__}({field}=...)"
                     raise TypeError(f"{function}() has no keyword {name!r}: it is said by {there}")
-        nearest = ", ".join(nearest_first(name, known).split(", ")[:3])
-        raise TypeError(f"{function}() has no keyword {name!r}; most like it are: {nearest}")
+        there = [each for each in known if each != "self"]
+        raise TypeError(
+            f"{function}() has no keyword {name!r}; it has, most like it first: {nearest_first(name, there)}"
+        )
 
 
 def nearest_first(name, names) -> str:

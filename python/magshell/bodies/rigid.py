@@ -7,6 +7,7 @@ import numpy as np
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
 from .._checks.selections import selection
+from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh
 from ..meshes.stuffed import from_distance
 from ..shapes import Shape
@@ -50,6 +51,7 @@ class Rigid(Owner):
     for_all = False
     _replaceable = ("mass", "inertia", "center", "magnetic_moment", "velocity", "angular_velocity")
 
+    @grouped()
     def __init__(
         self,
         vertices=None,

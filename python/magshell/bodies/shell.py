@@ -8,6 +8,7 @@ import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
+from .._machine.entry import grouped
 from ..mesh.face_shapes import corner_axes, sides
 from ..mesh.quality import MeshQuality
 from ..mesh.six_node_integrals import shape_integrals, shape_products
@@ -78,6 +79,7 @@ class Shell(Owner):
     )
     _in_time = ("growth", "rest_curvature")
 
+    @grouped()
     def __init__(
         self,
         mesh: TriangleMesh | SixNodeMesh,

@@ -8,6 +8,7 @@ import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
+from .._machine.entry import grouped
 from ..mesh.tet_integrals import shape_integrals, shape_products
 from ..mesh.tet_mesh import TetMesh
 from .materials import Projective, SolidMaterial
@@ -49,6 +50,7 @@ class Solid(Owner):
     True
     """
 
+    @grouped()
     def __init__(
         self,
         mesh: TetMesh,

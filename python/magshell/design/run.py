@@ -6,7 +6,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 
 from .._checks.arrays import number
@@ -17,6 +17,7 @@ from ..optim.standstill import STANDSTILL
 from .answer import Answer
 from .checkpoint import decoded, encoded
 from .configuration import kept
+from .jumps import checked_stateful, jumps_accepted, offering
 from .minimum import Minimum, Record
 from .rejections import conflict, effort_in_words, reason_of, total
 from .resume import check_objective, check_same
@@ -62,14 +63,17 @@ class Run:
         self.optimizer = _driven(optimizer(self.parameters) if callable(optimizer) else optimizer)
         if {id(p) for p in self.parameters} != {id(p) for p in self.optimizer.parameters}:
             raise ValueError("the optimizer must have been made with the same tensors as `parameters`")
-        self.stateful = _checked_stateful(stateful)
+        self.stateful = checked_stateful(stateful)
         self.objective, self.feasibility = objective, number("feasibility", feasibility)
         if not self.feasibility >= 0:
             raise ValueError(f"feasibility must not be negative, got {feasibility}")
         self.history: list[Record] = []
         self.best: dict | None = None
-        offering = {id(each): each for each in (objective, *self.stateful) if hasattr(each, "accept_jumps")}
-        self._offering, self._cross, self._checkpointed = list(offering.values()), cross, checkpointed
+        self._offering, self._cross, self._checkpointed = (
+            offering(objective, self.stateful),
+            cross,
+            checkpointed,
+        )
         self.configuration = kept({"feasibility": feasibility, **self.optimizer.configuration()})
         self._evaluations = 0
         self.rejections: Counter[str] = Counter()  # of the iteration under way
@@ -228,9 +232,7 @@ class Run:
     @contextmanager
     def accepting_jumps(self, accepted: bool = True) -> Iterator[None]:
         """Inside, the equilibrium may jump, where something offers that."""
-        with ExitStack() as stack:
-            for each in self._offering if accepted else ():
-                stack.enter_context(each.accept_jumps())
+        with jumps_accepted(self._offering if accepted else []):
             yield
 
     def set(self, values: list) -> None:
@@ -267,14 +269,6 @@ def _checked_parameters(parameters) -> list:
                 "gradient: x = x.detach().clone().requires_grad_()"
             )
     return parameters
-
-
-def _checked_stateful(stateful) -> list:
-    for each in stateful:
-        for method in ("state_dict", "load_state_dict"):
-            if not callable(getattr(each, method, None)):
-                raise ValueError(f"every object in `stateful` needs {method}(), and {_name(each)} has none")
-    return list(stateful)
 
 
 def _name(each) -> str:

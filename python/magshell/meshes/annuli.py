@@ -8,6 +8,7 @@ import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import angle_span, is_full_turn
 from ._grid import grid
@@ -15,6 +16,7 @@ from ._six_nodes import round_sheet
 from ._surface import surface
 
 
+@grouped()
 def annulus(
     inner_radius: float,
     outer_radius: float,
@@ -40,6 +42,7 @@ def annulus(
     return sector(inner_radius, outer_radius, 2 * np.pi, cells, diagonals, irregular, seed, order=order)
 
 
+@grouped()
 def sector(
     inner_radius: float,
     outer_radius: float,

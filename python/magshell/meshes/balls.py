@@ -8,11 +8,13 @@ import numpy as np
 
 from .._checks.arrays import count
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.tet_mesh import TetMesh
 from ._round import round_order
 from ._tet_cells import check_order, check_size, turned
 
 
+@grouped()
 def ball(radius: float, cells: int, order: int = 1) -> TetMesh:
     """The ball of the given radius [m] around the origin: 20 cells^3 tetrahedra, dihedral angles near those of regular
     ones.

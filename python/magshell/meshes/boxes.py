@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.quantity import quantity
+from .._machine.entry import grouped
 from ..mesh.tet_mesh import TetMesh
 from ._tet_cells import (
     check_diagonals,
@@ -17,6 +18,7 @@ from ._tet_cells import (
 )
 
 
+@grouped()
 def box(size, cells, diagonals: str = "alternating", order: int = 1) -> TetMesh:
     """The block [0, a] x [0, b] x [0, c] of tetrahedra.
 

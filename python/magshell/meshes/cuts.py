@@ -6,9 +6,11 @@ import numpy as np
 import scipy
 
 from .._checks.arrays import index_array
+from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh, checked_mesh
 
 
+@grouped()
 def cut(mesh: TriangleMesh, edges) -> TriangleMesh:
     """The mesh cut along interior edges: both sides of the cut get vertices of their own.
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
@@ -14,6 +15,7 @@ from ._six_nodes import round_sheet
 from ._surface import surface
 
 
+@grouped()
 def cylinder(
     radius: float,
     length: float,

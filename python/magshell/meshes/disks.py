@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh
 from ._grid import check_size
 from ._six_nodes import round_sheet
 
 
+@grouped()
 def disk(radius: float, cells: int, *, order: int = 1) -> TriangleMesh | Any:
     """The disk of the given radius [m] around the origin in the plane z = 0, its normal along +z.
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from .._checks.arrays import count
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.tet_mesh import TetMesh
 from ..mesh.triangle_mesh import TriangleMesh, checked_mesh
 from ._round import round_order
@@ -15,6 +16,7 @@ from .disks import disk
 _FLAT = 1e-9  # of the sheet's size
 
 
+@grouped()
 def extruded(sheet: TriangleMesh, height: float, layers: int, order: int = 1) -> TetMesh:
     """The solid between a flat sheet and its copy at `height` [m] above it.
 
@@ -44,12 +46,14 @@ def extruded(sheet: TriangleMesh, height: float, layers: int, order: int = 1) ->
     return mesh.second_order() if order == 2 else mesh
 
 
+@grouped()
 def stacked(sheet: TriangleMesh, height: float, layers: int) -> TetMesh:
     levels = [(0, 0, height * k / layers) for k in range(layers + 1)]
     points = np.concatenate([sheet.rest_positions + level for level in levels])
     return TetMesh(points, turned(points, prisms(sheet.faces.astype(np.int64), sheet.n_vertices, layers)))
 
 
+@grouped()
 def solid_cylinder(radius: float, length: float, cells, order: int = 1) -> TetMesh:
     """A round bar around the z axis, 0 <= z <= length.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.tet_mesh import TetMesh
 from ..mesh.tet_topology import face_table, groups
 from ..mesh.triangle_mesh import TriangleMesh, checked_mesh
@@ -12,6 +13,7 @@ from ._gmsh_session import gmsh_session
 from ._tet_cells import check_order, check_size, turned
 
 
+@grouped()
 def tetrahedralize(surface: TriangleMesh, size: float | None = None, order: int = 1) -> TetMesh:
     """The solid inside a closed surface, which stays as it is. Needs the extra `gmsh`.
 

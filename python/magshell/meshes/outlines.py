@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh
 from ._gmsh_session import gmsh_session
 from ._grid import check_size
@@ -28,6 +29,7 @@ _GROWTH = 0.3  # of the mesh size, with the distance from a short side
 _ON_BOUNDARY = 1e-7  # of the outline's extent: a slit that ends this close to the boundary reaches it
 
 
+@grouped()
 def outline(
     outer, holes: Sequence = (), slits: Sequence = (), *, size: float, order: int = 1
 ) -> TriangleMesh | Any:

@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh
 from ._grid import grid
 from ._six_nodes import sheet_of_order
 
 
+@grouped()
 def rectangle(
     length: float,
     width: float,

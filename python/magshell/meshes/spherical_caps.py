@@ -8,6 +8,7 @@ import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._grid import checked_cells, grid
@@ -15,6 +16,7 @@ from ._six_nodes import round_sheet
 from ._surface import surface
 
 
+@grouped()
 def spherical_cap(
     radius: float,
     angle_from: float = 0.0,

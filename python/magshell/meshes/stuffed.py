@@ -7,6 +7,7 @@ import numpy as np
 from .._checks.arrays import count
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.signed_distance import Distance, checked_distance
 from ..mesh.tet_mesh import TetMesh
 from ..mesh.tet_topology import FACES, face_table, outer_faces, touching_edges, touching_vertices
@@ -23,6 +24,7 @@ _CLOSE = 0.02  # enough, of that number
 _ROUNDS = 50  # of mending where the surface touches itself
 
 
+@grouped()
 def from_distance(
     shape, spacing: float | None = None, *, n_tetrahedra: int | None = None, bounds=None, order: int = 1
 ) -> TetMesh:

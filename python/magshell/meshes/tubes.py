@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..mesh.tet_mesh import TetMesh
 from ._angles import TURN, angle_span, is_full_turn
 from ._round import round_order
@@ -19,6 +20,7 @@ from ._tet_cells import (
 )
 
 
+@grouped()
 def tube(
     inner_radius: float,
     outer_radius: float,

@@ -64,8 +64,8 @@ def plot(
     titles: one a state; that a sheet passes through itself is added, where there are at most 20,000 faces to look at.
     overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light shows a motion.
     columns: of panels, by default what fits best.
-    view: (elevation, azimuth) in degrees of the eye, as in matplotlib; by default what suits the sheet. An ms.View says also
-        what the window holds.
+    view: (elevation, azimuth) in degrees of the eye, as in matplotlib, "top", "front" (both with x to the right) or "side";
+        by default what suits the sheet. An ms.View says also what the window holds.
     cut: a plane that opens solids (and cuts sheets): "x", "y" or "z" through the middle of the rest shape, ("x", 0.05) at
         that place [m], or a point [m] and a normal, (3,) each. What is on the eye's side of it, in every state as it is,
         is taken away; the section has the colours of the tetrahedra for what they have, of displacements and numbers at

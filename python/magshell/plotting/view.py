@@ -10,6 +10,13 @@ import numpy as np
 from .._checks.quantity import quantity
 from ..states.state import State
 
+NAMED = {
+    "top": (90.0, -90.0),
+    "front": (0.0, -90.0),
+    "side": (0.0, 0.0),
+}  # x to the right, to the right, to the eye
+NAMES = ", ".join(map(repr, NAMED))
+
 
 @dataclass(frozen=True)
 class View:
@@ -23,7 +30,7 @@ class View:
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     >>> end = ms.View(30, -60, frame=[(0.08, 0, 0), (0.1, 0.02, 0.01)])
     >>> ms.plot(mesh, view=end, width=800, style=ms.Style(backend="matplotlib"))
-    Picture(800 x 596 pixels, painted by matplotlib)
+    Picture(800 x 803 pixels, painted by matplotlib)
     """
 
     elevation: float
@@ -63,7 +70,13 @@ class View:
 
 
 def view_of(states: list[State], view) -> View:
-    """The view asked for, a View or (elevation, azimuth), or one that suits the sheets."""
+    """The view asked for, a View, (elevation, azimuth) or a word, or one that suits the sheets."""
+    if isinstance(view, str):
+        if view not in NAMED:
+            raise ValueError(
+                f"view must be (elevation, azimuth) in degrees, an ms.View, {NAMES}, got {view!r:.60}"
+            )
+        return View(*NAMED[view])
     if isinstance(view, View):
         return view
     if view is not None:

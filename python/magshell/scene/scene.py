@@ -12,6 +12,7 @@ import numpy as np
 from .. import _core
 from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity
+from .._machine.entry import grouped
 from ..bodies.actuator import Actuator
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
@@ -89,6 +90,7 @@ class Scene:
 
     _replaceable = ("gravity", "vertex_loads")
 
+    @grouped()
     def __init__(
         self,
         bodies: Shell | Solid | Rigid | Skeleton | Iterable[Shell | Solid | Rigid | Skeleton],
@@ -319,9 +321,8 @@ class Scene:
     @property
     def has_forces_of_motion(self) -> bool:
         """Whether forces act on it that no energy has: friction, water."""
-        return self.water is not None or any(
-            contact.friction_coefficient is not None for contact in self.contacts
-        )
+        rubs = any(contact.friction_coefficient is not None for contact in self.contacts)
+        return self.water is not None or rubs
 
     @property
     def n_unknowns(self) -> int:

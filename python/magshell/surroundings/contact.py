@@ -8,6 +8,7 @@ from .._checks.checked_list import checked_list
 from .._checks.owner import Owner
 from .._checks.scalars import not_negative, positive
 from .._checks.selections import indices, selection
+from .._machine.entry import grouped
 from ..bodies.bodies import BODIES, checked_body, joined, on_body
 from ..bodies.rigid import Rigid
 from ..bodies.shell import Shell
@@ -66,6 +67,7 @@ class Contact(Owner):
             return BodyContact(*given, **options)
         return super().__new__(cls)
 
+    @grouped()
     def __init__(
         self,
         obstacles,

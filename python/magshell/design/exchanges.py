@@ -1,0 +1,76 @@
+"""Single faces of a printable design changed, one after another, where the gradient says that it is worth a trial."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import DesignRejected
+from .printed_faces import PrintedFaces
+
+_RESTS = 8  # trials for which a face that was changed is left alone
+_MEMORY = 0.8  # of the mean curvature, at each trial
+_SAME = 1e-12  # in squares of the strength
+
+
+def exchange(search, count: int) -> float:
+    """Changes the face that promises most, `count` times, also where the objective rises for a while (a tabu search), and
+    leaves the faces at the lowest design seen. Returns its objective.
+
+    search: has the faces, sample(): (objective, gradient (n_f, 3) by shares of the strength in world axes) of them, kept()
+    and back_to() for all that belongs to a design, and a bar.
+
+    The objective is taken to be quadratic in each face, with one curvature for all: the mean of what the trials showed.
+    """
+    faces = search.faces
+    value, gradient = search.sample()
+    lowest, best = value, search.kept()
+    resting = np.zeros(len(faces.held), dtype=int)  # until which trial
+    rest = min(_RESTS, len(resting) // 4)
+    curvature = None
+    try:
+        for trial in range(count):
+            predicted, amounts, squares = _moves(faces, gradient, curvature or 0.0)
+            predicted[resting > trial] = np.inf
+            face, choice = divmod(int(predicted.argmin()), predicted.shape[1])
+            if not np.isfinite(predicted[face, choice]):
+                break
+            slope = predicted[face, choice] - 0.5 * (curvature or 0.0) * squares[face, choice]
+            before, amount = faces.kept(), amounts[face, choice]
+            faces.put(np.array([face]), np.array([choice // _levels(faces)]), amount)
+            try:
+                found, gradient = search.sample()
+            except DesignRejected:
+                faces.restore(before)
+                resting[face] = count
+            else:
+                shown = max(2.0 * (found - value - slope) / squares[face, choice], 0.0)
+                curvature = shown if curvature is None else _MEMORY * curvature + (1 - _MEMORY) * shown
+                resting[face], value = trial + 1 + rest, found
+                if value < lowest:
+                    lowest, best = value, search.kept()
+            search.bar.update()
+    finally:
+        search.back_to(best)
+    return lowest
+
+
+def _levels(faces: PrintedFaces) -> int:
+    return 1 if faces.ink.levels is None else len(faces.ink.levels)
+
+
+def _moves(faces: PrintedFaces, gradient: np.ndarray, curvature: float):
+    """Of every face and what it might be printed with, (n_f, c): the change of the objective that is expected, the share of
+    the strength, the square of the change. Infinite where it would change nothing."""
+    ink, now = faces.ink, faces.magnetization / faces.ink.strength
+    rays = ink.rays if ink.rays.ndim == 3 else ink.rays[None]
+    falls, along = ((each[:, None, :] * rays).sum(-1)[:, :, None] for each in (gradient, now))  # (n_f, k, 1)
+    if ink.levels is not None:
+        amounts = 0.0 * falls + np.array(ink.levels)
+    elif curvature > 0.0:
+        amounts = np.clip(along - falls / curvature, 0.0, 1.0)
+    else:
+        amounts = np.where(falls < 0.0, 1.0, 0.0)
+    squares = amounts**2 - 2.0 * amounts * along + (now**2).sum(axis=1)[:, None, None]
+    predicted = amounts * falls - (gradient * now).sum(axis=1)[:, None, None] + 0.5 * curvature * squares
+    predicted[squares < _SAME] = np.inf
+    return tuple(each.reshape(len(now), -1) for each in (predicted, amounts, squares))
