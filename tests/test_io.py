@@ -383,3 +383,14 @@ def test_names_come_back(tmp_path, ending, name):
     assert np.array_equal(fields.vertex[name], on_vertices) and np.array_equal(fields.face[name], also)
     assert np.array_equal(fields.face[f"{name}2"], on_faces)
     assert np.array_equal(ms.read_mesh(path).faces, mesh.faces)
+
+
+def test_a_file_in_millimetres(tmp_path) -> None:
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(4, 2))
+    ms.write_surface(tmp_path / "sheet.obj", mesh, unit="mm")
+    found = ms.read_mesh(tmp_path / "sheet.obj", unit="mm")
+    np.testing.assert_allclose(found.rest_positions, mesh.rest_positions, atol=1e-12)
+    with pytest.raises(ValueError, match='unit must be "m" or "mm", got \'inch\''):
+        ms.read_mesh(tmp_path / "sheet.obj", unit="inch")
+    with pytest.raises(TypeError, match=r"no keyword 'units'; .*first: unit"):
+        ms.read_mesh(tmp_path / "sheet.obj", units="mm")

@@ -325,7 +325,7 @@ def _here():
 def _files(s: Sample) -> Iterator[Call]:
     n_v, n_f = s.mesh.n_vertices, s.mesh.n_faces
     there = s.folder / "mesh.ply"
-    yield Call("read_mesh", ms.read_mesh, {"path": there, "drop_unused": False})
+    yield Call("read_mesh", ms.read_mesh, {"path": there, "drop_unused": False, "unit": "mm"})
     yield Call("read_fields", ms.read_fields, {"path": there, "drop_unused": False})
     fields = {"vertex_fields": {"u": np.zeros(n_v)}, "face_fields": {"m": np.zeros((n_f, 3))}}
     yield Call(

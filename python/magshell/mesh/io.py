@@ -12,6 +12,7 @@ import scipy
 from .._checks.arrays import index_array, named_values
 from .._checks.quantity import quantity, shape_of
 from .._checks.tensors import detached
+from .._machine.entry import grouped
 from .._machine.files import replacing
 from .obj import read_obj
 from .ply import read_ply, write_ply
@@ -35,12 +36,13 @@ class Fields(NamedTuple):
     face: dict[str, np.ndarray]
 
 
-def read_mesh(path, drop_unused: bool = False) -> TriangleMesh | Any:
+@grouped()
+def read_mesh(path, drop_unused: bool = False, unit: str = "m") -> TriangleMesh | Any:
     """The mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`): a TetMesh where a VTU or
     MSH file holds tetrahedra, a SixNodeMesh where it holds triangles of six points (gmsh's second order), else a
     TriangleMesh.
 
-    Coordinates are taken to be in m: use `.scaled(1e-3)` on a file in mm. Points in the plane get z = 0. An
+    No format has a word for the unit, and CAD programs write mm: say so by `unit`. Points in the plane get z = 0. An
     STL file stores each triangle apart: its corners within 1e-6 of the mesh's size are one vertex.
 
     Tetrahedra have 4 points or 10; triangles and lines beside them are left out. gmsh's physical groups of volumes become
@@ -49,6 +51,7 @@ def read_mesh(path, drop_unused: bool = False) -> TriangleMesh | Any:
     Args:
         path: the ending tells the format.
         drop_unused: leave out points that no triangle, or no tetrahedron, uses, instead of refusing them.
+        unit: of the coordinates in the file, "m" or "mm".
 
     Raises:
         FileNotFoundError: no such file.
@@ -63,7 +66,10 @@ def read_mesh(path, drop_unused: bool = False) -> TriangleMesh | Any:
     ...     ms.read_mesh(f"{folder}/sheet.ply").n_faces
     40
     """
-    return _read(path, drop_unused)[0]
+    if unit not in ("m", "mm"):
+        raise ValueError(f'unit must be "m" or "mm", got {unit!r:.60}')
+    mesh = _read(path, drop_unused)[0]
+    return mesh if unit == "m" else mesh.scaled(1e-3)
 
 
 def read_fields(path, drop_unused: bool = False) -> Fields | TetFields:
