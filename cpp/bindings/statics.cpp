@@ -114,6 +114,7 @@ void register_statics(py::module_& module) {
         .def_readonly("relaxation_steps", &StaticsResult::relaxation_steps)
         .def_readonly("saddles_left", &StaticsResult::saddles_left)
         .def_readonly("residual", &StaticsResult::residual)
+        .def_readonly("at_roundoff", &StaticsResult::at_roundoff)
         .def_readonly("stable", &StaticsResult::stable)
         .def_readonly("unstable_directions", &StaticsResult::unstable_directions)
         .def_readonly("linear_time", &StaticsResult::linear_time)

@@ -26,16 +26,7 @@ class Downhill : private Relaxing {
         : Relaxing(newton, q, controls), radius_(longest * model_.extent()), near_(near * model_.extent()) {}
 
     RelaxationReport run(int max_steps) {
-        if (!report_.reason.empty()) return report_;
-        for (; report_.steps < max_steps; ++report_.steps) {
-            if (!look()) return report_;
-            if (!step()) {
-                report_.reason = "no step lowers the energy, however short";
-                return report_;
-            }
-        }
-        report_.reason = "not at rest after " + std::to_string(max_steps) + " steps";
-        return report_;
+        return go(max_steps, [&] { return look(); }, [&] { return step(); });
     }
 
   private:
@@ -45,14 +36,7 @@ class Downhill : private Relaxing {
         const double residual = newton_.relative_residual(q_, {});
         at_rest_ = residual <= newton_.options().tolerance;
         falls_ = false;
-        if (!factor.succeeded) {  // as of a sheet that can still turn freely: the forces say how fast it may
-            rate_ = std::max(rate_, forced_rate());
-            report_.reason = factor.reason;
-            if (!at_rest_) return rate_ > 0.0;
-            report_.reason = "the equilibrium is neutral: its Hessian is singular (" + factor.reason + ")";
-            report_.neutral = true;
-            return false;
-        }
+        if (!factor.succeeded) return goes_on_without(factor, at_rest_);
         if (factor.negative_pivots > 0) {
             mode_ = most_unstable_mode(newton_, q_, controls_, factor.negative_pivots);
             rate_ = above_instability * std::abs(mode_.eigenvalue);
@@ -83,18 +67,13 @@ class Downhill : private Relaxing {
     }
 
     bool finish(double expected) {
-        VectorXd trial = q_;
-        const Model::Turns turns = model_.turns();
-        const NewtonReport report = newton_.solve(trial, controls_);
-        const bool there = expected <= round_off * model_.extent() && length(trial - q_) <= 3.0 * expected;
-        if (!report.converged || report.factor.negative_pivots > 0 ||
-            !(there || lowers(model_.energy(trial, controls_)))) {
-            model_.set_turns(turns);
-            return false;
-        }
-        report_.residual = report.residual;
-        q_ = trial;
-        return true;
+        return ends_by([&](VectorXd& trial) { return newton_.solve_wary(trial, controls_); },
+                       [&](const NewtonReport& report, const VectorXd& trial) {
+                           const bool there = expected <= round_off * model_.extent() &&
+                                              length(trial - q_) <= 3.0 * expected;
+                           return report.factor.negative_pivots == 0 &&
+                                  (there || lowers(model_.energy(trial, controls_)));
+                       });
     }
 
     bool step() {

@@ -31,6 +31,10 @@ constexpr int settling_iterations = 6;
 constexpr double shrinking = 0.7;
 // One that settles, as in the plane of a sheet, may pass a state that is not stable.
 constexpr double settling = 0.3;
+// Its second step may be longer than its first, in the plane of which a sheet was flat, and not beyond all bounds.
+constexpr double growing = 4.0;
+// Of what its first step moved: no more is left where one ends that need not end in place.
+constexpr double little_left = 1e-3;
 // A residual that shrinks less makes the next step a cautious one.
 constexpr double contracting = 0.5;
 
@@ -129,11 +133,11 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
 }
 
 NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations) {
-    if (!model_.has_body_contact()) return iterate(q, controls, anchor, max_iterations, options_.mixed);
+    if (!model_.has_body_contact()) return iterate(q, controls, anchor, max_iterations, options_.mixed, {});
     constexpr int searched = 5;  // times as many iterations
     const VectorXd from = q;
     const Model::Turns turns = model_.turns();
-    NewtonReport report = iterate(q, controls, anchor, max_iterations, options_.mixed);
+    NewtonReport report = iterate(q, controls, anchor, max_iterations, options_.mixed, {});
     if (report.converged || !report.touched) return report;
     const int iterations = report.iterations;
     // Short steps behind what was in the way would be taken again; others may have led anywhere.
@@ -148,7 +152,7 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Anchor& 
 }
 
 NewtonReport Newton::solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor) {
-    return iterate(q, controls, anchor, options_.max_iterations, false);
+    return iterate(q, controls, anchor, options_.max_iterations, false, {});
 }
 
 bool Newton::negligible(const VectorXd& step) const {
@@ -156,8 +160,12 @@ bool Newton::negligible(const VectorXd& step) const {
            negligible_move * model_.length_scale();
 }
 
-NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls) {
-    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, true);
+NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls, bool roughly) {
+    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {true, roughly});
+}
+
+NewtonReport Newton::solve_roughly(VectorXd& q, const Controls& controls) {
+    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {false, true});
 }
 
 // With friction held, the stage is a minimization, which damped steps do not leave. Normal forces follow,
@@ -173,7 +181,7 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const A
         const double enough = std::max(options_.tolerance, least_gain * relative_residual(q, anchor));
         if (!descend(q, controls, anchor, enough, most_steps, report)) return report;
         VectorXd end = q;
-        const NewtonReport last = iterate(end, controls, anchor, last_steps, false);
+        const NewtonReport last = iterate(end, controls, anchor, last_steps, false, {});
         report.iterations += last.iterations;
         if (last.converged) {
             q = std::move(end);
@@ -250,11 +258,11 @@ double Newton::obstacles_change(const VectorXd& step) const {
 }
 
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
-                             bool mixed, bool wary) {
+                             bool mixed, Care care) {
     NewtonReport report;
     VectorXd move = model_.reduction().prescribed_increment(q, controls);
     bool extrapolated = false;
-    double last_step = 0.0, last_residual = std::numeric_limits<double>::infinity();
+    double last_step = 0.0, step_before = 0.0, last_residual = std::numeric_limits<double>::infinity();
     double moved = std::numeric_limits<double>::infinity();  // since the last factorization
     Index first_negative_pivots = 0;
     const auto fail = [&](std::string reason) {
@@ -276,6 +284,14 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
             report.in_place = moved <= negligible_move * model_.length_scale();
+            return report;
+        }
+        // Steps that shrink by squares say what is left.
+        if (care.roughly && in_place && report.iterations > 1 && last_step <= settling * step_before &&
+            last_step * last_step * last_step <=
+                little_left * report.first_length * step_before * step_before &&
+            report.factor.negative_pivots <= first_negative_pivots) {
+            report.converged = report.rough = true;
             return report;
         }
         if (report.iterations == max_iterations)
@@ -342,16 +358,18 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         move = left_of(move, share, q, controls);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (report.iterations == 0) report.first_length = length;
-        if (wary && report.iterations > 0 &&
+        if (care.wary && report.iterations > 0 &&
             length > std::max(settling * last_step, 1e-3 * model_.extent()) &&
             (report.factor.negative_pivots > first_negative_pivots ||
-             (report.iterations > 1 && length > last_step)))
+             (report.iterations > 1 ? length > last_step
+                                    : length > growing * std::max(last_step, model_.extent()))))
             return fail("the iteration leaves the stable states");
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())
             return fail("the steps of the iteration do not get shorter");
         if (mixed) model_.extrapolate(step);
         extrapolated = true;
+        step_before = last_step;
         last_step = length;
         moved += length;
         evaluate(q, controls, anchor);

@@ -32,6 +32,7 @@ struct NewtonReport {
     int iterations = 0;
     double residual = 0.0;
     FactorReport factor;    // of the last matrix factorized
+    bool rough = false;     // whether it was ended where little was left
     bool in_place = false;  // whether that may stand for the solution's own, nothing having moved since
     bool touched = false;   // whether bodies touched, or were in each other's way, at any of its iterations
     std::string blocked;    // what was in the way of the last step of which little could be taken, in words
@@ -69,9 +70,12 @@ class Newton {
 
     /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
-    /// As solve(), and given up as soon as the matrix has unstable directions that it had not at the beginning, and steps
-    /// do not get much shorter.
-    NewtonReport solve_wary(VectorXd& q, const Controls& controls);
+    /// As solve(), and given up as soon as the matrix has unstable directions that it had not at the beginning and steps
+    /// do not get much shorter, or as steps get longer. roughly: ends where what is left is little beside what the first step
+    /// moved.
+    NewtonReport solve_wary(VectorXd& q, const Controls& controls, bool roughly = false);
+    /// As solve(), or only to where what is left is little beside what the first step moved.
+    NewtonReport solve_roughly(VectorXd& q, const Controls& controls);
     NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
     /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity), in rounds
     /// of held normal forces: slower, and sure of foot where contacts open and close, stick and slip.
@@ -136,8 +140,12 @@ class Newton {
     }
 
   private:
+    /// How an iteration is watched.
+    struct Care {
+        bool wary = false, roughly = false;
+    };
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
-                         bool mixed, bool wary = false);
+                         bool mixed, Care care);
     /// What is left of a motion that supports and motors prescribe after a share of it.
     VectorXd left_of(const VectorXd& move, double share, const VectorXd& q, const Controls& controls) const;
     /// Of a step, which is a share of a whole one, the part up to which bodies that touch do not push back by more than it

@@ -19,32 +19,15 @@ class Flow : private Relaxing {
     Flow(Newton& newton, VectorXd& q, const Controls& controls) : Relaxing(newton, q, controls) {}
 
     RelaxationReport run(int max_steps) {
-        if (!report_.reason.empty()) return report_;
-        for (; report_.steps < max_steps; ++report_.steps) {
-            if (!prepare()) return report_;
-            while (!step()) {
-                rate_ *= rate_growth;
-                if (!is_sensible(rate_)) {
-                    report_.reason = "no step lowers the energy, however short";
-                    return report_;
-                }
-            }
-        }
-        report_.reason = "not at rest after " + std::to_string(max_steps) + " steps";
-        return report_;
+        return go(max_steps, [&] { return prepare(); }, [&] { return advance(); });
     }
 
   private:
     // From the Hessian at q: done, where Newton finishes from here; otherwise the rate of the next step.
     bool prepare() {
         const FactorReport factor = newton_.factorize_at(q_, controls_);
-        if (!factor.succeeded) {  // as of a sheet that can still turn freely: the forces say how fast it may
-            rate_ = std::max(rate_, forced_rate());
-            report_.reason = factor.reason;
-            if (newton_.relative_residual(q_, {}) > newton_.options().tolerance) return rate_ > 0.0;
-            report_.reason = "the equilibrium is neutral: its Hessian is singular";
-            return false;
-        }
+        if (!factor.succeeded)
+            return goes_on_without(factor, newton_.relative_residual(q_, {}) <= newton_.options().tolerance);
         const bool convex = factor.negative_pivots == 0;
         if (convex) report_.falling.resize(0);
         if (!convex || rate_ == 0.0) {
@@ -60,15 +43,17 @@ class Flow : private Relaxing {
     }
 
     bool finish() {
-        VectorXd trial = q_;
-        const Model::Turns turns = model_.turns();
-        const NewtonReport report = newton_.solve(trial, controls_);
-        if (!report.converged || !lowers(model_.energy(trial, controls_))) {
-            model_.set_turns(turns);
-            return false;
+        return ends_by([&](VectorXd& trial) { return newton_.solve(trial, controls_); },
+                       [&](const NewtonReport&, const VectorXd& trial) {
+                           return lowers(model_.energy(trial, controls_));
+                       });
+    }
+
+    bool advance() {
+        while (!step()) {
+            rate_ *= rate_growth;
+            if (!is_sensible(rate_)) return false;
         }
-        report_.residual = report.residual;
-        q_ = trial;
         return true;
     }
 

@@ -26,6 +26,15 @@ Relaxing::Relaxing(Newton& newton, VectorXd& q, const Controls& controls)
     if (report_.reason.empty()) report_.reason = model_.refusal(q_);
 }
 
+bool Relaxing::goes_on_without(const FactorReport& factor, bool at_rest) {
+    rate_ = std::max(rate_, forced_rate());
+    report_.reason = factor.reason;
+    if (!at_rest) return rate_ > 0.0;
+    report_.reason = "the equilibrium is neutral: its Hessian is singular (" + factor.reason + ")";
+    report_.neutral = true;
+    return false;
+}
+
 double Relaxing::forced_rate() const {
     const Reduction& reduction = model_.reduction();
     const VectorXd force = reduction.vector(model_.residual().gradient),

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <limits>
+#include <string>
 
 #include "magshell/solve/modes.h"
 #include "magshell/solve/relaxation.h"
@@ -13,6 +14,39 @@ class Relaxing {
   protected:
     /// At the controls, supports moved to where these want them; the report says what is wrong with that.
     Relaxing(Newton& newton, VectorXd& q, const Controls& controls);
+
+    /// look() and step() in turns, until one of them says no: look() where the report says all, step() where none is left.
+    template <class Look, class Step>
+    RelaxationReport go(int max_steps, Look&& look, Step&& step) {
+        if (!report_.reason.empty()) return report_;
+        for (; report_.steps < max_steps; ++report_.steps) {
+            if (!look()) return report_;
+            if (step()) continue;
+            report_.reason = "no step lowers the energy, however short";
+            return report_;
+        }
+        report_.reason = "not at rest after " + std::to_string(max_steps) + " steps";
+        return report_;
+    }
+
+    /// Whether to go on where the Hessian could not be factorized, as of a sheet that can still turn freely: the forces say
+    /// how fast it may.
+    bool goes_on_without(const FactorReport& factor, bool at_rest);
+
+    /// Newton's end of the way: whether solve(trial) converges from q to where good(report, trial) holds, which q is then.
+    template <class Solve, class Good>
+    bool ends_by(Solve&& solve, Good&& good) {
+        VectorXd trial = q_;
+        const Model::Turns turns = model_.turns();
+        const NewtonReport report = solve(trial);
+        if (!report.converged || !good(report, trial)) {
+            model_.set_turns(turns);
+            return false;
+        }
+        report_.residual = report.residual;
+        q_ = trial;
+        return true;
+    }
 
     /// [N/m3] With this rate the forces move a sheet that only the anchor holds by a twentieth of its extent.
     double forced_rate() const;

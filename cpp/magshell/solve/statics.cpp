@@ -5,18 +5,15 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/deflation.h"
+#include "magshell/solve/load_steps.h"
 #include "magshell/solve/put_in_joints.h"
 #include "magshell/solve/relaxation.h"
 
 namespace magshell {
 namespace {
 
-constexpr int quick_iterations = 8;  // a load step that converged in so many is followed by one twice as long
-constexpr double good_length =
-    0.25;  // of the extent: as far as the first iteration of a load step should lead
 constexpr double longest_turn =
-    0.5;                            // [rad] of a support in one load step: full circles must be gone through
-constexpr double forgetting = 1.2;  // of a step that failed, with every one that did not
+    0.5;  // [rad] of a support in one load step: full circles must be gone through
 
 class Statics {
   public:
@@ -25,6 +22,26 @@ class Statics {
         : newton_(newton), from_(from), to_(to), options_(options), result_(result), wary_(goes_warily()) {}
 
     bool run() {
+        const bool found = search();
+        if (!found) finish();
+        return found;
+    }
+
+    /// Where the way ends early, what was reached roughly is made exact.
+    void finish() {
+        if (!rough_) return;
+        VectorXd trial = result_.state;
+        newton_.model().set_turns(result_.turns);
+        const NewtonReport report = newton_.solve(trial, controls_at(result_.progress));
+        rough_ = false;
+        if (!report.converged) return newton_.model().set_turns(result_.turns);
+        result_.state = trial;
+        result_.turns = newton_.model().turns();
+        result_.residual = report.residual;
+    }
+
+  private:
+    bool search() {
         controls_at(0.0);
         put_in_joints(newton_.model(), result_.state);
         result_.reason = newton_.model().refusal(result_.state);
@@ -32,7 +49,6 @@ class Statics {
         return result_.stable || !options_.require_stable || descend(1.0);
     }
 
-  private:
     // Supports must be gone along with, through saddles too; solids have unstable directions on the way to stable states.
     bool goes_warily() const {
         const Model& model = newton_.model();
@@ -51,50 +67,53 @@ class Statics {
     bool load() {
         if (options_.start_at_rest && from_ == to_ && newton_.still_holds(result_.state, to_))
             accept(result_.state, to_, 1.0, newton_.relative_residual(result_.state, {}));
-        double step = options_.first_step, failed_step = 2.0;
         const Reduction& reduction = newton_.model().reduction();
         const double turn =
             std::abs(reduction.progress(to_) - reduction.progress(from_)) * reduction.largest_turn();
         const double longest_step = turn > longest_turn ? longest_turn / turn : 1.0;
+        LoadSteps steps(options_.first_step, longest_step, options_.smallest_step, newton_.model().extent(),
+                        wary_);
         FactorReport factor;  // at the last load step
         while (result_.progress < 1.0) {
-            step = std::min(step, longest_step);
-            const double target = std::min(1.0, result_.progress + step);
+            const double left = 1.0 - result_.progress, step = steps.next(left);
+            const double target = step < left ? result_.progress + step : 1.0;
             const Controls controls = controls_at(target);
             VectorXd trial = result_.state;
-            NewtonReport report =
-                wary_ ? newton_.solve_wary(trial, controls) : newton_.solve(trial, controls);
-            if (report.converged && strays(report, target - result_.progress)) {
+            NewtonReport report = step_to(trial, controls, target < 1.0);
+            if (report.converged && strays(report, step)) {
                 report.converged = false;
                 report.reason = "a step ended on another branch, which is not stable";
             }
             if (report.converged) {
                 was_stable_ = report.factor.negative_pivots == 0;
                 accept(trial, controls, target, report.residual);
+                rough_ = report.rough;
                 factor = report.in_place ? report.factor : FactorReport();
-                if (report.iterations <= quick_iterations) step = std::min(2.0 * step, 0.75 * failed_step);
-                failed_step *= forgetting;
+                steps.succeeded(step, report);
                 continue;
             }
             newton_.model().set_turns(result_.turns);
             result_.reason = report.reason;
-            failed_step = target - result_.progress;
-            result_.failed.shortest_step = std::min(result_.failed.shortest_step, failed_step);
-            step = (report.lost ? 0.25 : 0.5) * failed_step;
-            // How far its first iteration led tells how much too long it was.
-            const double far = report.first_length / newton_.model().extent();
-            const double smallest = options_.smallest_step * longest_step;
-            if (wary_ && far > 0.5 * good_length && failed_step > smallest)
-                step = std::max(std::min(step, good_length / far * failed_step), smallest);
-            if (step >= smallest && options_.start_at_rest) continue;
+            result_.failed.shortest_step = std::min(result_.failed.shortest_step, step);
+            if (steps.failed(step, report) && options_.start_at_rest) continue;
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
             factor = {};
             const double end = longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0;
             if ((wary_ || !plain_steps(end)) && !descend(end)) return false;
-            step = longest_step;
+            rough_ = false;
+            steps.again_with(longest_step);
         }
         return factor.succeeded ? judge(factor) : check_stability();
     }
+
+    // States on the way need not be exact.
+    NewtonReport step_to(VectorXd& q, const Controls& controls, bool on_the_way) {
+        const bool roughly = on_the_way && goes_roughly();
+        if (wary_) return newton_.solve_wary(q, controls, roughly);
+        return roughly ? newton_.solve_roughly(q, controls) : newton_.solve(q, controls);
+    }
+
+    bool goes_roughly() const { return options_.start_at_rest && !newton_.model().has_body_contact(); }
 
     bool go_elsewhere() {
         constexpr int times_longer = 3;  // than Newton's way to an equilibrium that is near
@@ -112,6 +131,7 @@ class Statics {
     // Whether a step from a stable state went far and ended on an unstable branch, that a shorter one may not meet.
     bool strays(const NewtonReport& report, double step) const {
         constexpr double long_step = 0.125;
+        constexpr int quick_iterations = 8;
         return options_.start_at_rest && options_.require_stable && was_stable_ && step > long_step &&
                report.iterations > quick_iterations && report.factor.negative_pivots > 0;
     }
@@ -135,7 +155,14 @@ class Statics {
         result_.controls = controls;
         result_.progress = progress;
         result_.residual = residual;
+        tell_roundoff();
         ++result_.load_steps;
+    }
+
+    // Of the result's state, where the model was evaluated last.
+    void tell_roundoff() {
+        result_.at_roundoff = result_.progress == 1.0 && newton_.relative_residual(result_.state, {}, false) >
+                                                             newton_.options().tolerance;
     }
 
     // The factorization at the solution itself, with its own stresses, decides.
@@ -194,6 +221,7 @@ class Statics {
         result_.state = trial;
         result_.turns = newton_.model().turns();
         result_.residual = std::min(result_.residual, after);
+        tell_roundoff();
         if (!newton_.negligible(p)) check_stability();
     }
 
@@ -203,6 +231,7 @@ class Statics {
     StaticsResult& result_;
     const bool wary_;         // load steps are given up at once where they leave the stable states
     bool was_stable_ = true;  // where the last load step ended
+    bool rough_ = false;      // whether it ended before it was exact
 };
 
 }  // namespace
@@ -216,16 +245,19 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model:
     result.state = start;
     result.turns = turns;
     result.controls = from;
+    bool watched = true;
     Newton newton(model, options.newton, [&](double residual) {
-        if (watch) watch(result.progress, residual);
+        if (watch && watched) watch(result.progress, residual);
     });
+    Statics statics(newton, from, to, options, result);
     try {
-        Statics statics(newton, from, to, options, result);
         result.outcome = statics.run() ? Outcome::converged : Outcome::failed;
     } catch (const Interrupted&) {
         model.set_turns(result.turns);
         result.outcome = Outcome::interrupted;
         result.reason = "interrupted";
+        watched = false;
+        statics.finish();
     }
     for (Controls* each : {&result.controls, &result.failed.controls})
         each->conservativeResize(std::max<Index>(0, each->size() - varying.size()));

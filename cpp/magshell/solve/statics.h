@@ -40,6 +40,8 @@ struct StaticsResult {
     int iterations = 0, factorizations = 0, failed_factorizations = 0, load_steps = 0, relaxation_steps = 0;
     int saddles_left = 0;
     double residual = 0.0;
+    bool at_roundoff =
+        false;  // the residual is within round-off, and not within the tolerance of the forces that cancel
     bool stable = false;
     Index unstable_directions = 0;
     double linear_time = 0.0;              // [s] in factorizations and solves

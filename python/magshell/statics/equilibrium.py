@@ -28,7 +28,9 @@ class Equilibrium:
     positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
     remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
     energies: J, by term. stable: no direction lowers the energy; unstable_directions: how many do.
-    residual: relative to the forces that cancel in it. progress: how far the controls got, 1 unless a solve failed.
+    residual: relative to the forces that cancel in it, and to their round-off. at_roundoff: whether round-off ended the
+        solve, above the solver's tolerance, as of very thin sheets and long chains.
+    progress: how far the controls got, 1 unless a solve failed.
     largest_membrane_strain, largest_bending_strain: magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet leaves
         the model, of which ms.LargeStrainWarning warns.
     wall_time, linear_time: s, in all and in factorizations and back-substitutions. memory: bytes, of the core.
@@ -49,6 +51,7 @@ class Equilibrium:
     relaxation_steps: int
     saddles_left: int
     residual: float
+    at_roundoff: bool
     progress: float
     largest_membrane_strain: float
     largest_bending_strain: float
@@ -150,11 +153,12 @@ class Equilibrium:
         crossings = told(self.scene.mesh, np.asarray(detached(self.positions))[None])
         extra = f", {self.saddles_left} saddles left" if self.saddles_left else ""
         extra += f", {self.relaxation_steps} relaxation steps" if self.relaxation_steps else ""
+        ended = " at round-off" if self.at_roundoff else ""
         return (
             f"Equilibrium: {kind}; largest displacement {moved:.4g} m\n"
             f"  {told_strains(self, strain)}\n"
             f"  {crossings}\n"
             f"  energy {self.energy:.6g} J ({energies})\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.load_steps} load steps{extra}\n"
-            f"  residual {self.residual:.1e}, {self.wall_time:.3g} s, {self.memory / 1e6:.3g} MB, {self.factorization}"
+            f"  residual {self.residual:.1e}{ended}, {self.wall_time:.3g} s, {self.memory / 1e6:.3g} MB, {self.factorization}"
         )

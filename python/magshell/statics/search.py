@@ -185,6 +185,7 @@ def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_tim
         relaxation_steps=found.relaxation_steps,
         saddles_left=found.saddles_left,
         residual=found.residual,
+        at_roundoff=found.at_roundoff,
         progress=found.progress,
         largest_membrane_strain=strain.membrane,
         largest_bending_strain=strain.bending,
