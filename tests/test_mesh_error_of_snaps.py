@@ -1,4 +1,4 @@
-"""A pinched cylinder (A6: Sze, Liu, Lo 2004) on coarse meshes: before it snaps its error is known, after that it is refused."""
+"""A pinched cylinder (A6: Sze, Liu, Lo 2004) on coarse meshes: its error is told, and after it has snapped it is refused."""
 
 from __future__ import annotations
 

@@ -245,19 +245,16 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model:
     result.state = start;
     result.turns = turns;
     result.controls = from;
-    bool watched = true;
     Newton newton(model, options.newton, [&](double residual) {
-        if (watch && watched) watch(result.progress, residual);
+        if (watch) watch(result.progress, residual);
     });
-    Statics statics(newton, from, to, options, result);
     try {
+        Statics statics(newton, from, to, options, result);
         result.outcome = statics.run() ? Outcome::converged : Outcome::failed;
     } catch (const Interrupted&) {
         model.set_turns(result.turns);
         result.outcome = Outcome::interrupted;
         result.reason = "interrupted";
-        watched = false;
-        statics.finish();
     }
     for (Controls* each : {&result.controls, &result.failed.controls})
         each->conservativeResize(std::max<Index>(0, each->size() - varying.size()));

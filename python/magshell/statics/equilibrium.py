@@ -160,5 +160,6 @@ class Equilibrium:
             f"  {crossings}\n"
             f"  energy {self.energy:.6g} J ({energies})\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.load_steps} load steps{extra}\n"
-            f"  residual {self.residual:.1e}{ended}, {self.wall_time:.3g} s, {self.memory / 1e6:.3g} MB, {self.factorization}"
+            f"  residual {self.residual:.1e}{ended}, {self.wall_time:.3g} s, {self.memory / 1e6:.3g} MB, "
+            f"{self.factorization}"
         )

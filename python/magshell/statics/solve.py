@@ -64,12 +64,12 @@ def equilibrium(
     progress: show a bar once it has taken two seconds; or a function, called now and then with how far the controls have
         come (0 to 1, of all load cases) and the residual.
 
-    Raises NotConverged and Interrupted (on Ctrl-C), both with the last converged state as `last_good`; ValueError on
-    bad input. With torch tensors among the inputs, positions and edge rotations come back as tensors, and gradients go
-    back from them to every input above but `start`. Each costs one back-substitution with the factorization at the
-    solution, kept as long as the result is. Asked for where the solve did not converge, or at an equilibrium that is
-    not stable, they raise NoGradient. So do second derivatives: differences of gradients are exact to some 1e-8, and
-    (g(x + h v) - g(x - h v)) / 2h is the Hessian's product with v.
+    Raises NotConverged and Interrupted (on Ctrl-C), both with the last converged state as `last_good`, which on Ctrl-C may
+    be as rough as its residual says; ValueError on bad input. With torch tensors among the inputs, positions and edge
+    rotations come back as tensors, and gradients go back from them to every input above but `start`. Each costs one
+    back-substitution with the factorization at the solution, kept as long as the result is. Asked for where the solve did
+    not converge, or at an equilibrium that is not stable, they raise NoGradient. So do second derivatives: differences of
+    gradients are exact to some 1e-8, and (g(x + h v) - g(x - h v)) / 2h is the Hessian's product with v.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
