@@ -48,7 +48,7 @@ bool LoadSteps::failed(double step, const NewtonReport& report) {
         if (failures_ >= enough && length < short_length && step <= short_step) return false;
         const double good_step = good_length / std::max(length, tiny) * step;
         // Of a way of many extents a small share may be a long step.
-        smallest_ = std::min(smallest_, least_share * good_step);
+        if (!fixed_) smallest_ = std::min(smallest_, least_share * good_step);
         if (length > 0.5 * good_length && step > smallest_)
             step_ = std::max(std::min(step_, good_step), smallest_);
     }

@@ -1,7 +1,7 @@
 // How long the steps of the controls are, told by how those before have gone.
 #pragma once
 
-#include "magshell/solve/newton.h"
+#include "magshell/solve/statics.h"
 
 namespace magshell {
 
@@ -11,7 +11,12 @@ class LoadSteps {
     /// wary: that of steps given up as soon as they leave the stable states, of which the first iteration tells how much too
     /// long they were.
     LoadSteps(double first, double longest, double smallest, double extent, bool wary)
-        : step_(first), smallest_(smallest * longest), longest_(longest), extent_(extent), wary_(wary) {}
+        : step_(first),
+          smallest_(smallest * longest),
+          longest_(longest),
+          extent_(extent),
+          wary_(wary),
+          fixed_(smallest > StaticsOptions().smallest_step) {}
 
     /// The next one, where so much of the way is left.
     double next(double left);
@@ -29,6 +34,7 @@ class LoadSteps {
     double step_, smallest_;
     const double longest_, extent_;
     const bool wary_;
+    const bool fixed_;  // the smallest one, as it is larger than the usual one
     int failures_ = 0;  // since the last success
     double failed_step_ = 2.0,
            failed_length_ = 0.0;  // the shortest that is known to fail, and how far it led

@@ -18,7 +18,8 @@ class Newton:
         10 m are known to 1e-13), that is more than the tolerance, and results have fewer digits.
     max_iterations: a load step that needs more is halved.
     first_load_step: of the way from the old controls to the new ones, in (0, 1].
-    smallest_load_step: below it, the solve relaxes down the energy instead (implicit Euler steps of a gradient flow).
+    smallest_load_step: below it, the solve relaxes down the energy instead (implicit Euler steps of a gradient flow). Up
+        to 1/64 it is that of ways of usual length: where the whole way leads many extents far, shorter ones are tried.
     max_relaxation_steps: how many of those before it gives up.
 
     >>> import magshell as ms
