@@ -45,7 +45,7 @@ bool LoadSteps::failed(double step, const NewtonReport& report) {
     ++failures_;
     if (wary_) {
         const double length = failed_length_ = length_of(report);
-        if (failures_ >= enough && length < short_length && step <= short_step) return false;
+        if (!insists_ && failures_ >= enough && length < short_length && step <= short_step) return false;
         const double good_step = good_length / std::max(length, tiny) * step;
         // Of a way of many extents a small share may be a long step.
         if (!fixed_) smallest_ = std::min(smallest_, least_share * good_step);

@@ -1,6 +1,8 @@
 // How long the steps of the controls are, told by how those before have gone.
 #pragma once
 
+#include <utility>
+
 #include "magshell/solve/statics.h"
 
 namespace magshell {
@@ -25,6 +27,8 @@ class LoadSteps {
     /// False where no shorter one is worth trying.
     bool failed(double step, const NewtonReport& report);
 
+    /// Whether shorter ones are worth trying all the same, where it did not go down from where a branch seemed to end.
+    bool insist() { return !std::exchange(insists_, true) && step_ >= smallest_; }
     /// Where the way was gone otherwise, so long again.
     void again_with(double step) { step_ = step; }
 
@@ -35,6 +39,7 @@ class LoadSteps {
     const double longest_, extent_;
     const bool wary_;
     const bool fixed_;  // the smallest one, as it is larger than the usual one
+    bool insists_ = false;
     int failures_ = 0;  // since the last success
     double failed_step_ = 2.0,
            failed_length_ = 0.0;  // the shortest that is known to fail, and how far it led

@@ -99,7 +99,10 @@ class Statics {
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
             factor = {};
             const double end = longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0;
-            if ((wary_ || !plain_steps(end)) && !descend(end)) return false;
+            if ((wary_ || !plain_steps(end)) && !descend(end)) {
+                if (wary_ && steps.insist()) continue;
+                return false;
+            }
             rough_ = false;
             steps.again_with(longest_step);
         }
