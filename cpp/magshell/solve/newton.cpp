@@ -286,10 +286,11 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             report.in_place = moved <= negligible_move * model_.length_scale();
             return report;
         }
-        // Steps that shrink by squares say what is left.
+        // Steps that shrink by squares say what is left. Beside the thickness it must be small: it stretches the sheet.
         if (care.roughly && in_place && report.iterations > 1 && last_step <= settling * step_before &&
             last_step * last_step * last_step <=
-                little_left * report.first_length * step_before * step_before &&
+                std::min(little_left * report.first_length, 0.1 * model_.length_scale()) * step_before *
+                    step_before &&
             report.factor.negative_pivots <= first_negative_pivots) {
             report.converged = report.rough = true;
             return report;
