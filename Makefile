@@ -62,9 +62,16 @@ $(VENV)/.created: scripts/setup.sh
 	$(PIP) install --quiet 'scikit-build-core>=0.10' 'pybind11>=2.13' cmake ninja
 	touch $@
 
-# The package with one of pyproject.toml's extras. build/make is kept for the next time; a plain `pip install .` builds in
-# a directory of its own, so that its options do not end up in this one's cache.
-$(VENV)/.with-%: $(sources) $(VENV)/.created
-	$(PIP) install --quiet --no-build-isolation --check-build-dependencies \
-	    --config-settings=build-dir=build/make '.[$*]'
+# A wheel of the package, as anybody gets it, and that one installed. build/make is kept for the next time; a plain
+# `pip install .` builds in a directory of its own, so that its options do not end up in this one's cache.
+$(VENV)/.wheel: $(sources) $(VENV)/.created
+	rm -rf build/wheels
+	$(PIP) wheel --quiet --no-deps --no-build-isolation --check-build-dependencies \
+	    --config-settings=build-dir=build/make --wheel-dir build/wheels .
+	$(PIP) install --quiet --no-deps --force-reinstall build/wheels/*.whl
+	touch $@
+
+# What one of pyproject.toml's extras brings beside it.
+$(VENV)/.with-%: $(VENV)/.wheel
+	$(PIP) install --quiet "$$(echo build/wheels/*.whl)[$*]"
 	touch $@

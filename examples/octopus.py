@@ -15,14 +15,14 @@ from where that led: what went aside is led back by By and Bz, the field found h
 zero does nothing to first order, five more plans are tried before each search: swings of up to 12 mT, or earlier strokes
 once more. The gradient over such a horizon in the throat of pipe I agrees with differences to 2e-5 along itself.
 
-What comes out, from starts with noise of 1e-12 m (--noise 1e-12): ten searches a channel (--seed 1 to 10; the settings were
-chosen on seed 0), which differ by that noise and by what is tried. All 30 pass, and each field found passes again in the same
-step when the motion is simulated in one piece. Median, least and most; gradients, each of 400 steps, are those of all horizons:
+What comes out, from starts with noise of 1e-12 m (--noise 1e-12): ten searches a channel (--seed 1 to 10; the
+settings were chosen on seed 0), which differ by that noise and by what is tried. All 30 pass, and each field found passes
+in the same step when the motion is simulated in one piece. Median, least and most; gradients are of 400 steps each:
 
-               passes after [s]         horizons    gradients    tried       processor [s]    aside, at most [mm]
-    pipe I         1.25, 0.96 to 1.87    5 to 10     20 to 49    30 to 60    128, 83 to 174    0.14, up to 0.69
-    pipe II        1.38, 1.24 to 1.78    7 to 9      30 to 39    42 to 54    118, 110 to 156   0.08, up to 0.29
-    tunnel         1.41, 1.25 to 1.78    7 to 9      30 to 46    42 to 54    135, 112 to 181   0.16, up to 0.95
+            passes after [s]        horizons   gradients   tried      processor [s]    aside, at most [mm]
+    pipe I      1.25, 0.96 to 1.87   5 to 10    20 to 49    30 to 60   128, 83 to 174   0.14, up to 0.69
+    pipe II     1.38, 1.24 to 1.78   7 to 9     30 to 39    42 to 54   118, 110 to 156  0.08, up to 0.29
+    tunnel      1.41, 1.25 to 1.78   7 to 9     30 to 46    42 to 54   135, 112 to 181  0.16, up to 0.95
 
 An iteration takes 8 s at most, trials and all. With seed 0's field of pipe I, five more starts with other noise of 1e-12 m
 pass in the same step and end within 3e-8 mm.

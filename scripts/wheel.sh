@@ -41,5 +41,5 @@ for needed in licenses/NOTICE licenses/LICENSE magshell/py.typed; do
 done
 ! grep -q '\.libs/' <<<"$held" || { say "the wheel holds libraries of this machine"; exit 1; }
 
-PYTHON=$python scripts/try_wheel.sh "$wheel"
+PYTHON=$python build/sdist/scripts/try_wheel.sh "$wheel"  # the tests that the sdist holds: it is whole
 say "the quick start and the core tests pass in a bare environment"

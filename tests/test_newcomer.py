@@ -1,15 +1,21 @@
 """The way of somebody who has just installed magshell, by stopwatch: to a picture, and to a design of their own.
 
-The package is the one that is installed here: `make wheel` has the same quick start run from the wheel in an environment
-with nothing else (scripts/try_wheel.sh).
+`make test` installs a wheel, and CI runs from it. `make wheel` has the same quick start run in an environment with nothing
+else (scripts/try_wheel.sh).
 """
 
+import json
 import os
 import re
 import resource
 import subprocess
 import sys
+from importlib.metadata import distribution
 from pathlib import Path
+
+import pytest
+
+import magshell as ms
 
 ROOT = Path(__file__).parents[1]
 READING_SPEED = 200  # words a minute, code counted as words
@@ -22,6 +28,13 @@ def blocks(text: str) -> list[str]:
 def machine_time() -> float:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
+
+
+@pytest.mark.skipif("CI" not in os.environ, reason="whoever works on it may use it where it lies")
+def test_what_is_tested_came_as_a_wheel():
+    told = json.loads(distribution("magshell").read_text("direct_url.json") or "{}")
+    assert told["url"].endswith(".whl") and "archive_info" in told
+    assert ROOT not in Path(ms.__file__).parents or ROOT / ".venv" in Path(ms.__file__).parents
 
 
 def test_the_first_picture_takes_less_than_a_minute_of_machine_time(tmp_path):

@@ -154,6 +154,17 @@ def test_a_state_goes_on_with_the_same_bits(buckled, critical_field):
     np.testing.assert_array_equal(other(**step).positions, one(**step).positions)
 
 
+def test_a_state_of_a_design_without_values_goes_on_by_halves(buckled, critical_field):
+    """It was taken for one with values, none of them, and no step between it and the next design could be made."""
+    pytest.importorskip("torch")
+    scene, start = buckled
+    one, other = ms.WarmStart(scene, start=start), ms.WarmStart(scene)
+    one(**design(0.0))
+    other.load_state_dict(one.state_dict())
+    with pytest.raises(ms.EquilibriumJumped):
+        other(**design(1.2 * critical_field))
+
+
 def test_bad_input(buckled):
     scene, start = buckled
     with pytest.raises(ValueError, match="scene must be a Scene"):

@@ -125,10 +125,9 @@ LinkTwists SkeletonCarrier::twists(const VectorXd& q) const {
         for (Index at = paths_->start[k]; at < paths_->start[k + 1]; ++at) {
             const Column& column = *by_place[paths_->coordinate[at]];
             const Vec3 axis = column.share * column.axis;
-            if (column.turns)
-                twists.col(at) << axis.cross(points[k] - column.origin), axis;
-            else
-                twists.col(at) << axis, Vec3::Zero();
+            const Vec3 velocity = column.turns ? axis.cross(points[k] - column.origin) : axis;
+            twists.col(at).head<3>() = velocity;
+            twists.col(at).tail<3>() = column.turns ? axis : Vec3(Vec3::Zero());
         }
     }
     return {paths_, std::move(points), std::move(arms), std::move(twists)};

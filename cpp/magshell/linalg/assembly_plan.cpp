@@ -5,6 +5,7 @@
 #include <map>
 #include <numeric>
 #include <string>
+#include <utility>
 
 #include "magshell/core/errors.h"
 #include "magshell/linalg/slabs.h"
@@ -27,35 +28,45 @@ std::ptrdiff_t panel_place(const FrontShape& front, Index row, bool is_pivot, In
 }
 
 void place_entries(const SparsePattern& pattern, AssemblyPlan& plan) {
-    std::vector<Index> position(pattern.size), front_of(pattern.size), local_row(pattern.size);
+    struct Eliminated {
+        Index position, front;
+    };
+    std::vector<Eliminated> eliminated(pattern.size);
     for (Index s = 0; s < plan.front_count(); ++s) {
         const FrontShape& front = plan.fronts[s].shape;
-        for (Index k = front.first; k < front.first + front.pivots; ++k) {
-            position[plan.order[k]] = k;
-            front_of[plan.order[k]] = s;
-        }
+        for (Index k = front.first; k < front.first + front.pivots; ++k) eliminated[plan.order[k]] = {k, s};
     }
 
-    // Sorted by front: for now, with an entry's column in the matrix for its place.
+    // Sorted by front: for now, with the position of an entry's column for its place, and that of its row beside it. What
+    // is looked up by an unknown is all over the memory, so it is done here, in the pattern's order.
     plan.entries.resize(pattern.rows.size());
-    std::vector<Index> next(plan.fronts.size() + 1, 0);
+    std::vector<Index> row_of(pattern.rows.size()), next(plan.fronts.size() + 1, 0), local_row(pattern.size);
     const auto each_entry = [&](auto&& visit) {
-        for (Index j = 0; j < pattern.size; ++j)
-            for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k)
-                visit(std::min(front_of[j], front_of[pattern.rows[k]]), PlacedEntry{k, j});
+        for (Index j = 0; j < pattern.size; ++j) {
+            const Eliminated own = eliminated[j];
+            for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
+                const Eliminated other = eliminated[pattern.rows[k]];
+                visit(std::min(own.front, other.front), k,
+                      std::pair{std::min(own.position, other.position),
+                                std::max(own.position, other.position)});
+            }
+        }
     };
-    each_entry([&](Index front, const PlacedEntry&) { ++next[front + 1]; });
+    each_entry([&](Index front, Index, const auto&) { ++next[front + 1]; });
     for (std::size_t s = 0; s + 1 < next.size(); ++s) next[s + 1] += next[s];
     for (std::size_t s = 0; s < plan.fronts.size(); ++s) plan.fronts[s].first_entry = next[s];
-    each_entry([&](Index front, const PlacedEntry& entry) { plan.entries[next[front]++] = entry; });
+    each_entry([&](Index front, Index k, const std::pair<Index, Index>& position) {
+        const Index to = next[front]++;
+        plan.entries[to] = {k, position.first};
+        row_of[to] = position.second;
+    });
 
     for (Index s = 0; s < plan.front_count(); ++s) {
         const FrontShape& front = plan.fronts[s].shape;
         for (Index k = 0; k < front.below; ++k) local_row[plan.rows[front.rows + k]] = k;
         for (Index k = plan.fronts[s].first_entry; k < plan.fronts[s + 1].first_entry; ++k) {
             PlacedEntry& entry = plan.entries[k];
-            const auto [column, row] =
-                std::minmax(position[entry.place], position[pattern.rows[entry.entry]]);
+            const Index column = entry.place, row = row_of[k];
             const bool is_pivot = row < front.first + front.pivots;
             const Index in_front = is_pivot ? row - front.first : local_row[row];
             entry.place = static_cast<Index>(panel_place(front, in_front, is_pivot, column - front.first));

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "magshell/scene/scene_input.h"
+
 namespace magshell {
 
 Bodies::Bodies(const SceneInput& input) {

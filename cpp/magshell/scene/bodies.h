@@ -5,10 +5,15 @@
 #include <vector>
 
 #include "magshell/body/fibres.h"
+#include "magshell/body/sheet.h"
+#include "magshell/body/six_node_sheet.h"
+#include "magshell/body/solid.h"
 #include "magshell/body/surface_body.h"
-#include "magshell/scene/scene_input.h"
 
 namespace magshell {
+
+struct RigidInput;
+struct SceneInput;
 
 class Bodies {
   public:

@@ -7,6 +7,7 @@
 #include "magshell/assembly/skeleton_carrier.h"
 #include "magshell/core/errors.h"
 #include "magshell/linalg/low_rank_factor.h"
+#include "magshell/scene/scene_input.h"
 #include "magshell/term/body_contact_term.h"
 #include "magshell/term/border_term.h"
 #include "magshell/term/damper_term.h"

@@ -18,8 +18,10 @@
 #include "magshell/linalg/factor_store.h"
 #include "magshell/scene/bodies.h"
 #include "magshell/scene/varying.h"
+#include "magshell/term/contact_term.h"
 #include "magshell/term/field_sources.h"
 #include "magshell/term/force_term.h"
+#include "magshell/term/solid_term.h"
 #include "magshell/term/viscous_terms.h"
 
 namespace magshell {
@@ -28,6 +30,7 @@ class BodyContactTerm;
 class BorderTerm;
 class DamperTerm;
 class MuscleTerm;
+struct GrowthForm;
 
 class Model {
   public:

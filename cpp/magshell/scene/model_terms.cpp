@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "magshell/scene/model.h"
+#include "magshell/scene/scene_input.h"
 #include "magshell/strain/fold_angle.h"
 #include "magshell/strain/fold_six.h"
 #include "magshell/term/ball_torque_term.h"

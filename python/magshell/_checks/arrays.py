@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 
 from .quantity import array_of, real_numbers
 
 
-def index_array(name: str, values) -> np.ndarray:
+def index_array(name: str, values: Any) -> np.ndarray:
     """An int64 copy. Numbers that are not integers are refused rather than truncated."""
     array = array_of(name, values, "hold integer indices")
     if array.size and not np.issubdtype(array.dtype, np.integer):
@@ -18,7 +19,7 @@ def index_array(name: str, values) -> np.ndarray:
     return array.astype(np.int64)
 
 
-def count(name: str, value, least: int = 1) -> int:
+def count(name: str, value: Any, least: int = 1) -> int:
     """How many: an int, or a ValueError that says the name and the limit that was passed."""
     if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise ValueError(f"{name} must be an integer of at least {least}, got {value!r}")
@@ -27,7 +28,7 @@ def count(name: str, value, least: int = 1) -> int:
     return int(value)
 
 
-def whole_numbers(name: str, values, type: str = "i8") -> np.ndarray:
+def whole_numbers(name: str, values: Any, type: str = "i8") -> np.ndarray:
     """Numbers from a file that are to be of this integer type of numpy's, whatever they were written as."""
     array = np.asarray(values)
     limits = np.iinfo(type)
@@ -37,14 +38,14 @@ def whole_numbers(name: str, values, type: str = "i8") -> np.ndarray:
     return array.astype(type)
 
 
-def named_values(name: str, values) -> Mapping:
+def named_values(name: str, values: Any) -> Mapping[Any, Any]:
     """A dictionary, empty for None."""
     if not isinstance(values, Mapping | None):
         raise ValueError(f"{name} must be a dictionary of name: values, got {type(values).__name__}")
     return values or {}
 
 
-def number(name: str, value) -> float:
+def number(name: str, value: Any) -> float:
     """A float, infinite or not a number as well."""
     array = real_numbers(name, value)
     if array.ndim != 0:

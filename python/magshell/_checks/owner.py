@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 
@@ -12,7 +14,7 @@ class Owner:
     _replaceable: tuple[str, ...] = ()
     _in_time: tuple[str, ...] = ()  # those that may change during a motion
 
-    def add_numbers(self, label: str, values, numbers: dict[tuple[str, str], np.ndarray]) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[tuple[str, str], np.ndarray]) -> None:
         """Puts its numbers in place, by owner and name. values: those of the solve; label: its own name there."""
         for name in self._replaceable:
             numbers[label, name] = getattr(self, name)
@@ -20,6 +22,6 @@ class Owner:
     def _check_in_time(self, name: str, rows: np.ndarray) -> None:
         """Raises ValueError where it cannot have one of the numbers (n, ...) over time."""
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         """By its values, from the core's gradient; a row for each of its parts."""
         return {name: gradient.value(label, name) for name in self._replaceable}

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .tensor_kinds import is_tensor, numbers_of, why_not
 
 
-def quantity(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.ndarray:
+def quantity(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) -> np.ndarray:
     """A read-only float64 copy of finite numbers.
 
     Letters in the shape stand for any size, "..." in front for any leading axes.
@@ -35,7 +37,7 @@ def label(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def real_numbers(label: str, values) -> np.ndarray:
+def real_numbers(label: str, values: Any) -> np.ndarray:
     """A float64 copy of any shape. Truth values, masked entries and strings are no numbers."""
     array = array_of(label, values, "be an array of real numbers")
     if array.dtype == bool or not np.can_cast(array.dtype, np.float64, casting="same_kind"):
@@ -44,7 +46,7 @@ def real_numbers(label: str, values) -> np.ndarray:
     return array.astype(np.float64)
 
 
-def shape_of(label: str, values) -> tuple[int, ...]:
+def shape_of(label: str, values: Any) -> tuple[int, ...]:
     """The shape of what a caller handed in, which may be a list. Raises ValueError where it has none."""
     if why := why_not(values):
         raise ValueError(f"{label} {why}")
@@ -54,7 +56,7 @@ def shape_of(label: str, values) -> tuple[int, ...]:
         raise ValueError(f"{label} must be an array of real numbers: {error}") from None
 
 
-def array_of(label: str, values, wanted: str) -> np.ndarray:
+def array_of(label: str, values: Any, wanted: str) -> np.ndarray:
     """Whatever a caller handed in as an array, perhaps the caller's own. Raises ValueError where it is none, which is
     then told that it must be what is `wanted`."""
     if why := why_not(values):

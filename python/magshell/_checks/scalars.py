@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .quantity import label, quantity
 
 
-def positive(name: str, unit: str, value) -> float:
+def positive(name: str, unit: str, value: Any) -> float:
     """A positive finite number, or a ValueError that names it and its unit ("" for a number without one)."""
     number = float(quantity(name, unit, value, ()))
     if number <= 0:
@@ -15,7 +17,7 @@ def positive(name: str, unit: str, value) -> float:
     return number
 
 
-def not_negative(name: str, unit: str, value) -> float:
+def not_negative(name: str, unit: str, value: Any) -> float:
     """As `positive`; zero will do."""
     number = float(quantity(name, unit, value, ()))
     if number < 0:
@@ -23,7 +25,7 @@ def not_negative(name: str, unit: str, value) -> float:
     return number
 
 
-def all_positive(name: str, unit: str, values, shape: tuple[int | str, ...]) -> np.ndarray:
+def all_positive(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) -> np.ndarray:
     """An array of positive finite numbers, or a ValueError that names the first other entry."""
     array = quantity(name, unit, values, shape)
     if (wrong := np.argwhere(array <= 0)).size:
@@ -33,7 +35,7 @@ def all_positive(name: str, unit: str, values, shape: tuple[int | str, ...]) -> 
     return array
 
 
-def flag(name: str, value) -> bool:
+def flag(name: str, value: Any) -> bool:
     """True or False, or a ValueError that names it."""
     if not isinstance(value, bool):
         raise ValueError(f"{name} must be True or False, got {value!r:.60}")

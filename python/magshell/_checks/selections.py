@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .quantity import array_of
 
 
-def selection(name: str, values) -> np.ndarray:
+def selection(name: str, values: Any) -> np.ndarray:
     """Indices, or a mask, as they were given: (k,), k > 0. `indices` checks them once their mesh is known."""
     array = np.atleast_1d(array_of(name, values, "be integer indices of shape (k,)"))
     if array.size == 0:

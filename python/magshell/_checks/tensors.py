@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
 
@@ -20,12 +21,12 @@ def require_torch(what: str):
     return torch
 
 
-def tensor_of(values):
+def tensor_of(values: Any):
     """A tensor as it is; of arrays and lists a copy, because the mesh's own arrays cannot be written to."""
     return values if is_tensor(values) else require_torch("an objective").from_numpy(np.array(values))
 
 
-def real_tensor(name: str, values, shape: tuple[int | str, ...]):
+def real_tensor(name: str, values: Any, shape: tuple[int | str, ...]):
     """Real numbers of this shape as a floating tensor, in its graph; letters and "..." as in `quantity`."""
     torch = require_torch(f"a function of {name}")
     if is_tensor(values):
@@ -42,29 +43,29 @@ def real_tensor(name: str, values, shape: tuple[int | str, ...]):
     return tensor
 
 
-def positive_number(name: str, unit: str, value):
+def positive_number(name: str, unit: str, value: Any):
     """A positive float, or the tensor that holds one."""
     number = positive(name, unit, detached(value))
     return value if is_tensor(value) else number
 
 
-def wants_gradient(value) -> bool:
+def wants_gradient(value: Any) -> bool:
     """Whether torch is recording what happens to this tensor."""
     return is_tensor(value) and value.requires_grad and sys.modules["torch"].is_grad_enabled()
 
 
-def detached(value):
+def detached(value: Any):
     """A tensor's numbers without their history; anything else as it came. So does a tensor whose numbers cannot be had,
     for `quantity` to refuse by its name."""
     return numbers_of(value) if is_tensor(value) and not why_not(value) else value
 
 
-def plain_arrays(named: dict) -> dict:
+def plain_arrays(named: dict[Any, Any]) -> dict[Any, Any]:
     """The same with arrays in the place of tensors."""
     return {name: detached(value) for name, value in named.items()}
 
 
-def to_array(name: str, value):
+def to_array(name: str, value: Any):
     """A tensor's numbers; anything else as it came. Tensors that ask for a gradient are refused."""
     if is_tensor(value) and value.requires_grad and not why_not(value):
         raise ValueError(f"{name} requires a gradient, and nothing passes one back to it: detach it first")
@@ -84,7 +85,7 @@ def dtype_like(*inputs):
     return next(real, sys.modules["torch"].float64)
 
 
-def stacked(parts: list, axis: int = 0):
+def stacked(parts: list[Any], axis: int = 0):
     """Arrays as one along a new axis, or tensors in their graphs; of none, no numbers."""
     if parts and is_tensor(parts[0]):
         import torch

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -19,7 +19,7 @@ _DELAY = 2.0  # s, that a solve goes on before its bar is shown
 _SHARES = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
 
 
-def progress_bar(title: str, total: float, *, shown: bool = True, **options) -> tqdm:
+def progress_bar(title: str, total: float, *, shown: bool = True, **options: Any) -> tqdm:
     """A bar with tqdm's options; one that is not shown takes the same calls. Raises ValueError on another `shown`.
 
     Inside another bar it is gone once it is full.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import torch
 
@@ -13,14 +15,14 @@ class Solved(torch.autograd.Function):
     """Arrays that were computed from the leaves (tensors); the adjoint knows the way back, once."""
 
     @staticmethod
-    def forward(ctx, adjoint, arrays, dtype, *leaves):
+    def forward(ctx: Any, adjoint, arrays, dtype, *leaves):
         ctx.adjoint = adjoint
         # Not by save_for_backward: a design that was changed in place since is no error, its numbers are not used.
         ctx.leaves = leaves
         return tuple(torch.from_numpy(array).to(dtype=dtype) for array in arrays)
 
     @staticmethod
-    def backward(ctx, *by_outputs):
+    def backward(ctx: Any, *by_outputs):
         arrays = [_numbers(each) for each in by_outputs]
         gradients = ctx.adjoint.gradients(arrays, ctx.needs_input_grad[3:])
         by_leaves = [
@@ -42,11 +44,11 @@ class Once(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx, count, *given):
+    def forward(ctx: Any, count, *given):
         return given[:count]
 
     @staticmethod
-    def backward(ctx, *_):
+    def backward(ctx: Any, *_):
         raise NoGradient(
             "no second derivatives: a solve's gradient is exact, but it has none itself (create_graph=True, "
             "torch.autograd.functional.hessian). Take differences of gradients: H v = (g(x + h v) - g(x - h v)) / 2h."
@@ -66,7 +68,7 @@ def _numbers(by_output) -> np.ndarray:
     return by_output.detach().cpu().double().numpy()
 
 
-def solved(adjoint, arrays: tuple[np.ndarray, ...], dtype, leaves: list) -> tuple[torch.Tensor, ...]:
+def solved(adjoint, arrays: tuple[np.ndarray, ...], dtype, leaves: list[Any]) -> tuple[torch.Tensor, ...]:
     """The arrays as tensors from which gradients go back to the leaves."""
     return Solved.apply(adjoint, arrays, dtype, *leaves)
 

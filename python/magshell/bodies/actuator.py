@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ class Actuator(Owner):
 
     for_all = False
     is_spring = True
-    bodies: tuple = ()
+    bodies: tuple[Any, ...] = ()
     _units: ClassVar[dict[str, str]] = {}
 
     def _unit(self, name: str) -> str:
@@ -49,14 +49,14 @@ class Actuator(Owner):
         return changed
 
 
-def number(name: str, unit: str, value, least: float | None = None, above: bool = False) -> np.ndarray:
+def number(name: str, unit: str, value: Any, least: float | None = None, above: bool = False) -> np.ndarray:
     """A finite number as an array (), at least `least`, or above it. Raises ValueError."""
     array = quantity(name, unit, value, ())
     _check_range(name, unit, array, least, above)
     return array
 
 
-def numbers(name: str, unit: str, value, count: int, what: str, least: float, above: bool) -> np.ndarray:
+def numbers(name: str, unit: str, value: Any, count: int, what: str, least: float, above: bool) -> np.ndarray:
     """Finite numbers, one a cell (count,), given so or as one of all. Raises ValueError."""
     array = real_numbers(f"{name} [{unit}]", value)
     if array.shape not in ((), (count,)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import takewhile
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Bodies:
         self.touching: tuple[Rigid, ...] = tuple(touching)
         listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton))
         self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
-        self.listed: tuple = tuple(listed)
+        self.listed: tuple[Any, ...] = tuple(listed)
         self.shells: tuple[Shell | Solid, ...] = tuple(body for body in listed if isinstance(body, BODIES))
         self.rigid: tuple[Rigid, ...] = tuple(
             part for body in listed for part in _parts(body) if isinstance(part, Rigid)
@@ -67,7 +68,7 @@ class Bodies:
             row += magnetized_rows(mesh)
         self.ties: tuple[Tie, ...] = checked_list("ties", ties, (Tie,))
         self._welded = np.concatenate([np.zeros((0, 2), dtype=np.int64), *map(self._pairs, self.ties)])
-        self.original = originals(vertex, self._welded)
+        self.original: np.ndarray = originals(vertex, self._welded)
         self._check_welded_once()
 
     def _first_rotations(self) -> list[int]:
@@ -260,7 +261,7 @@ class Bodies:
             before += each.shape.n_vertices if any(each is other for other in self.touching) else 0
         return len(self.original) + 10 * len(self.rigid) + before
 
-    def of(self, item) -> Span:
+    def of(self, item: Any) -> Span:
         """What a support, a load or a contact is about. Raises ValueError where it does not say so, and has to."""
         kind = type(item).__name__
         if item.body is None:
@@ -317,7 +318,7 @@ class Bodies:
         return np.array([numbers.get(id(body), -1) for body in self.shells], dtype=int)[of], own
 
 
-def _parts(body) -> tuple:
+def _parts(body) -> tuple[Any, ...]:
     return body.links if isinstance(body, Skeleton) else (body,)
 
 
@@ -326,8 +327,8 @@ class Whole:
 
     def __init__(self, mesh: TriangleMesh, sheets: tuple[Shell, ...]):
         self.mesh = mesh
-        self.thickness = joined([sheet.face_thickness for sheet in sheets] or [np.zeros(0)])
-        self.young_modulus = joined([sheet.young_modulus for sheet in sheets] or [np.zeros(0)])
+        self.thickness: np.ndarray = joined([sheet.face_thickness for sheet in sheets] or [np.zeros(0)])
+        self.young_modulus: np.ndarray = joined([sheet.young_modulus for sheet in sheets] or [np.zeros(0)])
 
     @cached_property
     def quality(self) -> MeshQuality:

@@ -34,7 +34,7 @@ class Caps:
         mesh, quality = shell.mesh, shell.quality
         is_cap = quality.largest_angles > LEAST_ANGLE
         is_cap[np.asarray(recut, dtype=int)] = False
-        self.faces = np.flatnonzero(is_cap)
+        self.faces: np.ndarray = np.flatnonzero(is_cap)
         self._mesh = mesh
         edges = mesh.face_edges[self.faces]  # (k, 3)
         self._bases = np.take_along_axis(edges, np.argmax(mesh.edge_lengths[edges], axis=1)[:, None], 1)[:, 0]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy
 
 from .._checks.quantity import quantity
 
 
-def checked_table(name: str, given) -> np.ndarray:
+def checked_table(name: str, given: Any) -> np.ndarray:
     """(n, 2), n > 2: places that rise by equal steps, and values that are not negative."""
     table = quantity(name, "1", given, ("n", 2))
     places, values = table.T
@@ -26,7 +28,7 @@ def checked_table(name: str, given) -> np.ndarray:
     return table
 
 
-def checked_force_velocity(given) -> np.ndarray:
+def checked_force_velocity(given: Any) -> np.ndarray:
     """A table that is 1 where the rate is 0, a row of it, and nowhere falls."""
     table = checked_table("force_velocity", given)
     places, values = table.T

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ class Fibres:
     coordinates: np.ndarray | None = field(repr=False, default=None)
     length: float | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         elements = selection("elements", self.elements)
         count = len(elements) if elements.dtype != bool else int(elements.sum())
         directions = quantity("directions", "", self.directions, (count, 3))
@@ -57,7 +58,7 @@ class Fibres:
         return f"Fibres(in {len(self.elements)} tetrahedra{length})"
 
 
-def checked_directions(name: str, values, shape: tuple) -> np.ndarray:
+def checked_directions(name: str, values: Any, shape: tuple[Any, ...]) -> np.ndarray:
     """Vectors of any length but zero."""
     array = quantity(name, "", values, shape)
     short = ~(np.linalg.norm(np.atleast_2d(array), axis=1) > 0)
@@ -66,7 +67,7 @@ def checked_directions(name: str, values, shape: tuple) -> np.ndarray:
     return array
 
 
-def checked_weights(values, count: int) -> np.ndarray:
+def checked_weights(values: Any, count: int) -> np.ndarray:
     """(count,), or one for all; none below zero, some above."""
     shape = shape_of("weights", values)
     array = np.broadcast_to(quantity("weights", "1", values, () if shape == () else (count,)), (count,))

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .._checks.scalars import positive
 from ..mesh.triangle_mesh import TriangleMesh
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
-def filled(shape: TriangleMesh, mass_density) -> dict:
+
+def filled(shape: TriangleMesh, mass_density: Numbers) -> dict[Any, Any]:
     """mass [kg], inertia [kg m2] and center [m] of a Rigid that fills it. Raises ValueError where it is open, or turned
     inside out."""
     density = positive("mass_density", "kg/m3", mass_density)

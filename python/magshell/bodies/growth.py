@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.quantity import quantity, real_numbers
@@ -19,7 +21,7 @@ class Growth:
     def __init__(self, rows: str, axes: np.ndarray):
         self._rows, self._axes = rows, axes
 
-    def checked(self, name: str, given, before: np.ndarray | None = None) -> np.ndarray:
+    def checked(self, name: str, given: Any, before: np.ndarray | None = None) -> np.ndarray:
         """A number, (n,), (3, 3) or (n, 3, 3), as it was given; of the shape of what was `before`. Raises ValueError."""
         label, n = f"{name} [{UNITS[name]}]", len(self._axes)
         array = real_numbers(label, given)

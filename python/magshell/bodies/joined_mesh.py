@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 class JoinedMesh:
     """Vertices, edges and faces (of a solid, those of its surface) of one body after another."""
 
-    def __init__(self, meshes: list):
+    def __init__(self, meshes: list[Any]):
         self.meshes = meshes
         self._first = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
 
@@ -95,6 +99,6 @@ class JoinedMesh:
     def n_components(self) -> int:
         return sum(mesh.n_components for mesh in self.meshes)
 
-    def self_intersections(self, positions) -> np.ndarray:
+    def self_intersections(self, positions: Numbers) -> np.ndarray:
         """The faces that pass through each other, (k, 2)."""
         return self.surface.self_intersections(np.asarray(positions)[self.surface_vertices])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from .._checks.owner import Owner
 from .._checks.quantity import quantity
 from .._checks.scalars import not_negative, positive
 from .rigid import Rigid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Joint(Owner):
@@ -22,14 +25,22 @@ class Joint(Owner):
     _defaults: ClassVar[dict[str, Any]] = {}  # by name: where it does not act
     _vectors: ClassVar[dict[str, str]] = {}  # the units of those that have three numbers
 
-    def __init__(self, child: Rigid, parent: Rigid | None, origin, axis=None, rate=None, **law):
+    def __init__(
+        self,
+        child: Rigid,
+        parent: Rigid | None,
+        origin: Numbers,
+        axis: Numbers | None = None,
+        rate: Numbers | None = None,
+        **law: Any,
+    ):
         for name, link in (("child", child), ("parent", parent)):
             if not isinstance(link, Rigid) and (name == "child" or link is not None):
                 raise ValueError(f"{name} of a {type(self).__name__} must be a Rigid, got {link!r:.60}")
         if child is parent:
             raise ValueError(f"child and parent of a {type(self).__name__} must be two links")
         self.child, self.parent = child, parent
-        self.origin = np.array(quantity("origin", "m", origin, (3,)))
+        self.origin: np.ndarray = np.array(quantity("origin", "m", origin, (3,)))
         self.axis, self._axis_length = np.zeros(3), 1.0  # of what was given
         if axis is not None:
             self.axis = np.array(quantity("axis", "", axis, (3,)))
@@ -41,7 +52,7 @@ class Joint(Owner):
         for name, value in self._given.items():
             self._given[name] = self._checked(name, value)
         self._check_together()
-        self.rate = None if rate is None else self._checked_rate(rate)
+        self.rate: float | np.ndarray | None = None if rate is None else self._checked_rate(rate)
         # What it was made without, a solve cannot give it.
         self._replaceable = (
             *self._given,
@@ -50,7 +61,7 @@ class Joint(Owner):
         )
         self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
 
-    def __getattr__(self, name: str):
+    def __getattr__(self, name: str) -> Any:
         given = self.__dict__.get("_given", {})
         if name in given:
             return given[name]
@@ -126,7 +137,7 @@ class Joint(Owner):
         """Whether it was made with this."""
         return name in self._given
 
-    def replaced(self, **values) -> Joint:
+    def replaced(self, **values: Any) -> Joint:
         """The same joint with other numbers of what acts in it."""
         for name in values:
             if name not in self._replaceable:
@@ -144,18 +155,18 @@ class Joint(Owner):
         """What of it says where it is at rest."""
         return ("origin", "axis") if self.has_axis else ("origin",)
 
-    def _again(self, law: dict) -> Joint:
+    def _again(self, law: dict[Any, Any]) -> Joint:
         own = {name: getattr(self, name) for name in self.places}
         return type(self)(child=self.child, parent=self.parent, **{**own, **law})
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         if self.acts:
             for name, default in self._defaults.items():
                 numbers[label, name] = self._given.get(name, default)
         for name in self.places:
             numbers[label, name] = getattr(self, name)
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         found = {name: gradient.value(label, name)[0] for name in (*self._given, *self.places)}
         if self.rate is not None:
             rows = gradient.others.get("own_velocities")

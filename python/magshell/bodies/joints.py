@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -10,6 +10,10 @@ from .._checks.quantity import quantity
 from .._checks.scalars import positive
 from .joint import Joint
 from .rigid import Rigid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _FAR = 1e300  # a limit that nothing reaches
 
@@ -32,7 +36,7 @@ class Fixed(Joint):
     _kind = "fixed"
     _replaceable = ("origin",)
 
-    def __init__(self, child: Rigid, parent: Rigid | None = None, origin=(0.0, 0.0, 0.0)):
+    def __init__(self, child: Rigid, parent: Rigid | None = None, origin: Numbers = (0.0, 0.0, 0.0)):
         super().__init__(child, parent, origin)
 
 
@@ -89,21 +93,21 @@ class Revolute(Joint):
         child: Rigid,
         parent: Rigid | None = None,
         *,
-        origin,
-        axis,
-        spring_stiffness=None,
-        rest_angle=None,
-        damping=None,
-        torque=None,
-        motor_angle=None,
-        target_angle=None,
-        servo_stiffness=None,
-        torque_limit=None,
-        lower_limit=None,
-        upper_limit=None,
-        limit_stiffness=None,
-        limit_smoothing=None,
-        rate=None,
+        origin: Numbers,
+        axis: Numbers,
+        spring_stiffness: Numbers | None = None,
+        rest_angle: Numbers | None = None,
+        damping: Numbers | None = None,
+        torque: Numbers | None = None,
+        motor_angle: Numbers | None = None,
+        target_angle: Numbers | None = None,
+        servo_stiffness: Numbers | None = None,
+        torque_limit: Numbers | None = None,
+        lower_limit: Numbers | None = None,
+        upper_limit: Numbers | None = None,
+        limit_stiffness: Numbers | None = None,
+        limit_smoothing: Numbers | None = None,
+        rate: Numbers | None = None,
     ):
         law = {name: value for name, value in locals().items() if name in self._defaults}
         super().__init__(child, parent, origin, axis, rate, **law)
@@ -148,21 +152,21 @@ class Prismatic(Joint):
         child: Rigid,
         parent: Rigid | None = None,
         *,
-        origin,
-        axis,
-        spring_stiffness=None,
-        rest_displacement=None,
-        damping=None,
-        force=None,
-        motor_displacement=None,
-        target_displacement=None,
-        servo_stiffness=None,
-        force_limit=None,
-        lower_limit=None,
-        upper_limit=None,
-        limit_stiffness=None,
-        limit_smoothing=None,
-        rate=None,
+        origin: Numbers,
+        axis: Numbers,
+        spring_stiffness: Numbers | None = None,
+        rest_displacement: Numbers | None = None,
+        damping: Numbers | None = None,
+        force: Numbers | None = None,
+        motor_displacement: Numbers | None = None,
+        target_displacement: Numbers | None = None,
+        servo_stiffness: Numbers | None = None,
+        force_limit: Numbers | None = None,
+        lower_limit: Numbers | None = None,
+        upper_limit: Numbers | None = None,
+        limit_stiffness: Numbers | None = None,
+        limit_smoothing: Numbers | None = None,
+        rate: Numbers | None = None,
     ):
         law = {name: value for name, value in locals().items() if name in self._defaults}
         super().__init__(child, parent, origin, axis, rate, **law)
@@ -216,20 +220,20 @@ class Ball(Joint):
         child: Rigid,
         parent: Rigid | None = None,
         *,
-        origin,
-        axis=None,
-        spring_stiffness=None,
-        damping=None,
-        torque=None,
-        motor_rotation=None,
-        target_rotation=None,
-        servo_stiffness=None,
-        torque_limit=None,
-        upper_limit=None,
-        cone_limit=None,
-        limit_stiffness=None,
-        limit_smoothing=None,
-        rate=None,
+        origin: Numbers,
+        axis: Numbers | None = None,
+        spring_stiffness: Numbers | None = None,
+        damping: Numbers | None = None,
+        torque: Numbers | None = None,
+        motor_rotation: Numbers | None = None,
+        target_rotation: Numbers | None = None,
+        servo_stiffness: Numbers | None = None,
+        torque_limit: Numbers | None = None,
+        upper_limit: Numbers | None = None,
+        cone_limit: Numbers | None = None,
+        limit_stiffness: Numbers | None = None,
+        limit_smoothing: Numbers | None = None,
+        rate: Numbers | None = None,
     ):
         law = {name: value for name, value in locals().items() if name in self._defaults}
         super().__init__(child, parent, origin, axis, rate, **law)
@@ -271,5 +275,5 @@ class Closure(Joint):
     _defaults: ClassVar[dict[str, float]] = {"stiffness": 0.0}
     _replaceable = (*_defaults, "origin")
 
-    def __init__(self, child: Rigid, parent: Rigid | None = None, *, origin, stiffness):
+    def __init__(self, child: Rigid, parent: Rigid | None = None, *, origin: Numbers, stiffness: Numbers):
         super().__init__(child, parent, origin, stiffness=positive("stiffness", "N/m", stiffness))

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ..mesh.triangle_mesh import TriangleMesh
 from .rigid import Rigid
 from .shell import Shell
 from .solid import Solid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Link(Rigid):
@@ -24,15 +29,15 @@ class Link(Rigid):
 
     def __init__(
         self,
-        vertices=None,
+        vertices: Numbers | None = None,
         *,
         shape: TriangleMesh | None = None,
-        mass=None,
-        inertia=None,
-        center=None,
-        magnetic_moment=None,
-        velocity=None,
-        angular_velocity=None,
+        mass: Numbers | None = None,
+        inertia: Numbers | None = None,
+        center: Numbers | None = None,
+        magnetic_moment: Numbers | None = None,
+        velocity: Numbers | None = None,
+        angular_velocity: Numbers | None = None,
         body: Shell | Solid | None = None,
     ):
         super().__init__(

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from .._checks.quantity import quantity, real_numbers
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 # Beyond this Poisson's ratio the volume of quadratic elements counts on their mean, see Solid.
 NEARLY_INCOMPRESSIBLE = 0.4
@@ -22,9 +26,9 @@ class SolidMaterial:
     isochoric = False  # whether the part that resists shear is blind to growth
 
     # Of each value: unit, what it has to be, and a test of that.
-    _ranges: ClassVar[dict[str, tuple[str, str, Callable]]] = {}
+    _ranges: ClassVar[dict[str, tuple[str, str, Callable[..., Any]]]] = {}
 
-    def __init__(self, **values):
+    def __init__(self, **values: Any):
         self._given = {name: self._checked(name, value) for name, value in values.items()}
 
     def _checked(self, name: str, value) -> np.ndarray:
@@ -41,7 +45,7 @@ class SolidMaterial:
             raise ValueError(f"{name} [{unit}] must be {wanted}{entry} {array.ravel()[index]:g}")
         return array
 
-    def __getattr__(self, name: str):
+    def __getattr__(self, name: str) -> Any:
         try:
             return self.__dict__["_given"][name]
         except KeyError:
@@ -56,7 +60,7 @@ class SolidMaterial:
     def _core_name(self) -> str:
         return type(self).__name__
 
-    def replaced(self, **values) -> SolidMaterial:
+    def replaced(self, **values: Any) -> SolidMaterial:
         """The same material with other values."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
@@ -114,7 +118,7 @@ _YOUNG = {
 class _Isotropic(SolidMaterial):
     _ranges = _YOUNG
 
-    def __init__(self, *, young_modulus, poisson_ratio):
+    def __init__(self, *, young_modulus: Numbers, poisson_ratio: Numbers):
         super().__init__(young_modulus=young_modulus, poisson_ratio=poisson_ratio)
 
 
@@ -134,7 +138,7 @@ class NeoHookean(_Isotropic):
 
     _VOLUMES = ("ln J", "J", "isochoric")
 
-    def __init__(self, volume: str = "ln J", *, young_modulus, poisson_ratio):
+    def __init__(self, volume: str = "ln J", *, young_modulus: Numbers, poisson_ratio: Numbers):
         if volume not in self._VOLUMES:
             raise ValueError(f"volume must be one of {self._VOLUMES}, got {volume!r}")
         self.volume, self.isochoric = volume, volume == "isochoric"
@@ -159,7 +163,7 @@ class StableNeoHookean(_Isotropic):
     array(1000000.)
     """
 
-    def __init__(self, *, young_modulus, poisson_ratio, log_barrier: bool = False):
+    def __init__(self, *, young_modulus: Numbers, poisson_ratio: Numbers, log_barrier: bool = False):
         if not isinstance(log_barrier, bool):
             raise ValueError(f"log_barrier must be True or False, got {log_barrier!r}")
         self.log_barrier = log_barrier
@@ -256,11 +260,11 @@ class Guccione(SolidMaterial):
     def __init__(
         self,
         *,
-        stiffness,
-        fibre_exponent,
-        cross_fibre_exponent,
-        fibre_shear_exponent,
-        bulk_modulus,
+        stiffness: Numbers,
+        fibre_exponent: Numbers,
+        cross_fibre_exponent: Numbers,
+        fibre_shear_exponent: Numbers,
+        bulk_modulus: Numbers,
         fibres,
     ):
         super().__init__(

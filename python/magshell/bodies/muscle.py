@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,10 @@ from .actuator import Actuator
 from .fibre_tables import checked_force_velocity, checked_table, core_curve
 from .fibres import checked_directions, checked_weights, fibres_of
 from .solid import Solid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _TABLES = ("force_length", "passive", "force_velocity")
 
@@ -68,13 +72,13 @@ class Muscle(Actuator):
         body: Solid,
         fibres,
         *,
-        activation=0.0,
-        stiffness=None,
-        peak_stress=None,
+        activation: Numbers = 0.0,
+        stiffness: Numbers | None = None,
+        peak_stress: Numbers | None = None,
         force_length=None,
         passive=None,
         force_velocity=None,
-        shortening_rate=None,
+        shortening_rate: Numbers | None = None,
         segments=None,
         weights=None,
         elements=None,
@@ -84,26 +88,36 @@ class Muscle(Actuator):
         self.bodies = (body,)
         found = fibres_of(fibres, body.mesh, elements)
         count = body.mesh.n_tetrahedra
-        self.elements = np.flatnonzero(found.elements) if found.elements.dtype == bool else found.elements
+        self.elements: np.ndarray = (
+            np.flatnonzero(found.elements) if found.elements.dtype == bool else found.elements
+        )
         if len(self.elements) == 0 or self.elements.max() >= count:
             raise ValueError(f"elements must be in [0, {count}), got {self.elements.max()}")
         self.coordinates, self.length = found.coordinates, found.length
-        self.fibres = found.directions
-        self.weights = found.weights if weights is None else checked_weights(weights, len(self.elements))
+        self.fibres: np.ndarray = found.directions
+        self.weights: np.ndarray | None = (
+            found.weights if weights is None else checked_weights(weights, len(self.elements))
+        )
         if (stiffness is None) == (peak_stress is None):
             raise ValueError("a Muscle needs stiffness [Pa] or peak_stress [Pa], one of them")
-        self.stiffness = None if stiffness is None else positive("stiffness", "Pa", stiffness)
-        self.peak_stress = None if peak_stress is None else positive("peak_stress", "Pa", peak_stress)
-        self.force_length = None if force_length is None else checked_table("force_length", force_length)
-        self.passive = None if passive is None else checked_table("passive", passive)
-        self.force_velocity = None if force_velocity is None else checked_force_velocity(force_velocity)
-        self.shortening_rate = (
+        self.stiffness: float | None = None if stiffness is None else positive("stiffness", "Pa", stiffness)
+        self.peak_stress: float | None = (
+            None if peak_stress is None else positive("peak_stress", "Pa", peak_stress)
+        )
+        self.force_length: np.ndarray | None = (
+            None if force_length is None else checked_table("force_length", force_length)
+        )
+        self.passive: np.ndarray | None = None if passive is None else checked_table("passive", passive)
+        self.force_velocity: np.ndarray | None = (
+            None if force_velocity is None else checked_force_velocity(force_velocity)
+        )
+        self.shortening_rate: float | None = (
             None if shortening_rate is None else positive("shortening_rate", "1/s", shortening_rate)
         )
         self._check_together()
         self.segments, self.n_segments = self._segments(segments)
         own = () if self.segments is None else (self.n_segments,)
-        self.activation = np.broadcast_to(self._activation(activation, own), own)
+        self.activation: np.ndarray = np.broadcast_to(self._activation(activation, own), own)
         self._replaceable = tuple(name for name in type(self)._replaceable if getattr(self, name) is not None)
 
     def _check_together(self) -> None:
@@ -169,7 +183,7 @@ class Muscle(Actuator):
                 f"{low:g} to {high:g}, got {array[wrong].flat[0]:g}"
             )
 
-    def replaced(self, **values) -> Muscle:
+    def replaced(self, **values: Any) -> Muscle:
         """The same muscle with other numbers."""
         other, count = copy(self), len(self.elements)
         for name, value in values.items():
@@ -201,7 +215,7 @@ class Muscle(Actuator):
             return "target stretch"
         return "active stress" if self.force_length is None else "hill"
 
-    def _core_input(self, owner: str, solid: int) -> dict:
+    def _core_input(self, owner: str, solid: int) -> dict[Any, Any]:
         segments = np.zeros(len(self.elements), dtype=np.int64) if self.segments is None else self.segments
         return {
             "owner": owner,
@@ -213,14 +227,14 @@ class Muscle(Actuator):
             **{name: core_curve(getattr(self, name)) for name in _TABLES},
         }
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         numbers[label, "fibres"] = self.fibres / np.linalg.norm(self.fibres, axis=1, keepdims=True)
         numbers[label, "strength"] = self.strength * self.weights
         numbers[label, "activation"] = np.atleast_1d(self.activation)
         if self.shortening_rate is not None:
             numbers[label, "shortening_rate"] = self.shortening_rate
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         by_strength, by_fibres = gradient.value(label, "strength"), gradient.value(label, "fibres")
         lengths = np.linalg.norm(self.fibres, axis=1, keepdims=True)
         along = self.fibres / lengths

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..mesh.triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class NoMesh(TriangleMesh):
@@ -19,11 +24,11 @@ class NoMesh(TriangleMesh):
         self.edges = self.edge_faces = np.zeros((0, 2), dtype=np.int32)
         self.components = np.zeros(0, dtype=np.int32)
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return NoMesh, ()
 
     def __repr__(self) -> str:
         return "no mesh"
 
-    def self_intersections(self, positions=None) -> np.ndarray:
+    def self_intersections(self, positions: Numbers | None = None) -> np.ndarray:
         return np.zeros((0, 2), dtype=np.int32)

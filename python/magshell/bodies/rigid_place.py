@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -79,7 +79,7 @@ class Place(NamedTuple):
         turning = np.cross(or_zero(part.angular_velocity), points - self.center_of(part))
         return or_zero(part.velocity) + turning
 
-    def as_input(self, owner: str, magnetic: bool) -> dict:
+    def as_input(self, owner: str, magnetic: bool) -> dict[Any, Any]:
         """As the core takes it."""
         points = np.concatenate([self.rest, self.surface])
         return {"owner": owner, "points": points, "vertices": self.vertices.tolist(), "magnetic": magnetic}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -89,7 +89,7 @@ class ShellStresses(NamedTuple):
         return mean(self.volumes, of_points)
 
 
-def stresses_of(values, body: Shell, state: np.ndarray) -> ShellStresses:
+def stresses_of(values: Any, body: Shell, state: np.ndarray) -> ShellStresses:
     """Of a state of the scene's core, with these values of the scene. Raises ValueError where the body is no shell of
     it."""
     scene = values.scene

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.checked_list import checked_list
 from .joint import Joint
 from .joints import Closure
 from .rigid import Rigid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Skeleton:
@@ -50,7 +55,13 @@ class Skeleton:
 
     @classmethod
     def from_urdf(
-        cls, path, *, fixed_base: bool = True, limits: bool = True, limit_stiffness=None, limit_smoothing=None
+        cls,
+        path,
+        *,
+        fixed_base: bool = True,
+        limits: bool = True,
+        limit_stiffness: Numbers | None = None,
+        limit_smoothing: Numbers | None = None,
     ) -> Skeleton:
         """Reads a URDF file, with the extra `urdf`: links with masses and inertias, at rest where all joints are at zero;
         revolute, continuous, prismatic and fixed joints with axes, limits and damping; links on a floating joint are free.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .joint import Joint
@@ -9,7 +11,7 @@ from .joints import Closure
 from .skeleton import Skeleton
 
 
-def skeleton_inputs(bodies, labels: list[tuple[object, str]]) -> dict[str, list[dict]]:
+def skeleton_inputs(bodies, labels: list[tuple[object, str]]) -> dict[str, list[dict[Any, Any]]]:
     """Of a scene's Bodies. labels: the core's name of every object."""
     part = {id(link): k for k, link in enumerate(bodies.rigid)}
     label = {id(item): name for item, name in labels if isinstance(item, Joint)}
@@ -28,7 +30,7 @@ def skeleton_inputs(bodies, labels: list[tuple[object, str]]) -> dict[str, list[
     }
 
 
-def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -> dict:
+def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -> dict[Any, Any]:
     links = skeleton.in_order
     place = {id(link): k for k, link in enumerate(links)}
     joints = [skeleton.joint_to(link) for link in links]
@@ -40,7 +42,7 @@ def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -
     }
 
 
-def _joint(joint: Joint | None, place: dict[int, int]) -> dict:
+def _joint(joint: Joint | None, place: dict[int, int]) -> dict[Any, Any]:
     if joint is None:
         still = dict.fromkeys(("driven", "damped", "twisted", "served", "coned"), False)
         return {"kind": "free", "parent": -1, "origin": np.zeros(3), "axis": np.zeros(3), **still}

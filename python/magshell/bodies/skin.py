@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .._checks.owner import Owner
@@ -10,6 +12,9 @@ from .._checks.selections import indices, selection
 from ..mesh.tet_mesh import TetMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from .shell import magnetization_of
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Skin(Owner):
@@ -44,10 +49,19 @@ class Skin(Owner):
     _replaceable = ("thickness", "mass_density", "remanent_magnetization")
     _corners, _areas = np.zeros((0, 3), dtype=np.int32), np.zeros(0)  # of its triangles, on a solid's mesh
 
-    def __init__(self, *, thickness, mass_density=None, faces=None, remanent_magnetization=None):
-        self.faces = None if faces is None else selection("Skin faces", faces)
-        self.thickness = _positive("thickness", "m", thickness)
-        self.mass_density = None if mass_density is None else _positive("mass_density", "kg/m3", mass_density)
+    def __init__(
+        self,
+        *,
+        thickness: Numbers,
+        mass_density: Numbers | None = None,
+        faces: Numbers | None = None,
+        remanent_magnetization: Numbers | None = None,
+    ):
+        self.faces: np.ndarray | None = None if faces is None else selection("Skin faces", faces)
+        self.thickness: np.ndarray = _positive("thickness", "m", thickness)
+        self.mass_density: np.ndarray | None = (
+            None if mass_density is None else _positive("mass_density", "kg/m3", mass_density)
+        )
         self.remanent_magnetization = None
         if remanent_magnetization is not None:
             given = real_numbers("remanent_magnetization [A/m]", remanent_magnetization)
@@ -95,14 +109,14 @@ class Skin(Owner):
             skin.remanent_magnetization = np.repeat(of_faces, parts, axis=0)
         return skin
 
-    def replaced(self, **values) -> Skin:
+    def replaced(self, **values: Any) -> Skin:
         """The same skin with other values."""
         now = {name: getattr(self, name) for name in self._replaceable}
         other = Skin(faces=self.faces, **(now | values))
         other._corners, other._areas = self._corners, self._areas
         return other
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         """With what its values do to the masses of the vertices."""
         found = {
             "thickness": np.zeros(len(self.faces)),
@@ -125,7 +139,7 @@ class Skin(Owner):
             np.add.at(masses, self._corners, (of_faces / 3.0)[:, None])
         return masses
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         count = len(self.faces)
         numbers[label, "thickness"] = np.broadcast_to(self.thickness, count)
         given = self.remanent_magnetization
@@ -133,7 +147,7 @@ class Skin(Owner):
             np.zeros(3) if given is None else given, count
         )
 
-    def _core_input(self, owner: str, mesh: TetMesh, vertices: np.ndarray) -> dict:
+    def _core_input(self, owner: str, mesh: TetMesh, vertices: np.ndarray) -> dict[Any, Any]:
         """As the core takes it. mesh: the solid's; vertices: the scene's of each of that, (n_v,)."""
         faces = mesh.faces[self.faces]
         used = np.unique(faces)

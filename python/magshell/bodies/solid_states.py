@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class SolidStates(NamedTuple):
         return mean(self.volumes, of_points)
 
 
-def states_at(values, body: Solid, positions: np.ndarray) -> SolidStates:
+def states_at(values: Any, body: Solid, positions: np.ndarray) -> SolidStates:
     """At positions (n_v of the scene, 3) m, with these values of the scene in its core."""
     scene = values.scene
     with values.in_core():

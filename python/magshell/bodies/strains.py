@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .._machine.callers import callers_level
 from ..errors import LargeStrainWarning
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 SMALL = 0.2  # the largest strain for which St. Venant-Kirchhoff material is of use
 _MOST_NAMED = 5  # faces in a warning
@@ -62,7 +66,7 @@ class StrainHistory(NamedTuple):
         return StrainHistory(numbers[:, 0], numbers[:, 1])
 
     @staticmethod
-    def of_each(strains) -> StrainHistory:
+    def of_each(strains: Numbers) -> StrainHistory:
         """From the Strains of each state."""
         pairs = [[np.abs(each).max(initial=0.0) for each in of_state] for of_state in strains]
         return StrainHistory(*np.reshape(pairs, (-1, 2)).T)
@@ -98,7 +102,7 @@ def largest_of(scene, state: np.ndarray, thickness: np.ndarray) -> Largest:
     return StrainHistory.of([scene._model.largest_strains(state, thickness)]).at(0)
 
 
-def warn_if_large(result, largest: Largest, where: str, index: tuple = ()) -> None:
+def warn_if_large(result, largest: Largest, where: str, index: tuple[Any, ...] = ()) -> None:
     """Says once a scene that a result leaves the model, and again where strains have doubled since: a design that is
     solved a thousand times says it a few times, wherever it goes. index: what result.strains takes."""
     scene, worst = result.scene, max(largest)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import scipy
 
@@ -10,6 +12,9 @@ from .._checks.selections import indices, selection
 from ..mesh.selection import RELATIVE_TOLERANCE
 from .shell import Shell
 from .solid import Solid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Tie:
@@ -34,7 +39,14 @@ class Tie:
     15
     """
 
-    def __init__(self, a: Shell | Solid, b: Shell | Solid, *, vertices=None, tolerance: float | None = None):
+    def __init__(
+        self,
+        a: Shell | Solid,
+        b: Shell | Solid,
+        *,
+        vertices: Numbers | None = None,
+        tolerance: float | None = None,
+    ):
         for name, body in (("a", a), ("b", b)):
             if not isinstance(body, Shell | Solid):
                 raise ValueError(f"Tie {name} must be a Shell or a Solid of the scene, got {body!r:.60}")
@@ -43,8 +55,10 @@ class Tie:
                 "a Tie joins two bodies, but a and b are one: to join a mesh to itself use ms.weld"
             )
         self.a, self.b = a, b
-        self.vertices = None if vertices is None else selection("Tie vertices", vertices)
-        self.tolerance = None if tolerance is None else float(quantity("tolerance", "m", tolerance, ()))
+        self.vertices: np.ndarray | None = None if vertices is None else selection("Tie vertices", vertices)
+        self.tolerance: float | None = (
+            None if tolerance is None else float(quantity("tolerance", "m", tolerance, ()))
+        )
         if self.tolerance is not None and not self.tolerance > 0.0:
             raise ValueError(f"tolerance [m] must be positive, got {self.tolerance:g}")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,9 +11,12 @@ from .joint import Joint
 from .joints import Fixed, Prismatic, Revolute
 from .link import Link
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 def read_urdf(
-    path, *, fixed_base: bool, limits: bool, limit_stiffness, limit_smoothing
+    path, *, fixed_base: bool, limits: bool, limit_stiffness: Numbers, limit_smoothing: Numbers
 ) -> tuple[list[Link], list[Joint], dict[str, Link | Joint]]:
     """Links, joints, and both by their names in the file. See Skeleton.from_urdf."""
     robot = _parsed(Path(path))
@@ -110,7 +114,7 @@ def _link(given, frame: np.ndarray) -> Link:
         raise ValueError(f"link {given.name!r}: {error}") from error
 
 
-def _joint(given, links: dict[str, Link], frame: np.ndarray, limits: dict | None) -> Joint | None:
+def _joint(given, links: dict[str, Link], frame: np.ndarray, limits: dict[Any, Any] | None) -> Joint | None:
     if given.mimic is not None:
         raise ValueError("it mimics another joint, which no joint here does: take the mimic element out")
     ends = {"child": links[given.child], "parent": links.get(given.parent)}

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.quantity import array_of, quantity
 from .._checks.tensors import detached, is_tensor, require_torch
 
 
-def tensor(name: str, unit: str, value, shape: tuple[int | str, ...]):
+def tensor(name: str, unit: str, value: Any, shape: tuple[int | str, ...]):
     """Finite numbers of this shape, in which letters stand for any size, as a float64 tensor."""
     torch = require_torch("ms.control")
     numbers = quantity(name, unit, detached(value), shape)
     return value.to("cpu", torch.float64) if is_tensor(value) else torch.tensor(numbers)
 
 
-def indices(name: str, value, size: int):
+def indices(name: str, value: Any, size: int):
     """Integers within -size ... size - 1, one or a row, as a tensor; those below zero count from the end."""
     torch = require_torch("ms.control")
     given = array_of(name, value, "be an integer or a row of them")

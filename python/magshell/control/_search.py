@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from .._checks.tensors import real_tensor, require_torch
 from ..design.minimize import minimize
 from ..design.minimum import Minimum
 from ..errors import DesignRejected, ObjectiveFailed
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 def given_controls(controls):
@@ -22,7 +26,7 @@ def given_controls(controls):
     return now
 
 
-def row_bound(name: str, value, controls):
+def row_bound(name: str, value: Any, controls):
     """Of every entry; infinite where there is none."""
     shape, array = tuple(controls.shape[1:]), real_numbers(name, value)
     if np.isnan(array).any():
@@ -32,14 +36,19 @@ def row_bound(name: str, value, controls):
     return controls.new_tensor(np.broadcast_to(array, controls.shape).copy())
 
 
-def check_functions(**functions) -> None:
+def check_functions(**functions: Any) -> None:
     for name, function in functions.items():
         if not callable(function):
             raise ValueError(f"{name} must be a function, got {function!r:.60}")
 
 
 def search_rows(
-    objective: Callable, rows, lower, upper, make: Callable | None, **options
+    objective: Callable[..., Any],
+    rows,
+    lower: Numbers,
+    upper: Numbers,
+    make: Callable[..., Any] | None,
+    **options: Any,
 ) -> tuple[Minimum | None, DesignRejected | None]:
     """The best rows, or None; and why a search ended early that met a design that cannot be evaluated.
 

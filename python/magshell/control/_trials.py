@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._checks.arrays import index_array
 from ._search import row_bound
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,7 @@ class Trials:
     longest: int
 
     @classmethod
-    def of(cls, number: int, spread, periods, controls) -> Trials:
+    def of(cls, number: int, spread: Numbers, periods: Numbers, controls) -> Trials:
         """Raises ValueError where something is to be tried and it is not said how."""
         if number == 0:
             return cls(0, np.zeros(controls.shape), 1, 1)
@@ -40,7 +44,9 @@ class Trials:
             )
         return cls(number, sizes, *limits)
 
-    def drawn(self, planned, given, first: int, known: int, end: int, lower, upper, rng) -> Iterator:
+    def drawn(
+        self, planned, given: Any, first: int, known: int, end: int, lower: Numbers, upper: Numbers, rng
+    ) -> Iterator:
         """Rows first ... end, each as planned until a random row before `known`, and then something else, every other one
         of them a repetition if enough is known; entries without a spread stay as planned."""
         for number in range(self.number):

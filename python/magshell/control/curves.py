@@ -9,12 +9,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._checks.quantity import quantity
 from .._checks.tensors import require_torch
 from ._arguments import tensor
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _TURN = 2 * np.pi
 
@@ -25,14 +30,14 @@ class Curve(ABC):
     length: float
 
     @abstractmethod
-    def nearest(self, points):
+    def nearest(self, points: Numbers):
         """The point of the curve nearest to each of the points: (n, 3) m to (n, 3) m."""
 
     @abstractmethod
-    def at(self, shares):
+    def at(self, shares: Numbers):
         """Points (n, 3) m of the curve at shares (n,) of its length, from 0, its start, to 1, its end."""
 
-    def squared_distance(self, points):
+    def squared_distance(self, points: Numbers):
         """(n,) m2, of points (n, 3) m from the curve."""
         points = tensor("points", "m", points, ("n", 3))
         return ((points - self.nearest(points)) ** 2).sum(-1)
@@ -58,7 +63,7 @@ class Polyline(Curve):
     (0.03, tensor([2.5000e-05], dtype=torch.float64))
     """
 
-    def __init__(self, points):
+    def __init__(self, points: Numbers):
         corners = quantity("points", "m", points, ("k", 3))
         if len(corners) < 2:
             raise ValueError(f"points [m] must be at least two, got {len(corners)}")
@@ -69,13 +74,13 @@ class Polyline(Curve):
         self.length = float(lengths.sum())
         self._corners, self._knots = tensor("points", "m", corners, ("k", 3)), _knots(lengths)
 
-    def nearest(self, points):
+    def nearest(self, points: Numbers):
         points = tensor("points", "m", points, ("n", 3))
         begin, along = self._corners[:-1], self._corners.diff(dim=0)
         shares = ((points[:, None] - begin) * along).sum(-1) / (along**2).sum(-1)
         return _nearest_of(points, begin + shares.clamp(0, 1)[..., None] * along)
 
-    def at(self, shares):
+    def at(self, shares: Numbers):
         piece, share = _located(shares, self._knots)
         return self._corners[piece] + share[:, None] * self._corners.diff(dim=0)[piece]
 
@@ -91,7 +96,7 @@ class Arc(Curve):
     tensor([0.0200, 0.0000, 0.0200], dtype=torch.float64)
     """
 
-    def __init__(self, center, start, axis, angle: float):
+    def __init__(self, center: Numbers, start, axis: Numbers, angle: float):
         center = quantity("center", "m", center, (3,))
         arm = quantity("start", "m", start, (3,)) - center
         axis = quantity("axis", "1", axis, (3,))
@@ -111,7 +116,7 @@ class Arc(Curve):
         self._center = tensor("center", "m", center, (3,))
         self._plane = tensor("plane", "1", np.stack([outwards, onwards]), (2, 3))
 
-    def nearest(self, points):
+    def nearest(self, points: Numbers):
         torch = require_torch("ms.control.Arc")
         points = tensor("points", "m", points, ("n", 3))
         center, plane = self._center, self._plane
@@ -126,7 +131,7 @@ class Arc(Curve):
         ends = torch.stack([self.start, self.end]).expand(len(points), 2, 3)
         return torch.where((angles <= self._angle)[:, None], on_circle, _nearest_of(points, ends))
 
-    def at(self, shares):
+    def at(self, shares: Numbers):
         angles = _shares(shares)[:, None] * self._angle
         return self._center + self._radius * (angles.cos() * self._plane[0] + angles.sin() * self._plane[1])
 
@@ -154,12 +159,12 @@ class Chain(Curve):
             if gap > 1e-6 * self.length:
                 raise ValueError(f"pieces[{k}] starts {gap:.3g} m away from the end of the piece before it")
 
-    def nearest(self, points):
+    def nearest(self, points: Numbers):
         torch = require_torch("ms.control.Chain")
         points = tensor("points", "m", points, ("n", 3))
         return _nearest_of(points, torch.stack([piece.nearest(points) for piece in self._pieces], dim=1))
 
-    def at(self, shares):
+    def at(self, shares: Numbers):
         torch = require_torch("ms.control.Chain")
         piece, share = _located(shares, self._knots)
         return _picked(torch.stack([each.at(share) for each in self._pieces], dim=1), piece)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from ..design.minimum import Minimum, effort
 from ..errors import DesignRejected, Interrupted, ObjectiveFailed
 from ._search import check_functions, given_controls, row_bound, search_rows
 from ._trials import Trials
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 @dataclass(frozen=True)
@@ -53,23 +56,23 @@ class Receding:
 
 
 def receding(
-    objective: Callable,
-    advance: Callable,
+    objective: Callable[..., Any],
+    advance: Callable[..., Any],
     controls,
     *,
     horizon: int,
     stride: int,
     start=None,
-    lower=-np.inf,
-    upper=np.inf,
+    lower: Numbers = -np.inf,
+    upper: Numbers = np.inf,
     trials: int = 0,
-    spread=None,
-    periods=None,
+    spread: Numbers | None = None,
+    periods: Numbers | None = None,
     seed: int = 0,
-    optimizer: Callable | None = None,
+    optimizer: Callable[..., Any] | None = None,
     max_iterations: int = 5,
     tolerance: float = 1e-3,
-    until: Callable | None = None,
+    until: Callable[..., Any] | None = None,
     progress: bool = True,
 ) -> Receding:
     """Minimizes over a control in time, `horizon` rows at once, of which the first `stride` are then done for good.

@@ -6,6 +6,8 @@ A frame is an index into the recorded states, 0 the start, -1 the last. [Chen22]
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.quantity import quantity, shape_of
@@ -14,8 +16,11 @@ from .._checks.tensors import detached, positive_number
 from ._arguments import indices, tensor
 from .curves import Curve
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
-def frames_at(times, wanted):
+
+def frames_at(times: Numbers, wanted):
     """The frames at wanted times [s], (k,) or one.
 
     times: (n,) s, of the frames, ascending. Raises ValueError if the nearest frame is further off than half a step.
@@ -38,7 +43,7 @@ def frames_at(times, wanted):
     return frames
 
 
-def track(positions, vertices, weights=None):
+def track(positions: Numbers, vertices: Numbers, weights=None):
     """The track (n, 3) m of a vertex, or of the mean of some.
 
     positions: (n, n_v, 3) m. vertices: an index, or (m,). weights: (m,), for example masses; by default equal.
@@ -58,7 +63,7 @@ def track(positions, vertices, weights=None):
     return (weights[:, None] * chosen).sum(1) / total
 
 
-def key_frames(positions, frames, targets, vertices=None, weights=None):
+def key_frames(positions: Numbers, frames, targets, vertices: Numbers | None = None, weights=None):
     """Sum of squared distances of vertices from their targets at some frames [m2]; [Chen22] (34).
 
     positions: (n, n_v, 3) m. frames: (k,). targets: (k, m, 3) m. vertices: (m,) indices, by default all.
@@ -97,7 +102,7 @@ def path_following(track, targets, weights=None):
     return (tensor("weights", "1", weights, tuple(squares.shape)) * squares).sum()
 
 
-def successive_targets(targets, begin, times, delay: float = 0.0):
+def successive_targets(targets, begin: Numbers, times: Numbers, delay: float = 0.0):
     """Targets (n, 3) m and weights (n,), a frame, for `path_following`: each target holds until the next appears, and
     counts once the delay has passed, as in [Chen22] Figure 13.
 
@@ -147,7 +152,12 @@ def curve_distance(track, curve: Curve, smoothing: float | None = None):
 
 
 def track_fitting(
-    track, curve: Curve, start_frame: int, end_frame: int, weights=(1.0, 1.0, 1.0), smoothing=None
+    track,
+    curve: Curve,
+    start_frame: int,
+    end_frame: int,
+    weights=(1.0, 1.0, 1.0),
+    smoothing: Numbers | None = None,
 ):
     """The three terms of [Chen22] 6.1, "Track Fitting", for `ms.minimize`: {"start", "end", "curve"}.
 

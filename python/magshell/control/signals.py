@@ -8,6 +8,7 @@ times among them.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,8 +19,11 @@ from ..dynamics.trajectory import MotionState, Trajectory
 from ..methods.clock import Clock, clock_of
 from ._arguments import tensor
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
-def step_times(steps: int, time_step, start: Trajectory | MotionState | None = None):
+
+def step_times(steps: int, time_step: Numbers, start: Trajectory | MotionState | None = None):
     """The times of the ends of all steps, the start first: (steps + 1,) s.
 
     time_step: s. start: the motion that goes on with these steps, and whose times do; by default they begin at 0.
@@ -38,7 +42,7 @@ def step_times(steps: int, time_step, start: Trajectory | MotionState | None = N
     return clock.moment(torch.arange(steps + 1, dtype=torch.float64), 0.0, time_step)
 
 
-def held(values, steps: int):
+def held(values: Any, steps: int):
     """A value a step, (steps, 3) T, from fewer: each is held equally long, to within one step.
 
     values: (k, 3) T, k <= steps. Bounds of the values are bounds of the field.
@@ -53,7 +57,7 @@ def held(values, steps: int):
     return values[np.arange(steps) * len(values) // steps]
 
 
-def harmonics(number: int, duration):
+def harmonics(number: int, duration: Numbers):
     """The angular frequencies 2 pi j / duration, j = 1 ... number: (number,) rad/s. duration: s.
 
     >>> import magshell as ms
@@ -66,7 +70,9 @@ def harmonics(number: int, duration):
     return torch.arange(1, count("number", number) + 1, dtype=torch.float64) * (2 * math.pi / duration)
 
 
-def oscillation(times, angular_frequencies, cosine_amplitudes, sine_amplitudes):
+def oscillation(
+    times: Numbers, angular_frequencies: Numbers, cosine_amplitudes: Numbers, sine_amplitudes: Numbers
+):
     """sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), with alpha and beta both (J,) or both (J, 3) [T]; as `fourier`."""
     frequencies = tensor("angular_frequencies", "rad/s", angular_frequencies, ("J",))
     one = len(shape_of("cosine_amplitudes [T]", cosine_amplitudes)) == 1
@@ -77,7 +83,13 @@ def oscillation(times, angular_frequencies, cosine_amplitudes, sine_amplitudes):
     return phases.cos() @ cosines + phases.sin() @ sines
 
 
-def fourier(times, angular_frequencies, cosine_amplitudes, sine_amplitudes, mean=(0.0, 0.0, 0.0)):
+def fourier(
+    times: Numbers,
+    angular_frequencies: Numbers,
+    cosine_amplitudes: Numbers,
+    sine_amplitudes: Numbers,
+    mean: Numbers = (0.0, 0.0, 0.0),
+):
     """B(t) = mean + sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), T.
 
     times: (n,) or one, s. angular_frequencies w: (J,) rad/s. cosine_amplitudes alpha, sine_amplitudes beta: (J, 3) T.
@@ -94,7 +106,7 @@ def fourier(times, angular_frequencies, cosine_amplitudes, sine_amplitudes, mean
     return tensor("mean", "T", mean, (3,)) + signal
 
 
-def fit_fourier(values, times, angular_frequencies):
+def fit_fourier(values: Any, times: Numbers, angular_frequencies: Numbers):
     """The mean (3,) T and amplitudes (J, 3), (J, 3) T whose `fourier` is nearest to a series in the least squares.
 
     values: (n, 3) T at times (n,) s. angular_frequencies: (J,) rad/s, positive. Raises ValueError where the series does
@@ -124,7 +136,7 @@ def fit_fourier(values, times, angular_frequencies):
     return torch.tensor(mean[0]), torch.tensor(cosines), torch.tensor(sines)
 
 
-def rotating(times, magnitude, axis, angular_frequency, start):
+def rotating(times: Numbers, magnitude: Numbers, axis: Numbers, angular_frequency: Numbers, start):
     """A field of given magnitude that turns about an axis, perpendicular to it, T.
 
     times: (n,) or one, s. magnitude: T, a number or, as times, one a time. axis: (3,), of any length but zero; seen
@@ -154,6 +166,6 @@ def rotating(times, magnitude, axis, angular_frequency, start):
     return magnitude[..., None] * (angle.cos() * first + angle.sin() * torch.linalg.cross(axis, first))
 
 
-def at_times(times):
+def at_times(times: Numbers):
     """One time or a row of them, s."""
     return tensor("times", "s", times, ("n",) if shape_of("times [s]", times) else ())

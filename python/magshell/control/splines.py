@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .._checks.arrays import count
@@ -10,8 +12,13 @@ from .._checks.tensors import detached, positive_number, require_torch
 from ._arguments import tensor
 from .signals import at_times
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
-def spline(times, control_points, duration, degree: int = 3, periodic: bool = False):
+
+def spline(
+    times: Numbers, control_points: Numbers, duration: Numbers, degree: int = 3, periodic: bool = False
+):
     """B(t) = sum_i N_i(t) P_i, T, with the B-splines N_i of a degree on evenly spaced knots; C2 for cubic ones.
 
     The N_i are not negative and their sum is 1, so each component stays within the bounds of the control points', and
@@ -28,7 +35,7 @@ def spline(times, control_points, duration, degree: int = 3, periodic: bool = Fa
     return spline_weights(times, len(control_points), duration, degree, periodic) @ control_points
 
 
-def spline_weights(times, number: int, duration, degree: int = 3, periodic: bool = False):
+def spline_weights(times: Numbers, number: int, duration: Numbers, degree: int = 3, periodic: bool = False):
     """The weights N_i(t) of the control points: (n, number), or (number,) at one time. Arguments as in `spline`."""
     torch = require_torch("ms.control.spline")
     degree = count("degree", degree)
@@ -47,7 +54,13 @@ def spline_weights(times, number: int, duration, degree: int = 3, periodic: bool
 
 
 def fit_spline(
-    values, times, number: int, duration, degree: int = 3, periodic: bool = False, limit: float | None = None
+    values: Any,
+    times: Numbers,
+    number: int,
+    duration: Numbers,
+    degree: int = 3,
+    periodic: bool = False,
+    limit: float | None = None,
 ):
     """The control points (number, 3) T whose spline is nearest to a series in the least squares.
 

@@ -3,16 +3,31 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from .._checks.quantity import shape_of
 from .._checks.tensors import require_torch
 from ._arguments import tensor
 from .signals import at_times
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 _STEEP = 4.0  # the exponent of a pulse: exp(-4) a width from its middle
 
 
-def wave(times, places, *, speed, wavelength, amplitude=0.5, mean=0.5, delay=0.0, ramp=None):
+def wave(
+    times: Numbers,
+    places,
+    *,
+    speed: Numbers,
+    wavelength: Numbers,
+    amplitude: Numbers = 0.5,
+    mean: Numbers = 0.5,
+    delay: Numbers = 0.0,
+    ramp: Numbers | None = None,
+):
     """A harmonic wave along a muscle, of one activation a segment:
 
         a(s, t) = R(t) (mean + amplitude sin(2 pi (speed (t - delay) - s) / wavelength)).
@@ -39,7 +54,16 @@ def wave(times, places, *, speed, wavelength, amplitude=0.5, mean=0.5, delay=0.0
     return signal if ramp is None else _risen(late, ramp) * signal
 
 
-def pulse(times, places, *, speed, width, amplitude=1.0, delay=0.0, period=None):
+def pulse(
+    times: Numbers,
+    places,
+    *,
+    speed: Numbers,
+    width: Numbers,
+    amplitude: Numbers = 1.0,
+    delay: Numbers = 0.0,
+    period: Numbers | None = None,
+):
     """A bump of activation that runs along a muscle:
 
         a(s, t) = amplitude exp(-4 (s - speed (t - delay))^2 / width^2).

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from .._checks.tensors import require_torch
 from ..design.minimum import Minimum
 from ..errors import Interrupted
 from ._search import check_functions, given_controls, row_bound, search_rows
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 @dataclass(frozen=True)
@@ -43,16 +47,16 @@ class Windows:
 
 
 def in_windows(
-    objective: Callable,
+    objective: Callable[..., Any],
     controls,
     *,
     lengths: Sequence[int],
-    lower=-np.inf,
-    upper=np.inf,
+    lower: Numbers = -np.inf,
+    upper: Numbers = np.inf,
     smoothings: Sequence[float] = (1.0,),
     depth: int | None = None,
     hold: bool = True,
-    optimizer: Callable | None = None,
+    optimizer: Callable[..., Any] | None = None,
     max_iterations: int = 20,
     tolerance: float = 1e-3,
     progress: bool = True,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +14,12 @@ from .._machine.files import replace_file
 _ARRAY = "numpy array"  # the only key of a dict that stands for one
 
 
-def save(path: str | Path, contents: dict) -> None:
+def save(path: str | Path, contents: dict[Any, Any]) -> None:
     torch = require_torch("a checkpoint")
     replace_file(path, lambda file: torch.save(contents, file))
 
 
-def load(path: str | Path, parts: Iterable[str]) -> dict:
+def load(path: str | Path, parts: Iterable[str]) -> dict[Any, Any]:
     """What `save` wrote; a file of anything but tensors and plain values, or without these parts, is refused."""
     torch = require_torch("a checkpoint")
     try:
@@ -30,7 +31,7 @@ def load(path: str | Path, parts: Iterable[str]) -> dict:
     return contents
 
 
-def encoded(value, label: str):
+def encoded(value: Any, label: str):
     """A state of tensors, arrays and plain values as what a safe file may hold; anything else is refused."""
     if isinstance(value, dict):
         return {key: encoded(entry, f"{label}[{key!r}]") for key, entry in value.items()}
@@ -50,7 +51,7 @@ def encoded(value, label: str):
     )
 
 
-def decoded(value):
+def decoded(value: Any):
     """What was given to `encoded`."""
     if isinstance(value, dict):
         if value.keys() == {_ARRAY}:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.tensors import detached
@@ -9,7 +11,7 @@ from .checkpoint import encoded
 from .digest import digest
 
 
-def kept(configuration: dict) -> dict:
+def kept(configuration: dict[Any, Any]) -> dict[Any, Any]:
     """As a checkpoint holds it: arrays and plain values; of anything else the type."""
     held = {}
     for name, value in configuration.items():
@@ -20,16 +22,16 @@ def kept(configuration: dict) -> dict:
     return held
 
 
-def changes(known: dict, now: dict) -> list[str]:
+def changes(known: dict[Any, Any], now: dict[Any, Any]) -> list[str]:
     """What two of them differ in, in words."""
     return [_change(name, known, now) for name in {**known, **now} if _differs(name, known, now)]
 
 
-def _differs(name: str, known: dict, now: dict) -> bool:
+def _differs(name: str, known: dict[Any, Any], now: dict[Any, Any]) -> bool:
     return not (name in known and name in now) or digest(known[name]) != digest(now[name])
 
 
-def _change(name: str, known: dict, now: dict) -> str:
+def _change(name: str, known: dict[Any, Any], now: dict[Any, Any]) -> str:
     if not (name in known and name in now):
         return f"{name} is given {'in the checkpoint' if name in known else 'now'} only"
     was, is_ = (_array(each[name]) for each in (known, now))

@@ -13,6 +13,7 @@ import sysconfig
 import types
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ _NOT_CONTENT = {
 }
 
 
-def digest(value) -> str:
+def digest(value: Any) -> str:
     """Raises TypeError where the value, or a part of it, neither is plain nor can be pickled."""
     return _Digester().of(value).hex()
 
@@ -52,7 +53,7 @@ def used_globals(function: types.FunctionType) -> Iterator[tuple[str, object]]:
                     yield f"{name}.{inner}", vars(value)[inner]
 
 
-def is_own_function(value) -> bool:
+def is_own_function(value: Any) -> bool:
     """Whether it is a function of the user's, in Python."""
     return isinstance(value, types.FunctionType) and _is_own(value.__code__.co_filename)
 
@@ -77,9 +78,9 @@ class _Digester:
     def __init__(self):
         self._known: dict[int, bytes] = {}
         self._above: dict[int, int] = {}  # the objects that hold the one at hand, by how deep they are
-        self._seen: list = []  # alive, else another object might be taken for one of them
+        self._seen: list[Any] = []  # alive, else another object might be taken for one of them
 
-    def of(self, value) -> bytes:
+    def of(self, value: Any) -> bytes:
         if value is None or type(value) in _PLAIN:
             return _joined(type(value).__name__, repr(value))
         if id(value) in self._known:
@@ -137,7 +138,7 @@ class _Digester:
         ]
 
     def _class_parts(self, value: type) -> list[bytes | str]:
-        parts: list = ["class", _name(value), *map(self.of, value.__bases__)]
+        parts: list[Any] = ["class", _name(value), *map(self.of, value.__bases__)]
         for name, each in sorted(vars(value).items()):
             if name in _NOT_CONTENT:
                 continue

@@ -22,8 +22,8 @@ _TIME_TO_READ = 0.2  # s, between two texts of the progress bar
 
 
 def minimize(
-    objective: Callable,
-    parameters: Sequence,
+    objective: Callable[..., Any],
+    parameters: Sequence[Any],
     optimizer,
     *,
     max_iterations: int = 100,
@@ -31,7 +31,7 @@ def minimize(
     patience: int = 3,
     feasibility: float = 1e-6,
     on_jump: str = "cross",
-    stateful: Sequence = (),
+    stateful: Sequence[Any] = (),
     callback: Callable[[Record], bool | None] | None = None,
     progress: bool = True,
     checkpoint: str | Path | None = None,
@@ -134,7 +134,7 @@ class _Ends:
     patience: int
     callback: Callable[[Record], bool | None] | None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.max_iterations < 0:
             raise ValueError(f"max_iterations must not be negative, got {self.max_iterations}")
         if not self.tolerance >= 0:

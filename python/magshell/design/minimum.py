@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 from .rejections import effort_in_words, in_words, total
 
@@ -37,7 +38,7 @@ class Minimum:
     many}, in all. conflict: what seems to keep the objective from falling, where it is one and the same jump of the
     equilibrium in every one of the last iterations; else empty."""
 
-    parameters: list
+    parameters: list[Any]
     objective: float
     violation: float
     history: list[Record] = field(default_factory=list)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from ..errors import DesignRejected, EquilibriumJumped, NotConverged
 
@@ -42,7 +43,7 @@ def effort_in_words(evaluations: int, rejections: Mapping[str, int]) -> list[str
     return [f"{evaluations} evaluations", *filter(None, [in_words(rejections)])]
 
 
-def conflict(history: Sequence, lost: Mapping[str, int], stuck: bool) -> str:
+def conflict(history: Sequence[Any], lost: Mapping[str, int], stuck: bool) -> str:
     """What is to be said where a run met the same jump in every one of its last iterations and gained little, or ended
     at one; else nothing. That lower designs lie beyond it is likely, and no more than that.
 

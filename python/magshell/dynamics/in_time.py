@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..bodies.actuator import Actuator
@@ -44,7 +46,7 @@ class InTime:
                 now = self.varied[course.owner, course.name] = numbers.reshape(-1, *course.row)
                 course.owner._check_in_time(course.name, now)
             rows += [numbers] * self._add(course, numbers.shape[1])
-        self.rows = np.concatenate(rows, axis=1)
+        self.rows: np.ndarray = np.concatenate(rows, axis=1)
         self._add_obstacles([each for each in courses if isinstance(each.owner, Obstacle)])
 
     def _add(self, course: Course, width: int) -> int:
@@ -81,7 +83,7 @@ class _Values:
     def __init__(self, in_time: InTime, course: Course):
         self._places, self._key = in_time._places, (id(course.owner), course.name)
 
-    def by_knots(self, gradient) -> np.ndarray:
+    def by_knots(self, gradient: Any) -> np.ndarray:
         return sum(gradient.of_controls(place) for place in self._places[self._key])
 
 
@@ -91,5 +93,5 @@ class _Pose:
     def __init__(self, number: int):
         self._number = number
 
-    def by_knots(self, gradient) -> np.ndarray:
+    def by_knots(self, gradient: Any) -> np.ndarray:
         return gradient.control(f"obstacle {self._number}", "pose")

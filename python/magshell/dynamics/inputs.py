@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .. import _core
@@ -22,6 +24,10 @@ from .in_time import InTime
 from .schedule import scheduled
 from .trajectory import MotionState, Trajectory
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 _CONTROLS = {  # (unit, of one time)
     "applied_flux_density": ("T", (3,)),
     "field_factor": ("1", ()),
@@ -39,32 +45,32 @@ class MotionInputs:
         inputs: Inputs,
         *,
         steps,
-        time_step,
+        time_step: Numbers,
         record_every,
         keep,
         start,
-        velocities,
-        damping,
-        stiffness_damping,
-        maxwell_modulus,
-        maxwell_time,
+        velocities: Numbers,
+        damping: Numbers,
+        stiffness_damping: Numbers,
+        maxwell_modulus: Numbers,
+        maxwell_time: Numbers,
         integrator: Integrator,
         solver: Newton,
         courses=(),
-        **controls,
+        **controls: Any,
     ):
         self.inputs, self.integrator = inputs, integrator
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
         check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
         self.keep, self.memory_budget = getattr(_core.Keep, keep.what or "nothing"), int(keep.memory_budget)
         self.given_time_step, self._outside = time_step, None
-        self.time_step = positive("time_step", "s", inputs.take("time_step", time_step))
+        self.time_step: float = positive("time_step", "s", inputs.take("time_step", time_step))
         self._mass = inputs.values.masses
         self._damping = self._checked_damping(inputs.take("damping", damping))
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
-        self.start = self._begin(start, velocities)
-        self.clock = clock_of(self.start).going_on(self.time_step)
-        self.knots = self.steps * (len(integrator._times) + 1)
+        self.start: MotionState = self._begin(start, velocities)
+        self.clock: Clock = clock_of(self.start).going_on(self.time_step)
+        self.knots: int = self.steps * (len(integrator._times) + 1)
         self._knots = {name: self._controls(name, value) for name, value in controls.items()}
         self._in_time = InTime(self, list(courses))
         if self._outside is not None:
@@ -95,7 +101,7 @@ class MotionInputs:
         """A control at the first `count` recorded states, (count, *row): at the start, then at the ends of steps."""
         return self._knots[name][self._recorded_knots(count)]
 
-    def varied(self, count: int) -> dict[tuple, np.ndarray]:
+    def varied(self, count: int) -> dict[tuple[Any, ...], np.ndarray]:
         """Likewise {(actuator, shell or field, name): its values} of what varies."""
         at = self._recorded_knots(count)
         return {key: rows[at] for key, rows in self._in_time.varied.items()}
@@ -133,7 +139,7 @@ class MotionInputs:
         knots = self.at_knots(name, unit, value, row)
         return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
 
-    def at_knots(self, name: str, unit: str, value, row: tuple[int, ...]):
+    def at_knots(self, name: str, unit: str, value: Any, row: tuple[int, ...]):
         """A value in time, as in `scheduled`, at all knots: a tensor in its graph if it is one."""
         time_step = self.given_time_step
         knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)

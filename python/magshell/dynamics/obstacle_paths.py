@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from .._checks.quantity import shape_of
 from .._checks.tensors import detached, is_tensor, require_torch
 from ..obstacles._motion import CENTRAL, FORWARD, STEP
 from .schedule import scheduled
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class ObstaclePath:
@@ -33,7 +37,7 @@ class ObstaclePath:
         for (name, value), unit in zip(self._given.items(), ("m", "rad"), strict=True):
             rows.append((asked.at_knots(name, unit, value, (3,)), self._rates(asked, name, unit, value)))
         xp, ((center, velocity), (rotation, rate)) = alike(rows)
-        self.knots = xp.stack((center, rotation, velocity, spin(xp, rotation, rate)), 1)
+        self.knots: Any = xp.stack((center, rotation, velocity, spin(xp, rotation, rate)), 1)
 
     def __call__(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         return self._at("center", time), self._at("rotation", time)
@@ -110,7 +114,7 @@ def _slope(function, time):
     return sum(weight / STEP * each for weight, each in zip(weights.values(), found, strict=True))
 
 
-def spin(xp: ModuleType, vector, rate):
+def spin(xp: ModuleType, vector, rate: Numbers):
     """J(w) dw/dt (n, 3), J the left Jacobian of rotations: how fast R(w) turns, in world axes, as w changes."""
     square = (vector * vector).sum(-1)[:, None]
     small = square < 1e-4  # where the closed forms cancel, and have no derivative at zero
@@ -135,7 +139,7 @@ def _cross(xp: ModuleType, a, b):
     )
 
 
-def alike(values):
+def alike(values: Any):
     """numpy or torch, and the values as arrays or tensors of it, float64: tensors if one of them is."""
     if any(is_tensor(each) for each in _flat(values)):
         torch = require_torch("a path")

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .._checks.quantity import quantity, shape_of
 from .._checks.tensors import detached, is_tensor
 from ..methods.clock import Clock
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 def scheduled(
     name: str,
     unit: str,
-    value,
+    value: Any,
     row: tuple[int, ...],
     steps: int,
     times: tuple[float, ...],
     clock: Clock,
-    time_step,
+    time_step: Numbers,
 ):
     """The values at all (steps, stages + 1) knots, in one row after another: (steps (stages + 1), *row).
 

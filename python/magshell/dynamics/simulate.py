@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,6 +29,9 @@ from ..surroundings.contact_inputs import check_apart
 from .inputs import MotionInputs
 from .trajectory import MotionState, Trajectory
 
+if TYPE_CHECKING:
+    from .._checks.kinds import InTime, Numbers
+
 
 @grouped(solver=MixedNewton, keep=Keep)
 @solve_entry
@@ -36,9 +39,9 @@ def simulate(
     scene: Scene,
     *,
     steps: int,
-    time_step,
-    remanent_magnetization=None,
-    applied_flux_density=None,
+    time_step: Numbers,
+    remanent_magnetization: InTime | None = None,
+    applied_flux_density: InTime | None = None,
     load_factor: Any = 1.0,
     gravity_factor: Any = 1.0,
     field_factor: Any = 1.0,
@@ -46,16 +49,16 @@ def simulate(
     damping: Any = 0.0,
     stiffness_damping: Any = 0.0,
     maxwell_modulus: Any = 0.0,
-    maxwell_time=None,
+    maxwell_time: InTime | None = None,
     start=None,
-    velocities=None,
-    thickness=None,
-    young_modulus=None,
-    poisson_ratio=None,
-    mass_density=None,
-    curvature_scale=None,
-    vertex_loads=None,
-    values: dict | None = None,
+    velocities: InTime | None = None,
+    thickness: InTime | None = None,
+    young_modulus: InTime | None = None,
+    poisson_ratio: InTime | None = None,
+    mass_density: InTime | None = None,
+    curvature_scale: InTime | None = None,
+    vertex_loads: InTime | None = None,
+    values: dict[Any, Any] | None = None,
     integrator: Integrator | None = None,
     record_every: int = 1,
     keep: str | Keep | None = None,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.tensors import detached
 from ..surroundings import constraints
 
 
-def check_supports(asked, courses: list) -> None:
+def check_supports(asked, courses: list[Any]) -> None:
     """Raises ValueError where a support is moved, at the end of a step, against another that holds the same vertex.
 
     courses: (course, its value at all knots) of supports.
@@ -31,7 +33,7 @@ def check_supports(asked, courses: list) -> None:
         return
     a_step = len(asked.integrator._times) + 1
     for knot in (0, *range(a_step - 1, asked.knots, a_step)):
-        now: dict = {}
+        now: dict[Any, Any] = {}
         for course, knots in courses:
             now.setdefault(course.owner, {})[course.name] = np.asarray(detached(knots))[knot]
         supports = [values.current(each) for each in scene.supports]

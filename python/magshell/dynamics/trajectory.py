@@ -57,7 +57,7 @@ class MotionState:
     time: float
     state: np.ndarray = field(repr=False)
     velocity: np.ndarray = field(repr=False)
-    turns: list = field(repr=False, default_factory=list)
+    turns: list[Any] = field(repr=False, default_factory=list)
     acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
@@ -146,7 +146,9 @@ class Trajectory:
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
     _load_factors: np.ndarray = field(repr=False)
-    _varied: dict = field(repr=False)  # {(actuator, shell or field, name): (n, ...)}, of the recorded states
+    _varied: dict[Any, Any] = field(
+        repr=False
+    )  # {(actuator, shell or field, name): (n, ...)}, of the recorded states
     _thickness: np.ndarray = field(repr=False)
     _values: Any = field(repr=False)
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
@@ -158,7 +160,7 @@ class Trajectory:
     def __copy__(self) -> Trajectory:
         return self  # nothing of it changes
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[Any, Any]:
         """What a copy, another process or a file makes it from again: tensors as arrays, without their gradients, and paths
         of obstacles as far as the recorded states need them."""
         pairs = zip(self.scene.obstacles, self._obstacles, strict=True)
@@ -169,7 +171,7 @@ class Trajectory:
         }
         return {**plain_arrays(vars(self)), "_values": {**self._values.kept(), "paths": paths}}
 
-    def __setstate__(self, kept: dict) -> None:
+    def __setstate__(self, kept: dict[Any, Any]) -> None:
         values = Values.again(kept["scene"], kept["_values"])
         for obstacle, path in kept["_values"]["paths"].items():
             values.move(obstacle, path)
@@ -189,14 +191,14 @@ class Trajectory:
 
     def _values_at(self, index: int):
         """With actuators, growth and field sources as they were then."""
-        then: dict[Actuator | Shell | AppliedField, dict] = {}
+        then: dict[Actuator | Shell | AppliedField, dict[Any, Any]] = {}
         for (owner, name), rows in self._varied.items():
             then.setdefault(owner, {})[name] = rows[index]
         now = {each: self._values.current(each).replaced(**named) for each, named in then.items()}
         return self._values.with_objects(now) if now else self._values
 
     @property
-    def _obstacles(self) -> tuple:
+    def _obstacles(self) -> tuple[Any, ...]:
         """Of the scene, where they were and went."""
         return tuple(self._values.current(each) for each in self.scene.obstacles)
 

@@ -24,6 +24,7 @@ gymnasium (the extra `gym`) is imported when `Environment` or `robots` is first 
 from __future__ import annotations
 
 from importlib import import_module
+from typing import Any
 
 from .actuator import Actuator
 from .rollouts import Episode, episodes
@@ -33,7 +34,7 @@ from .steered import Steered
 __all__ = ["Actuator", "Environment", "Episode", "Snapshot", "Steered", "episodes", "robots"]
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> Any:
     if name == "Environment":
         return import_module(".environment", __name__).Environment
     if name == "robots":

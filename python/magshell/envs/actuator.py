@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .._checks.quantity import quantity
 from .._machine.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
 from ..scene.courses import changes_at_once, names_in_time, row_in_time
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Actuator:
@@ -28,7 +33,7 @@ class Actuator:
     Actuator(torque of Revolute, 1 number from -2 to 2)
     """
 
-    def __init__(self, owner, name: str, *, lower, upper):
+    def __init__(self, owner: Any, name: str, *, lower: Numbers, upper: Numbers):
         self.owner, self.name = owner, name
         self._of_scene = hasattr(owner, "bodies") and hasattr(owner, "supports")
         if self._of_scene:
@@ -59,7 +64,7 @@ class Actuator:
         )
 
     @property
-    def owners(self) -> tuple:
+    def owners(self) -> tuple[Any, ...]:
         """Of what the value is set."""
         return (self.owner,)
 

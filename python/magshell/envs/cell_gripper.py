@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .. import meshes, obstacles
@@ -55,15 +57,15 @@ class CellGripper(Robot):
             for each, mass in ((mesh, MASS), (round_mesh, BALL_MASS))
         )
         self.traveller = self.ball
-        self.cells = Cells(self.arms, groups, stiffness=STIFFNESS)
+        self.cells: Cells = Cells(self.arms, groups, stiffness=STIFFNESS)
         top = mesh.rest_positions[:, 1].max()
         plate = mesh.vertices_where(lambda x: x[:, 1] > top - 1e-6)
-        self.drone = Pin(plate, displacement=(0, 0, 0), body=self.arms)
+        self.drone: Pin = Pin(plate, displacement=(0, 0, 0), body=self.arms)
         tips = mesh.vertices_where(lambda x: x[:, 1] < LOW + 1e-6)
         side = np.argmax(mesh.rest_positions[tips] @ [(-1, 1, 0, 0), (0, 0, 0, 0), (0, 0, -1, 1)], axis=1)
-        self.ends = np.array([tips[side == k] for k in range(4)])
+        self.ends: np.ndarray = np.array([tips[side == k] for k in range(4)])
         table = obstacles.Plane(center=(0, -RADIUS, 0), normal=(0, 1, 0))
-        self.grip = BodyContact(self.arms, self.ball, friction_coefficient=friction_coefficient)
+        self.grip: BodyContact = BodyContact(self.arms, self.ball, friction_coefficient=friction_coefficient)
         self.scene = Scene(
             [self.arms, self.ball],
             supports=[self.drone],
@@ -73,7 +75,7 @@ class CellGripper(Robot):
             allow_rigid_motions=True,
         )
 
-    def values(self, controls) -> dict:
+    def values(self, controls) -> dict[Any, Any]:
         """controls: (steps, 59)."""
         ago = np.subtract.outer(np.arange(len(controls)), np.arange(len(controls)))
         filling = np.where(ago >= 0, RESPONSE * (1.0 - RESPONSE) ** np.maximum(ago, 0), 0.0)

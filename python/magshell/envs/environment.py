@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -78,10 +79,10 @@ class Environment(gymnasium.Env):
         time_step: float,
         actions_per_episode: int,
         steps_per_action: int = 1,
-        start: Callable[[np.random.Generator], dict] | None = None,
+        start: Callable[[np.random.Generator], dict[Any, Any]] | None = None,
         finished: Callable[[Snapshot], bool] | None = None,
         failure_reward: float | None = None,
-        simulate: dict | None = None,
+        simulate: dict[Any, Any] | None = None,
         render_mode: str | None = None,
         render_width: int = 480,
         view=None,
@@ -106,9 +107,9 @@ class Environment(gymnasium.Env):
         self._failure_reward = (
             None if failure_reward is None else float(quantity("failure_reward", "", failure_reward, ()))
         )
-        self.time_step = positive("time_step", "s", time_step)
-        self.steps_per_action = count("steps_per_action", steps_per_action)
-        self.actions_per_episode = count("actions_per_episode", actions_per_episode)
+        self.time_step: float = positive("time_step", "s", time_step)
+        self.steps_per_action: int = count("steps_per_action", steps_per_action)
+        self.actions_per_episode: int = count("actions_per_episode", actions_per_episode)
         self._options = dict(named_values("simulate", simulate))
         known = [
             name for name in inspect.signature(simulate_motion).parameters if name not in (*_OWN, "scene")
@@ -122,28 +123,30 @@ class Environment(gymnasium.Env):
                 )
                 raise ValueError(f"simulate must not hold {name!r}, {why}")
         self.render_mode, self._width, self._view = render_mode, checked_width(render_width), view
-        self.metadata = {
+        self.metadata: dict[str, list[str] | int] = {
             "render_modes": ["rgb_array"],
             "render_fps": max(1, round(min(1e9, 1.0 / (self.time_step * self.steps_per_action)))),
         }
         size = sum(each.size for each in self.actuators)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float64)
+        self.action_space: Any = gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float64)
         self._shape: tuple[int, ...] | None = None
         self._camera: Camera | None = None
         self._now: Snapshot | None = None
         self._begin({})
         self._shape = self._observed(self._now).shape
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, self._shape, np.float64)
+        self.observation_space: Any = gymnasium.spaces.Box(-np.inf, np.inf, self._shape, np.float64)
         self._now = None
 
-    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[Any, Any] | None = None
+    ) -> tuple[np.ndarray, dict[Any, Any]]:
         """Begins an episode: (observation, info)."""
         super().reset(seed=seed)
         begun = {} if self._start is None else self._start(self.np_random)
         self._begin({**named_values("what `start` returns", begun), **named_values("options", options)})
         return self._observed(self._now), {"time": 0.0}
 
-    def step(self, action) -> tuple[np.ndarray, float, bool, bool, dict]:
+    def step(self, action) -> tuple[np.ndarray, float, bool, bool, dict[Any, Any]]:
         """One action: (observation, reward, terminated, truncated, info)."""
         if self._now is None:
             raise RuntimeError("reset must be called before the first step of an episode")
@@ -183,7 +186,7 @@ class Environment(gymnasium.Env):
             self._camera.close()
             self._camera = None
 
-    def _begin(self, where: dict) -> None:
+    def _begin(self, where: dict[Any, Any]) -> None:
         """The state that an episode begins in: the first of a motion of one step, which is not gone on with."""
         for name in where:
             if name not in ("start", "velocities"):
@@ -193,8 +196,8 @@ class Environment(gymnasium.Env):
         motion = self._moved(where, 1, self._setting, self._setting)
         self._now = Snapshot(motion, 0, np.concatenate([value.ravel() for value in self._setting]))
 
-    def _moved(self, where: dict, steps: int, before: list, now: list):
-        values: dict = {}
+    def _moved(self, where: dict[Any, Any], steps: int, before: list[Any], now: list[Any]):
+        values: dict[Any, Any] = {}
         for actuator, old, new in zip(self.actuators, before, now, strict=True):
             courses = actuator.courses(old, new, steps)
             for owner, course in zip(actuator.owners, courses, strict=True):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .. import meshes, shapes
@@ -61,7 +63,9 @@ class Fish(Robot):
         material = NeoHookean(young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO)
         density = MASS / mesh.volumes.sum()
         self.flesh = self.traveller = Solid(mesh, material=material, mass_density=density, element="linear")
-        self.links = {name: Link(self._near(*bone), body=self.flesh) for name, bone in _BONES.items()}
+        self.links: dict[str, Link] = {
+            name: Link(self._near(*bone), body=self.flesh) for name, bone in _BONES.items()
+        }
         self.joints = tuple(
             Revolute(
                 self.links[child], self.links[parent], origin=place, axis=axis, torque=0.0, damping=damping
@@ -78,7 +82,7 @@ class Fish(Robot):
         share = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
         return np.flatnonzero(np.linalg.norm(points - a - share[:, None] * (b - a), axis=1) < distance)
 
-    def values(self, controls) -> dict:
+    def values(self, controls) -> dict[Any, Any]:
         """controls: torques over the largest."""
         return {
             joint: {"torque": most * controls[:, k]}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..bodies.fibres import fibres_along
@@ -14,6 +16,10 @@ from ..scene.scene import Scene
 from .octopus_shape import HEAD, LEG, LEGS, around, octopus_mesh, placed
 from .robot import Robot
 from .water import water
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 CELLS = 10  # along a leg: 2112 tetrahedra; [Qiao21]'s has 2160, of 1.0 x 0.5 x 1.0 m
 YOUNG_MODULUS, POISSON_RATIO, MASS, PEAK_STRESS = 2e5, 0.4, 10.0, 5e5  # Pa, 1, kg, Pa
@@ -53,7 +59,7 @@ class MuscleOctopus(Robot):
             for above, height in ((True, 0.75), (False, 0.25))
         )
         ends = around(placed(np.array([(HEAD + LEG, 0.0, 0.5)] * LEGS)), np.arange(LEGS))
-        self.tips = np.linalg.norm(mesh.rest_positions - ends[:, None], axis=2).argmin(axis=1)
+        self.tips: Any = np.linalg.norm(mesh.rest_positions - ends[:, None], axis=2).argmin(axis=1)
         self.scene = Scene(self.flesh, actuators=self.muscles, water=water(), allow_rigid_motions=True)
 
     def _muscle(self, leg: int, height: float, elements: np.ndarray) -> Muscle:
@@ -62,7 +68,7 @@ class MuscleOctopus(Robot):
         fibres = fibres_along(around(placed(flat), leg), self.flesh, reach=REACH, elements=elements)
         return Muscle(self.flesh, fibres, peak_stress=PEAK_STRESS, segments=SEGMENTS)
 
-    def activations(self, controls, times):
+    def activations(self, controls, times: Numbers):
         """(n, 16, SEGMENTS), a tensor. controls: (n, 16, 4), a tensor; times: (n,) s."""
         strength, depth, delay, waves = controls.unbind(-1)
         along = WAVES[0] + (WAVES[1] - WAVES[0]) * 0.5 * (waves + 1.0)
@@ -78,7 +84,7 @@ class MuscleOctopus(Robot):
             delay=(DELAY * delay + later) / FREQUENCY,
         )
 
-    def values(self, controls) -> dict:
+    def values(self, controls) -> dict[Any, Any]:
         """controls: (steps, 64), of one muscle after another."""
         import torch
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class Robot:
     scene: Scene
     traveller: Solid
 
-    def values(self, controls) -> dict:
+    def values(self, controls) -> dict[Any, Any]:
         """Of the scene's objects over the time of a motion, as ms.simulate takes them."""
         raise TypeError(f"{type(self).__name__} does not say what its controls are")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .. import meshes
@@ -164,7 +166,7 @@ def muscle_octopus(
 
 
 def cell_gripper(
-    target=CellGripper.target, render_mode: str | None = None, disturbed: bool = True, **changes
+    target=CellGripper.target, render_mode: str | None = None, disturbed: bool = True, **changes: Any
 ) -> Environment:
     """Four arms of 56 pneumatic cells under a drone, to grip a ball on a table and to carry it to a target, (3,) m from
     where it was. An action, the volumes of all cells and the speed of the drone, lasts 10 ms, an episode 0.5 s: [Qiao21]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -30,8 +31,8 @@ class Episode:
 
 
 def episodes(
-    make: Callable,
-    policies: Sequence,
+    make: Callable[..., Any],
+    policies: Sequence[Any],
     *,
     seeds: Sequence[int] | None = None,
     executor: Executor | None = None,
@@ -85,10 +86,10 @@ def _actions(index: int, policy) -> np.ndarray:
     return array
 
 
-_made: dict = {}  # in each process: the environment of the last function
+_made: dict[Any, Any] = {}  # in each process: the environment of the last function
 
 
-def _episode(make: Callable, policy, seed: int) -> Episode:
+def _episode(make: Callable[..., Any], policy, seed: int) -> Episode:
     if make not in _made:
         _made.clear()
         _made[make] = make()

@@ -77,7 +77,7 @@ class Snapshot:
         """The principal strains of every face."""
         return self.motion.strains(self.index)
 
-    def __getitem__(self, item):
+    def __getitem__(self, item: Any):
         """What it says of one body, link or joint."""
         return result_of(self, item)
 

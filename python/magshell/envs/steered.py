@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ class Steered(Actuator):
     Steered(torque of Revolute, by 1 number)
     """
 
-    def __init__(self, owner, name: str, numbers: int, value: Callable):
+    def __init__(self, owner: Any, name: str, numbers: int, value: Callable[..., Any]):
         self._several = isinstance(owner, list | tuple)
         if self._several and not owner:
             raise ValueError("owner of a Steered must be one object or a list of at least one")
@@ -53,7 +54,7 @@ class Steered(Actuator):
         return self._numbers
 
     @property
-    def owners(self) -> tuple:
+    def owners(self) -> tuple[Any, ...]:
         """Of what the value is set, one by one."""
         return (self.owner, *(each.owner for each in self._further))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -31,8 +32,8 @@ class CustomField(AppliedField):
     """
 
     def __init__(self, function: Function, *, length_scale: float, gradient: Function | None = None) -> None:
-        self.length_scale = positive("length_scale", "m", length_scale)
-        self.name = getattr(function, "__name__", type(function).__name__)
+        self.length_scale: float = positive("length_scale", "m", length_scale)
+        self.name: Any | str = getattr(function, "__name__", type(function).__name__)
         self._made_from = {"function": function, "length_scale": self.length_scale, "gradient": gradient}
         step = RELATIVE_STEP * self.length_scale
         flux_density = _checked_function("function", "T", function, (3,))
@@ -65,7 +66,7 @@ class MagpylibField(AppliedField):
 
     def __init__(self, sources, *, length_scale: float) -> None:
         magpylib = _import_magpylib()
-        self.length_scale = positive("length_scale", "m", length_scale)
+        self.length_scale: float = positive("length_scale", "m", length_scale)
         listed = list(sources) if isinstance(sources, list | tuple) else [sources]
         try:
             copies = [source.copy() for source in listed]
@@ -83,14 +84,14 @@ class MagpylibField(AppliedField):
             return magpylib.getB(copies, points, sumup=True, squeeze=False).reshape(-1, 3)
 
         self._made_from = {"sources": copies, "length_scale": self.length_scale}
-        self.names = [type(source).__name__ for source in listed]
+        self.names: list[str] = [type(source).__name__ for source in listed]
         self._core = core.PythonField(FluxSampler(flux_density, RELATIVE_STEP * self.length_scale))
 
     def __repr__(self) -> str:
         return f"MagpylibField({', '.join(self.names)}, length_scale={self.length_scale:g} m)"
 
 
-def _checked_function(name: str, unit: str, function: Function, tail: tuple[int, ...]) -> Callable:
+def _checked_function(name: str, unit: str, function: Function, tail: tuple[int, ...]) -> Callable[..., Any]:
     """The function with its result checked for shape at each call; NaN may pass, as fields end somewhere."""
     if not callable(function):
         raise ValueError(f"{name} must be a function of points (n, 3) [m], got {type(function).__name__}")

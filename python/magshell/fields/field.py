@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,8 +16,11 @@ from .._checks.tensors import detached, is_tensor, real_tensor
 from .regridded import as_they_lie, interpolated
 from .table import read_table
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
-def residual_to_remanent(residual_flux_density):
+
+def residual_to_remanent(residual_flux_density: Numbers):
     """The remanent magnetization M_r = B_r / mu_0 [A/m] of the residual flux density B_r [T] of a data sheet.
 
     Numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph. Raises ValueError on
@@ -50,21 +54,21 @@ class AppliedField(Owner):
     _replaceable: tuple[str, ...] = ()
     _made_from: Mapping[str, object] = MappingProxyType({})
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         for name in self._replaceable:
             numbers[label, name] = self._made_from[name]
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[Any, Any]:
         return dict(self._made_from)
 
-    def __setstate__(self, arguments: dict) -> None:
+    def __setstate__(self, arguments: dict[Any, Any]) -> None:
         self.__init__(**arguments)
 
-    def flux_density(self, points) -> np.ndarray:
+    def flux_density(self, points: Numbers) -> np.ndarray:
         """B [T], (..., 3), at points [m], (..., 3); NaN where the field has no value."""
         return self._samples(points, order=0)[0]
 
-    def gradient(self, points) -> np.ndarray:
+    def gradient(self, points: Numbers) -> np.ndarray:
         """dB_i/dx_j [T/m], (..., 3, 3) as [..., i, j], at points [m], (..., 3); NaN as above."""
         return self._samples(points, order=1)[1]
 
@@ -108,13 +112,13 @@ class Dipoles(AppliedField):
 
     _replaceable = _in_time = ("positions", "moments")
 
-    def __init__(self, positions, moments) -> None:
-        self.positions = quantity("positions", "m", positions, ("n", 3))
-        self.moments = quantity("moments", "A m^2", moments, (len(self.positions), 3))
+    def __init__(self, positions: Numbers, moments: Numbers) -> None:
+        self.positions: np.ndarray = quantity("positions", "m", positions, ("n", 3))
+        self.moments: np.ndarray = quantity("moments", "A m^2", moments, (len(self.positions), 3))
         self._made_from = {"positions": self.positions, "moments": self.moments}
         self._core = core.Dipoles(**self._made_from)
 
-    def replaced(self, **values) -> Dipoles:
+    def replaced(self, **values: Any) -> Dipoles:
         """As many dipoles with other positions or moments."""
         changed = Dipoles(**{"positions": self.positions, "moments": self.moments, **values})
         if len(changed.positions) != len(self.positions):
@@ -150,9 +154,9 @@ class SampledField(AppliedField):
     _replaceable = ("flux_density",)
     table_error: float | None = None  # T, of `from_table`
 
-    def __init__(self, origin, spacing, flux_density) -> None:
-        self.origin = quantity("origin", "m", origin, (3,))
-        self.spacing = quantity("spacing", "m", spacing, (3,))
+    def __init__(self, origin: Numbers, spacing: Numbers, flux_density: Numbers) -> None:
+        self.origin: np.ndarray = quantity("origin", "m", origin, (3,))
+        self.spacing: np.ndarray = quantity("spacing", "m", spacing, (3,))
         flux_density = quantity("flux_density", "T", flux_density, ("nx", "ny", "nz", 3))
         self.counts: tuple[int, ...] = flux_density.shape[:3]
         if 0 in self.counts:
@@ -168,7 +172,7 @@ class SampledField(AppliedField):
 
     @classmethod
     def from_function(
-        cls, function: Callable[[np.ndarray], np.ndarray], lower, upper, counts
+        cls, function: Callable[[np.ndarray], np.ndarray], lower: Numbers, upper: Numbers, counts
     ) -> SampledField:
         """Samples a function of points (n, 3) [m] that returns B (n, 3) [T]: a slow field is worth it.
 
@@ -198,8 +202,8 @@ class SampledField(AppliedField):
         flux_density_unit: str | None = None,
         columns=None,
         counts=None,
-        lower=None,
-        upper=None,
+        lower: Numbers | None = None,
+        upper: Numbers | None = None,
     ) -> SampledField:
         """The field in a text file of points and B there: a CSV with names, or an export of COMSOL.
 
@@ -245,13 +249,13 @@ class SampledField(AppliedField):
         field.table_error = grid.error
         return field
 
-    def replaced(self, *, flux_density) -> SampledField:
+    def replaced(self, *, flux_density: Numbers) -> SampledField:
         """Other values on the same grid."""
         return SampledField(
             self.origin, self.spacing, quantity("flux_density", "T", flux_density, (*self.counts, 3))
         )
 
-    def contains(self, points) -> np.ndarray:
+    def contains(self, points: Numbers) -> np.ndarray:
         """Whether points [m], (..., 3), lie in the grid: bool, (...)."""
         points = quantity("points", "m", points, ("...", 3))
         return np.asarray(self._core.contains(points), dtype=np.bool_).reshape(points.shape[:-1])

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .. import _core as core
 from .._checks.quantity import quantity
 from .._checks.scalars import all_positive, positive
 from .field import AppliedField
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Magnet(AppliedField):
@@ -23,14 +28,16 @@ class Magnet(AppliedField):
 
     _in_time = ("remanent_magnetization", "center", "rotation")
 
-    def __init__(self, remanent_magnetization, center, rotation) -> None:
-        self.remanent_magnetization = quantity("remanent_magnetization", "A/m", remanent_magnetization, (3,))
-        self.center = quantity("center", "m", center, (3,))
-        self.rotation = quantity("rotation", "rad", rotation, (3,))
+    def __init__(self, remanent_magnetization: Numbers, center: Numbers, rotation: Numbers) -> None:
+        self.remanent_magnetization: np.ndarray = quantity(
+            "remanent_magnetization", "A/m", remanent_magnetization, (3,)
+        )
+        self.center: np.ndarray = quantity("center", "m", center, (3,))
+        self.rotation: np.ndarray = quantity("rotation", "rad", rotation, (3,))
         self._made_from = {name: getattr(self, name) for name in self._replaceable}
         self._core = getattr(core, type(self).__name__)(**self._made_from)
 
-    def replaced(self, **values) -> Magnet:
+    def replaced(self, **values: Any) -> Magnet:
         """A magnet of the same shape with other sizes, magnetization, center or rotation."""
         if unknown := sorted(set(values) - set(self._replaceable)):
             raise ValueError(
@@ -72,9 +79,13 @@ class CuboidMagnet(Magnet):
     _replaceable = ("dimensions", "remanent_magnetization", "center", "rotation")
 
     def __init__(
-        self, dimensions, remanent_magnetization, center=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)
+        self,
+        dimensions: Numbers,
+        remanent_magnetization: Numbers,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
     ) -> None:
-        self.dimensions = all_positive("dimensions", "m", dimensions, (3,))
+        self.dimensions: np.ndarray = all_positive("dimensions", "m", dimensions, (3,))
         super().__init__(remanent_magnetization, center, rotation)
 
     def __repr__(self) -> str:
@@ -106,10 +117,15 @@ class CylinderMagnet(Magnet):
     _replaceable = ("radius", "height", "remanent_magnetization", "center", "rotation")
 
     def __init__(
-        self, radius, height, remanent_magnetization, center=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)
+        self,
+        radius: Numbers,
+        height: Numbers,
+        remanent_magnetization: Numbers,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
     ) -> None:
-        self.radius = positive("radius", "m", radius)
-        self.height = positive("height", "m", height)
+        self.radius: float = positive("radius", "m", radius)
+        self.height: float = positive("height", "m", height)
         super().__init__(remanent_magnetization, center, rotation)
 
     def __repr__(self) -> str:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from .. import _core as core
 from .._checks.quantity import quantity
 from .field import AppliedField, UniformField
 from .magnets import Magnet
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class PlacedField(AppliedField):
@@ -32,7 +37,9 @@ class PlacedField(AppliedField):
 
     _replaceable = _in_time = ("center", "rotation")
 
-    def __init__(self, field: AppliedField, *, center=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)) -> None:
+    def __init__(
+        self, field: AppliedField, *, center: Numbers = (0.0, 0.0, 0.0), rotation: Numbers = (0.0, 0.0, 0.0)
+    ) -> None:
         if not isinstance(field, AppliedField) or isinstance(field, UniformField | Magnet | PlacedField):
             raise ValueError(
                 f"field must be a SampledField, CustomField, MagpylibField or Dipoles, got {type(field).__name__}"
@@ -46,14 +53,14 @@ class PlacedField(AppliedField):
         self._made_from = {"field": field, "center": self.center, "rotation": self.rotation}
         self._core = core.PlacedField(field._core, self.center, self.rotation)
 
-    def __setstate__(self, arguments: dict) -> None:
+    def __setstate__(self, arguments: dict[Any, Any]) -> None:
         self.__init__(arguments["field"], center=arguments["center"], rotation=arguments["rotation"])
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         self.field.add_numbers(label, values, numbers)
         numbers[label, "center"], numbers[label, "rotation"] = self.center, self.rotation
 
-    def replaced(self, **values) -> PlacedField:
+    def replaced(self, **values: Any) -> PlacedField:
         """The field elsewhere, or with other values of its own."""
         place = {name: values.pop(name, getattr(self, name)) for name in ("center", "rotation")}
         if unknown := sorted(set(values) - set(self._replaceable)):

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _SAME = 1e-6  # of the extent along an axis: as many digits as tables have
 _NEIGHBORS = 40  # that a value between scattered points is made from
@@ -47,7 +51,7 @@ def as_they_lie(points: np.ndarray, values: np.ndarray) -> Grid | None:
     return Grid(lower, np.array(spacing), rows.reshape(*counts, 3), None)
 
 
-def interpolated(points: np.ndarray, values: np.ndarray, lower, upper, counts) -> Grid:
+def interpolated(points: np.ndarray, values: np.ndarray, lower: Numbers, upper: Numbers, counts) -> Grid:
     """On a grid of `counts` between two corners, by cubic functions of the distance to the nearest points.
 
     Raises ValueError where points lie on each other, or where the grid goes beyond them.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
@@ -15,6 +16,10 @@ from ..scene.inputs import Inputs, plain_inputs
 from ..scene.scene import Scene
 from .mode_shapes import mode_shapes
 from .rest import RestStiffness, pulling_joints
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _LARGEST_CHANGE = 1e100  # over the stiffness itself: its square still is a number
 _ROUND_OFF = 1e-14  # of a length: what moves no more does not move
@@ -47,13 +52,13 @@ class Buckling:
 def linear_buckling(
     scene: Scene,
     *,
-    remanent_magnetization=None,
-    applied_flux_density=None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
-    values: dict | None = None,
+    values: dict[Any, Any] | None = None,
     modes: int = 1,
 ) -> Buckling:
     """The smallest positive multiples of the controls at which a scene buckles, by linear theory.

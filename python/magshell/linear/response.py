@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from .._machine.entry import solve_entry
 from ..scene.inputs import plain_inputs
 from ..scene.scene import Scene
 from .rest import RestStiffness, forces_at_rest
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 @dataclass(frozen=True, repr=False)
@@ -46,13 +49,13 @@ class LinearResponse:
 def linear_response(
     scene: Scene,
     *,
-    remanent_magnetization=None,
-    applied_flux_density=None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
-    values: dict | None = None,
+    values: dict[Any, Any] | None = None,
 ) -> LinearResponse:
     """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import scipy
@@ -76,7 +77,7 @@ def vibration_modes(
     scene: Scene,
     equilibrium: Equilibrium | None = None,
     *,
-    values: dict | None = None,
+    values: dict[Any, Any] | None = None,
     count: int = 6,
     mass: str = "lumped",
 ) -> VibrationModes:
@@ -157,8 +158,8 @@ class _Pencil:
 
     def __init__(
         self,
-        stiffness: tuple,
-        beside: tuple,
+        stiffness: tuple[Any, ...],
+        beside: tuple[Any, ...],
         points: np.ndarray,
         masses: np.ndarray,
         slow_square: float,
@@ -268,13 +269,13 @@ class _Pencil:
         return report
 
 
-def _root(masses: np.ndarray) -> tuple:
+def _root(masses: np.ndarray) -> tuple[Any, ...]:
     """Products with L and with L^T, M = L L^T a diagonal."""
     roots = np.sqrt(masses)
     return (lambda x: roots * x), (lambda x: roots * x)
 
 
-def _root_of(inertia, masses: np.ndarray) -> tuple:
+def _root_of(inertia, masses: np.ndarray) -> tuple[Any, ...]:
     """The same of a matrix whose last rows, of rigid parts, are coupled."""
     coupled = inertia.copy()
     coupled.setdiag(0.0)
@@ -287,7 +288,7 @@ def _root_of(inertia, masses: np.ndarray) -> tuple:
     return (lambda x: root @ x), (lambda x: root.T @ x)
 
 
-def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict | None) -> Inputs:
+def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict[Any, Any] | None) -> Inputs:
     """Magnetization and values of the equilibrium; the scene's own, without a field, at rest."""
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
@@ -309,7 +310,7 @@ def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict | None) 
     return inputs
 
 
-def _idle(scene: Scene, replaced: dict) -> dict:
+def _idle(scene: Scene, replaced: dict[Any, Any]) -> dict[Any, Any]:
     """With a magnetization of zero for the sheets and skins that are given none, as no field acts on it."""
     if not scene.fields:
         return replaced

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -21,6 +21,10 @@ from .six_node_mesh import SixNodeMesh
 from .tet_io import TetContent, TetFields, cells_and_data, tetrahedra_of
 from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh, checked_mesh
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
 _READABLE = (".obj", ".ply", *_MESHIO_MODULES)
@@ -90,7 +94,7 @@ def read_fields(path, drop_unused: bool = False) -> Fields | TetFields:
 def write_mesh(
     path,
     mesh: TriangleMesh | SixNodeMesh | TetMesh,
-    positions=None,
+    positions: Numbers | None = None,
     vertex_fields=None,
     face_fields=None,
     tetrahedron_fields=None,
@@ -149,7 +153,13 @@ def write_mesh(
     write_cells(path, points, cells, on_vertices, cell_data)
 
 
-def write_cells(path: Path, points, cells: list, on_vertices: dict, cell_data: dict[str, list]) -> None:
+def write_cells(
+    path: Path,
+    points: Numbers,
+    cells: list[Any],
+    on_vertices: dict[Any, Any],
+    cell_data: dict[str, list[Any]],
+) -> None:
     """A VTU of what has been checked: cells [(meshio's kind, rows)] and data {name: [of each kind]}."""
     meshio = _meshio("vtu")
     content = _meshio().Mesh(points, cells, point_data=on_vertices, cell_data=cell_data)
@@ -236,7 +246,9 @@ def _meshio(module: str | None = None):
         raise ImportError('this file format needs meshio: pip install "magshell[io]"') from error
 
 
-def _read_with_meshio(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict] | TetContent:
+def _read_with_meshio(
+    path: Path,
+) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[Any, Any]] | TetContent:
     # meshio.read ends the interpreter on a file it cannot read; the readers of the formats raise
     with np.errstate(over="ignore"):  # its STL reader multiplies whatever stands where the count should
         content = _meshio(_MESHIO_MODULES[path.suffix.lower()]).read(path)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
 
-def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
+def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[Any, Any]]:
     """(points, faces, no fields). Raises ValueError, with the line, on what is not a vertex or a triangle."""
     points: list[list[float]] = []
     faces: list[list[int]] = []

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class _Element:
     properties: list[_Property] = field(default_factory=list)
 
 
-def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
+def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[Any, Any]]:
     """(points, faces, vertex fields, face fields). Raises ValueError on what is not PLY, or not triangles."""
     data = path.read_bytes()
     order, elements, groups, body = _header(data)
@@ -69,7 +70,11 @@ def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
 
 
 def write_ply(
-    path: Path, points: np.ndarray, faces: np.ndarray, vertex_fields: dict, face_fields: dict
+    path: Path,
+    points: np.ndarray,
+    faces: np.ndarray,
+    vertex_fields: dict[Any, Any],
+    face_fields: dict[Any, Any],
 ) -> None:
     """Fields: name -> (n,) or (n, k), float64 or int32."""
     vertex, vertex_comments = _columns("vertex", vertex_fields)
@@ -90,7 +95,7 @@ def write_ply(
     replace_file(path, lambda file: file.writelines(parts))
 
 
-def _header(data: bytes) -> tuple[str, list[_Element], dict, int]:
+def _header(data: bytes) -> tuple[str, list[_Element], dict[Any, Any], int]:
     """Byte order ("" for ASCII), elements, field components that belong together, where the body starts."""
     end = data.find(b"\nend_header") + 1
     if not data.startswith(b"ply") or not end:
@@ -129,7 +134,7 @@ def _text(header: bytes) -> str:
         return header.decode("latin-1")
 
 
-def _binary_table(element: _Element, data: bytes, offset: int, order: str) -> tuple[dict, int]:
+def _binary_table(element: _Element, data: bytes, offset: int, order: str) -> tuple[dict[Any, Any], int]:
     # all lists of an element are taken to be as long as in its first row; _same_lengths checks it
     columns, position = [], offset
     for prop in element.properties:
@@ -151,7 +156,7 @@ def _binary_table(element: _Element, data: bytes, offset: int, order: str) -> tu
     return {prop.name: table[prop.name] for prop in element.properties}, offset + row.itemsize * element.count
 
 
-def _ascii_table(element: _Element, lines) -> dict:
+def _ascii_table(element: _Element, lines) -> dict[Any, Any]:
     rows = []
     while len(rows) < element.count:
         line = next(lines, None)
@@ -178,7 +183,7 @@ def _ascii_table(element: _Element, lines) -> dict:
     return table
 
 
-def _of_type(prop: _Property, words: list) -> np.ndarray:
+def _of_type(prop: _Property, words: list[Any]) -> np.ndarray:
     """Words as the numbers that the header says they are."""
     numbers = np.array(words, dtype=np.float64)
     if prop.type.startswith("f"):

@@ -7,6 +7,7 @@ there: an empty support would otherwise surface much later, as a sheet that flie
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,13 +15,23 @@ from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.scalars import not_negative
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 RELATIVE_TOLERANCE = 1e-6  # of the mesh's size: far above round-off, far below any edge
 
 
 class MeshSelection:
     """The selecting half of TriangleMesh."""
 
-    def vertices_at(self, x=None, y=None, z=None, tolerance: float | None = None) -> np.ndarray:
+    def vertices_at(
+        self,
+        x: Numbers | None = None,
+        y: Numbers | None = None,
+        z: Numbers | None = None,
+        tolerance: float | None = None,
+    ) -> np.ndarray:
         """Vertices whose given coordinates [m] match within `tolerance` [m].
 
         The default tolerance is 1e-6 of the diagonal of the bounding box.
@@ -35,11 +46,23 @@ class MeshSelection:
             raise ValueError(self._nothing_at("vertex", wanted, tolerance))
         return found
 
-    def edges_at(self, x=None, y=None, z=None, tolerance: float | None = None) -> np.ndarray:
+    def edges_at(
+        self,
+        x: Numbers | None = None,
+        y: Numbers | None = None,
+        z: Numbers | None = None,
+        tolerance: float | None = None,
+    ) -> np.ndarray:
         """Edges with both ends at the given coordinates [m]; see `vertices_at`."""
         return self._at("edge", self.edges, x, y, z, tolerance)
 
-    def faces_at(self, x=None, y=None, z=None, tolerance: float | None = None) -> np.ndarray:
+    def faces_at(
+        self,
+        x: Numbers | None = None,
+        y: Numbers | None = None,
+        z: Numbers | None = None,
+        tolerance: float | None = None,
+    ) -> np.ndarray:
         """Faces with all three vertices at the given coordinates [m]; see `vertices_at`."""
         return self._at("face", self.faces, x, y, z, tolerance)
 
@@ -69,12 +92,12 @@ class MeshSelection:
         """Faces where predicate((n_f, 3) barycenters [m]) -> (n_f,) bool holds."""
         return _where("face", predicate, self.face_barycenters, np.arange(self.n_faces))
 
-    def nearest_vertex(self, point) -> int:
+    def nearest_vertex(self, point: Numbers) -> int:
         """The vertex nearest to a point (3,) [m]; the lowest index where several are."""
         point = quantity("point", "m", point, (3,))
         return int(np.argmin(np.linalg.norm(self.rest_positions - point, axis=1)))
 
-    def edges_between(self, vertex_indices) -> np.ndarray:
+    def edges_between(self, vertex_indices: Numbers) -> np.ndarray:
         """Edges with both ends among the given vertices."""
         indices = index_array("vertex_indices", vertex_indices).ravel()
         outside = indices[(indices < 0) | (indices >= self.n_vertices)]
@@ -133,7 +156,7 @@ def _describe(coordinates: dict[int, float]) -> str:
     return ", ".join(f"{'xyz'[axis]} = {value:.9g}" for axis, value in coordinates.items())
 
 
-def _where(kind: str, predicate: Callable, points: np.ndarray, indices: np.ndarray) -> np.ndarray:
+def _where(kind: str, predicate: Callable[..., Any], points: np.ndarray, indices: np.ndarray) -> np.ndarray:
     mask = np.asarray(predicate(points))
     if mask.shape != (len(points),) or mask.dtype != bool:
         raise ValueError(

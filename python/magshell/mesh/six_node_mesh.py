@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +20,10 @@ from .smooth_fit import middles_on_fit
 from .tet_topology import FLAT
 from .transforms import moved
 from .triangle_mesh import TriangleMesh, checked_mesh
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _MIRRORED = [0, 2, 1, 5, 4, 3]
 
@@ -51,7 +56,7 @@ class SixNodeMesh(MeshBase):
 
     order = 2
 
-    def __init__(self, rest_positions, elements):
+    def __init__(self, rest_positions: Numbers, elements):
         positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
         nodes = index_array("elements", elements)
         check_elements(nodes, len(positions))
@@ -114,7 +119,9 @@ class SixNodeMesh(MeshBase):
         middles = middles_on_fit(mesh, mesh if to is None else checked_mesh(to, "to"), name)
         return cls.of(mesh, place=lambda _: middles)
 
-    def __reduce__(self):  # copies and worker processes rebuild the connectivity, which is cheap
+    def __reduce__(
+        self,
+    ) -> tuple[Any, ...]:  # copies and worker processes rebuild the connectivity, which is cheap
         return SixNodeMesh, (self.rest_positions, self.elements)
 
     def __repr__(self) -> str:
@@ -265,11 +272,17 @@ class SixNodeMesh(MeshBase):
         vectors = area_vectors(self.rest_positions[self.elements])
         return frozen(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
-    def self_intersections(self, positions=None) -> np.ndarray:
+    def self_intersections(self, positions: Numbers | None = None) -> np.ndarray:
         """The pairs of flat faces that pass through each other, as those of a TriangleMesh, (k, 2)."""
         return self.surface.self_intersections(positions)
 
-    def edges_at(self, x=None, y=None, z=None, tolerance: float | None = None) -> np.ndarray:
+    def edges_at(
+        self,
+        x: Numbers | None = None,
+        y: Numbers | None = None,
+        z: Numbers | None = None,
+        tolerance: float | None = None,
+    ) -> np.ndarray:
         """Edges with both ends and the node between them at the given coordinates [m]; see `vertices_at`."""
         return self._at("edge", self.nodes_of_edges, x, y, z, tolerance)
 
@@ -298,7 +311,7 @@ class SixNodeMesh(MeshBase):
         """The same surface with its normals on the other side; elements and vertices keep their numbers."""
         return SixNodeMesh(self.rest_positions, self.elements[:, _MIRRORED])
 
-    def transformed(self, rotation=None, translation=None) -> SixNodeMesh:
+    def transformed(self, rotation=None, translation: Numbers | None = None) -> SixNodeMesh:
         """The mesh moved by x -> rotation x + translation, as a TriangleMesh is."""
         return SixNodeMesh(moved(self.rest_positions, rotation, translation), self.elements)
 

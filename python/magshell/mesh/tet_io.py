@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def tetrahedra_of(content) -> TetContent | None:
     )
 
 
-def cells_and_data(mesh: TetMesh, fields: dict[str, np.ndarray]) -> tuple[list, dict[str, list]]:
+def cells_and_data(mesh: TetMesh, fields: dict[str, np.ndarray]) -> tuple[list[Any], dict[str, list[Any]]]:
     """For meshio. A mesh of several parts, or of one with another number than 0, has them in the field `part`."""
     data = {name: [values] for name, values in fields.items()}
     if mesh.parts.any():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -14,6 +14,9 @@ from .tet_checks import check_range, duplicates, names_twice, plural
 from .tet_jacobian import straight_volumes
 from .tet_selection import checked_parts
 from .tet_topology import MIRRORED, groups
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Mended(NamedTuple):
     report: MendReport
 
 
-def mended(kind, rest_positions, tetrahedra, parts, part_names, merge_tolerance) -> Mended:
+def mended(kind, rest_positions: Numbers, tetrahedra, parts, part_names, merge_tolerance: Numbers) -> Mended:
     positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
     nodes = index_array("tetrahedra", tetrahedra)
     n_given = len(positions)

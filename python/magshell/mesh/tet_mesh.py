@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,6 +42,9 @@ from .tet_topology import (
 from .transforms import moved
 from .triangle_mesh import TriangleMesh
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 class TetMesh(TetSelection):
     """A conforming mesh of tetrahedra with a manifold surface, of one piece or several. Immutable.
@@ -66,7 +70,7 @@ class TetMesh(TetSelection):
     [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]
     """
 
-    def __init__(self, rest_positions, tetrahedra, parts=None, part_names=None):
+    def __init__(self, rest_positions: Numbers, tetrahedra, parts=None, part_names=None):
         positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
         nodes = index_array("tetrahedra", tetrahedra)
         check_range(nodes, len(positions))
@@ -86,7 +90,9 @@ class TetMesh(TetSelection):
         self._rest_positions = positions
         self._tetrahedra = frozen(nodes.astype(np.int32))
 
-    def __reduce__(self):  # copies and worker processes rebuild the connectivity, which is cheap
+    def __reduce__(
+        self,
+    ) -> tuple[Any, ...]:  # copies and worker processes rebuild the connectivity, which is cheap
         return TetMesh, (self.rest_positions, self.tetrahedra, self.parts, self.part_names)
 
     def __repr__(self) -> str:
@@ -106,7 +112,14 @@ class TetMesh(TetSelection):
         )
 
     @classmethod
-    def mended(cls, rest_positions, tetrahedra, parts=None, part_names=None, merge_tolerance=None) -> Mended:
+    def mended(
+        cls,
+        rest_positions: Numbers,
+        tetrahedra,
+        parts=None,
+        part_names=None,
+        merge_tolerance: Numbers | None = None,
+    ) -> Mended:
         """A mesh of what the constructor would refuse: (mesh, vertex_map, tetrahedron_map, report).
 
         Vertices nearer than `merge_tolerance` [m] become one (by default none do); tetrahedra that then name a vertex
@@ -284,7 +297,7 @@ class TetMesh(TetSelection):
         """The shapes of its tetrahedra: dihedral angles, radius ratios, aspects, Jacobians."""
         return TetQuality(self)
 
-    def self_intersections(self, positions) -> np.ndarray:
+    def self_intersections(self, positions: Numbers) -> np.ndarray:
         """The faces of the surface that pass through each other at positions (n_v, 3) m, (k, 2)."""
         return self.surface.self_intersections(np.asarray(positions)[self.surface_vertices])
 
@@ -315,7 +328,7 @@ class TetMesh(TetSelection):
         """
         return refined(self, surface)
 
-    def transformed(self, rotation=None, translation=None) -> TetMesh:
+    def transformed(self, rotation=None, translation: Numbers | None = None) -> TetMesh:
         """The mesh moved by x -> rotation x + translation.
 
         rotation: a (3, 3) matrix or a scipy Rotation. Any invertible matrix will do; under one that mirrors, corners 0

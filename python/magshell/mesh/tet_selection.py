@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._checks.arrays import count, index_array
 from .mesh_base import MeshBase
 from .selection import _where
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class TetSelection(MeshBase):
@@ -17,7 +21,13 @@ class TetSelection(MeshBase):
     Tolerances are those of `vertices_at`; a selection that finds nothing raises a ValueError that says what is there.
     """
 
-    def tetrahedra_at(self, x=None, y=None, z=None, tolerance: float | None = None) -> np.ndarray:
+    def tetrahedra_at(
+        self,
+        x: Numbers | None = None,
+        y: Numbers | None = None,
+        z: Numbers | None = None,
+        tolerance: float | None = None,
+    ) -> np.ndarray:
         """Tetrahedra with a corner at the given coordinates [m]: the layer that lies against a plane, for example."""
         wanted, tolerance = self._coordinates(x, y, z, tolerance)
         found = np.flatnonzero(self._matches(wanted, tolerance)[self.corners].any(axis=1))

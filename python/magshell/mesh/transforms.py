@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.quantity import quantity
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
-def moved(positions: np.ndarray, rotation=None, translation=None) -> np.ndarray:
+
+def moved(positions: np.ndarray, rotation=None, translation: Numbers | None = None) -> np.ndarray:
     """rotation x + translation. rotation: an invertible (3, 3) matrix or a scipy Rotation. translation: (3,), m."""
     if rotation is not None:
         positions = positions @ matrix_of(rotation).T
@@ -16,7 +21,7 @@ def moved(positions: np.ndarray, rotation=None, translation=None) -> np.ndarray:
     return positions
 
 
-def matrix_of(rotation) -> np.ndarray:
+def matrix_of(rotation: Numbers) -> np.ndarray:
     """(3, 3), invertible, of a matrix or a scipy Rotation."""
     as_matrix = getattr(rotation, "as_matrix", None)
     matrix = quantity("rotation", "1", as_matrix() if as_matrix else rotation, (3, 3))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
@@ -17,6 +18,9 @@ from .refine import refined
 from .signed_distance import Distance
 from .summary import boundary_loops, summary
 from .transforms import moved
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class TriangleMesh(MeshBase):
@@ -37,12 +41,14 @@ class TriangleMesh(MeshBase):
     [[0, 1], [0, 2], [1, 2]]
     """
 
-    def __init__(self, rest_positions, faces):
+    def __init__(self, rest_positions: Numbers, faces: Numbers):
         self._core = _core.TriangleMesh(
             quantity("rest_positions", "m", rest_positions, ("n_v", 3)), index_array("faces", faces)
         )
 
-    def __reduce__(self):  # copies and worker processes rebuild the connectivity, which is cheap
+    def __reduce__(
+        self,
+    ) -> tuple[Any, ...]:  # copies and worker processes rebuild the connectivity, which is cheap
         return TriangleMesh, (self.rest_positions, self.faces)
 
     def __repr__(self) -> str:
@@ -168,7 +174,7 @@ class TriangleMesh(MeshBase):
 
     # The surface somewhere else
 
-    def self_intersections(self, positions=None) -> np.ndarray:
+    def self_intersections(self, positions: Numbers | None = None) -> np.ndarray:
         """The pairs of faces that pass through each other, (k, 2), lower number first, sorted.
 
         positions: (n_v, 3), m; by default those at rest. Faces that share an edge never do; those that share a vertex
@@ -203,7 +209,7 @@ class TriangleMesh(MeshBase):
         """
         return refined(self, surface)
 
-    def transformed(self, rotation=None, translation=None) -> TriangleMesh:
+    def transformed(self, rotation=None, translation: Numbers | None = None) -> TriangleMesh:
         """The mesh moved by x -> rotation x + translation.
 
         Args:
@@ -220,7 +226,7 @@ class TriangleMesh(MeshBase):
         return TriangleMesh(positions, self.faces)
 
 
-def checked_mesh(value, name: str = "mesh") -> TriangleMesh:
+def checked_mesh(value: Any, name: str = "mesh") -> TriangleMesh:
     if not isinstance(value, TriangleMesh):
         raise ValueError(f"{name} must be a TriangleMesh, got {type(value).__name__}")
     return value

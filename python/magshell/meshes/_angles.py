@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.quantity import real_numbers
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 TURN = 2 * np.pi
 _ROUND_OFF = 1e-12
 
 
-def angle_span(name: str, angle, symmetric: bool = False) -> tuple[float, float]:
+def angle_span(name: str, angle: Numbers, symmetric: bool = False) -> tuple[float, float]:
     """(from, to) in rad of a span given as such, or by its width: from 0, or to both sides of 0."""
     span = real_numbers(f"{name} [rad]", angle)
     if span.shape == ():

@@ -7,11 +7,16 @@ faces run counter-clockwise in (u, v), so a surface's normal is that of d/du x d
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._checks.arrays import number
 from .._checks.quantity import array_of
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 DIAGONALS = ("alternating", "aligned", "crossed")
 
@@ -80,7 +85,7 @@ def grid(
 MOST_FACES = (2**31 - 1) // 3
 
 
-def checked_cells(cells) -> tuple[int, int]:
+def checked_cells(cells: Numbers) -> tuple[int, int]:
     counts = array_of("cells", cells, "be two integers")
     if counts.shape != (2,) or not np.issubdtype(counts.dtype, np.integer) or (counts < 1).any():
         raise ValueError(f"cells must be two integers of at least 1, got {cells!r}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,13 +12,19 @@ from ..errors import MeshQualityWarning
 from ..mesh.signed_distance import Distance
 from ..mesh.tet_mesh import TetMesh
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 _MOST_SAMPLES = 300_000
 _LOST = 0.15  # of the volume: rounded edges of coarse meshes lose less
 _SURE = 4.0  # standard deviations of the volume that samples tell
 _MISSED = 0.2  # of the number of tetrahedra that was asked for
 
 
-def warn_of_loss(mesh: TetMesh, distance: Distance, low, high, spacing: float, wanted: int | None) -> None:
+def warn_of_loss(
+    mesh: TetMesh, distance: Distance, low: Numbers, high: Numbers, spacing: float, wanted: int | None
+) -> None:
     """low, high: (3,) m, the box around the shape. wanted: the number of tetrahedra asked for."""
     pitch = max(0.25 * spacing, float((np.prod(high - low) / _MOST_SAMPLES) ** (1 / 3)))
     counts = np.maximum(np.ceil((high - low) / pitch), 1).astype(int)

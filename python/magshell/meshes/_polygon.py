@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.quantity import quantity
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
-def checked_polyline(name: str, points, least: int) -> np.ndarray:
+
+def checked_polyline(name: str, points: Numbers, least: int) -> np.ndarray:
     """(n, 2) finite points, n >= least, no two in a row alike."""
     array = quantity(name, "m", points, ("n", 2))
     if len(array) < least:
@@ -20,7 +25,7 @@ def checked_polyline(name: str, points, least: int) -> np.ndarray:
     return array
 
 
-def checked_polygon(name: str, points) -> np.ndarray:
+def checked_polygon(name: str, points: Numbers) -> np.ndarray:
     """A simple polygon, its last point not the first again."""
     polygon = checked_polyline(name, points, 3)
     if (polygon[0] == polygon[-1]).all():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ..mesh.triangle_mesh import TriangleMesh
 
 
-def surface(points: np.ndarray, faces: np.ndarray, outwards: Callable) -> TriangleMesh:
+def surface(points: np.ndarray, faces: np.ndarray, outwards: Callable[..., Any]) -> TriangleMesh:
     """The mesh, if the normal of each face is on the side of outwards(barycenters).
 
     Bending a grid is not linear: a face that is merely slanted in the unit square may turn over on a

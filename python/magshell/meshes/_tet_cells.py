@@ -6,17 +6,22 @@ Eight corners are numbered in binary: corner 1 is the next along the first axis,
 from __future__ import annotations
 
 from itertools import permutations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._checks.quantity import array_of
 from ..mesh.tet_topology import MIRRORED
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 DIAGONALS = ("alternating", "aligned", "crossed")
 _MOST_TETRAHEDRA = (2**31 - 1) // 4
 
 
-def checked_cells(cells, axes: tuple[str, ...]) -> tuple[int, ...]:
+def checked_cells(cells: Numbers, axes: tuple[str, ...]) -> tuple[int, ...]:
     counts = array_of("cells", cells, f"be {len(axes)} integers")
     if counts.shape != (len(axes),) or not np.issubdtype(counts.dtype, np.integer) or (counts < 1).any():
         raise ValueError(

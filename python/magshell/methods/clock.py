@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .._checks.tensors import detached, is_tensor
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class Clock:
         """With other steps counting begins again."""
         return self if self.time_step == time_step else Clock(self.time, time_step)
 
-    def moment(self, steps, share: float, time_step):
+    def moment(self, steps, share: float, time_step: Numbers):
         """As at(); where `time_step` is a tensor, another in its graph, with the time now as it is."""
         time = self.at(steps, share)
         if not is_tensor(time_step):

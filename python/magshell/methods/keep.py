@@ -29,7 +29,7 @@ class Keep:
     what: str | None = None
     memory_budget: float = 2e9
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.what not in (None, *KINDS):
             raise ValueError(
                 f'keep must be "stages", "checkpoints", "factors" or None, got {self.what!r:.60}'

@@ -54,7 +54,7 @@ class ProjectiveDynamics:
     _name = "euler"
     _times = (1.0,)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         count("iterations", self.iterations)
         count("history", self.history, least=0)
         if self.contact not in ("penalty", "coulomb"):

@@ -38,7 +38,7 @@ class Newton:
 
     _mixed = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 0.0 < quantity("tolerance", "1", self.tolerance, ()) < 1.0:
             raise ValueError(f"tolerance must be in (0, 1), got {self.tolerance}")
         for name in ("first_load_step", "smallest_load_step"):

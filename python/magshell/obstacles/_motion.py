@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import scipy
@@ -22,7 +23,7 @@ def matrix(rotation_vector: np.ndarray) -> np.ndarray:
     return scipy.spatial.transform.Rotation.from_rotvec(np.array(rotation_vector)).as_matrix()
 
 
-def pose(motion: Callable | None, time: float) -> tuple[np.ndarray, np.ndarray]:
+def pose(motion: Callable[..., Any] | None, time: float) -> tuple[np.ndarray, np.ndarray]:
     """Displacement (3,) m and rotation vector (3,) rad at a time [s], (,). Raises ValueError on anything else."""
     time = float(quantity("time", "s", time, ()))
     if motion is None:
@@ -44,7 +45,7 @@ def pose(motion: Callable | None, time: float) -> tuple[np.ndarray, np.ndarray]:
     return quantity(call, "m", found, (3,)), np.zeros(3)
 
 
-def rates(motion: Callable | None, time: float) -> tuple[np.ndarray, np.ndarray]:
+def rates(motion: Callable[..., Any] | None, time: float) -> tuple[np.ndarray, np.ndarray]:
     """Velocity (3,) m/s and spin omega (3,) rad/s in world axes, with dR/dt = [omega] R, at a time [s]."""
     time = float(quantity("time", "s", time, ()))
     if motion is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from .._checks.quantity import quantity, shape_of
 from .._checks.scalars import all_positive, flag, positive
 from ._surfaces import box_surface, sphere_surface, swept_surface
 from .obstacle import Obstacle, Surface
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Sphere(Obstacle):
@@ -30,13 +34,13 @@ class Sphere(Obstacle):
         radius: float,
         inside: bool = False,
         *,
-        center=(0.0, 0.0, 0.0),
-        rotation=(0.0, 0.0, 0.0),
-        motion: Callable | None = None,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
+        motion: Callable[..., Any] | None = None,
     ) -> None:
         super().__init__(center, rotation, motion)
-        self.radius = positive("radius", "m", radius)
-        self.inside = flag("inside", inside)
+        self.radius: float = positive("radius", "m", radius)
+        self.inside: bool = flag("inside", inside)
         self._of(_sided(core.Obstacle.sphere(self.radius), inside), radius=self.radius, inside=inside)
 
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
@@ -64,23 +68,23 @@ class Box(Obstacle):
 
     def __init__(
         self,
-        size,
+        size: Numbers,
         rounding: float = 0.0,
         inside: bool = False,
         *,
-        center=(0.0, 0.0, 0.0),
-        rotation=(0.0, 0.0, 0.0),
-        motion: Callable | None = None,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
+        motion: Callable[..., Any] | None = None,
     ) -> None:
         super().__init__(center, rotation, motion)
-        self.size = all_positive("size", "m", size, (3,))
-        self.rounding = float(quantity("rounding", "m", rounding, ()))
+        self.size: np.ndarray = all_positive("size", "m", size, (3,))
+        self.rounding: float = float(quantity("rounding", "m", rounding, ()))
         if not 0 <= self.rounding <= self.size.min() / 2:
             raise ValueError(
                 f"rounding [m] must lie between 0 and half the shortest side, {self.size.min() / 2:g}, "
                 f"got {self.rounding:g}"
             )
-        self.inside = flag("inside", inside)
+        self.inside: bool = flag("inside", inside)
         shape = core.Obstacle.box(self.size / 2, self.rounding)
         self._of(_sided(shape, inside), size=self.size, rounding=self.rounding, inside=inside)
 
@@ -112,20 +116,20 @@ class Capsule(Obstacle):
         radius: float,
         inside: bool = False,
         *,
-        center=(0.0, 0.0, 0.0),
-        rotation=(0.0, 0.0, 0.0),
-        motion: Callable | None = None,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
+        motion: Callable[..., Any] | None = None,
     ) -> None:
         super().__init__(center, rotation, motion)
         if shape_of("ends [m]", ends) == ():
             half = positive("ends", "m", ends) / 2
             ends = [[-half, 0, 0], [half, 0, 0]]
-        self.ends = quantity("ends", "m", ends, (2, 3))
-        self.radius = positive("radius", "m", radius)
-        self.length = float(np.linalg.norm(self.ends[1] - self.ends[0]))
+        self.ends: np.ndarray = quantity("ends", "m", ends, (2, 3))
+        self.radius: float = positive("radius", "m", radius)
+        self.length: float = float(np.linalg.norm(self.ends[1] - self.ends[0]))
         if self.length <= 1e-12 * self.radius:
             raise ValueError("ends [m] must be two different points; Sphere is a capsule without a length")
-        self.inside = flag("inside", inside)
+        self.inside: bool = flag("inside", inside)
         shape = core.Obstacle.capsule(self.ends[0], self.ends[1], self.radius)
         self._of(_sided(shape, inside), ends=self.ends, radius=self.radius, inside=inside)
 

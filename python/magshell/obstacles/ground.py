@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,10 @@ from .._checks.quantity import quantity
 from .._checks.scalars import flag, positive
 from ._surfaces import grid_faces
 from .obstacle import Obstacle, Surface
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 LARGEST_UNEVENNESS = 1e-6  # of a spacing: how far coordinates may be from equal ones
 
@@ -33,17 +38,17 @@ class HeightField(Obstacle):
 
     def __init__(
         self,
-        x,
-        y,
-        heights,
+        x: Numbers,
+        y: Numbers,
+        heights: Numbers,
         *,
-        center=(0.0, 0.0, 0.0),
-        rotation=(0.0, 0.0, 0.0),
-        motion: Callable | None = None,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
+        motion: Callable[..., Any] | None = None,
     ) -> None:
         super().__init__(center, rotation, motion)
         self.x, self.y = _axis("x", x), _axis("y", y)
-        self.heights = quantity("heights", "m", heights, (len(self.x), len(self.y)))
+        self.heights: np.ndarray = quantity("heights", "m", heights, (len(self.x), len(self.y)))
         origin = (self.x[0], self.y[0])
         spacing = [(axis[-1] - axis[0]) / (len(axis) - 1) for axis in (self.x, self.y)]
         shape = core.Obstacle.height_field(origin, spacing, self.heights)
@@ -65,9 +70,9 @@ def bump(
     length: float,
     ridge: bool = True,
     *,
-    center=(0.0, 0.0, 0.0),
-    rotation=(0.0, 0.0, 0.0),
-    motion: Callable | None = None,
+    center: Numbers = (0.0, 0.0, 0.0),
+    rotation: Numbers = (0.0, 0.0, 0.0),
+    motion: Callable[..., Any] | None = None,
 ) -> HeightField:
     """A floor z = 0 with a ridge along y, without end, or a round mound around the center.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from os import PathLike
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
@@ -12,6 +13,10 @@ from .. import _core as core
 from ..mesh.io import read_mesh
 from ..mesh.triangle_mesh import TriangleMesh
 from .obstacle import Obstacle, Surface
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 MOST_CELLS = 256  # cells; 140 MB of samples
 SAME_PLACE = 1e-9  # of the mesh's size: vertices so near are in one place
@@ -46,22 +51,22 @@ class MeshObstacle(Obstacle):
     def __init__(
         self,
         mesh,
-        faces=None,
+        faces: Numbers | None = None,
         resolution: int = 64,
         *,
-        center=(0.0, 0.0, 0.0),
-        rotation=(0.0, 0.0, 0.0),
-        motion: Callable | None = None,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
+        motion: Callable[..., Any] | None = None,
     ) -> None:
         super().__init__(center, rotation, motion)
         if isinstance(resolution, bool) or not isinstance(resolution, int | np.integer):
             raise ValueError(f"resolution must be an integer, got {resolution!r:.60}")
         if not 4 <= resolution <= MOST_CELLS:
             raise ValueError(f"resolution must lie between 4 and {MOST_CELLS}, got {resolution}")
-        self.mesh = _mesh_of(mesh, faces)
+        self.mesh: TriangleMesh = _mesh_of(mesh, faces)
         _check_closed(self.mesh)
         _check_orientation(self.mesh)
-        self.resolution = int(resolution)
+        self.resolution: int = int(resolution)
         self._of(
             core.Obstacle.mesh(self.mesh._core, self.resolution), mesh=self.mesh, resolution=self.resolution
         )

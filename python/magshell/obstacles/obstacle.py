@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from .. import _core as core
 from .._checks.owner import Owner
 from .._checks.quantity import quantity
 from . import _motion
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 Surface = tuple[np.ndarray, np.ndarray]
 
@@ -38,10 +42,13 @@ class Obstacle(Owner, ABC):
     _made_from: dict[str, Any]
 
     def __init__(
-        self, center=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0), motion: Callable | None = None
+        self,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
+        motion: Callable[..., Any] | None = None,
     ) -> None:
-        self.center = quantity("center", "m", center, (3,))
-        self.rotation = quantity("rotation", "rad", rotation, (3,))
+        self.center: np.ndarray = quantity("center", "m", center, (3,))
+        self.rotation: np.ndarray = quantity("rotation", "rad", rotation, (3,))
         if motion is not None and not callable(motion):
             raise ValueError(
                 f"motion must be None or a function of the time [s], got {type(motion).__name__}"
@@ -54,14 +61,14 @@ class Obstacle(Owner, ABC):
         self._core = shape
         self._made_from = arguments
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[Any, Any]:
         place = {"center": self.center, "rotation": self.rotation, "motion": self.motion}
         return {**self._made_from, **place}
 
-    def __setstate__(self, arguments: dict) -> None:
+    def __setstate__(self, arguments: dict[Any, Any]) -> None:
         self.__init__(**arguments)
 
-    def replaced(self, **values) -> Obstacle:
+    def replaced(self, **values: Any) -> Obstacle:
         """The same body with another center or rotation."""
         unknown = sorted(set(values) - set(self._replaceable))
         if unknown:
@@ -73,7 +80,7 @@ class Obstacle(Owner, ABC):
         )
         return other
 
-    def _on(self, path: Callable) -> Obstacle:
+    def _on(self, path: Callable[..., Any]) -> Obstacle:
         """The same body as its path has it: at a time, its center and its rotation."""
         other = self.replaced(center=np.zeros(3), rotation=np.zeros(3))
         other.motion = path
@@ -91,7 +98,7 @@ class Obstacle(Owner, ABC):
         """
         return _motion.rates(self.motion, time)
 
-    def signed_distance(self, points, time: float = 0.0) -> np.ndarray:
+    def signed_distance(self, points: Numbers, time: float = 0.0) -> np.ndarray:
         """(...) m, negative inside the body, of points (..., 3) m at a time [s].
 
         >>> from magshell.obstacles import Sphere
@@ -100,7 +107,7 @@ class Obstacle(Owner, ABC):
         """
         return self._distances(points, time)[0]
 
-    def normals(self, points, time: float = 0.0) -> np.ndarray:
+    def normals(self, points: Numbers, time: float = 0.0) -> np.ndarray:
         """(..., 3) unit vectors away from the body, the gradient of the distance, at points (..., 3) m."""
         return self._distances(points, time)[1] @ self._frame(time)[0].T
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +11,10 @@ from .. import _core as core
 from .._checks.quantity import quantity
 from ._surfaces import grid_faces
 from .obstacle import Obstacle, Surface
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 CELLS = 16  # of the square that stands for a plane: painters sort small triangles well
 
@@ -27,18 +32,18 @@ class Plane(Obstacle):
 
     def __init__(
         self,
-        normal=(0.0, 0.0, 1.0),
+        normal: Numbers = (0.0, 0.0, 1.0),
         *,
-        center=(0.0, 0.0, 0.0),
-        rotation=(0.0, 0.0, 0.0),
-        motion: Callable | None = None,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
+        motion: Callable[..., Any] | None = None,
     ) -> None:
         super().__init__(center, rotation, motion)
         given = quantity("normal", "1", normal, (3,))
         largest = np.abs(given).max()
         if largest == 0:
             raise ValueError("normal must not be zero")
-        self.normal = given / largest / np.linalg.norm(given / largest)
+        self.normal: Any = given / largest / np.linalg.norm(given / largest)
         self._of(core.Obstacle.plane(self.normal), normal=self.normal)
 
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
@@ -58,11 +63,11 @@ class Plane(Obstacle):
 
 def slope(
     angle: float,
-    uphill=(1.0, 0.0),
+    uphill: Numbers = (1.0, 0.0),
     *,
-    center=(0.0, 0.0, 0.0),
-    rotation=(0.0, 0.0, 0.0),
-    motion: Callable | None = None,
+    center: Numbers = (0.0, 0.0, 0.0),
+    rotation: Numbers = (0.0, 0.0, 0.0),
+    motion: Callable[..., Any] | None = None,
 ) -> Plane:
     """A plane that rises.
 

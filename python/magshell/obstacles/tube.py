@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from .._checks.quantity import quantity, shape_of
 from .._checks.scalars import all_positive, flag
 from ._surfaces import swept_surface
 from .obstacle import Obstacle, Surface
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Tube(Obstacle):
@@ -36,17 +40,17 @@ class Tube(Obstacle):
 
     def __init__(
         self,
-        points,
-        radius,
+        points: Numbers,
+        radius: Numbers,
         inside: bool = True,
         closed: bool = False,
         *,
-        center=(0.0, 0.0, 0.0),
-        rotation=(0.0, 0.0, 0.0),
-        motion: Callable | None = None,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
+        motion: Callable[..., Any] | None = None,
     ) -> None:
         super().__init__(center, rotation, motion)
-        self.points = quantity("points", "m", points, ("k", 3))
+        self.points: np.ndarray = quantity("points", "m", points, ("k", 3))
         if len(self.points) < 2:
             raise ValueError(f"points [m] must be at least two, got {len(self.points)}")
         gaps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
@@ -57,7 +61,7 @@ class Tube(Obstacle):
             )
         constant = shape_of("radius [m]", radius) == ()
         given = np.full(len(self.points), radius) if constant else radius
-        self.radius = all_positive("radius", "m", given, (len(self.points),))
+        self.radius: np.ndarray = all_positive("radius", "m", given, (len(self.points),))
         self.inside, self.closed = flag("inside", inside), flag("closed", closed)
         shape = core.Obstacle.tube(self.points, self.radius, self.closed)
         self._of(

@@ -6,6 +6,7 @@ torch is imported when one of them is first asked for.
 from __future__ import annotations
 
 from importlib import import_module
+from typing import Any
 
 from .._checks.tensors import require_torch
 
@@ -14,7 +15,7 @@ _HOMES = {"GCMMA": ".gcmma", "LBFGS": ".lbfgs", "MMA": ".mma"}
 __all__ = ["GCMMA", "LBFGS", "MMA"]
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     require_torch(f"optim.{name}")

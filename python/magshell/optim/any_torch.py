@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import inspect
 from collections.abc import Callable
+from typing import Any
 
 import torch
 
@@ -32,10 +33,10 @@ class AnyTorch(Iterate):
             check_parameter(parameter)
 
     @property
-    def param_groups(self) -> list[dict]:
+    def param_groups(self) -> list[dict[Any, Any]]:
         return self.optimizer.param_groups
 
-    def step(self, closure: Callable) -> float:
+    def step(self, closure: Callable[..., Any]) -> float:
         """Moves the parameters and returns the objective there."""
         for shortening in range(self.max_shortenings + 1):
             try:
@@ -44,22 +45,22 @@ class AnyTorch(Iterate):
                 if shortening == self.max_shortenings:
                     raise
 
-    def leap(self, closure: Callable) -> float:
+    def leap(self, closure: Callable[..., Any]) -> float:
         """The step at the full learning rate and no other."""
         return self._step(closure, share=1.0)
 
-    def state_dict(self) -> dict:
+    def state_dict(self) -> dict[Any, Any]:
         return {"optimizer": self.optimizer.state_dict(), "sample": self._sample_state()}
 
-    def load_state_dict(self, state_dict: dict) -> None:
+    def load_state_dict(self, state_dict: dict[Any, Any]) -> None:
         self.optimizer.load_state_dict(state_dict["optimizer"])
         self._load_sample(state_dict["sample"])
 
-    def configuration(self) -> dict:
+    def configuration(self) -> dict[Any, Any]:
         """{name: value} of the groups' options."""
         return {"max_shortenings": self.max_shortenings, **group_options(self.param_groups, set())}
 
-    def _step(self, closure: Callable, share: float) -> float:
+    def _step(self, closure: Callable[..., Any], share: float) -> float:
         begin = self.evaluate(closure)
         self._refuse_constraints(begin)
         x, state = self._sample_x, copy.deepcopy(self.optimizer.state_dict())
@@ -82,7 +83,7 @@ class AnyTorch(Iterate):
                     group["lr"] = rate
         return reached.objective
 
-    def _move(self, closure: Callable) -> None:
+    def _move(self, closure: Callable[..., Any]) -> None:
         def answer() -> torch.Tensor:
             sample = self.evaluate(closure)
             self._refuse_constraints(sample)

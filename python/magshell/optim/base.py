@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
@@ -35,15 +36,15 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
 
     standstill = STANDSTILL  # what it means when a step moves nothing
 
-    def __init__(self, params, defaults: dict, max_shortenings: int):
+    def __init__(self, params, defaults: dict[Any, Any], max_shortenings: int):
         if not (isinstance(max_shortenings, int) and max_shortenings >= 0):
             raise ValueError(f"max_shortenings must be an integer, 0 or more, got {max_shortenings!r}")
         self.max_shortenings = max_shortenings
-        self._run: dict = {}
+        self._run: dict[Any, Any] = {}
         Iterate.__init__(self)
         torch.optim.Optimizer.__init__(self, params, defaults)
 
-    def step(self, closure: Callable) -> float:
+    def step(self, closure: Callable[..., Any]) -> float:
         """Moves the parameters by one step, within their box, and returns the objective there.
 
         closure: a function without arguments that returns the objective of the parameters as they stand, a scalar tensor,
@@ -56,7 +57,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
             self._advance(sample, self._box(), self._sample_x)
         return self._sample.objective
 
-    def leap(self, closure: Callable) -> float:
+    def leap(self, closure: Callable[..., Any]) -> float:
         """Takes the step that `step` would try first, whatever the objective is there; returns it.
 
         For a design beyond a jump of the equilibrium, which no shorter step reaches.
@@ -67,7 +68,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
             self._leap(sample, self._box(), self._sample_x)
         return self._sample.objective
 
-    def add_param_group(self, param_group: dict) -> None:
+    def add_param_group(self, param_group: dict[Any, Any]) -> None:
         """Adds a group, {"params": tensors, "lower": ..., "upper": ..., "scale": ...}, before the first step.
 
         Raises ValueError after that, and for options that there are not.
@@ -92,12 +93,12 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
             self.param_groups.pop()
             raise
 
-    def state_dict(self) -> dict:
+    def state_dict(self) -> dict[Any, Any]:
         """torch's state dict, with the run's own numbers under "run"; safe to load with `weights_only`."""
         run = {name: as_tensor(value) for name, value in self._run.items()}
         return {**super().state_dict(), "run": {**run, **self._sample_state()}}
 
-    def load_state_dict(self, state_dict: dict) -> None:
+    def load_state_dict(self, state_dict: dict[Any, Any]) -> None:
         """Goes on where the optimizer was whose `state_dict` this is: the same steps from there, to the bit.
 
         Raises ValueError for the state of another kind of optimizer, or of other parameters.
@@ -110,7 +111,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         sample = self._sample_state()
         self._run = {name: as_array(value) for name, value in state_dict["run"].items() if name not in sample}
 
-    def configuration(self) -> dict:
+    def configuration(self) -> dict[Any, Any]:
         """{name: number or array} of all that decides where a run goes: the box, the groups' options and the method's."""
         box = self._box()
         told = {
@@ -119,7 +120,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         told |= {name: getattr(self, name) for name in self._copied if not name.startswith("_")}
         return told | group_options(self.param_groups, set(told))
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[Any, Any]:
         """What a copy or pickle takes along; not the closure."""
         kept = {name: getattr(self, name) for name in self._copied}
         return {**super().__getstate__(), **kept, "_closure": None}
@@ -132,7 +133,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
     def _leap(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         """The first step that `_advance` would try, and no other."""
 
-    def _check_group(self, group: dict, box: Box) -> None:
+    def _check_group(self, group: dict[Any, Any], box: Box) -> None:
         """What a method asks of a group's options beyond its bounds."""
 
     def _check_sample(self, sample: Sample) -> None:
@@ -150,7 +151,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         return np.repeat([float(group[name]) for group in self.param_groups], sizes)
 
 
-def group_options(groups: list[dict], without: set[str]) -> dict:
+def group_options(groups: list[dict[Any, Any]], without: set[str]) -> dict[Any, Any]:
     """The options of parameter groups, by names of their own."""
     kept = {"params", "param_names", *without}
     return {
@@ -161,7 +162,7 @@ def group_options(groups: list[dict], without: set[str]) -> dict:
     }
 
 
-def require_range(group: dict, name: str, low: float, high: float) -> None:
+def require_range(group: dict[Any, Any], name: str, low: float, high: float) -> None:
     """A group's option that must lie strictly between two numbers."""
     value = group[name]
     if not (isinstance(value, int | float) and low < value < high):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -54,7 +55,7 @@ class Box:
             )
 
 
-def option_tensors(label: str, value, parameters: list[torch.Tensor]) -> list[torch.Tensor]:
+def option_tensors(label: str, value: Any, parameters: list[torch.Tensor]) -> list[torch.Tensor]:
     """A bound or a scale as one float64 tensor a parameter: a number, a tensor, or a list with one of these each."""
     values = value if isinstance(value, list | tuple) else [value] * len(parameters)
     if len(values) != len(parameters):
@@ -77,7 +78,7 @@ def option_tensors(label: str, value, parameters: list[torch.Tensor]) -> list[to
     return tensors
 
 
-def group_box(number: int, group: dict) -> Box:
+def group_box(number: int, group: dict[Any, Any]) -> Box:
     """The box of one parameter group. Bounds that cross, and sizes that are not positive, are refused."""
     lowers, uppers, scales, names, sizes = [], [], [], [], []
     bounds = zip(

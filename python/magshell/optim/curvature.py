@@ -20,7 +20,7 @@ class Curvature:
 
     def __init__(self, steps: np.ndarray, changes: np.ndarray, theta: float):
         self.theta = theta
-        self.w = np.concatenate([changes, theta * steps]).T  # (n, 2 k)
+        self.w: np.ndarray = np.concatenate([changes, theta * steps]).T  # (n, 2 k)
         inner = steps @ changes.T
         below = np.tril(inner, -1)
         inverse = np.block([[-np.diag(np.diag(inner)), below.T], [below, theta * steps @ steps.T]])

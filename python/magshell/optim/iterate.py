@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
@@ -21,14 +22,14 @@ class Iterate:
     def __init__(self):
         self._sample: Sample | None = None
         self._sample_x: np.ndarray | None = None
-        self._closure: Callable | None = None
+        self._closure: Callable[..., Any] | None = None
 
     @property
     def parameters(self) -> list[torch.Tensor]:
         """Every parameter, group by group."""
         return [parameter for group in self.param_groups for parameter in group["params"]]
 
-    def evaluate(self, closure: Callable) -> Sample:
+    def evaluate(self, closure: Callable[..., Any]) -> Sample:
         """The sample of the parameters as they stand; asks the closure only if it is not known yet."""
         if not callable(closure):
             raise ValueError(
@@ -70,14 +71,14 @@ class Iterate:
     def _keep(self, x: np.ndarray, sample: Sample) -> None:
         self._sample_x, self._sample = x, sample
 
-    def _sample_state(self) -> dict:
+    def _sample_state(self) -> dict[Any, Any]:
         """What is known of the design, as tensors and numbers."""
         if self._sample is None:
             return {}
         state = {_SAMPLE + name: as_tensor(value) for name, value in vars(self._sample).items()}
         return {**state, _SAMPLE + "x": as_tensor(self._sample_x)}
 
-    def _load_sample(self, state: dict) -> None:
+    def _load_sample(self, state: dict[Any, Any]) -> None:
         sample = {
             name.removeprefix(_SAMPLE): as_array(value)
             for name, value in state.items()
@@ -105,9 +106,9 @@ class Restoring:
                     parameter.grad = gradient
 
 
-def as_tensor(value):
+def as_tensor(value: Any):
     return torch.from_numpy(value.copy()) if isinstance(value, np.ndarray) else value
 
 
-def as_array(value):
+def as_array(value: Any):
     return value.detach().cpu().numpy().copy() if isinstance(value, torch.Tensor) else value

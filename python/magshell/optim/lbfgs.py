@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from .curvature import Curvature, shows_curvature, updated_diagonal
 from .line_search import Probe, strong_wolfe
 from .sample import Sample
 from .standstill import STANDSTILL
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _ROUNDING = 4 * np.finfo(float).eps  # of the objective: a smaller decrease cannot be seen
 
@@ -50,9 +55,9 @@ class LBFGS(BoxOptimizer):
         self,
         params,
         *,
-        lower=-math.inf,
-        upper=math.inf,
-        scale=None,
+        lower: Numbers = -math.inf,
+        upper: Numbers = math.inf,
+        scale: Numbers | None = None,
         memory: int = 10,
         first_step: float = 1.0,
         max_evaluations: int = 20,
@@ -93,7 +98,7 @@ class LBFGS(BoxOptimizer):
             moved, trial = self._trial(line.at(1.0))
             self._keep(moved, trial.differentiate())
 
-    def _line(self, sample: Sample, box: Box, x: np.ndarray, run: dict) -> _Line | None:
+    def _line(self, sample: Sample, box: Box, x: np.ndarray, run: dict[Any, Any]) -> _Line | None:
         """The line to the minimum of the model; None where the model falls nowhere within the box."""
         stretch = np.sqrt(run["diagonal"]) if run else 1.0
         unit = _sizes(box) / stretch
@@ -144,7 +149,7 @@ class LBFGS(BoxOptimizer):
             )
         return None
 
-    def _learned(self, run: dict, box: Box, step: np.ndarray, change: np.ndarray) -> dict:
+    def _learned(self, run: dict[Any, Any], box: Box, step: np.ndarray, change: np.ndarray) -> dict[Any, Any]:
         """The last steps and changes of the gradient, (k, n) in units of the sizes, and the model before them."""
         size = _sizes(box)
         step, change = step[box.free] / size, change[box.free] * size

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +13,10 @@ from .approximation import Asymptotes, Surroundings
 from .base import BoxOptimizer, require_range
 from .box import Box
 from .sample import Sample
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _KEPT = 0.5  # each step, of the steepest slope so far: one wild design must not set the scale for good
 _CONVEXITY = 1e-6  # of the steepest slope so far: damps steps once the gradient has all but vanished
@@ -48,9 +53,9 @@ class MMA(BoxOptimizer):
         self,
         params,
         *,
-        lower=-math.inf,
-        upper=math.inf,
-        scale=None,
+        lower: Numbers = -math.inf,
+        upper: Numbers = math.inf,
+        scale: Numbers | None = None,
         move: float = 1.0,
         asymptote_initial: float = 0.5,
         asymptote_shrink: float = 0.7,
@@ -58,7 +63,7 @@ class MMA(BoxOptimizer):
         penalty: float = 1000.0,
         max_shortenings: int = 6,
     ):
-        self.penalty = positive("penalty", "", penalty)
+        self.penalty: float = positive("penalty", "", penalty)
         super().__init__(
             params,
             {
@@ -116,7 +121,7 @@ class MMA(BoxOptimizer):
             return options.initial.copy()
         return options.distance(self._run["distance"], x - before, before - before_that)
 
-    def _check_group(self, group: dict, box: Box) -> None:
+    def _check_group(self, group: dict[Any, Any], box: Box) -> None:
         require_range(group, "move", 0.0, math.inf)
         require_range(group, "asymptote_initial", 0.0, 10.0)
         require_range(group, "asymptote_shrink", 0.0, 1.0)

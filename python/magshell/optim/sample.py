@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -31,14 +32,14 @@ class Trial:
     Raises TypeError or ValueError for anything else and FloatingPointError for a value that is not finite.
     """
 
-    def __init__(self, closure: Callable, parameters: list[torch.Tensor]):
+    def __init__(self, closure: Callable[..., Any], parameters: list[torch.Tensor]):
         with torch.enable_grad():
             result = closure()
         objective, constraints = result if isinstance(result, tuple) and len(result) == 2 else (result, None)
         self._parameters = parameters
         self._objective = _checked_objective(objective)
         self._constraints = _checked_constraints(constraints)
-        self.objective = float(self._objective.detach())
+        self.objective: float = float(self._objective.detach())
         self.constraints = np.zeros(0)
         if self._constraints is not None:
             self.constraints = self._constraints.detach().double().cpu().numpy().copy()
@@ -89,7 +90,7 @@ class Trial:
         _require_finite(f"the gradient of {label}", row.numpy())
         return row.numpy()
 
-    def _leave(self, gradients: list) -> None:
+    def _leave(self, gradients: list[Any]) -> None:
         for parameter, gradient in zip(self._parameters, gradients, strict=True):
             parameter.grad = gradient
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..bodies.growth import core_form
@@ -17,7 +19,7 @@ from ..surroundings.pressure import Pressure
 from ..surroundings.tendon import Tendon
 
 
-def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
+def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict[Any, Any]]]:
     """Sheets, solids, skins, rigid parts. directed_edges: (k, 2), the scene's edges and the rows of their directions."""
     return {
         "sheets": _sheets(scene, directed_edges),
@@ -31,7 +33,7 @@ def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict]]:
     }
 
 
-def muscle_inputs(scene) -> list[dict]:
+def muscle_inputs(scene) -> list[dict[Any, Any]]:
     bodies = scene._bodies
     first = len(bodies.flat_sheets)
     return [
@@ -41,7 +43,7 @@ def muscle_inputs(scene) -> list[dict]:
     ]
 
 
-def face_inputs(scene) -> dict[str, list[dict]]:
+def face_inputs(scene) -> dict[str, list[dict[Any, Any]]]:
     """Energies of faces, and pressures."""
     bodies, n_skins = scene._bodies, len(_skins(scene))
     return {
@@ -56,7 +58,7 @@ def face_inputs(scene) -> dict[str, list[dict]]:
     }
 
 
-def actuator_inputs(scene) -> dict[str, list[dict]]:
+def actuator_inputs(scene) -> dict[str, list[dict[Any, Any]]]:
     """Volumes and tendons."""
     bodies = scene._bodies
     volumes = [
@@ -77,7 +79,7 @@ def _directed_by_body(scene, directed_edges: np.ndarray) -> list[np.ndarray]:
     return [pairs[of == k] for k in range(len(scene.bodies))]
 
 
-def _sheets(scene, directed_edges: np.ndarray) -> list[dict]:
+def _sheets(scene, directed_edges: np.ndarray) -> list[dict[Any, Any]]:
     directed = _directed_by_body(scene, directed_edges)
     return [
         {
@@ -95,7 +97,7 @@ def _sheets(scene, directed_edges: np.ndarray) -> list[dict]:
     ]
 
 
-def _six_node_sheets(scene, directed_edges: np.ndarray) -> list[dict]:
+def _six_node_sheets(scene, directed_edges: np.ndarray) -> list[dict[Any, Any]]:
     directed = _directed_by_body(scene, directed_edges)
     return [
         {
@@ -116,7 +118,7 @@ def _six_node_sheets(scene, directed_edges: np.ndarray) -> list[dict]:
     ]
 
 
-def _growth(shell: Shell) -> dict:
+def _growth(shell: Shell) -> dict[Any, Any]:
     return {name: core_form(getattr(shell, name)) for name in ("growth", "rest_curvature")}
 
 
@@ -127,7 +129,7 @@ def _surface_acts(scene, body: int) -> bool:
     )
 
 
-def _solids(scene) -> list[dict]:
+def _solids(scene) -> list[dict[Any, Any]]:
     bodies = scene._bodies
     return [
         {
@@ -139,7 +141,7 @@ def _solids(scene) -> list[dict]:
     ]
 
 
-def _skins(scene) -> list[dict]:
+def _skins(scene) -> list[dict[Any, Any]]:
     """Those that feel a field; what they weigh their solids know."""
     if not scene.fields:
         return []

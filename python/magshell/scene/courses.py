@@ -69,9 +69,11 @@ _UNITS = {
 }
 
 
-def over_time(scene, replaced: dict[object, dict]) -> tuple[dict[object, dict], list[Course]]:
+def over_time(
+    scene, replaced: dict[object, dict[Any, Any]]
+) -> tuple[dict[object, dict[Any, Any]], list[Course]]:
     """What of the values of a solve is the same all the time, and what is not. Raises ValueError on what cannot change."""
-    still: dict[object, dict] = {}
+    still: dict[object, dict[Any, Any]] = {}
     courses: list[Course] = []
     for owner, named in replaced.items():
         for name, value in named.items():
@@ -95,7 +97,7 @@ def over_time(scene, replaced: dict[object, dict]) -> tuple[dict[object, dict], 
     return still, courses
 
 
-def refuse_functions(owner, name: str, value, in_time: bool) -> None:
+def refuse_functions(owner: Any, name: str, value: Any, in_time: bool) -> None:
     """Raises ValueError on a function where there must be numbers."""
     if not callable(value):
         return
@@ -108,12 +110,12 @@ def refuse_functions(owner, name: str, value, in_time: bool) -> None:
     raise ValueError(f"{name} of {kind} cannot change during a motion ({what}): give numbers")
 
 
-def row_in_time(owner, name: str) -> tuple[int, ...] | None:
+def row_in_time(owner: Any, name: str) -> tuple[int, ...] | None:
     """The shape of a value that may change during a motion, at one time."""
     return np.shape(getattr(owner, name, np.zeros(3))) if name in names_in_time(owner) else None
 
 
-def changes_at_once(owner) -> bool:
+def changes_at_once(owner: Any) -> bool:
     """Whether values of an object may jump during a motion; others move."""
     return isinstance(owner, _JUMPING)
 
@@ -129,6 +131,6 @@ def values_between(before, after, share: float) -> dict[str, np.ndarray]:
     return named
 
 
-def names_in_time(owner) -> tuple[str, ...]:
+def names_in_time(owner: Any) -> tuple[str, ...]:
     """The values of an object that may change during a motion."""
     return getattr(owner, "_in_time", ())

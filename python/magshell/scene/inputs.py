@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from .magnetization import check_given_once, check_on_skins, of_all_bodies
 from .replacements import checked, requested
 from .scene import Scene
 from .values import Values
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Leaf(NamedTuple):
@@ -48,14 +51,14 @@ class Inputs:
     def __init__(
         self,
         scene: Scene,
-        remanent_magnetization,
-        applied_flux_density,
+        remanent_magnetization: Numbers,
+        applied_flux_density: Numbers,
         *,
-        replaced: dict[object, dict] | None = None,
+        replaced: dict[object, dict[Any, Any]] | None = None,
         differentiable: bool = False,
         moving: bool = False,
         without_forces_of_motion: bool = False,
-        **factors,
+        **factors: Any,
     ):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
@@ -72,7 +75,7 @@ class Inputs:
         replaced = replaced or {}
         check_given_once(scene, remanent_magnetization, replaced)
         numbers = self._numbers("remanent_magnetization", remanent_magnetization)
-        self.magnetization = (
+        self.magnetization: np.ndarray | None = (
             None if numbers is None else magnetization_of(numbers, scene._bodies.n_magnetized)
         )
         flux_density = self._flux_density(self._numbers("applied_flux_density", applied_flux_density))
@@ -83,18 +86,18 @@ class Inputs:
             for key, value in factors.items()
         }
         controls["scene", "applied_flux_density"] = flux_density
-        self.controls = scene._control_layout.packed(controls, scene._control_layout.zeros())
-        self.values = self._values(replaced)
+        self.controls: np.ndarray = scene._control_layout.packed(controls, scene._control_layout.zeros())
+        self.values: Values = self._values(replaced)
         self.given_magnetization = (
             of_all_bodies(scene, replaced) if remanent_magnetization is None else remanent_magnetization
         )
 
     @property
-    def tensors(self) -> list:
+    def tensors(self) -> list[Any]:
         """Those of the leaves."""
         return [leaf.tensor for leaf in self.leaves]
 
-    def take(self, name: str, value, owner=None):
+    def take(self, name: str, value: Any, owner: Any = None):
         """The numbers of another input, which joins the leaves if it asks for a gradient."""
         return self._numbers(name, value, owner)
 
@@ -114,7 +117,7 @@ class Inputs:
             self.leaves.append(Leaf(value, owner, name))
         return detached(value)
 
-    def _values(self, replaced: dict[object, dict]) -> Values:
+    def _values(self, replaced: dict[object, dict[Any, Any]]) -> Values:
         scene = self.scene
         arrays = {
             owner: {
@@ -149,7 +152,7 @@ class Inputs:
             yield
 
 
-def plain_inputs(scene, remanent_magnetization, applied_flux_density, values, **factors) -> Inputs:
+def plain_inputs(scene, remanent_magnetization, applied_flux_density, values: Any, **factors: Any) -> Inputs:
     """Of a solve whose values may be replaced, without gradients."""
     replaced = requested(scene, None, values) if isinstance(scene, Scene) else None
     return Inputs(scene, remanent_magnetization, applied_flux_density, replaced=replaced, **factors)

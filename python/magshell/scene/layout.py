@@ -26,7 +26,7 @@ class Layout:
 
     def __init__(self, entries):
         self._places = {(owner, name): Place(*place) for owner, name, *place in entries}
-        self.size = sum(place.rows * place.width for place in self._places.values())
+        self.size: int = sum(place.rows * place.width for place in self._places.values())
 
     def __contains__(self, key: tuple[str, str]) -> bool:
         return key in self._places

@@ -3,6 +3,8 @@ own."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.tensors import is_tensor, require_torch
@@ -11,7 +13,7 @@ from ..bodies.solid import Solid
 _NAME = "remanent_magnetization"
 
 
-def check_given_once(scene, given, replaced: dict[object, dict]) -> None:
+def check_given_once(scene, given: Any, replaced: dict[object, dict[Any, Any]]) -> None:
     """Raises ValueError where it is given twice, or without a field, or not for every shell and skin."""
     replacing = any(_NAME in replaced.get(carrier, {}) for _, carrier, _ in _carriers(scene))
     if not scene.fields:
@@ -60,7 +62,7 @@ def of_carriers(scene, magnetization: np.ndarray):
         yield labels[id(carrier)], magnetization[faces]
 
 
-def gradient_by_all(scene, gradient) -> np.ndarray:
+def gradient_by_all(scene, gradient: Any) -> np.ndarray:
     """(n_f of all, 3): the transpose of `of_carriers`."""
     labels = {id(each): label for each, label in scene._labels}
     found = np.zeros((scene._bodies.n_magnetized, 3))
@@ -69,7 +71,7 @@ def gradient_by_all(scene, gradient) -> np.ndarray:
     return found
 
 
-def of_all_bodies(scene, replaced: dict[object, dict]):
+def of_all_bodies(scene, replaced: dict[object, dict[Any, Any]]):
     """(n_f of all, 3) A/m where it was not an argument, zero on what has none: a tensor in its graph where there is one,
     None without a field.
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._checks.quantity import quantity
 from ..surroundings.constraints import held_directions
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Reaction:
         """(3,) N, of all points together."""
         return self.forces.sum(axis=0)
 
-    def torque(self, point=(0.0, 0.0, 0.0)) -> np.ndarray:
+    def torque(self, point: Numbers = (0.0, 0.0, 0.0)) -> np.ndarray:
         """(3,) N m about a point (3,) m: of the forces, and of the couple with which a Clamp or a SymmetryPlane holds the
         sheet's direction across edges."""
         about = quantity("point", "m", point, (3,))

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from .._checks.quantity import quantity
 from .._machine.keywords import controls_of, nearest_first
 from ..bodies.shell import Shell
 from ..surroundings.loads import DeadLoad
 from .courses import refuse_functions
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 # Those of a scene's one body that have a keyword of their own.
 SHELL_NAMES = tuple(
@@ -15,7 +21,7 @@ SHELL_NAMES = tuple(
 
 
 def requested(
-    scene, vertex_loads, values, moving: bool = False, in_time: bool = False, **shell
+    scene, vertex_loads: Numbers, values: Any, moving: bool = False, in_time: bool = False, **shell: Any
 ) -> dict[object, dict[str, object]]:
     """{object of the scene: {name: value}} from a solve's arguments. Raises ValueError on what has no place.
 
@@ -44,7 +50,7 @@ def requested(
     return asked
 
 
-def checked(scene, owner, name: str, value):
+def checked(scene, owner: Any, name: str, value: Any):
     """The values that no constructor checks."""
     if owner is not scene:
         return value
@@ -52,7 +58,7 @@ def checked(scene, owner, name: str, value):
     return quantity(name, unit, value, shape)
 
 
-def _add(asked: dict, owner, name: str, value) -> None:
+def _add(asked: dict[Any, Any], owner, name: str, value) -> None:
     if name in asked.setdefault(owner, {}):
         raise ValueError(f"{name} was given twice: as an argument and in values")
     asked[owner][name] = value
@@ -83,7 +89,7 @@ def _check(scene, owner, named) -> None:
             )
 
 
-def _check_against_scene(scene, asked: dict, moving: bool) -> None:
+def _check_against_scene(scene, asked: dict[Any, Any], moving: bool) -> None:
     heavy = bool(scene.gravity.any())
     dense = any("mass_density" in asked.get(body, {}) for body in scene.bodies)
     idle_density = dense and not moving

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -88,7 +89,7 @@ class Touching:
 
 def touching_in(
     scene,
-    values,
+    values: Any,
     contact: BodyContact | Contact,
     state: np.ndarray,
     velocities: np.ndarray | None = None,
@@ -114,7 +115,7 @@ def touching_in(
     )
 
 
-def _gathered(scene, found: dict, coefficient: float, sticking_speed: float) -> Touching:
+def _gathered(scene, found: dict[Any, Any], coefficient: float, sticking_speed: float) -> Touching:
     pairs, weights = found["pairs"], found["weights"]
     there = pairs >= 0
 

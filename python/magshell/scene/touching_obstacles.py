@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def standing(obstacle: Obstacle, time: float | None) -> Standing:
 
 
 def pairs_with_obstacles(
-    scene, values, contact, positions: np.ndarray, velocities: np.ndarray, time: float | None
+    scene, values: Any, contact, positions: np.ndarray, velocities: np.ndarray, time: float | None
 ) -> dict[str, np.ndarray]:
     """What touching_pairs of the core has of bodies; positions and velocities (n_v, 3)."""
     vertices, weights = scene._bodies.contact_points(contact)

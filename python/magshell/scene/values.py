@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from copy import copy, deepcopy
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ class Values:
     def __init__(
         self,
         scene,
-        replaced: dict[object, dict] | None = None,
+        replaced: dict[object, dict[Any, Any]] | None = None,
         magnetization: np.ndarray | None = None,
     ):
         self.scene = scene
@@ -41,11 +42,11 @@ class Values:
                 self._now[body].skin = self._now[body.skin]
         self.sheets = tuple(self.current(body) for body in scene.bodies)
         self.rigid = tuple(self.current(span) for span in scene.rigid_parts)
-        self.constraints = scene._constraints
+        self.constraints: Constraints = scene._constraints
         if any(support in self._now for support in scene.supports):
             self.constraints = self._moved()
         own = (replaced or {}).get(scene, {})
-        self.gravity = own.get("gravity", scene.gravity)
+        self.gravity: Any = own.get("gravity", scene.gravity)
         numbers: dict[tuple[str, str], np.ndarray] = {}
         for owner, label in scene._labels:
             self.current(owner).add_numbers(label, self, numbers)
@@ -86,7 +87,7 @@ class Values:
     def same_as(self, other: Values) -> bool:
         return np.array_equal(self.numbers, other.numbers)
 
-    def gradients(self, owner, gradient: Gradient) -> dict[str, np.ndarray]:
+    def gradients(self, owner: Any, gradient: Gradient) -> dict[str, np.ndarray]:
         """By the values of one object of the scene, from the core's gradients; a row for each of its parts. Found once
         for all names of an object."""
         if owner not in gradient.of_owners:
@@ -105,7 +106,7 @@ class Values:
         return found
 
     @property
-    def contacts(self) -> list[tuple]:
+    def contacts(self) -> list[tuple[Any, ...]]:
         """(contact with obstacles, its label, the sheets that touch) of all, as they are in this solve."""
         labels = [
             (each, label) for each, label in self.scene._labels if each in self.scene._obstacle_contacts
@@ -121,7 +122,7 @@ class Values:
             return sheets[0]
         return Whole(self.scene.mesh if flat else None, sheets)
 
-    def touching(self, contact) -> tuple:
+    def touching(self, contact) -> tuple[Any, ...]:
         """The sheets that a contact is about, as they are in this solve."""
         return self.sheets[self.scene._bodies.of(contact).bodies]
 
@@ -162,13 +163,13 @@ class Values:
         """Where one of `rigid` is."""
         return next(place for place, each in zip(self.scene._rigid, self.rigid, strict=True) if each is part)
 
-    def started_by(self, part) -> list:
+    def started_by(self, part) -> list[Any]:
         """The places of all that starts with one of `rigid`."""
         scene = self.scene
         own = next(each for each, now in zip(scene.rigid_parts, self.rigid, strict=True) if now is part)
         return [scene._rigid[k] for k in scene._bodies.started_by(own)]
 
-    def moved_by(self, joint) -> list:
+    def moved_by(self, joint) -> list[Any]:
         """The places of all that one of the joints carries."""
         scene = self.scene
         own = next(each for each in scene.joints if self.current(each) is joint)
@@ -192,11 +193,11 @@ class Values:
             return None
         return gradient.value("gravity", "forces")
 
-    def current(self, item):
+    def current(self, item: Any):
         """An object of the scene as it is in this solve."""
         return self._now.get(item, item)
 
-    def with_objects(self, now: dict) -> Values:
+    def with_objects(self, now: dict[Any, Any]) -> Values:
         """These with other objects, {object of the scene: as it is}, whose numbers are their own alone."""
         other = copy(self)
         other._now = {**self._now, **now}
@@ -214,12 +215,12 @@ class Values:
                 now[owner].add_numbers(label, self, numbers)
         return self.scene._value_layout.packed(numbers, before)
 
-    def kept(self) -> dict:
+    def kept(self) -> dict[Any, Any]:
         """What `again` makes them from in another process, or after the scene was made anew."""
         return {"replaced": self.replaced, "numbers": self.numbers}
 
     @classmethod
-    def again(cls, scene, kept: dict) -> Values:
+    def again(cls, scene, kept: dict[Any, Any]) -> Values:
         """Raises ValueError where they do not fit the scene."""
         values = cls(scene, kept["replaced"])
         values.numbers = quantity("values", "SI", kept["numbers"], (scene._value_layout.size,))
@@ -248,10 +249,10 @@ class Gradient:
     values: (n,); controls: (m,), or (knots, m) of a motion; others: by what a motion has beside them, by name.
     """
 
-    def __init__(self, scene, values: np.ndarray, controls: np.ndarray, others: dict | None = None):
+    def __init__(self, scene, values: np.ndarray, controls: np.ndarray, others: dict[Any, Any] | None = None):
         self._scene, self._values, self._controls = scene, values, controls
-        self.others = others or {}
-        self.of_owners: dict = {}  # by the values of objects, as they were asked for
+        self.others: dict[Any, Any] = others or {}
+        self.of_owners: dict[Any, Any] = {}  # by the values of objects, as they were asked for
 
     def has(self, owner: str, name: str) -> bool:
         return (owner, name) in self._scene._value_layout

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,13 +11,17 @@ from .._checks.quantity import quantity
 from .._checks.scalars import positive
 from .shape import Bounds, Shape
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
 class Primitive(Shape):
     """A distance (n, 3) -> (n,), the box around where it is negative, and what to print."""
 
-    def __init__(self, distance: Callable, low, high, text: str):
+    def __init__(self, distance: Callable[..., Any], low: Numbers, high: Numbers, text: str):
         self._function, self._bounds, self._text = distance, (np.asarray(low), np.asarray(high)), text
 
     @property
@@ -31,7 +36,7 @@ class Primitive(Shape):
         return self._text
 
 
-def ball(radius: float, center=_ORIGIN) -> Shape:
+def ball(radius: float, center: Numbers = _ORIGIN) -> Shape:
     """A ball; radius and center (3,) in m.
 
     >>> ball(1.0)([3, 0, 0]).item()
@@ -82,7 +87,7 @@ def capsule(start, end, radius: float, end_radius: float | None = None) -> Shape
     return Primitive(distance, low, high, f"capsule({_listed(start)}, {_listed(end)}, {radius:g}{taper})")
 
 
-def box(size, center=_ORIGIN, rounding: float = 0.0) -> Shape:
+def box(size: Numbers, center: Numbers = _ORIGIN, rounding: float = 0.0) -> Shape:
     """A box with sides along the axes.
 
     Args:
@@ -136,7 +141,7 @@ def cylinder(start, end, radius: float) -> Shape:
     return Primitive(distance, low, high, f"cylinder({_listed(start)}, {_listed(end)}, {radius:g})")
 
 
-def half_space(normal, point=_ORIGIN) -> Shape:
+def half_space(normal: Numbers, point: Numbers = _ORIGIN) -> Shape:
     """All behind the plane through a point (3,) m: where normal . (x - point) < 0. It has no end.
 
     >>> half_space((0, 0, 2))([0, 0, 3]).item()
@@ -153,7 +158,7 @@ def half_space(normal, point=_ORIGIN) -> Shape:
     return Primitive(lambda points: (points - point) @ normal, low, high, f"half_space({_listed(normal)})")
 
 
-def ellipsoid(radii, center=_ORIGIN) -> Shape:
+def ellipsoid(radii: Numbers, center: Numbers = _ORIGIN) -> Shape:
     """An ellipsoid with axes along x, y and z; radii and center (3,) in m.
 
     >>> round(ellipsoid((3, 2, 1))([0, 0, 4]).item(), 9)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
 from ..mesh.transforms import matrix_of
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 Bounds = tuple[np.ndarray, np.ndarray]
 
@@ -22,7 +28,7 @@ class Shape:
 
     name: str | None = None
 
-    def __call__(self, points) -> np.ndarray:
+    def __call__(self, points: Numbers) -> np.ndarray:
         points = quantity("points", "m", points, ("...", 3))
         return self._distance(points.reshape(-1, 3)).reshape(points.shape[:-1])
 
@@ -63,11 +69,11 @@ class Shape:
 
     # Moved and changed
 
-    def translated(self, translation) -> Shape:
+    def translated(self, translation: Numbers) -> Shape:
         """Moved by (3,) m."""
         return Placed(self, np.eye(3), quantity("translation", "m", translation, (3,)), 1.0)
 
-    def rotated(self, rotation, center=(0.0, 0.0, 0.0)) -> Shape:
+    def rotated(self, rotation, center: Numbers = (0.0, 0.0, 0.0)) -> Shape:
         """Turned about a center (3,) m by a rotation matrix (3, 3) or a scipy Rotation."""
         matrix = matrix_of(rotation)
         if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-9:

@@ -69,7 +69,7 @@ class CallOff:
     def __init__(self):
         self.done = False
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return CallOff, ()
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from pathlib import Path
+from typing import Any
 
 from .._checks.arrays import number as checked_number
 from .._checks.tensors import is_tensor
@@ -26,8 +27,8 @@ from .worker_processes import WorkerDied, WorkerProcesses
 
 
 def multistart(
-    run: Callable,
-    starts: Iterable,
+    run: Callable[..., Any],
+    starts: Iterable[Any],
     executor: Executor | None = None,
     *,
     workers: int | None = None,
@@ -99,7 +100,7 @@ def multistart(
     return _unless_all_failed(state.result())
 
 
-def _drive(state: _State, executor: Executor, task: Callable, bar) -> None:
+def _drive(state: _State, executor: Executor, task: Callable[..., Any], bar) -> None:
     """Has every unfinished start run, and takes the outcomes as they come.
 
     Ctrl-C comes at any moment, between the end of a start and its outcome being taken too: what has finished is kept.
@@ -142,7 +143,7 @@ def _next(done: queue.SimpleQueue[tuple[int, Future]]) -> tuple[int, Future]:
 class _State:
     """What is known of each start."""
 
-    def __init__(self, starts: list, feasibility: float, files: StartFiles | None):
+    def __init__(self, starts: list[Any], feasibility: float, files: StartFiles | None):
         self.starts, self._feasibility, self._files = starts, feasibility, files
         self.outcomes: dict[int, Outcome] = files.finished() if files else {}
         self.resumed = tuple(sorted(self.outcomes))
@@ -191,7 +192,7 @@ class _State:
         return ", ".join(filter(None, (best, done, failed, resumed)))
 
 
-def _tasks(run, starts: list, executor) -> Callable[[int, CallOff], tuple]:
+def _tasks(run, starts: list[Any], executor) -> Callable[[int, CallOff], tuple[Any, ...]]:
     """What is submitted for each start. Whatever cannot go to another process is refused here, before any work."""
     if executor is not None and not isinstance(executor, futures.ProcessPoolExecutor):
         return lambda number, call_off: (attempt_sent, run, starts[number], this_process(), call_off)
@@ -231,7 +232,7 @@ def _unless_all_failed(found: Multistart) -> Multistart:
     )
 
 
-def _listed(starts) -> list:
+def _listed(starts) -> list[Any]:
     if isinstance(starts, str | bytes | dict):
         raise ValueError(f"starts must be several, such as a list of arrays, got a {type(starts).__name__}")
     if is_tensor(starts):

@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import pickle
 import sys
+from typing import Any
 
 _REMEDY = (
     "Define it at the top of a module that worker processes can import, or pass executor="
@@ -13,7 +14,7 @@ _REMEDY = (
 )
 
 
-def packed(name: str, value) -> bytes:
+def packed(name: str, value: Any) -> bytes:
     """The pickled value. Raises ValueError, naming it, where it does not pickle or could not be unpickled."""
     try:
         contents = pickle.dumps(value)

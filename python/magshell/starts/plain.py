@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ _RECORDS = {each.__name__: each for each in (Minimum, Record, MotionState, Clock
 _ADVICE = "return numbers, arrays and tensors, such as (minimum, equilibrium.positions)"
 
 
-def to_plain(value, arrays: list[np.ndarray], label: str):
+def to_plain(value: Any, arrays: list[np.ndarray], label: str):
     """What JSON can hold, with the arrays appended to a list. Raises TypeError, with the label, on what is not data."""
     if value is None or type(value) in (bool, int, float, str):
         return value

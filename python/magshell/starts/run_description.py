@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import types
+from typing import Any
 
 import numpy as np
 
@@ -56,7 +57,7 @@ def differences(known: dict[str, str], now: dict[str, str]) -> list[str]:
     ]
 
 
-def told_apart(name: str, value) -> str:
+def told_apart(name: str, value: Any) -> str:
     """The value in words or its digest. Raises ValueError, naming it, where it has none."""
     try:
         return _in_words(value)

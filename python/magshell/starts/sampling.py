@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 import numbers
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._checks.quantity import real_numbers
 from .._checks.tensors import detached
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 # Sobol's directions end here. Where a start is as long as that, evenly spread points are far apart in any case.
 _LONGEST_SOBOL = 21201
 
 
-def random_starts(count: int, lower, upper, seed: int = 0) -> np.ndarray:
+def random_starts(count: int, lower: Numbers, upper: Numbers, seed: int = 0) -> np.ndarray:
     """Starts spread evenly over a box, (count, ...): the rest of the shape is that of the bounds.
 
     lower, upper: numbers or arrays that fit each other. seed: another one gives other starts; the same one the same,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,8 +25,8 @@ class StartFiles:
     Raises ValueError where run or a start cannot be told from another.
     """
 
-    def __init__(self, folder: str | Path, run, starts: list, resume: bool):
-        self.folder = Path(folder)
+    def __init__(self, folder: str | Path, run, starts: list[Any], resume: bool):
+        self.folder: Path = Path(folder)
         if self.folder.exists() and not self.folder.is_dir():
             raise ValueError(f"checkpoint must be a folder, and {folder} is a file")
         self._run = described(run)

@@ -8,6 +8,7 @@ import queue
 import signal
 import threading
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from typing import Any
 
 from .one_thread import one_thread_in_children
 
@@ -59,7 +60,7 @@ class WorkerProcesses(Executor):
             for worker in self._workers:
                 worker.leave()
 
-    def _call(self, function, arguments: tuple) -> bytes:
+    def _call(self, function, arguments: tuple[Any, ...]) -> bytes:
         worker = self._idle.get()
         try:
             for _ in range(self._attempts):
@@ -114,7 +115,7 @@ class _Worker:
         except (EOFError, OSError):
             return False
 
-    def call(self, function, arguments: tuple) -> bytes:
+    def call(self, function, arguments: tuple[Any, ...]) -> bytes:
         """Raises EOFError if the process dies of it."""
         try:
             self._connection.send_bytes(pickle.dumps((function, arguments)))

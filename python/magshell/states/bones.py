@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.tensors import detached
@@ -68,7 +70,7 @@ def shapes_at_rest(scene) -> list[tuple[np.ndarray, np.ndarray]]:
     return [(points, faces) for _, points, faces in _shapes(scene)]
 
 
-def _shapes(scene) -> list:
+def _shapes(scene) -> list[Any]:
     """(part, vertices at rest (n, 3) m, faces (m, 3)) of the rigid parts, no links, that have a shape."""
     bodies = scene._bodies
     parts = [part for part in bodies.rigid if part.shape is not None and bodies.skeleton_of(part) is None]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -124,7 +125,7 @@ class _Later(Exception):
     pass
 
 
-def _fields(result, scene: Scene) -> dict:
+def _fields(result, scene: Scene) -> dict[Any, Any]:
     """What makes it again, with numbers in the place of the scene's objects."""
     if isinstance(result, Equilibria):
         return {"_cases": [_fields(case, scene) for case in result]}
@@ -138,11 +139,11 @@ def _fields(result, scene: Scene) -> dict:
     return held
 
 
-def _numbered(of_objects: dict, numbers: dict[int, int]) -> dict:
+def _numbered(of_objects: dict[Any, Any], numbers: dict[int, int]) -> dict[Any, Any]:
     return {numbers[id(each)]: value for each, value in of_objects.items()}
 
 
-def _made(kind: type, held: dict, scene: Scene):
+def _made(kind: type, held: dict[Any, Any], scene: Scene):
     """The other way round. Raises an error where it does not fit the scene."""
     objects = (scene, *scene.objects)
     if held.keys() != _expected(kind):

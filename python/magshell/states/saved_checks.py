@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from .._checks.quantity import quantity
 from ..dynamics.trajectory import MotionState
 from ..scene.scene import Scene
 
 
-def check_fits(held: dict, scene: Scene) -> None:
+def check_fits(held: dict[Any, Any], scene: Scene) -> None:
     """Raises ValueError where an array has another shape than one of this scene, or is not finite where it must be."""
     mesh, model = scene.mesh, scene._model
     of_motion = "times" in held

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,20 +24,23 @@ from .element_fields import element_fields
 from .solid_files import write_solids
 from .state import State, states_of, with_times
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 def write_series(
     path,
     what,
     *,
-    positions=None,
-    times=None,
-    velocities=None,
-    remanent_magnetization=None,
-    applied_flux_density=None,
+    positions: Numbers | None = None,
+    times: Numbers | None = None,
+    velocities: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
     field=None,
-    vertex_fields: dict | None = None,
-    face_fields: dict | None = None,
-    tetrahedron_fields: dict | None = None,
+    vertex_fields: dict[Any, Any] | None = None,
+    face_fields: dict[Any, Any] | None = None,
+    tetrahedron_fields: dict[Any, Any] | None = None,
     progress: bool = True,
 ) -> Path:
     """Writes a motion for ParaView: strip.pvd, and in a folder strip/ beside it one VTU a state (the extra `io`).
@@ -121,7 +125,7 @@ def write_series(
     return path
 
 
-def _by_state(fields: dict | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
+def _by_state(fields: dict[Any, Any] | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
     fields = named_values(f"{kind}_fields", fields)
     mesh = states[0].mesh
     if kind == "tetrahedron" and fields and isinstance(mesh, TriangleMesh | SixNodeMesh):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from .contact_loads import ContactLoads, contact_loads
 from .magnets import surfaces_of
 from .tendons import tendons_at_rest, tendons_of
 from .units import clock
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 @dataclass(frozen=True)
@@ -124,9 +127,9 @@ class State:
 def states_of(
     what,
     *,
-    positions=None,
-    remanent_magnetization=None,
-    applied_flux_density=None,
+    positions: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
     field=None,
     obstacles=None,
 ) -> list[State]:
@@ -228,7 +231,7 @@ def _with_elements(result, states: list[State], positions) -> list[State]:
     return [replace(state, elements=elements_of(k), loads=loads_of(k)) for k, state in enumerate(states)]
 
 
-def timed(states: list[State], times) -> list[State]:
+def timed(states: list[State], times: Numbers) -> list[State]:
     """The states at these times, (n,), s, which are their titles too. Raises ValueError unless there is one a state
     and none falls."""
     array = quantity("times", "s", detached(times), ("n",))
@@ -244,7 +247,7 @@ def timed(states: list[State], times) -> list[State]:
     ]
 
 
-def with_times(states: list[State], times) -> list[State]:
+def with_times(states: list[State], times: Numbers) -> list[State]:
     """The states at the times given; else at their own, which must not fall where a motion follows another."""
     own = [state.time for state in states]
     if times is None and None in own:
@@ -371,7 +374,7 @@ def _obstacles(values) -> tuple[Obstacle, ...]:
     return listed
 
 
-def _listed(value) -> tuple:
+def _listed(value) -> tuple[Any, ...]:
     if value is None:
         return ()
     return tuple(value) if isinstance(value, list | tuple) else (value,)

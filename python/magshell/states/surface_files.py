@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,11 +20,23 @@ from ..mesh.triangle_mesh import TriangleMesh
 from ..scene.scene import Scene
 from .state import State, states_of
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 _WRITERS = {".stl": write_stl, ".obj": write_obj}
 _UNITS = {"m": 1.0, "mm": 1e3}
 
 
-def write_surface(path, what, *, thickness=None, index: int = -1, unit: str = "m", positions=None) -> None:
+def write_surface(
+    path,
+    what,
+    *,
+    thickness: Numbers | None = None,
+    index: int = -1,
+    unit: str = "m",
+    positions: Numbers | None = None,
+) -> None:
     """Writes a shape as triangles to binary STL or to OBJ: for a printer, a slicer or a renderer.
 
     path: ends in .stl or .obj.

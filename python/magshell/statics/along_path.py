@@ -31,7 +31,7 @@ class AlongPath:
                 "field sources, obstacles and supports, pressures, what acts in joints, activations of muscles and growth"
             )
         every = list(self._layout)
-        self.entries = [every.index(key) for key in differ]
+        self.entries: list[int] = [every.index(key) for key in differ]
         self._owners = {id(can[key]): can[key] for key in differ}
         self.before, self.after = (
             np.concatenate([np.zeros(0), *(self._part(values, key).ravel() for key in differ)])

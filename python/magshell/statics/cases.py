@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from .._checks.quantity import shape_of
 from .._machine.keywords import FACTORS
@@ -16,7 +17,7 @@ from .search import Search, find
 _DIMENSIONS = {"applied_flux_density": 1, **dict.fromkeys(FACTORS, 0)}  # of one case
 
 
-def split(arguments: dict) -> list[dict] | None:
+def split(arguments: dict[Any, Any]) -> list[dict[Any, Any]] | None:
     """The arguments of each case; None where they are those of one. Raises ValueError where the counts differ."""
     of_cases = {
         name: arguments[name]
@@ -40,7 +41,7 @@ def join(found: Sequence[Equilibrium], of_cases: bool) -> Equilibrium | Equilibr
     return Equilibria(found) if of_cases else found[0]
 
 
-def starts_of(start, count: int) -> Sequence:
+def starts_of(start, count: int) -> Sequence[Any]:
     """Where each case starts."""
     if not isinstance(start, Equilibria):
         return [start] * count
@@ -57,7 +58,7 @@ def of_case(error: BaseException, number: int, count: int, last_good) -> BaseExc
     return type(error)(told, last_good)
 
 
-def find_all(scene: Scene, cases: list[dict], starts: Sequence, search: Search) -> Equilibria:
+def find_all(scene: Scene, cases: list[dict[Any, Any]], starts: Sequence[Any], search: Search) -> Equilibria:
     """The equilibrium of each case. An error tells which one failed, and holds those before it and its last state."""
     found: list[Equilibrium] = []
     for k, (arguments, start) in enumerate(zip(cases, starts, strict=True)):

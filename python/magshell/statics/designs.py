@@ -46,12 +46,12 @@ def packed(scene, design: dict, form) -> dict:
 
 
 def unpacked(scene, design: dict) -> dict:
-    """The other way. Raises ValueError where the scene lacks an object."""
+    """The other way; a design without values has none then. Raises ValueError where the scene lacks an object."""
     objects = _objects(scene)
     if any(number >= len(objects) for number in design["values"]):
         raise ValueError("this state is of another scene: it has values of more objects than there are here")
     values = {objects[number]: named for number, named in design["values"].items()}
-    return numbers_only({**design, "values": values})
+    return numbers_only({**design, "values": values or None})
 
 
 def _objects(scene) -> list:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,29 +15,33 @@ from ..bodies.solid import Solid
 from .search import inputs_of
 from .start import check_faces
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 _ELASTIC = ("membrane", "bending")  # of shells
 
 
 @solve_entry
 def energies(
     scene,
-    positions,
+    positions: Numbers,
     *,
-    edge_rotations=None,
+    edge_rotations: Numbers | None = None,
     body: Shell | Solid | None = None,
-    remanent_magnetization=None,
-    applied_flux_density=None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
     load_factor: Any = 1.0,
     gravity_factor: Any = 1.0,
     field_factor: Any = 1.0,
     motion_factor: Any = 1.0,
-    thickness=None,
-    young_modulus=None,
-    poisson_ratio=None,
-    mass_density=None,
-    curvature_scale=None,
-    vertex_loads=None,
-    values: dict | None = None,
+    thickness: Numbers | None = None,
+    young_modulus: Numbers | None = None,
+    poisson_ratio: Numbers | None = None,
+    mass_density: Numbers | None = None,
+    curvature_scale: Numbers | None = None,
+    vertex_loads: Numbers | None = None,
+    values: dict[Any, Any] | None = None,
 ) -> dict[str, float]:
     """{name: J}, the potential energies of a scene with its vertices at given places, whether it is at rest there or not.
 

@@ -32,13 +32,13 @@ class Equilibria(Sequence):
         for case in self._cases:
             if not isinstance(case, Equilibrium):
                 raise ValueError(f"cases must hold Equilibrium objects, got {type(case).__name__}")
-        self.positions = stacked([case.positions for case in self._cases])
-        self.edge_rotations = stacked([case.edge_rotations for case in self._cases])
+        self.positions: Any | np.ndarray = stacked([case.positions for case in self._cases])
+        self.edge_rotations: Any | np.ndarray = stacked([case.edge_rotations for case in self._cases])
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[Any, Any]:
         return {"_cases": self._cases}
 
-    def __setstate__(self, kept: dict) -> None:
+    def __setstate__(self, kept: dict[Any, Any]) -> None:
         self.__init__(kept["_cases"])
 
     @property

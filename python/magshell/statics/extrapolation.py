@@ -40,7 +40,7 @@ class Extrapolation:
     value: Any
     error: Any
     order: Any
-    values: tuple
+    values: tuple[Any, ...]
 
     def __repr__(self) -> str:
         if isinstance(self.value, dict):
@@ -52,7 +52,9 @@ class Extrapolation:
         return f"Extrapolation of {len(self.values)} meshes: {_told(self.value, self.error, self.order)}"
 
 
-def extrapolated(solve: Callable, meshes: Sequence, *, order: float | None = None) -> Extrapolation:
+def extrapolated(
+    solve: Callable[..., Any], meshes: Sequence[Any], *, order: float | None = None
+) -> Extrapolation:
     """What `solve` tends to as the mesh becomes finer, and how far it still is from that.
 
     With f at mesh width h, c at r h, and errors that fall as h^p (Richardson 1911):
@@ -126,7 +128,9 @@ def extrapolated(solve: Callable, meshes: Sequence, *, order: float | None = Non
     return result
 
 
-def _of_one(name: str, values: list, meshes: list, nests: list[Nesting], order: float | None) -> tuple:
+def _of_one(
+    name: str, values: list[Any], meshes: list[Any], nests: list[Nesting], order: float | None
+) -> tuple[Any, ...]:
     """Value, error, order, and where it does not converge how it changes, in words."""
     values = _at_same_points(name, values, meshes, nests)
     fine, ratio = values[-1], nests[0].ratio
@@ -141,7 +145,7 @@ def _of_one(name: str, values: list, meshes: list, nests: list[Nesting], order: 
     return fine + change, abs(change), order, ""
 
 
-def _found_order(differences: list, ratio: int) -> tuple[float, str]:
+def _found_order(differences: list[Any], ratio: int) -> tuple[float, str]:
     """The order, and where there is none how the values change."""
     first, last = (_norm(each) for each in differences)
     order = math.log(first / last) / math.log(ratio) if first > 0.0 else -math.inf
@@ -152,7 +156,7 @@ def _found_order(differences: list, ratio: int) -> tuple[float, str]:
     return order, f"it changes by {first:.3g} and then by {last:.3g}{back}"
 
 
-def _at_same_points(name: str, values: list, meshes: list, nests: list[Nesting]) -> list:
+def _at_same_points(name: str, values: list[Any], meshes: list[Any], nests: list[Nesting]) -> list[Any]:
     shapes = [tuple(value.shape) for value in values]
     if len(set(shapes)) == 1:
         return values
@@ -169,7 +173,7 @@ def _at_same_points(name: str, values: list, meshes: list, nests: list[Nesting])
     return at_coarse
 
 
-def _checked_meshes(meshes) -> list:
+def _checked_meshes(meshes) -> list[Any]:
     listed = list(meshes) if isinstance(meshes, Sequence) else [meshes]
     for k, mesh in enumerate(listed):
         if not isinstance(mesh, TriangleMesh | SixNodeMesh | TetMesh):
@@ -181,7 +185,7 @@ def _checked_meshes(meshes) -> list:
     return listed
 
 
-def _named(returned) -> dict:
+def _named(returned) -> dict[Any, Any]:
     return returned if isinstance(returned, dict) else {"": returned}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +23,10 @@ from .equilibrium import Equilibrium
 from .search import Search, Solution, find, inputs_of, solve
 from .start import starting_point
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
+
 _MODES = 4  # that each equilibrium is pushed along, beside its unstable ones
 _NUDGE, _PUSH = (
     0.1,
@@ -38,19 +43,19 @@ _USUAL = 0.05  # of the size, then
 def equilibria(
     scene: Scene,
     *,
-    remanent_magnetization=None,
-    applied_flux_density=None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
-    thickness=None,
-    young_modulus=None,
-    poisson_ratio=None,
-    mass_density=None,
-    curvature_scale=None,
-    vertex_loads=None,
-    values: dict | None = None,
+    thickness: Numbers | None = None,
+    young_modulus: Numbers | None = None,
+    poisson_ratio: Numbers | None = None,
+    mass_density: Numbers | None = None,
+    curvature_scale: Numbers | None = None,
+    vertex_loads: Numbers | None = None,
+    values: dict[Any, Any] | None = None,
     start=None,
     unstable: bool = False,
     attempts: int = 24,
@@ -129,7 +134,9 @@ def equilibria(
 class _Hunt:
     """The equilibria that are known, and the searches for others."""
 
-    def __init__(self, scene: Scene, design: dict, search: Search, tolerance: float | None, seed: int):
+    def __init__(
+        self, scene: Scene, design: dict[Any, Any], search: Search, tolerance: float | None, seed: int
+    ):
         self.known: list[Equilibrium] = []
         self._scene, self._search, self._design = scene, search, design
         self._inputs = inputs_of(scene, design, search.at_rest)
@@ -139,7 +146,7 @@ class _Hunt:
         self._tolerance = _SAME * self._size if tolerance is None else tolerance
         self._share, self._failed = 0.0, 0
 
-    def run(self, starts: list, attempts: int) -> None:
+    def run(self, starts: list[Any], attempts: int) -> None:
         found = [self._find(start) for start in starts or [None]]
         for each in found:
             self._add(each)
@@ -251,7 +258,7 @@ def _again(inputs, found: Equilibrium, search: Search) -> Equilibrium:
     return again.equilibrium
 
 
-def _listed(start) -> list:
+def _listed(start) -> list[Any]:
     if start is None:
         return []
     if isinstance(start, Equilibria | list | tuple) and not _is_positions(start):

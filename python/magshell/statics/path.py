@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,6 +29,9 @@ from .along_path import AlongPath
 from .equilibrium import Equilibrium
 from .search import solve
 from .start import starting_point
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class Path:
     failed_factorizations: int
     wall_time: float
     reason: str
-    _points: list = field(repr=False)
+    _points: list[Any] = field(repr=False)
     _inputs: Inputs = field(repr=False)
     _moving: AlongPath = field(repr=False)
     _from: Any = field(repr=False)
@@ -180,13 +183,13 @@ class Path:
 def follow(
     scene: Scene,
     *,
-    remanent_magnetization=None,
-    applied_flux_density=None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
     motion_factor: float = 1.0,
-    values: dict | None = None,
+    values: dict[Any, Any] | None = None,
     start: Equilibrium | None = None,
     until: Callable[[float, np.ndarray], bool] | None = None,
     first_step: float = 0.05,
@@ -335,7 +338,7 @@ def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> 
     )
 
 
-def _largest(model, values: Values, point) -> tuple:
+def _largest(model, values: Values, point) -> tuple[Any, ...]:
     with values.growth_in_core():
         return model.largest_strains(point.state, values.whole.thickness)
 

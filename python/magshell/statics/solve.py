@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,25 +16,28 @@ from .equilibria import Equilibria
 from .equilibrium import Equilibrium
 from .search import Search, find
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 @grouped(solver=MixedNewton)
 @solve_entry
 def equilibrium(
     scene: Scene,
     *,
-    remanent_magnetization=None,
-    applied_flux_density=None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
     load_factor: Any = 1.0,
     gravity_factor: Any = 1.0,
     field_factor: Any = 1.0,
     motion_factor: Any = 1.0,
-    thickness=None,
-    young_modulus=None,
-    poisson_ratio=None,
-    mass_density=None,
-    curvature_scale=None,
-    vertex_loads=None,
-    values: dict | None = None,
+    thickness: Numbers | None = None,
+    young_modulus: Numbers | None = None,
+    poisson_ratio: Numbers | None = None,
+    mass_density: Numbers | None = None,
+    curvature_scale: Numbers | None = None,
+    vertex_loads: Numbers | None = None,
+    values: dict[Any, Any] | None = None,
     start: Equilibrium | Equilibria | np.ndarray | None = None,
     require_stable: bool = True,
     at_rest: bool = False,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ class Origin(NamedTuple):
     """A state that is an equilibrium for these inputs, and the turns that its terms have made on the way."""
 
     state: np.ndarray
-    turns: list
+    turns: list[Any]
     inputs: Inputs
 
 

@@ -56,19 +56,19 @@ class WarmStart:
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
         self.scene = scene
-        self.solves = 0
+        self.solves: int = 0
         self._search = Search(MixedNewton() if solver is None else solver)
         self._accepting, self._of_cases = False, False
         self._start = start
         self._last: list[Solution] = []
-        self._design: list[dict] = []
+        self._design: list[dict[Any, Any]] = []
 
     @property
     def equilibria(self) -> Equilibrium | Equilibria | None:
         """Those of the last design."""
         return join([each.equilibrium for each in self._last], self._of_cases) if self._last else None
 
-    def __call__(self, **design) -> Equilibrium | Any:
+    def __call__(self, **design: Any) -> Equilibrium | Any:
         """The equilibrium, or equilibria, of a design: the arguments of ms.equilibrium."""
         design = as_keywords(self.scene, design, CONTROLS)
         cases = split(design)
@@ -99,14 +99,14 @@ class WarmStart:
         finally:
             self._accepting = before
 
-    def state_dict(self) -> dict:
+    def state_dict(self) -> dict[Any, Any]:
         """What a later WarmStart of an equal scene needs to go on with the same bits: tensors and plain values."""
         torch = require_torch("a state_dict")
         states = [{"state": torch.tensor(s.found.state), "turns": s.found.turns} for s in self._last]
         designs = [packed(self.scene, arguments, torch.from_numpy) for arguments in self._design]
         return {"states": states, "designs": designs, "of_cases": self._of_cases}
 
-    def load_state_dict(self, state: dict) -> None:
+    def load_state_dict(self, state: dict[Any, Any]) -> None:
         """Goes on from what another one had."""
         designs = [unpacked(self.scene, arguments) for arguments in state["designs"]]
         last = []
@@ -115,11 +115,11 @@ class WarmStart:
             last.append(find(self.scene, arguments, origin, self._search, keep_factor=True))
         self._last, self._design, self._of_cases = last, designs, state["of_cases"]
 
-    def _first(self, start, arguments: dict) -> Solution:
+    def _first(self, start, arguments: dict[Any, Any]) -> Solution:
         self.solves += 1
         return find(self.scene, arguments, start, self._search, keep_factor=True)
 
-    def _next(self, k: int, arguments: dict) -> Solution:
+    def _next(self, k: int, arguments: dict[Any, Any]) -> Solution:
         """Case k of the new design, in as few steps as lead there without straying."""
         if self._accepting:
             return self._step(self._last[k], arguments)
@@ -141,7 +141,7 @@ class WarmStart:
                 )
         return solution
 
-    def _try(self, last: Solution, arguments: dict) -> Solution | None:
+    def _try(self, last: Solution, arguments: dict[Any, Any]) -> Solution | None:
         """The next equilibrium, or None where it is not the old one's continuation."""
         try:
             there = self._step(last, arguments)
@@ -151,7 +151,7 @@ class WarmStart:
             return None
         return there if self._continues(last, there) else None
 
-    def _step(self, last: Solution, arguments: dict) -> Solution:
+    def _step(self, last: Solution, arguments: dict[Any, Any]) -> Solution:
         self.solves += 1
         return find(self.scene, arguments, last.equilibrium, self._search, keep_factor=True)
 
@@ -164,7 +164,7 @@ class WarmStart:
         strayed, size = _largest(moved - expected), _largest(expected)
         return strayed <= max(_LARGEST_SECOND_ORDER * size, _NO_JUMP * self.scene._bodies.extent)
 
-    def _check(self, cases: list[dict] | None) -> None:
+    def _check(self, cases: list[dict[Any, Any]] | None) -> None:
         count = 1 if cases is None else len(cases)
         if self._last and (count != len(self._last) or (cases is not None) != self._of_cases):
             raise ValueError(

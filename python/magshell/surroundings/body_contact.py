@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from ..mesh.triangle_mesh import TriangleMesh
 from .widths import width_of
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _REACH_OF_SHEETS = 0.1  # of the thickness
 _REACH_OF_SOLIDS = 0.05  # of the mean edge on the surface
@@ -90,14 +94,14 @@ class BodyContact(Owner):
         a,
         b,
         *,
-        minimal_distance=None,
+        minimal_distance: Numbers | None = None,
         reach=None,
-        contact_stiffness=None,
+        contact_stiffness: Numbers | None = None,
         law: str = "barrier",
-        smoothing=None,
-        friction_coefficient=None,
-        static_friction_coefficient=None,
-        sticking_speed=None,
+        smoothing: Numbers | None = None,
+        friction_coefficient: Numbers | None = None,
+        static_friction_coefficient: Numbers | None = None,
+        sticking_speed: Numbers | None = None,
         lagged_friction: bool = False,
     ):
         self.a, self.b = checked_side("a", a), checked_side("b", b)
@@ -154,16 +158,16 @@ class BodyContact(Owner):
         return min(map(_reach, bodies))
 
     @property
-    def sides(self) -> tuple:
+    def sides(self) -> tuple[Any, ...]:
         return self.a, self.b
 
     @property
-    def _numbers(self) -> dict:
+    def _numbers(self) -> dict[Any, Any]:
         """What `replaced` begins with."""
         own = {name: getattr(self, name) for name in self._replaceable}
         return {**own, "law": self.law, "lagged_friction": self.lagged_friction}
 
-    def _checked_names(self, values: dict) -> dict:
+    def _checked_names(self, values: dict[Any, Any]) -> dict[Any, Any]:
         """Of `replaced`: what a contact was made without, no solve gives it."""
         for name in ("friction_coefficient", "static_friction_coefficient"):
             if getattr(self, name) is None and name in values:
@@ -172,7 +176,7 @@ class BodyContact(Owner):
                 )
         return values
 
-    def replaced(self, **values) -> BodyContact:
+    def replaced(self, **values: Any) -> BodyContact:
         """The same contact with other numbers of its law."""
         return BodyContact(self.a, self.b, **{**self._numbers, **self._checked_names(values)})
 
@@ -180,13 +184,13 @@ class BodyContact(Owner):
     def _one_coefficient(self) -> bool:
         return self.static_friction_coefficient is None
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         for name in self._replaceable:
             numbers[label, name] = getattr(self, name) or 0.0
         if self._one_coefficient:
             numbers[label, "static_friction_coefficient"] = numbers[label, "friction_coefficient"]
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         found = super().gradients(label, values, gradient)
         if self._one_coefficient:
             found["friction_coefficient"] = (
@@ -222,14 +226,14 @@ class SelfContact(BodyContact):
         self,
         a,
         *,
-        minimal_distance=None,
+        minimal_distance: Numbers | None = None,
         reach=None,
-        contact_stiffness=None,
+        contact_stiffness: Numbers | None = None,
         law: str = "barrier",
-        smoothing=None,
-        friction_coefficient=None,
-        static_friction_coefficient=None,
-        sticking_speed=None,
+        smoothing: Numbers | None = None,
+        friction_coefficient: Numbers | None = None,
+        static_friction_coefficient: Numbers | None = None,
+        sticking_speed: Numbers | None = None,
         lagged_friction: bool = False,
     ):
         if not isinstance(a, BODIES):
@@ -252,10 +256,10 @@ class SelfContact(BodyContact):
         return _thickness(self.a)
 
     @property
-    def sides(self) -> tuple:
+    def sides(self) -> tuple[Any, ...]:
         return (self.a,)
 
-    def replaced(self, **values) -> SelfContact:
+    def replaced(self, **values: Any) -> SelfContact:
         """The same contact with other numbers of its law."""
         return SelfContact(self.a, **{**self._numbers, **self._checked_names(values)})
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,10 @@ from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from .actuator_results import CavityResult
 from .closed_surface import ClosedSurface, of_faces
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 ATMOSPHERE = 101325.0  # Pa
 WATER = 2.2e9  # Pa, its bulk modulus
@@ -74,13 +78,13 @@ class Cavity(Actuator):
     def __init__(
         self,
         body,
-        faces=None,
+        faces: Numbers | None = None,
         *,
-        pressure=None,
-        filling_pressure=None,
-        outside_pressure=None,
-        volume=None,
-        bulk_modulus=None,
+        pressure: Numbers | None = None,
+        filling_pressure: Numbers | None = None,
+        outside_pressure: Numbers | None = None,
+        volume: Numbers | None = None,
+        bulk_modulus: Numbers | None = None,
         cap_rims: bool = False,
     ):
         self._parts = _parts(body, faces)
@@ -95,7 +99,7 @@ class Cavity(Actuator):
                 "a Cavity takes one of pressure [Pa], filling_pressure [Pa] (a gas) and volume [m3] (a liquid), got "
                 + (" and ".join(chosen) or "none")
             )
-        self.law = {"pressure": "pressure", "filling_pressure": "gas", "volume": "liquid"}[chosen[0]]
+        self.law: str = {"pressure": "pressure", "filling_pressure": "gas", "volume": "liquid"}[chosen[0]]
         for name, value, law in (
             ("outside_pressure", outside_pressure, "gas"),
             ("bulk_modulus", bulk_modulus, "liquid"),
@@ -106,21 +110,21 @@ class Cavity(Actuator):
                 )
         self._replaceable = self._in_time = _LAWS[self.law]
         if self.law == "pressure":
-            self.pressure = number("pressure", "Pa", pressure)
+            self.pressure: np.ndarray = number("pressure", "Pa", pressure)
             self.is_spring = False
         elif self.law == "gas":
-            self.filling_pressure = number("filling_pressure", "Pa", filling_pressure, 0.0)
+            self.filling_pressure: np.ndarray = number("filling_pressure", "Pa", filling_pressure, 0.0)
             outside = ATMOSPHERE if outside_pressure is None else outside_pressure
-            self.outside_pressure = number("outside_pressure", "Pa", outside, 0.0)
+            self.outside_pressure: np.ndarray = number("outside_pressure", "Pa", outside, 0.0)
         else:
-            self.volume = number("volume", "m3", volume, 0.0, above=True)
-            self.bulk_modulus = number(
+            self.volume: np.ndarray = number("volume", "m3", volume, 0.0, above=True)
+            self.bulk_modulus: np.ndarray = number(
                 "bulk_modulus", "Pa", WATER if bulk_modulus is None else bulk_modulus, 0.0, above=True
             )
 
     _replaceable = _in_time = tuple(name for names in _LAWS.values() for name in names)
 
-    def replaced(self, **values) -> Cavity:
+    def replaced(self, **values: Any) -> Cavity:
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cavity(self._parts, cap_rims=self.cap_rims, **now))
 
@@ -137,7 +141,7 @@ class Cavity(Actuator):
             return 0.0
         return abs(self.volume / self.rest_volume(scene) - 1.0)
 
-    def pressure_at(self, volume, rest_volume: float, load_factor: float):
+    def pressure_at(self, volume: Numbers, rest_volume: float, load_factor: float):
         """Pa, over that outside, at a volume (m3)."""
         if self.law == "pressure":
             return load_factor * self.pressure + 0.0 * volume
@@ -146,7 +150,7 @@ class Cavity(Actuator):
         target = rest_volume + load_factor * (self.volume - rest_volume)
         return -self.bulk_modulus * (volume - target) / rest_volume
 
-    def _core_input(self, label: str, bodies: Bodies) -> dict:
+    def _core_input(self, label: str, bodies: Bodies) -> dict[Any, Any]:
         return {
             "owner": label,
             "law": self.law,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from ..bodies.bodies import Bodies, on_body
 from ..bodies.solid import Solid
 from .actuator_results import CellsResult
 from .closed_surface import of_tetrahedra
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 # Of the nodes of a cell: up to so many are coupled all with each other in the matrix, more are bordered.
 _FEW_NODES = 40
@@ -46,13 +50,17 @@ class Cells(Actuator):
     _replaceable = _in_time = ("volume_ratio", "stiffness")
     _units: ClassVar[dict[str, str]] = {"volume_ratio": "1", "stiffness": "Pa"}
 
-    def __init__(self, body: Solid, groups=None, *, stiffness, volume_ratio=1.0):
+    def __init__(self, body: Solid, groups=None, *, stiffness: Numbers, volume_ratio: Numbers = 1.0):
         if not isinstance(body, Solid):
             raise ValueError(f"Cells are of a Solid, got {body!r:.60}")
         self.bodies = (body,)
         self._groups = _groups(groups, body.mesh.n_tetrahedra)
-        self.stiffness = numbers("stiffness", "Pa", stiffness, self.count, "cell", 0.0, above=True)
-        self.volume_ratio = numbers("volume_ratio", "1", volume_ratio, self.count, "cell", 0.0, above=True)
+        self.stiffness: np.ndarray = numbers(
+            "stiffness", "Pa", stiffness, self.count, "cell", 0.0, above=True
+        )
+        self.volume_ratio: np.ndarray = numbers(
+            "volume_ratio", "1", volume_ratio, self.count, "cell", 0.0, above=True
+        )
 
     @property
     def groups(self) -> list[np.ndarray]:
@@ -64,21 +72,21 @@ class Cells(Actuator):
         """How many cells there are."""
         return len(self._groups)
 
-    def replaced(self, **values) -> Cells:
+    def replaced(self, **values: Any) -> Cells:
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cells(self.body, self._groups, **now))
 
     def filling(self, scene) -> float:
         return float(np.abs(np.asarray(self.volume_ratio) - 1.0).max(initial=0.0))
 
-    def pressure_at(self, ratios, load_factor: float):
+    def pressure_at(self, ratios: Numbers, load_factor: float):
         """(k,) Pa, at volume ratios (k,)."""
         target = 1.0 + load_factor * (self.volume_ratio - 1.0)
         if isinstance(ratios, np.ndarray):
             return self.stiffness * (target - ratios)
         return ratios.new_tensor(self.stiffness) * (ratios.new_tensor(target) - ratios)
 
-    def _core_input(self, label: str, bodies: Bodies) -> dict:
+    def _core_input(self, label: str, bodies: Bodies) -> dict[Any, Any]:
         of_scene = bodies.original[bodies.of(self).vertices]
         tetrahedra = self.body.mesh.tetrahedra
         surfaces = [of_tetrahedra(of_scene[tetrahedra[group]]) for group in self._groups]

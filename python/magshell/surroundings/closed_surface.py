@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +11,10 @@ from ..bodies.solid import Solid
 from ..mesh.face_shapes import sides
 from ..mesh.six_node_integrals import rule, shapes
 from ..mesh.tet_topology import FACE_NODES, FACES, groups
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _NAMED = 4  # edges that an error names
 _NO_VOLUME = 1e-9  # of the cube of its size
@@ -26,7 +31,7 @@ class ClosedSurface:
     curved_weights: np.ndarray
 
     @property
-    def core_input(self) -> dict:
+    def core_input(self) -> dict[Any, Any]:
         return {
             "triangles": self.triangles.ravel().tolist(),
             "weights": self.weights.tolist(),
@@ -38,7 +43,7 @@ class ClosedSurface:
     def vertices(self) -> np.ndarray:
         return np.unique(np.concatenate([self.triangles.ravel(), self.curved.ravel()]))
 
-    def volume(self, positions):
+    def volume(self, positions: Numbers):
         """(...) m3, of positions (..., n_v, 3) m, numpy's or a tensor in its graph."""
         origin = positions[..., self.vertices[:1], :]
         total = 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class Constraints:
     held_nodes: np.ndarray  # (m, 5): node, how many directions, of each the move or -1
     held_frames: np.ndarray  # (m, 3, 3): columns, the held directions first
     moves: tuple[RigidMove, ...]
-    direction_owners: tuple  # (n_d,), the support that holds each direction, or None
+    direction_owners: tuple[Any, ...]  # (n_d,), the support that holds each direction, or None
 
 
 def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import numpy as np
 
@@ -15,18 +16,18 @@ from ..errors import MeshQualityWarning
 from .body_contact import BodyContact, side_of, touches_with_shape
 
 
-def obstacles_of(contacts) -> tuple:
+def obstacles_of(contacts) -> tuple[Any, ...]:
     """Every obstacle once, in the order in which contacts name them."""
     return tuple({id(each): each for contact in contacts for each in contact.obstacles}.values())
 
 
-def split_contacts(contacts) -> tuple[tuple, tuple]:
+def split_contacts(contacts) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """Those with obstacles, and those of bodies."""
     of_bodies = tuple(each for each in contacts if isinstance(each, BodyContact))
     return tuple(each for each in contacts if not isinstance(each, BodyContact)), of_bodies
 
 
-def body_contact_inputs(contacts, bodies) -> tuple[list[dict], list[dict]]:
+def body_contact_inputs(contacts, bodies) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
     """What of the contacts of bodies no solve can change: surfaces, and which of them touch."""
     _check_each_pair_once(contacts)
     sides = list({id(side): side for contact in contacts for side in contact.sides}.values())
@@ -59,7 +60,7 @@ def shapes_that_touch(contacts) -> tuple[Rigid, ...]:
     return tuple({id(side): side for side in sides}.values())
 
 
-def _surface(side, bodies) -> dict:
+def _surface(side, bodies) -> dict[Any, Any]:
     """The faces of a body, of a rigid part's shape, or those between its vertices: (k, 3), the scene's vertices."""
     body = side_of(side)
     try:
@@ -135,7 +136,7 @@ def check_shapes(contacts, parts, places) -> None:
             )
 
 
-def contact_inputs(contacts, bodies) -> list[dict]:
+def contact_inputs(contacts, bodies) -> list[dict[Any, Any]]:
     """What of the contacts no solve can change."""
     numbers = {id(each): k for k, each in enumerate(obstacles_of(contacts))}
     inputs = []
@@ -186,7 +187,7 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
     return every[every >= 0]
 
 
-def check_outside(scene, values, positions: np.ndarray, time: float) -> None:
+def check_outside(scene, values: Any, positions: np.ndarray, time: float) -> None:
     """A sheet that starts deeper in an obstacle than half its thickness would be shot out of it, or a solid that starts
     deeper than a hundredth of its size."""
     if not scene._obstacle_contacts:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .. import _core
@@ -11,6 +13,9 @@ from .._checks.selections import indices, selection
 from ..bodies.bodies import checked_body, on_body
 from ..bodies.shell import Shell
 from ..mesh.triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class FaceEnergy(Owner):
@@ -26,9 +31,11 @@ class FaceEnergy(Owner):
     _energy: type
     for_all = False
 
-    def __init__(self, values: dict[str, object], faces, body: Shell | None):
-        self.faces = None if faces is None else selection(f"{type(self).__name__} faces", faces)
-        self.body = checked_body(body)
+    def __init__(self, values: dict[str, object], faces: Numbers, body: Shell | None):
+        self.faces: np.ndarray | None = (
+            None if faces is None else selection(f"{type(self).__name__} faces", faces)
+        )
+        self.body: Shell | None = checked_body(body)
         for name, unit in zip(self._replaceable, self._units, strict=True):
             array = real_numbers(f"{name} [{unit}]", values[name])
             if array.ndim > 1:
@@ -41,7 +48,7 @@ class FaceEnergy(Owner):
     def _core(self):
         return self._energy()
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         mesh = values.scene._bodies.of(self).mesh
         chosen = self._chosen(mesh)
         for name in self._replaceable:
@@ -49,11 +56,11 @@ class FaceEnergy(Owner):
             of_faces[chosen] = getattr(self, name)
             numbers[label, name] = of_faces
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         chosen = self._chosen(values.scene._bodies.of(self).mesh)
         return {name: gradient.value(label, name)[chosen] for name in self._replaceable}
 
-    def replaced(self, **values) -> FaceEnergy:
+    def replaced(self, **values: Any) -> FaceEnergy:
         now = {name: getattr(self, name) for name in self._replaceable}
         return type(self)(*(now | values).values(), faces=self.faces, body=self.body)
 
@@ -95,5 +102,5 @@ class SurfaceTension(FaceEnergy):
     _units = ("N/m",)
     _energy = _core.SurfaceTension
 
-    def __init__(self, surface_tension, *, faces=None, body: Shell | None = None):
+    def __init__(self, surface_tension: Numbers, *, faces: Numbers | None = None, body: Shell | None = None):
         super().__init__({"surface_tension": surface_tension}, faces, body)

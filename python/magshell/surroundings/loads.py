@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .._checks.owner import Owner
@@ -14,6 +16,9 @@ from ..mesh.face_shapes import edge_shares, shares
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 class DeadLoad(Owner):
     """Forces that keep size and direction, given by one value: so much of it on each of some parts of the mesh.
@@ -23,7 +28,7 @@ class DeadLoad(Owner):
 
     for_all = False  # whether it acts on all bodies where it names none
 
-    def __init__(self, label: str, values, body: Shell | Solid | None):
+    def __init__(self, label: str, values: Any, body: Shell | Solid | None):
         """label: the name and unit of the value."""
         self._label, self.body = label, checked_body(body)
         setattr(self, self._replaceable[0], _vectors(*label.rstrip("]").split(" [", 1), values))
@@ -34,14 +39,14 @@ class DeadLoad(Owner):
         rows = _rows(self._label, getattr(self, self._replaceable[0]), len(vertices))
         return _spread(mesh, vertices, rows[:, None] * weights[..., None])
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         key = ("loads", "forces")
         part = values.scene._bodies.of(self)
         forces = np.zeros((values.scene.mesh.n_vertices, 3)) if key not in numbers else numbers[key]
         forces[part.vertices] += self.vertex_forces(part.mesh)
         numbers[key] = forces
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         part = values.scene._bodies.of(self)
         vertices, weights = self._shares(part.mesh)
         by_forces = gradient.value("loads", "forces")[part.vertices]
@@ -64,11 +69,11 @@ class PointLoad(DeadLoad):
 
     _replaceable = ("force",)
 
-    def __init__(self, vertices, force, body: Shell | Solid | None = None):
-        self.vertices = selection("PointLoad vertices", vertices)
+    def __init__(self, vertices: Numbers, force: Numbers, body: Shell | Solid | None = None):
+        self.vertices: np.ndarray = selection("PointLoad vertices", vertices)
         super().__init__("force [N]", force, body)
 
-    def replaced(self, *, force) -> PointLoad:
+    def replaced(self, *, force: Numbers) -> PointLoad:
         return PointLoad(self.vertices, force, self.body)
 
     def _shares(self, mesh: TriangleMesh):
@@ -93,11 +98,11 @@ class EdgeLoad(DeadLoad):
 
     _replaceable = ("force_per_length",)
 
-    def __init__(self, edges, force_per_length, body: Shell | Solid | None = None):
-        self.edges = selection("EdgeLoad edges", edges)
+    def __init__(self, edges, force_per_length: Numbers, body: Shell | Solid | None = None):
+        self.edges: np.ndarray = selection("EdgeLoad edges", edges)
         super().__init__("force_per_length [N/m]", force_per_length, body)
 
-    def replaced(self, *, force_per_length) -> EdgeLoad:
+    def replaced(self, *, force_per_length: Numbers) -> EdgeLoad:
         return EdgeLoad(self.edges, force_per_length, self.body)
 
     def _shares(self, mesh: TriangleMesh):
@@ -119,12 +124,14 @@ class AreaLoad(DeadLoad):
 
     _replaceable = ("force_per_area",)
 
-    def __init__(self, force_per_area, faces=None, body: Shell | Solid | None = None):
-        self.faces = None if faces is None else selection("AreaLoad faces", faces)
-        self.for_all = faces is None
+    def __init__(
+        self, force_per_area: Numbers, faces: Numbers | None = None, body: Shell | Solid | None = None
+    ):
+        self.faces: np.ndarray | None = None if faces is None else selection("AreaLoad faces", faces)
+        self.for_all: bool = faces is None
         super().__init__("force_per_area [N/m2]", force_per_area, body)
 
-    def replaced(self, *, force_per_area) -> AreaLoad:
+    def replaced(self, *, force_per_area: Numbers) -> AreaLoad:
         return AreaLoad(force_per_area, self.faces, self.body)
 
     def _shares(self, mesh: TriangleMesh):
@@ -156,13 +163,13 @@ class EdgeCouple(Owner):
     _replaceable = ("couple_per_length",)
     for_all = False
 
-    def __init__(self, edges, couple_per_length, body: Shell | Solid | None = None):
-        self.body = checked_body(body)
-        self.edges = selection("EdgeCouple edges", edges)
+    def __init__(self, edges, couple_per_length: Numbers, body: Shell | Solid | None = None):
+        self.body: Shell | None = checked_body(body)
+        self.edges: np.ndarray = selection("EdgeCouple edges", edges)
         array = real_numbers("couple_per_length [N]", couple_per_length)
         if array.shape not in ((), (3,)):
             raise ValueError(f"couple_per_length [N] must be a number or have shape (3,), got {array.shape}")
-        self.couple_per_length = quantity("couple_per_length", "N", array, array.shape)
+        self.couple_per_length: np.ndarray = quantity("couple_per_length", "N", array, array.shape)
 
     def edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
         """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn."""
@@ -173,7 +180,7 @@ class EdgeCouple(Owner):
         edges, along = self._along(mesh)
         return edges, along @ np.atleast_1d(self.couple_per_length)
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         key, turned = ("couples", "couples"), values.scene._couple_edges
         part = values.scene._bodies.of(self)
         edges, couples = self.edge_couples(part.mesh)
@@ -181,13 +188,13 @@ class EdgeCouple(Owner):
         by_edge = np.bincount(part.first_edge + edges, weights=couples, minlength=n_edges)
         numbers[key] = numbers.get(key, 0.0) + by_edge[turned]
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         part = values.scene._bodies.of(self)
         edges, along = self._along(part.mesh)
         of_edges = np.searchsorted(values.scene._couple_edges, part.first_edge + edges)
         return {"couple_per_length": gradient.value("couples", "couples")[of_edges] @ along}
 
-    def replaced(self, *, couple_per_length) -> EdgeCouple:
+    def replaced(self, *, couple_per_length: Numbers) -> EdgeCouple:
         changed = EdgeCouple(self.edges, couple_per_length, self.body)
         if changed.couple_per_length.shape != self.couple_per_length.shape:
             raise ValueError(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .._checks.owner import Owner
@@ -11,6 +13,9 @@ from ..bodies.bodies import Bodies, checked_body, on_body
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from ..mesh.face_shapes import sides
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 class Pressure(Owner):
@@ -45,15 +50,15 @@ class Pressure(Owner):
     _in_time = ("pressure",)
     for_all = False
 
-    def __init__(self, pressure, *, faces=None, body: Shell | Solid | None = None):
-        self.faces = None if faces is None else selection("Pressure faces", faces)
-        self.body = checked_body(body)
+    def __init__(self, pressure: Numbers, *, faces: Numbers | None = None, body: Shell | Solid | None = None):
+        self.faces: np.ndarray | None = None if faces is None else selection("Pressure faces", faces)
+        self.body: Shell | None = checked_body(body)
         array = real_numbers("pressure [Pa]", pressure)
         if array.ndim > 1:
             raise ValueError(f"pressure [Pa] must be a number or one a face, got shape {array.shape}")
-        self.pressure = quantity("pressure", "Pa", array, array.shape)
+        self.pressure: np.ndarray = quantity("pressure", "Pa", array, array.shape)
 
-    def replaced(self, *, pressure) -> Pressure:
+    def replaced(self, *, pressure: Numbers) -> Pressure:
         changed = Pressure(pressure, faces=self.faces, body=self.body)
         if changed.pressure.shape != self.pressure.shape:
             raise ValueError(
@@ -61,10 +66,10 @@ class Pressure(Owner):
             )
         return changed
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         numbers[label, "pressure"] = np.atleast_1d(self.pressure)
 
-    def _core_input(self, label: str, bodies: Bodies) -> dict:
+    def _core_input(self, label: str, bodies: Bodies) -> dict[Any, Any]:
         """As the core takes it: the nodes of sides, and which of its numbers acts on each of their parts."""
         part = bodies.of(self)
         count = part.mesh.n_faces

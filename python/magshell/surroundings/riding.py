@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..bodies.bodies import Bodies
@@ -10,6 +12,10 @@ from ..bodies.solid import Solid
 from ..mesh.six_node_integrals import shapes
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.tet_topology import EDGES, FLAT
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _OUTSIDE = 1e-6  # of a body's size: a point farther from every element is outside
 _STEPS = 30  # of Newton's method, into curved elements
@@ -21,7 +27,7 @@ _CORNERS_OF_FACES = np.concatenate([np.eye(3), 0.5 * (np.eye(3) + np.roll(np.eye
 ]
 
 
-def riding_points(points, bodies: Bodies, places) -> list[tuple[np.ndarray, np.ndarray]]:
+def riding_points(points: Numbers, bodies: Bodies, places) -> list[tuple[np.ndarray, np.ndarray]]:
     """points: [(body, (3,) m)]; places: of a scene's rigid parts. Of each, vertices of the scene (then of rigid parts, ten
     each) and weights, which add up to 1. Raises ValueError where a point lies outside its body."""
     found = []

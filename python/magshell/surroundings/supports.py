@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import permutations
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _AXES = "xyz"
 _ORDERS = {"".join(axes) for n in (1, 2, 3) for axes in permutations(_AXES, n)}
@@ -62,13 +66,13 @@ class Support(Owner):
 
     for_all = False  # whether it holds all bodies where it names none
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         for owner, move in self._moves(values):
             numbers[owner, "center"] = move.center
             numbers[owner, "rotation"] = move.rotation
             numbers[owner, "displacement"] = move.translation
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         owners = [owner for owner, _ in self._moves(values)]
         return {
             name: np.sum([gradient.value(owner, name)[0] for owner in owners], axis=0)
@@ -97,16 +101,16 @@ class Pin(Support):
 
     def __init__(
         self,
-        vertices,
+        vertices: Numbers,
         components: str = "xyz",
         *,
-        displacement=None,
-        rotation=None,
-        center=None,
+        displacement: Numbers | None = None,
+        rotation: Numbers | None = None,
+        center: Numbers | None = None,
         body: Shell | Solid | None = None,
     ):
-        self.body = checked_body(body)
-        self.vertices = selection("Pin vertices", vertices)
+        self.body: Shell | None = checked_body(body)
+        self.vertices: np.ndarray = selection("Pin vertices", vertices)
         if not isinstance(components, str) or components not in _ORDERS:
             raise ValueError(f'components must be some of "x", "y", "z", got {components!r}')
         self.components = components
@@ -129,7 +133,7 @@ class Pin(Support):
     def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
         return []
 
-    def replaced(self, **values) -> Pin:
+    def replaced(self, **values: Any) -> Pin:
         """The same Pin with another displacement, rotation or center."""
         return Pin(self.vertices, self.components, body=self.body, **{**self._move.as_arguments(), **values})
 
@@ -153,10 +157,16 @@ class Clamp(Support):
     _replaceable = _in_time = ("displacement", "rotation", "center")
 
     def __init__(
-        self, edges, *, displacement=None, rotation=None, center=None, body: Shell | Solid | None = None
+        self,
+        edges,
+        *,
+        displacement: Numbers | None = None,
+        rotation: Numbers | None = None,
+        center: Numbers | None = None,
+        body: Shell | Solid | None = None,
     ):
-        self.body = checked_body(body)
-        self.edges = selection("Clamp edges", edges)
+        self.body: Shell | None = checked_body(body)
+        self.edges: np.ndarray = selection("Clamp edges", edges)
         self._move = _Move(displacement, rotation, center)
 
     def held(self, mesh: TriangleMesh) -> list[Held]:
@@ -170,7 +180,7 @@ class Clamp(Support):
         # Continues the face in its own plane, so that a clamped flat sheet has no fold at its clamp.
         return [DirectedEdges(edges, continuations(mesh, edges), self._move_on(mesh))]
 
-    def replaced(self, **values) -> Clamp:
+    def replaced(self, **values: Any) -> Clamp:
         """The same Clamp with another displacement, rotation or center."""
         return Clamp(self.edges, body=self.body, **{**self._move.as_arguments(), **values})
 
@@ -206,20 +216,22 @@ class SymmetryPlane(Support):
 
     def __init__(
         self,
-        normal,
-        point=(0.0, 0.0, 0.0),
+        normal: Numbers,
+        point: Numbers = (0.0, 0.0, 0.0),
         *,
         tolerance: float | None = None,
         body: Shell | Solid | None = None,
     ):
-        self.body = checked_body(body)
+        self.body: Shell | None = checked_body(body)
         normal = quantity("normal", "1", normal, (3,))
         length = np.linalg.norm(normal)
         if length == 0.0:
             raise ValueError("normal must not be zero")
-        self.normal = normal / length
-        self.point = quantity("point", "m", point, (3,))
-        self.tolerance = None if tolerance is None else not_negative("tolerance", "m", tolerance)
+        self.normal: np.ndarray | Any = normal / length
+        self.point: np.ndarray = quantity("point", "m", point, (3,))
+        self.tolerance: float | None = (
+            None if tolerance is None else not_negative("tolerance", "m", tolerance)
+        )
 
     def _vertices(self, mesh: TriangleMesh) -> np.ndarray:
         height = (mesh.rest_positions - self.point) @ self.normal
@@ -306,7 +318,7 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
 class _Move:
     """A displacement and a rotation as a caller gives them."""
 
-    def __init__(self, displacement, rotation, center):
+    def __init__(self, displacement: Numbers, rotation: Numbers, center: Numbers):
         self.displacement = (
             None if displacement is None else quantity("displacement", "m", displacement, (3,))
         )

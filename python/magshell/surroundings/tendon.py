@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from .actuator_results import TendonResult
 from .riding import riding_points
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _SMOOTHING = 1e-3  # of the length at rest
 _KINDS = (*BODIES, Rigid)
@@ -59,11 +63,11 @@ class Tendon(Actuator):
         points,
         body=None,
         *,
-        tension=0.0,
-        stiffness=0.0,
-        rest_length=None,
+        tension: Numbers = 0.0,
+        stiffness: Numbers = 0.0,
+        rest_length: Numbers | None = None,
         sliding: bool = True,
-        smoothing=None,
+        smoothing: Numbers | None = None,
     ):
         self._points = _points(points, body)
         if not isinstance(sliding, bool):
@@ -77,12 +81,12 @@ class Tendon(Actuator):
                 f"points {np.argmin(self._shares)} and {np.argmin(self._shares) + 1} of the Tendon are one"
             )
         self._shares /= length
-        self.tension = number("tension", "N", tension, 0.0)
-        self.stiffness = number("stiffness", "N/m", stiffness, 0.0)
+        self.tension: np.ndarray = number("tension", "N", tension, 0.0)
+        self.stiffness: np.ndarray = number("stiffness", "N/m", stiffness, 0.0)
         rest = length if rest_length is None else rest_length
-        self.rest_length = number("rest_length", "m", rest, 0.0, above=True)
+        self.rest_length: np.ndarray = number("rest_length", "m", rest, 0.0, above=True)
         smooth = _SMOOTHING * length if smoothing is None else smoothing
-        self.smoothing = number("smoothing", "m", smooth, 0.0, above=True)
+        self.smoothing: np.ndarray = number("smoothing", "m", smooth, 0.0, above=True)
 
     @property
     def is_spring(self) -> bool:
@@ -99,11 +103,11 @@ class Tendon(Actuator):
         """The first shell or solid that it goes through, or None."""
         return next((each for each in self.bodies if isinstance(each, BODIES)), None)
 
-    def replaced(self, **values) -> Tendon:
+    def replaced(self, **values: Any) -> Tendon:
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Tendon(self._points, sliding=self.sliding, **now))
 
-    def tension_at(self, length):
+    def tension_at(self, length: Numbers):
         """N, at a length, m; of a tendon that does not slide, at those of its segments, (..., segments)."""
         shares = 1.0 if self.sliding else _like(self._shares, length)
         beyond = length - shares * float(self.rest_length)
@@ -118,7 +122,7 @@ class Tendon(Actuator):
         """Of each point the core's vertices that it rides on, and their weights."""
         return riding_points(self._points, scene_bodies, places)
 
-    def _core_input(self, label: str, bodies: Bodies, places) -> dict:
+    def _core_input(self, label: str, bodies: Bodies, places) -> dict[Any, Any]:
         return {
             "owner": label,
             "slides": self.sliding,

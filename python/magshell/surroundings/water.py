@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .. import _core
 from .._checks.owner import Owner
 from .._checks.quantity import quantity
 from .._checks.scalars import not_negative
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 _HEAD_ON = 0.5 * np.pi
 _NONE = 1e-9  # what of a table counts as zero, over its largest value; and how far its angles may miss the ends [rad]
@@ -58,19 +64,19 @@ class Water(Owner):
 
     def __init__(
         self,
-        fluid_density=1000.0,
-        velocity=(0.0, 0.0, 0.0),
-        drag_coefficient=1.0,
-        thrust_coefficient=1.0,
-        attack_table=None,
-        thrust_table=None,
-        added_mass=0.0,
+        fluid_density: Numbers = 1000.0,
+        velocity: Numbers = (0.0, 0.0, 0.0),
+        drag_coefficient: Numbers = 1.0,
+        thrust_coefficient: Numbers = 1.0,
+        attack_table: Numbers | None = None,
+        thrust_table: Numbers | None = None,
+        added_mass: Numbers = 0.0,
     ):
-        self.fluid_density = not_negative("fluid_density", "kg/m3", fluid_density)
-        self.velocity = quantity("velocity", "m/s", velocity, (3,))
-        self.drag_coefficient = not_negative("drag_coefficient", "1", drag_coefficient)
-        self.thrust_coefficient = not_negative("thrust_coefficient", "1", thrust_coefficient)
-        self.added_mass = not_negative("added_mass", "kg/m2", added_mass)
+        self.fluid_density: float = not_negative("fluid_density", "kg/m3", fluid_density)
+        self.velocity: np.ndarray = quantity("velocity", "m/s", velocity, (3,))
+        self.drag_coefficient: float = not_negative("drag_coefficient", "1", drag_coefficient)
+        self.thrust_coefficient: float = not_negative("thrust_coefficient", "1", thrust_coefficient)
+        self.added_mass: float = not_negative("added_mass", "kg/m2", added_mass)
         self.attack_table = _table("attack_table", attack_table)
         self.thrust_table = _table("thrust_table", thrust_table)
         self._drag_curve = _curve(self.attack_table)
@@ -81,7 +87,7 @@ class Water(Owner):
             thrust_curve=self._thrust_curve,
         )
 
-    def replaced(self, **values) -> Water:
+    def replaced(self, **values: Any) -> Water:
         """The same water with other numbers: any of those that a solve may replace, and differentiate by."""
         if unknown := sorted(set(values) - set(self._replaceable)):
             raise ValueError(
@@ -89,7 +95,7 @@ class Water(Owner):
             )
         return Water(**{**self.__getstate__(), **values})
 
-    def coefficients(self, attack_angle) -> tuple[np.ndarray, np.ndarray]:
+    def coefficients(self, attack_angle: Numbers) -> tuple[np.ndarray, np.ndarray]:
         """C_d and C_t, each (...), at attack angles [rad] in [0, pi/2], (...)."""
         angles = quantity("attack_angle", "rad", attack_angle, ("...",))
         if (bad := (angles < 0) | (angles > _HEAD_ON)).any():
@@ -100,7 +106,9 @@ class Water(Owner):
         )
         return self.drag_coefficient * drag, self.thrust_coefficient * thrust
 
-    def force(self, positions, velocities, accelerations=None) -> np.ndarray:
+    def force(
+        self, positions: Numbers, velocities: Numbers, accelerations: Numbers | None = None
+    ) -> np.ndarray:
         """The force on each face, (n_f, 3), N; a third of it acts on each corner.
 
         positions, velocities, accelerations: of the corners of the faces, (n_f, 3, 3), a row a corner; m, m/s, m/s2.
@@ -125,14 +133,14 @@ class Water(Owner):
         thrust_is = self.thrust_coefficient == 0 or (thrust[0] == 0 and thrust_slopes[1] == 0)
         return bool(drag_is and thrust_is)
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[Any, Any]:
         return {
             **{name: getattr(self, name) for name in self._replaceable},
             "attack_table": self.attack_table,
             "thrust_table": self.thrust_table,
         }
 
-    def __setstate__(self, arguments: dict) -> None:
+    def __setstate__(self, arguments: dict[Any, Any]) -> None:
         self.__init__(**arguments)
 
     def __repr__(self) -> str:
