@@ -216,6 +216,16 @@ def test_processes_that_share_a_file_keep_each_others_runs(tmp_path) -> None:
     assert [again.known("bowl", "L-BFGS", seed, 4)["best"] for seed in range(3)] == [[0.0], [1.0], [2.0]]
 
 
+def test_runs_of_other_budgets_that_are_the_same(tmp_path) -> None:
+    kept, never = Kept(tmp_path / "runs.json"), lambda: pytest.fail("it is known")
+    kept.run("bowl", "spent", 0, 3, lambda: {"best": [3.0, 2.0, 1.0], "seconds": [0.1, 0.2, 0.3]})
+    kept.run("bowl", "ended", 0, 3, lambda: {"best": [3.0, 2.0], "seconds": [0.1, 0.2]})
+    assert kept.run("bowl", "spent", 0, 2, never) == {"best": [3.0, 2.0], "seconds": [0.1, 0.2]}
+    assert kept.run("bowl", "ended", 0, 9, never) == {"best": [3.0, 2.0], "seconds": [0.1, 0.2]}
+    assert kept.run("bowl", "ended", 0, 1, never) == {"best": [3.0], "seconds": [0.1]}
+    assert kept.known("bowl", "spent", 0, 4) is None and kept.known("bowl", "ended", 1, 3) is None
+
+
 def test_files_of_runs_that_are_none(tmp_path) -> None:
     path = tmp_path / "runs.json"
     with pytest.raises(SystemExit, match="name one that is there"):

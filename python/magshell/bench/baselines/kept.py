@@ -19,21 +19,26 @@ class Kept:
         self._runs = {} if path is None or not path.exists() else _read(path)
 
     def known(self, task: str, method: str, seed: int, budget: int) -> dict | None:
-        """{"best", "seconds"} of a run, if an earlier one of the same budget was kept."""
-        return self._runs.get((task, method, seed, budget))
+        """{"best", "seconds"} of a run, if one was kept: what a larger budget began with, too, and all of one that ended
+        before its own budget was spent."""
+        for (*which, given), run in self._runs.items():
+            if which == [task, method, seed] and (given >= budget or len(run["best"]) < given):
+                return {name: values[:budget] for name, values in run.items()}
+        return None
 
     def run(self, task: str, method: str, seed: int, budget: int, make: Callable[[], dict]) -> dict:
         """The one known, or what `make` returns, which is kept."""
-        key = (task, method, seed, budget)
-        if key not in self._runs:
-            self._runs[key] = make()
-            if self._path is not None:
-                if self._path.exists():  # another process may have kept some there
-                    self._runs = _read(self._path) | self._runs
-                rows = [dict(zip(_KEYS, each, strict=True)) | run for each, run in self._runs.items()]
-                text = "[\n" + ",\n".join(map(json.dumps, rows)) + "\n]\n"
-                replace_file(self._path, lambda file: file.write(text.encode()))
-        return self._runs[key]
+        known = self.known(task, method, seed, budget)
+        if known is not None:
+            return known
+        run = self._runs[task, method, seed, budget] = make()
+        if self._path is not None:
+            if self._path.exists():  # another process may have kept some there
+                self._runs = _read(self._path) | self._runs
+            rows = [dict(zip(_KEYS, each, strict=True)) | run for each, run in self._runs.items()]
+            text = "[\n" + ",\n".join(map(json.dumps, rows)) + "\n]\n"
+            replace_file(self._path, lambda file: file.write(text.encode()))
+        return run
 
 
 def _read(path: Path) -> dict:

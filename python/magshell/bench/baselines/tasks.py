@@ -16,9 +16,7 @@ class Task:
     name: str
     unknowns: int
     goal: float | None = None
-    squared = (
-        False  # differentiable is: a distance has a kink at its goal, which models of curvature do not know
-    )
+    squared = False  # differentiable is: of a distance, which has a kink at its goal
     learned = (
         False  # whether it is an environment too: then with `actions` an episode, `environment` and `lost`
     )
