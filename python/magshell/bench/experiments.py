@@ -24,8 +24,8 @@ NEAR = 0.01  # of what ours ends with: where a task has no goal, ours is there
 
 
 class Experiment(NamedTuple):
-    """budget: simulations a run, TIMES what the gradient needs; of the octopus, which takes 3 s for one, half as many. seeds:
-    runs of each method, without --full; together they take about an hour of one core."""
+    """budget: simulations a run, TIMES what the gradient needs; of the octopus, which takes 3 s for one, half as many.
+    seeds: runs of each method, without --full; together they take about an hour of one core."""
 
     task: Callable
     budget: int
