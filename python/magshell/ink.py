@@ -121,6 +121,7 @@ class Ink:
         return values / self.strength
 
     def check_faces(self, count: int) -> None:
+        """Raises ValueError where the frames are not those of so many faces."""
         if self.frames is not None and len(self.frames) != count:
             raise ValueError(
                 f"the ink has frames for {len(self.frames)} faces, and remanent_magnetization has {count}"
