@@ -37,6 +37,7 @@ void LoadSteps::succeeded(double step, const NewtonReport& report) {
 
 bool LoadSteps::failed(double step, const NewtonReport& report) {
     constexpr double lost_share = 0.25, usual_share = 0.5, least_share = 0.125;
+    constexpr double not_shorter = 0.9, shortest_ever = 1e-6;
     // Steps that lead so little way and are so short, and fail one after another, are where a branch of states ends.
     constexpr double short_length = 0.05, short_step = 0.25;
     constexpr int enough = 2;
@@ -44,11 +45,13 @@ bool LoadSteps::failed(double step, const NewtonReport& report) {
     step_ = (report.lost ? lost_share : usual_share) * step;
     ++failures_;
     if (wary_) {
-        const double length = failed_length_ = length_of(report);
+        const double before = failed_length_, length = failed_length_ = length_of(report);
         if (!insists_ && failures_ >= enough && length < short_length && step <= short_step) return false;
+        // What moves as far in a shorter step is not moved by the controls.
+        if (failures_ >= enough && length > not_shorter * before) return false;
         const double good_step = good_length / std::max(length, tiny) * step;
         // Of a way of many extents a small share may be a long step.
-        if (!fixed_) smallest_ = std::min(smallest_, least_share * good_step);
+        if (!fixed_) smallest_ = std::max(std::min(smallest_, least_share * good_step), shortest_ever);
         if (length > 0.5 * good_length && step > smallest_)
             step_ = std::max(std::min(step_, good_step), smallest_);
     }
