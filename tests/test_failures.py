@@ -134,7 +134,7 @@ def test_a_failure_says_where_and_what_was_tried():
 
 def test_a_failure_beside_flat_faces_names_them():
     """Steps however short do not help there."""
-    mesh = crossed(LENGTH, WIDTH, (20, 2), [0.001, 0.5])
+    mesh = crossed(LENGTH, WIDTH, (20, 2), [0.0003, 0.5])
     with pytest.raises(ms.NotConverged) as caught:
         bent_far(mesh)
     text = str(caught.value)

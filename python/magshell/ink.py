@@ -121,7 +121,9 @@ class Ink:
         return values / self.strength
 
     def check_faces(self, count: int) -> None:
-        """Raises ValueError where the frames are not those of so many faces."""
+        """Raises ValueError where there are none, or the frames are not those of so many faces."""
+        if count == 0:
+            raise ValueError("remanent_magnetization has no faces")
         if self.frames is not None and len(self.frames) != count:
             raise ValueError(
                 f"the ink has frames for {len(self.frames)} faces, and remanent_magnetization has {count}"

@@ -189,8 +189,6 @@ def printable(remanent_magnetization, ink, areas=None, sharpness=None):
     if not isinstance(ink, Ink):
         raise ValueError(f"ink must be an ms.Ink, got {type(ink).__name__}")
     squares = ink.squares(remanent_magnetization)
-    if len(squares) == 0:
-        raise ValueError("remanent_magnetization has no faces")
     if sharpness is None:
         squares = squares.min(dim=1).values
     else:
