@@ -10,7 +10,7 @@ class DesignRejected(RuntimeError):
     less far. `last_good` holds the last state of the same kind that could be, if there is one. `load_case`: the number
     of the load case that it is about, or None."""
 
-    def __init__(self, message: str, last_good=None, load_case: int | None = None):
+    def __init__(self, message: str, last_good: Any = None, load_case: int | None = None):
         super().__init__(message)
         self.last_good: Any = last_good
         self.load_case = load_case
@@ -33,7 +33,7 @@ class Interrupted(KeyboardInterrupt):
     """Ctrl-C stopped a solve. `last_good` holds the last converged state, as a result of the same kind; None where
     there is nothing before all of it is done, as of linear solves, or where the start was not yet known."""
 
-    def __init__(self, message: str, last_good=None):
+    def __init__(self, message: str, last_good: Any = None):
         super().__init__(message)
         self.last_good: Any = last_good
 
@@ -41,7 +41,7 @@ class Interrupted(KeyboardInterrupt):
 class ObjectiveFailed(RuntimeError):
     """An optimization met an error, its cause, on the way. `last_good` holds the best design until then."""
 
-    def __init__(self, message: str, last_good=None):
+    def __init__(self, message: str, last_good: Any = None):
         super().__init__(message)
         self.last_good: Any = last_good
 
@@ -50,7 +50,7 @@ class MultistartFailed(RuntimeError):
     """The executor of a multistart broke, or none of the starts came to its end. `last_good` holds a Multistart of
     what finished."""
 
-    def __init__(self, message: str, last_good=None):
+    def __init__(self, message: str, last_good: Any = None):
         super().__init__(message)
         self.last_good: Any = last_good
 
@@ -59,7 +59,7 @@ class LargeStrainWarning(UserWarning):
     """A result has strains beyond 20 %, for which its material law is not meant. Said once a scene, and again where
     strains have doubled since. Where warnings are made errors, `last_good` holds the result."""
 
-    def __init__(self, message: str, last_good=None):
+    def __init__(self, message: str, last_good: Any = None):
         super().__init__(message)
         self.last_good: Any = last_good
 

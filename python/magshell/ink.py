@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ._checks.quantity import quantity
 from ._checks.scalars import positive
 from ._checks.tensors import detached, is_tensor, like, real_tensor, require_torch
+
+if TYPE_CHECKING:
+    import torch
+
+    from ._checks.kinds import Computed, Numbers
 
 _UNIT = 1e-6  # how far frames may be from orthonormal
 
@@ -29,24 +36,31 @@ class Ink:
     [[50000.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
     """
 
-    def __init__(self, strength: float, directions, *, levels=None, frames=None):
-        self.strength = positive("strength", "A/m", detached(strength))
+    def __init__(
+        self,
+        strength: float,
+        directions: Numbers,
+        *,
+        levels: Numbers | None = None,
+        frames: Numbers | None = None,
+    ):
+        self.strength: float = positive("strength", "A/m", detached(strength))
         rays = quantity("directions", "1", detached(directions), ("k", 3))
         lengths = np.linalg.norm(rays, axis=1, keepdims=True)
         if len(rays) == 0:
             raise ValueError("directions must hold at least one")
         if not (lengths > 0).all():
             raise ValueError("directions must not be zero")
-        self.directions = _constant(rays / lengths)
-        self.levels = None if levels is None else _checked_levels(levels)
-        self.frames = None if frames is None else _checked_frames(frames)
+        self.directions: np.ndarray = _constant(rays / lengths)
+        self.levels: tuple[float, ...] | None = None if levels is None else _checked_levels(levels)
+        self.frames: np.ndarray | None = None if frames is None else _checked_frames(frames)
 
     @property
     def rays(self) -> np.ndarray:
         """Unit vectors in world axes at rest: (k, 3), or with frames (n_f, k, 3)."""
         return self.directions if self.frames is None else self.directions @ self.frames
 
-    def choices(self, remanent_magnetization) -> tuple[np.ndarray, np.ndarray]:
+    def choices(self, remanent_magnetization: Numbers) -> tuple[np.ndarray, np.ndarray]:
         """What comes nearest to the magnetization of each face: (n_f,) which direction, and (n_f,) which share of the
         strength.
 
@@ -61,7 +75,7 @@ class Ink:
         choice = np.where(nearest, along, -np.inf).argmax(axis=1)
         return self._ray_of(choice), amounts[np.arange(len(share)), choice]
 
-    def nearest(self, remanent_magnetization):
+    def nearest(self, remanent_magnetization: Numbers) -> Computed:
         """(n_f, 3) A/m: what of this ink comes nearest to the magnetization of each face.
 
         remanent_magnetization: (n_f, 3) A/m, an array or a tensor; the result is the same, without a gradient.
@@ -70,12 +84,12 @@ class Ink:
         rays = self.rays_of(np.arange(len(direction)), direction)
         return like(self.strength * amount[:, None] * rays, remanent_magnetization)
 
-    def rays_of(self, faces, directions) -> np.ndarray:
+    def rays_of(self, faces: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(n, 3) unit vectors in world axes: of each of these faces the direction with this number. faces, directions:
         (n,) indices."""
         return self.rays[directions] if self.frames is None else self.rays[faces, directions]
 
-    def distances(self, remanent_magnetization):
+    def distances(self, remanent_magnetization: Numbers) -> Computed:
         """(n_f,) shares of the strength: how far the magnetization of each face is from what can be printed there.
 
         remanent_magnetization: as in `nearest`.
@@ -83,7 +97,7 @@ class Ink:
         _, _, squares = self._choices(self._shares(remanent_magnetization), self.rays)
         return like(np.sqrt(squares.min(axis=1)), remanent_magnetization)
 
-    def squares(self, remanent_magnetization):
+    def squares(self, remanent_magnetization: Numbers) -> torch.Tensor:
         """(n_f, choices) tensor, differentiable: the squared distances from all that might be printed on each face, in
         squares of the strength. A choice is a direction with a level, or a direction with its best share.
 

@@ -6,12 +6,21 @@ A/m. Positions may be those of one equilibrium, (n_v, 3), or of several load cas
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ._checks.quantity import quantity
 from ._checks.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
 from .ink import Ink
 
+if TYPE_CHECKING:
+    import torch
 
-def shape_matching(positions, target, vertices=None, weights=None):
+    from ._checks.kinds import Numbers
+
+
+def shape_matching(
+    positions: Numbers, target: Numbers, vertices: Numbers | None = None, weights: Numbers | None = None
+) -> torch.Tensor:
     """Sum of squared distances between vertices and their targets [m2].
 
     positions: (n_v, 3) or (k, n_v, 3). target: as the positions, or (n_v, 3) for all cases; with only the chosen
@@ -29,7 +38,13 @@ def shape_matching(positions, target, vertices=None, weights=None):
     )
 
 
-def height_map(positions, rest_positions, image, extent, weights=None):
+def height_map(
+    positions: Numbers,
+    rest_positions: Numbers,
+    image: Numbers,
+    extent: Numbers,
+    weights: Numbers | None = None,
+) -> torch.Tensor:
     """Sum of squared differences between the vertices' heights z and an image [m2].
 
     The image is sampled bilinearly where the vertices rest. positions: (n_v, 3) or (k, n_v, 3). rest_positions:
@@ -48,7 +63,7 @@ def height_map(positions, rest_positions, image, extent, weights=None):
     return _weighted_sum((positions[..., 2] - heights.to(positions)) ** 2, weights)
 
 
-def bilinear(image, points, extent):
+def bilinear(image: Numbers, points: Numbers, extent: Numbers) -> torch.Tensor:
     """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in `height_map`.
 
     >>> import magshell as ms
@@ -77,7 +92,7 @@ def bilinear(image, points, extent):
     return above * (1 - down_share) + below * down_share
 
 
-def extension(positions, vertices, direction):
+def extension(positions: Numbers, vertices: Numbers, direction: Numbers) -> torch.Tensor:
     """Minus the mean reach of the chosen vertices along a direction [m]: minimize it to pull them as far as they go.
 
     positions: (n_v, 3) or (k, n_v, 3). vertices: an index, or (n_chosen,). direction: (3,), of any length but zero, or
@@ -97,7 +112,7 @@ def extension(positions, vertices, direction):
     return -(chosen * (direction / lengths)[..., None, :]).sum(-1).mean(-1).sum()
 
 
-def magnitude(values, areas=None):
+def magnitude(values: Numbers, areas: Numbers | None = None) -> torch.Tensor:
     """Sum of squares, weighted by areas [m2] where given: of magnetizations (n_f, 3), or of any (n, ...).
 
     values: (n, ...); areas: (n,) m2.
@@ -113,7 +128,9 @@ def magnitude(values, areas=None):
     return _weighted_sum(squares, areas, "areas")
 
 
-def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
+def total_variation(
+    values: Numbers, edge_faces: Numbers, edge_lengths: Numbers | None = None, smoothing: float = 1e-3
+) -> torch.Tensor:
     """Sum over interior edges of edge length times the jump of the values across, smooth at zero:
     sqrt(jump^2 + eps^2) - eps.
 
@@ -145,7 +162,7 @@ def total_variation(values, edge_faces, edge_lengths=None, smoothing=1e-3):
     return (_like(edge_lengths, rounded, "edge_lengths", interior.shape, axes=1)[interior] * rounded).sum()
 
 
-def cap(remanent_magnetization, limit, sharpness=None):
+def cap(remanent_magnetization: Numbers, limit: Numbers, sharpness: float | None = None) -> torch.Tensor:
     """Constraints g <= 0 that keep |M_r| at or below a limit: (|M_r| / limit)^2 - 1.
 
     remanent_magnetization: (n_f, 3) A/m. limit: A/m. One constraint a face, (n_f,); with a sharpness p > 1, a single
@@ -171,7 +188,9 @@ def cap(remanent_magnetization, limit, sharpness=None):
     return (largest * powers ** (1 / sharpness) - 1)[None]
 
 
-def printable(remanent_magnetization, ink, areas=None, sharpness=None):
+def printable(
+    remanent_magnetization: Numbers, ink: Ink, areas: Numbers | None = None, sharpness: float | None = None
+) -> torch.Tensor:
     """Mean squared distance of magnetizations from what an ink can print, over the square of its strength: 0 where all
     can be printed, 1 where none is magnetized and all must be fully.
 

@@ -4,14 +4,22 @@ the faces."""
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ._checks.quantity import quantity
 from ._checks.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
 
+if TYPE_CHECKING:
+    import torch
 
-def from_regions(values, regions):
+    from ._checks.kinds import Numbers
+    from .mesh.six_node_mesh import SixNodeMesh
+    from .mesh.triangle_mesh import TriangleMesh
+
+
+def from_regions(values: Numbers, regions: Numbers) -> torch.Tensor:
     """Values a face, (n_f, ...), equal within a region.
 
     values: (n_regions, ...). regions: (n_f,) the region of each face, from 0.
@@ -38,7 +46,7 @@ def from_regions(values, regions):
     return values[regions]
 
 
-def along(amplitude, directions):
+def along(amplitude: Numbers, directions: Numbers) -> torch.Tensor:
     """Magnetizations (n_f, 3) of free amplitude in fixed directions.
 
     amplitude: (n_f,) A/m. directions: (3,) or (n_f, 3), of any length but zero.
@@ -61,7 +69,7 @@ def along(amplitude, directions):
     return amplitude[:, None] * (directions / lengths)
 
 
-def log_scaled(shares, lower, upper):
+def log_scaled(shares: Numbers, lower: Numbers, upper: Numbers) -> torch.Tensor:
     """Values between lower and upper, evenly spread in their logarithm: lower (upper / lower)^share, for shares in
     [0, 1].
 
@@ -75,7 +83,7 @@ def log_scaled(shares, lower, upper):
     return lower * (real_tensor("shares", shares, ("...",)) * math.log(ratio)).exp()
 
 
-def log_shares(values, lower, upper):
+def log_shares(values: Numbers, lower: Numbers, upper: Numbers) -> torch.Tensor:
     """The shares of `log_scaled` that give these values.
 
     values, lower, upper: in one unit.
@@ -88,7 +96,7 @@ def log_shares(values, lower, upper):
     return (real_tensor("values", values, ("...",)) / lower).log() / math.log(ratio)
 
 
-def capped(vectors, limit):
+def capped(vectors: Numbers, limit: Numbers) -> torch.Tensor:
     """Magnetizations (n_f, 3) below a limit [A/m], smoothly from any (n_f, 3): v / sqrt(1 + |v|^2 / limit^2).
 
     vectors: (n_f, 3), A/m. limit: A/m.
@@ -102,7 +110,7 @@ def capped(vectors, limit):
     return vectors / (1 + ((vectors / limit) ** 2).sum(-1, keepdim=True)) ** 0.5
 
 
-def project_to_cap(vectors, limit):
+def project_to_cap(vectors: Numbers, limit: Numbers) -> torch.Tensor:
     """The nearest magnetizations (n_f, 3) that do not exceed a limit [A/m]: longer ones are cut to it.
 
     vectors: (n_f, 3), A/m. limit: A/m.
@@ -123,7 +131,7 @@ def project_to_cap(vectors, limit):
     )
 
 
-def frames_along(mesh, direction):
+def frames_along(mesh: TriangleMesh | SixNodeMesh, direction: Numbers) -> np.ndarray:
     """Axes of each face for directions that follow it, (n_f, 3, 3) as the `frames` of `ms.Ink`: rows are the direction as
     far as it lies in the face, the one across within the face, and the face's normal.
 
@@ -149,7 +157,9 @@ def frames_along(mesh, direction):
     return np.stack([along, np.cross(normals, along), normals], axis=1)
 
 
-def radial_frames(mesh, center=None, axis=None):
+def radial_frames(
+    mesh: TriangleMesh | SixNodeMesh, center: Numbers | None = None, axis: Numbers | None = None
+) -> np.ndarray:
     """Axes of each face for "radially in or out", (n_f, 3, 3) as the `frames` of `ms.Ink`: rows are outwards within the
     face, around, and the face's normal.
 

@@ -6,7 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 
-def checked_list(name: str, items, kinds: tuple[type, ...], wanted: str | None = None) -> tuple[Any, ...]:
+def checked_list(
+    name: str, items, kinds: tuple[type[Any], ...], wanted: str | None = None
+) -> tuple[Any, ...]:
     """Of one object or several; raises ValueError where one is of none of the kinds."""
     wanted = wanted or ", ".join(kind.__name__ for kind in kinds) + " objects"
     several = (

@@ -6,7 +6,7 @@ import functools
 import inspect
 import sys
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ..errors import Interrupted
 from .keywords import as_keywords, check_known
@@ -14,7 +14,7 @@ from .keywords import as_keywords, check_known
 F = TypeVar("F", bound=Callable)
 
 
-def grouped(**groups: type) -> Callable[[F], F]:
+def grouped(**groups: type[Any]) -> Callable[[F], F]:
     """A function as users call it, some of whose parameters take groups: dataclasses made once and handed to many calls.
     A keyword that it does not have is told with the group that has it, or with those that are most like it."""
 
@@ -55,10 +55,10 @@ def solve_entry(function: F) -> F:
     return called
 
 
-_disabled: dict[Callable, Callable] = {}
+_disabled: dict[Callable[..., Any], Callable[..., Any]] = {}
 
 
-def _untraced(function: Callable) -> Callable:
+def _untraced(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function, hidden from torch.compile where that has been loaded; to load it takes seconds."""
     if "torch._dynamo" not in sys.modules:
         return function

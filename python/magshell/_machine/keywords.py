@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 FLUX_DENSITY = "applied_flux_density"
 FACTORS = ("load_factor", "gravity_factor", "field_factor", "motion_factor")
 CONTROLS = (FLUX_DENSITY, *FACTORS)
@@ -20,7 +22,7 @@ def controls_of(owner, scene) -> tuple[str, ...]:
     return (FLUX_DENSITY,) if getattr(owner, "_is_uniform", False) else ()
 
 
-def as_keywords(scene, named: dict, known) -> dict:
+def as_keywords(scene, named: dict[Any, Any], known) -> dict[Any, Any]:
     """The keywords of a solve with what `values` say of it among them, as far as it has such a keyword (`known`).
 
     Raises ValueError where one is given twice. What else is wrong with `values` is told where they are checked.
@@ -48,7 +50,7 @@ def as_keywords(scene, named: dict, known) -> dict:
     return {**named, **controls, "values": kept or None}
 
 
-def check_known(function: str, named, known, groups: dict[str, type]) -> None:
+def check_known(function: str, named, known, groups: dict[str, type[Any]]) -> None:
     """Raises TypeError on a keyword that a function does not have: with the group that has it, {parameter: dataclass},
     or the keywords that are most like it."""
     for name in named:
@@ -72,5 +74,5 @@ def nearest_first(name, names) -> str:
     return ", ".join(sorted(names, key=lambda each: -SequenceMatcher(None, str(name), each).ratio()))
 
 
-def _fields(scene) -> tuple:
+def _fields(scene) -> tuple[Any, ...]:
     return tuple(getattr(scene, "fields", ()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -10,19 +10,29 @@ import torch
 from .._checks.tensor_kinds import why_not
 from ..errors import NoGradient
 
+if TYPE_CHECKING:
+    from .dynamic import MotionAdjoint
+    from .static import Adjoint
+
 
 class Solved(torch.autograd.Function):
     """Arrays that were computed from the leaves (tensors); the adjoint knows the way back, once."""
 
     @staticmethod
-    def forward(ctx: Any, adjoint, arrays, dtype, *leaves):
+    def forward(
+        ctx: Any,
+        adjoint: Adjoint | MotionAdjoint,
+        arrays: tuple[np.ndarray, ...],
+        dtype: torch.dtype,
+        *leaves: torch.Tensor,
+    ) -> tuple[torch.Tensor, ...]:
         ctx.adjoint = adjoint
         # Not by save_for_backward: a design that was changed in place since is no error, its numbers are not used.
         ctx.leaves = leaves
         return tuple(torch.from_numpy(array).to(dtype=dtype) for array in arrays)
 
     @staticmethod
-    def backward(ctx: Any, *by_outputs):
+    def backward(ctx: Any, *by_outputs: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         arrays = [_numbers(each) for each in by_outputs]
         gradients = ctx.adjoint.gradients(arrays, ctx.needs_input_grad[3:])
         by_leaves = [
@@ -44,11 +54,11 @@ class Once(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx: Any, count, *given):
+    def forward(ctx: Any, count: int, *given: torch.Tensor) -> tuple[torch.Tensor, ...]:
         return given[:count]
 
     @staticmethod
-    def backward(ctx: Any, *_):
+    def backward(ctx: Any, *_: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         raise NoGradient(
             "no second derivatives: a solve's gradient is exact, but it has none itself (create_graph=True, "
             "torch.autograd.functional.hessian). Take differences of gradients: H v = (g(x + h v) - g(x - h v)) / 2h."
@@ -68,7 +78,9 @@ def _numbers(by_output) -> np.ndarray:
     return by_output.detach().cpu().double().numpy()
 
 
-def solved(adjoint, arrays: tuple[np.ndarray, ...], dtype, leaves: list[Any]) -> tuple[torch.Tensor, ...]:
+def solved(
+    adjoint: Adjoint | MotionAdjoint, arrays: tuple[np.ndarray, ...], dtype: torch.dtype, leaves: list[Any]
+) -> tuple[torch.Tensor, ...]:
     """The arrays as tensors from which gradients go back to the leaves."""
     return Solved.apply(adjoint, arrays, dtype, *leaves)
 

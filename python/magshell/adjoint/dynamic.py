@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .. import _core
@@ -10,14 +13,17 @@ from ..methods.projective_dynamics import ProjectiveDynamics
 from ..scene.values import Gradient
 from .static import by_leaf
 
+if TYPE_CHECKING:
+    from ..dynamics.inputs import MotionInputs
+
 
 class MotionAdjoint:
     """Gradients of one motion. Keeps what the memory budget allowed to keep of it."""
 
-    def __init__(self, asked, found):
+    def __init__(self, asked: MotionInputs, found: _core.MotionResult):
         self._asked, self._found = asked, found
 
-    def gradients(self, by_outputs: list[np.ndarray], wanted) -> list[np.ndarray | None]:
+    def gradients(self, by_outputs: list[np.ndarray], wanted: Sequence[bool]) -> list[np.ndarray | None]:
         """By each wanted leaf of the inputs, shaped like it. Raises NoGradient where there is none."""
         asked, found, inputs = self._asked, self._found, self._asked.inputs
         if found.outcome != _core.Outcome.converged:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .. import _core
@@ -9,14 +12,17 @@ from ..errors import NoGradient
 from ..scene.inputs import Inputs
 from ..scene.values import Gradient
 
+if TYPE_CHECKING:
+    from ..scene.inputs import Leaf
+
 
 class Adjoint:
     """Gradients of one equilibrium. Keeps its factorization, so that each costs one back-substitution."""
 
-    def __init__(self, inputs: Inputs, found):
+    def __init__(self, inputs: Inputs, found: _core.StaticsResult):
         self._inputs, self._found = inputs, found
 
-    def gradients(self, by_outputs: list[np.ndarray], wanted) -> list[np.ndarray | None]:
+    def gradients(self, by_outputs: list[np.ndarray], wanted: Sequence[bool]) -> list[np.ndarray | None]:
         """By each wanted leaf of the inputs, shaped like it. Raises NoGradient where there is none."""
         self._refuse()
         inputs, model = self._inputs, self._inputs.scene._model
@@ -40,7 +46,7 @@ class Adjoint:
             )
 
 
-def by_leaf(inputs: Inputs, leaf, gradient: Gradient) -> np.ndarray:
+def by_leaf(inputs: Inputs, leaf: Leaf, gradient: Gradient) -> np.ndarray:
     """By one leaf, from the core's gradients. Raises NoGradient where it has none."""
     if leaf.refusal:
         raise NoGradient(f"no gradient by {leaf.name}: {leaf.refusal}")

@@ -10,7 +10,7 @@ import argparse
 import importlib
 import sys
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .._machine.files import replacing
 from .report import (
@@ -102,7 +102,7 @@ def _part(name: str, arguments: list[str]) -> int:
     return _draw(name, results, setting(), options.figure) if options.figure else 0
 
 
-def _draw(name: str, results: dict, made_on: dict, path: Path) -> int:
+def _draw(name: str, results: dict[str, Any], made_on: dict[str, Any], path: Path) -> int:
     try:
         figures = importlib.import_module(f"magshell.bench.figures.{PARTS[name].figure}")
     except ImportError as error:

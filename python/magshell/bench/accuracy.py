@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from typing import Any
 
 import magshell as ms
 
@@ -53,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_rounds(parser, 3)
 
 
-def run(options: argparse.Namespace) -> dict:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Prints the tables, returns their numbers. Raises ImportError before any work where NGSolve is asked for and not
     there."""
     if options.ngsolve:
@@ -72,7 +73,7 @@ def run(options: argparse.Namespace) -> dict:
     return results
 
 
-def _against_references(options: argparse.Namespace) -> dict:
+def _against_references(options: argparse.Namespace) -> dict[str, Any]:
     cases = [case for case in CASES if options.only is None or case.name in options.only]
     coarse = options.quick and not options.usual_meshes
     outcomes = {case.name: {b: _outcome(case, b, coarse) for b in BENDINGS} for case in cases}
@@ -99,7 +100,7 @@ def _outcome(case: Case, bending: str, quick: bool) -> Outcome | str:
         return str(error)
 
 
-def _print_cases(cases: list[Case], outcomes: dict) -> None:
+def _print_cases(cases: list[Case], outcomes: dict[str, Any]) -> None:
     rows, compared, within = [], 0, 0
     for case in cases:
         midedge, *others = (outcomes[case.name][bending] for bending in BENDINGS)
@@ -146,7 +147,7 @@ def _noted(case: Case, comparison: Comparison) -> str:
     return note("error", name, comparison.error, at_most=comparison.allowed)
 
 
-def _single_solves() -> dict:
+def _single_solves() -> dict[str, Any]:
     found = {name: solve() for name, (solve, _) in SINGLE_SOLVES.items()}
     limits = {name: limit for name, (_, limit) in SINGLE_SOLVES.items()}
     missed = {
@@ -172,7 +173,7 @@ def _single_solves() -> dict:
     }
 
 
-def _print_orders(studies: dict[tuple[str, str], Convergence]) -> list[dict]:
+def _print_orders(studies: dict[tuple[str, str], Convergence]) -> list[dict[str, Any]]:
     rows, plain = [], []
     for (name, bending), study in studies.items():
         required = REQUIRED_ORDER.get(bending)
@@ -230,7 +231,7 @@ def _cost(run: Outcome | str) -> tuple[str, str]:
     return ("", "") if isinstance(run, str) else (f"{run.time:.3f} s", str(run.factorizations))
 
 
-def _plain(outcomes: dict[str, Outcome | str]) -> dict:
+def _plain(outcomes: dict[str, Outcome | str]) -> dict[str, Any]:
     """For JSON."""
     return {
         bending: {"failed": run} if isinstance(run, str) else _plain_outcome(run)
@@ -238,7 +239,7 @@ def _plain(outcomes: dict[str, Outcome | str]) -> dict:
     }
 
 
-def _plain_outcome(run: Outcome) -> dict:
+def _plain_outcome(run: Outcome) -> dict[str, Any]:
     return {
         "mesh": run.mesh,
         "faces": run.n_faces,

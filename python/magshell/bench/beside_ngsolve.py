@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import magshell as ms
 
@@ -35,8 +35,8 @@ class Case(NamedTuple):
 
     name: str
     run: Callable[..., Outcome]
-    regular: tuple
-    irregular: tuple
+    regular: tuple[Any, ...]
+    irregular: tuple[Any, ...]
     parts: tuple[str, ...] = ("",)
 
 
@@ -80,7 +80,7 @@ def check_ngsolve() -> None:
     ngsolve.SetNumThreads(1)
 
 
-def measure(names: list[str] | None, rounds: int, quick: bool = False) -> dict:
+def measure(names: list[str] | None, rounds: int, quick: bool = False) -> dict[str, Any]:
     """{"rows": of the table, "points": of the figure}, plain. quick: regular meshes alone, which the figure shows."""
     cases = [case for case in CASES if names is None or case.name in names]
     asked = [(case, irregular) for case in cases for irregular in ((False,) if quick else (False, True))]
@@ -96,11 +96,11 @@ def measure(names: list[str] | None, rounds: int, quick: bool = False) -> dict:
     return {"rows": [row._asdict() for row in rows], "points": points}
 
 
-def _meshes(case: Case, irregular: bool) -> tuple:
+def _meshes(case: Case, irregular: bool) -> tuple[Any, ...]:
     return case.irregular if irregular else case.regular
 
 
-def _ways(case: Case, irregular: bool) -> dict[int, Callable]:
+def _ways(case: Case, irregular: bool) -> dict[int, Callable[..., Any]]:
     """{order of NGSolve's, 0 of ours: mesh -> Tried, or None where that does not converge}."""
     from .baselines.ngsolve_cases import RUNS
     from .baselines.ngsolve_strips import DidNotConverge
@@ -131,7 +131,7 @@ def _ways(case: Case, irregular: bool) -> dict[int, Callable]:
     return {0: ours, **{order: theirs(order) for order in ORDERS}}
 
 
-def _until_within(run: Callable, meshes: tuple) -> Iterator[Tried]:
+def _until_within(run: Callable[..., Any], meshes: tuple[Any, ...]) -> Iterator[Tried]:
     """Finer and finer, until all parts are within the bound on two meshes that follow each other: one alone may be so by
     chance."""
     before = False
@@ -154,7 +154,7 @@ def _first(tried: list[Tried], part: int) -> Tried | None:
     return None
 
 
-def _again(ways: dict, tried: dict, rounds: int) -> None:
+def _again(ways: dict[str, Any], tried: dict[str, Any], rounds: int) -> None:
     """Times of the meshes that rows name become the best of rounds in which all ways have their turns, but for long
     ones."""
     named = {
@@ -176,7 +176,7 @@ def _again(ways: dict, tried: dict, rounds: int) -> None:
                 each[k] = one._replace(seconds=seconds)
 
 
-def _rows(case: Case, irregular: bool, tried: dict) -> Iterator[Row]:
+def _rows(case: Case, irregular: bool, tried: dict[str, Any]) -> Iterator[Row]:
     for k, part in enumerate(case.parts):
         ours = _first(tried[0], k)
         theirs = {order: found for order in ORDERS if (found := _first(tried[order], k))}
@@ -195,7 +195,7 @@ def _rows(case: Case, irregular: bool, tried: dict) -> Iterator[Row]:
         )
 
 
-def _points(case: Case, irregular: bool, tried: dict) -> Iterator[dict]:
+def _points(case: Case, irregular: bool, tried: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """NGSolve's of the figure, whose panels have all parts of a case together."""
     for order in ORDERS:
         for one in tried[order]:
@@ -209,7 +209,7 @@ def _points(case: Case, irregular: bool, tried: dict) -> Iterator[dict]:
             }
 
 
-def print_rows(rows: list[dict]) -> None:
+def print_rows(rows: list[dict[str, Any]]) -> None:
     """And notes how ours compares."""
     table = []
     for row in (Row(**each) for each in rows):
@@ -237,7 +237,7 @@ def print_rows(rows: list[dict]) -> None:
     )
 
 
-def _told(mesh, error, seconds) -> tuple:
+def _told(mesh, error, seconds) -> tuple[Any, ...]:
     if mesh is None:
         return "never", "", ""
     return "x".join(map(str, mesh)), f"{100 * error:.2g} %", f"{1e3 * seconds:.3g}"

@@ -12,6 +12,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 from multiprocessing import get_context
 from statistics import median
+from typing import Any
 
 import magshell as ms
 
@@ -39,7 +40,7 @@ while os.getppid() == parent:
 """
 
 
-def measure(rounds: int) -> dict:
+def measure(rounds: int) -> dict[str, Any]:
     """Prints the table, returns its numbers: medians of seconds by the clock on the wall, one thread and two by turns.
     No rounds: one of a tiny strip, to see what it prints."""
     cells, steps = (CELLS, STEPS) if rounds else (QUICK_CELLS, QUICK_STEPS)
@@ -67,7 +68,7 @@ def measure(rounds: int) -> dict:
     return results
 
 
-def ratio(times: dict) -> float:
+def ratio(times: dict[str, Any]) -> float:
     """Two threads' time over that of one."""
     return times["2"] / times["1"]
 
@@ -110,7 +111,7 @@ def _busy_programs(count: int) -> Iterator[None]:
             program.wait()
 
 
-def _print(results: dict, targets: bool) -> None:
+def _print(results: dict[str, Any], targets: bool) -> None:
     rows = []
     for name, (_, _, allowed) in COMPANY.items():
         times = results["company"][name]

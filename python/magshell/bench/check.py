@@ -13,7 +13,9 @@ import io
 import json
 import math
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +39,7 @@ PARTS = {
 TIMED = ("share", "time")  # kinds that other people's work disturbs: worse is only what is so twice
 
 
-def check(arguments: list[str], run=None) -> int:
+def check(arguments: list[str], run: Callable[[str, list[str]], dict[str, float]] | None = None) -> int:
     """run(part, arguments) -> the ratios of a part, for tests."""
     options = _parser().parse_args(arguments)
     run = measured if run is None else run
@@ -184,7 +186,7 @@ def _read(path: Path) -> dict[str, dict[str, float]]:
         raise SystemExit(f"{path} holds no ratios of a release: {error}") from error
 
 
-def _write(path: Path, now: dict[str, dict[str, Ratio]], failed: dict[str, str], kept: dict) -> int:
+def _write(path: Path, now: dict[str, dict[str, Ratio]], failed: dict[str, str], kept: dict[str, Any]) -> int:
     """kept: of the parts that were not asked for."""
     _print_missed(now)
     _print_failed(failed)

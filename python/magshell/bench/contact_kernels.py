@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import magshell as ms
@@ -16,7 +18,7 @@ ALLOWED = 0.6  # us a pair, gradient and Hessian, on one core (ipctk 1.6: 3.1)
 LAW = {"stiffness": 1e5, "reach": 0.4, "thickness": 0.0, "smoothing": 0.1, "penalty": False}
 
 
-def contacts(quick: bool, rounds: int) -> dict:
+def contacts(quick: bool, rounds: int) -> dict[str, Any]:
     """Prints the tables of pairs that touch and of sheets that lie on each other; returns their numbers, times in s."""
     pairs = [
         cost_of_pairs(kind, QUICK_PAIRS if quick else PAIRS, rounds)
@@ -51,7 +53,7 @@ def contacts(quick: bool, rounds: int) -> dict:
     return {"pairs": pairs, "searches": searches}
 
 
-def cost_of_pairs(kind: str, count: int, rounds: int) -> dict:
+def cost_of_pairs(kind: str, count: int, rounds: int) -> dict[str, Any]:
     """Of random pairs nearer than three quarters of the reach."""
     rng = np.random.default_rng(0)
     places = rng.uniform(-1.0, 1.0, (20 * count, 4, 3))
@@ -71,7 +73,7 @@ def cost_of_pairs(kind: str, count: int, rounds: int) -> dict:
     }
 
 
-def cost_of_search(cells: int, rounds: int) -> dict:
+def cost_of_search(cells: int, rounds: int) -> dict[str, Any]:
     """Of two curved sheets, a fifth of a cell above each other, within two fifths."""
     mesh, cell = ms.meshes.rectangle(1.0, 1.0, cells=(cells, cells), irregular=0.2), 1.0 / cells
     lower = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,7 +69,9 @@ class Convergence:
         return np.array([_slope(self.cells, errors) for errors in self.errors])
 
 
-def converge(study: str, bending: str, meshes=MESHES, seeds=SEEDS) -> Convergence:
+def converge(
+    study: str, bending: str, meshes: Sequence[tuple[int, int]] = MESHES, seeds: Sequence[int] = SEEDS
+) -> Convergence:
     run, length = STUDIES[study]
     if bending == "midedge2":
         return _against_the_limit(study, COARSE_MESHES, seeds)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(options: argparse.Namespace) -> dict:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Prints the tables, returns their numbers."""
     if options.long < 0:
         raise SystemExit("--long must be at least 0")
@@ -69,7 +70,7 @@ def strip(cells: tuple[int, int] = (16, 2)) -> ms.Scene:
     return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
 
 
-def _errors(steps: tuple[int, ...], rounds: int) -> dict:
+def _errors(steps: tuple[int, ...], rounds: int) -> dict[str, Any]:
     """Of a period in a field that swells and fades: root mean square of the positions at 20 times, over the length."""
     scene = strip()
     period = 1.0 / ms.vibration_modes(scene, count=1).frequencies[0]
@@ -113,7 +114,7 @@ def _errors(steps: tuple[int, ...], rounds: int) -> dict:
     return results
 
 
-def _energies(periods: int) -> dict:
+def _energies(periods: int) -> dict[str, Any]:
     """What is left of the energy of an undamped strip that begins with its first mode's velocities."""
     scene = strip()
     modes = ms.vibration_modes(scene, count=1)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .baselines import methods
 from .baselines.kept import Kept
@@ -16,6 +16,9 @@ from .baselines.tasks import BridgeTask, StripTask, robot_task
 from .memory_of_bridge import measure as measure_memory
 from .paper import examples_folder, on_path
 from .report import bar, chosen, print_table, writable_path
+
+if TYPE_CHECKING:
+    from .baselines.tasks import Task
 
 QUICK_BUDGET = 6
 SEEDS = 5
@@ -27,7 +30,7 @@ class Experiment(NamedTuple):
     """budget: simulations a run, TIMES what the gradient needs; of the octopus, which takes 3 s for one, half as many.
     seeds: runs of each method, without --full; together they take about an hour of one core."""
 
-    task: Callable
+    task: Callable[..., Any]
     budget: int
     seeds: int
 
@@ -82,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(options: argparse.Namespace) -> dict:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Prints the tables, returns their numbers."""
     if options.quick and options.full:
         raise SystemExit("--quick or --full, not both")
@@ -116,7 +119,9 @@ def run(options: argparse.Namespace) -> dict:
     return results
 
 
-def compared(task, budget: int, seeds: int, only, kept: Kept, known: bool = False) -> dict:
+def compared(
+    task: Task, budget: int, seeds: int, only: Sequence[str] | None, kept: Kept, known: bool = False
+) -> dict[str, Any]:
     """{"unknowns", "goal", "budget", "seeds", "methods": {name: {"runs": [...]} or {"missing": library}}}.
 
     known: only what is kept, nothing is run."""
@@ -149,7 +154,7 @@ def compared(task, budget: int, seeds: int, only, kept: Kept, known: bool = Fals
     return {**setting, "methods": found}
 
 
-def _print_task(name: str, task: dict) -> None:
+def _print_task(name: str, task: dict[str, Any]) -> None:
     goal, budget, seeds = (task[each] for each in ("goal", "budget", "seeds"))
     headings = ["method", "", "start", "best of 10", f"best of {budget}", "lowest", "highest"]
     headings += ["simulations until the goal" if goal else "simulations", "seconds"]
@@ -184,7 +189,7 @@ def _print_task(name: str, task: dict) -> None:
     print_table(f"{name}: {task['unknowns']} unknowns, medians of {seeds} runs{told}", headings, rows)
 
 
-def beside_ours(method: str, task: dict) -> str:
+def beside_ours(method: str, task: dict[str, Any]) -> str:
     """Whether a baseline is better or worse than ours, given TIMES as many simulations: medians of all runs."""
     ours = task["methods"].get(OURS, {}).get("runs")
     if method == OURS or not ours:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_rounds(parser, 5)
 
 
-def run(options: argparse.Namespace) -> dict:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Prints the table, returns its numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if faces < 2:
@@ -59,7 +60,7 @@ def run(options: argparse.Namespace) -> dict:
     return results
 
 
-def _cost(scene: ms.Scene, inputs: dict, values: dict, rounds: int) -> dict:
+def _cost(scene: ms.Scene, inputs: dict[str, Any], values: dict[str, Any], rounds: int) -> dict[str, Any]:
     """The best of some rounds of each, s of processor time."""
     import torch
 
@@ -96,7 +97,7 @@ def _size(body: ms.Shell | ms.Solid) -> str:
     return f"{body.mesh.n_faces} faces"
 
 
-def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict, dict]:
+def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict[str, Any], dict[str, Any]]:
     """A square sheet with every kind of input: bent by fields, gravity and a load, its clamp turned on the way."""
     cells = max(1, round((faces / 2) ** 0.5))
     mesh = ms.meshes.rectangle(0.1, 0.1, cells=(cells, cells))
@@ -123,7 +124,7 @@ def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict, dict]:
     return scene, inputs, values
 
 
-def _solid(cells: tuple[int, int, int]) -> tuple[ms.Scene, dict, dict]:
+def _solid(cells: tuple[int, int, int]) -> tuple[ms.Scene, dict[str, Any], dict[str, Any]]:
     """A beam with every kind of input: bent by a field, gravity and forces, its end turned on the way."""
     mesh = ms.meshes.box((0.1, 0.025, 0.025), cells=cells)
     count, x = mesh.n_tetrahedra, mesh.rest_positions[:, 0]

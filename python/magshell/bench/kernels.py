@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_rounds(parser, 7)
 
 
-def run(options: argparse.Namespace) -> dict:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Prints the table, returns its numbers."""
     sizes = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if min(sizes) < 2:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 from .ratios import note
 from .report import print_table
@@ -21,7 +22,7 @@ PAPER = {10: (0.9, 0.1), 20: (1.4, 0.1), 100: (6.9, 0.1), 200: (15.7, 0.1)}  # G
 AT_MOST = 1e8  # bytes, with checkpoints over 200 steps
 
 
-def measure(examples: Path, quick: bool) -> list[dict]:
+def measure(examples: Path, quick: bool) -> list[dict[str, Any]]:
     """Prints the table, returns its rows: bytes that the process grew by, by how much of it for the gradient."""
     rows = [
         {"steps": steps, **{keep: _in_fresh_process(steps, keep, examples) for keep in KEEPS}}
@@ -53,7 +54,7 @@ def _megabytes(value: float | None) -> str:
     return "" if value is None else f"{value / 1e6:.1f} MB"
 
 
-def _in_fresh_process(steps: int, keep: str, examples: Path) -> dict:
+def _in_fresh_process(steps: int, keep: str, examples: Path) -> dict[str, Any]:
     command = [sys.executable, "-m", "magshell.bench.memory_of_bridge", str(steps), keep, str(examples)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
@@ -61,7 +62,7 @@ def _in_fresh_process(steps: int, keep: str, examples: Path) -> dict:
     return json.loads(done.stdout)
 
 
-def _one(steps: int, keep: str, examples: str) -> dict:
+def _one(steps: int, keep: str, examples: str) -> dict[str, Any]:
     """Bytes that the peak rises by, from one step with its gradient to the motion asked for with its own."""
     import torch
 

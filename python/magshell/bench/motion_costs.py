@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +15,9 @@ import magshell as ms
 from .ratios import note
 from .report import print_table
 from .timing import peak_memory, resident_memory
+
+if TYPE_CHECKING:
+    from ..methods.integrators import Integrator
 
 ALLOWED_STEP = 0.015  # s, at 768 faces
 # Of the time of the same motion without gradients.
@@ -37,20 +41,20 @@ def turning(steps: int) -> np.ndarray:
     return 3e-3 * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
 
 
-def drive(scene: ms.Scene, steps: int, **options) -> ms.Trajectory:
+def drive(scene: ms.Scene, steps: int, **options: Any) -> ms.Trajectory:
     given = {"remanent_magnetization": (2e4, 0, 0), "applied_flux_density": turning(steps), "damping": 1e-6}
     given |= {"time_step": TIME_STEP, "record_every": steps, "progress": False}
     return ms.simulate(scene, steps=steps, **{**given, **options})
 
 
-def budget(scene: ms.Scene, integrator, steps: int) -> float:
+def budget(scene: ms.Scene, integrator: Integrator, steps: int) -> float:
     """Bytes with which checkpoints suffice to take every step again but once."""
     of_a_state = 4 if isinstance(integrator, ms.TRBDF2) else 2  # vectors, beside one a stage
     record = 8.0 * scene._model.size * (of_a_state + len(integrator._times))
     return min(0.6 * record * steps, 4e6)
 
 
-def measure(rounds: int, quick: bool, cells: tuple[int, int]) -> dict:
+def measure(rounds: int, quick: bool, cells: tuple[int, int]) -> dict[str, Any]:
     """Prints the tables, returns their numbers."""
     steps = 5 if quick else STEPS
     return {
@@ -60,7 +64,7 @@ def measure(rounds: int, quick: bool, cells: tuple[int, int]) -> dict:
     }
 
 
-def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict:
+def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
     results, rows = {}, []
     for integrator in (ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()):
         times = []
@@ -82,7 +86,7 @@ def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict:
     return results
 
 
-def _gradients(scene: ms.Scene, steps: int, rounds: int) -> dict:
+def _gradients(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
     """By the field of every step and the magnetization; all of an integrator's runs in turn, as loads change."""
     results, rows = {}, []
     for integrator in (ms.ImplicitEuler(), ms.TRBDF2()):
@@ -139,7 +143,7 @@ def _forward_and_back(scene: ms.Scene, steps: int, integrator, keep: str) -> tup
     return done - began, time.process_time() - done, move.bytes
 
 
-def _memory(keeps: Iterable[str], counts: Iterable[int]) -> dict:
+def _memory(keeps: Iterable[str], counts: Iterable[int]) -> dict[str, Any]:
     """Each run in a process of its own, because only the largest size of a process is told."""
     results, rows = {}, []
     for keep in keeps:
@@ -169,7 +173,7 @@ def _grown(steps: int, keep: str) -> tuple[float, float, int, int | None]:
     return forward, back, kept, None if before is None or after is None else after - before
 
 
-def long_run(steps: int, parts: int = 10) -> dict:
+def long_run(steps: int, parts: int = 10) -> dict[str, Any]:
     """A small driven strip for so many steps, in parts that go on from one another."""
     results, rows = {}, []
     for integrator in (ms.ImplicitEuler(), ms.TRBDF2()):

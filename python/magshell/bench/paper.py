@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import magshell as ms
 
@@ -35,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(options: argparse.Namespace) -> dict:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Prints the table, returns its numbers."""
     if options.iterations is not None and options.iterations < 1:
         raise SystemExit("--iterations must be at least 1")
@@ -76,7 +77,7 @@ def on_path(folder: Path) -> Iterator[None]:
         sys.path.remove(str(folder))
 
 
-def _measured(row: Row, iterations: int) -> dict:
+def _measured(row: Row, iterations: int) -> dict[str, Any]:
     known = {
         "figure": row.figure,
         "name": row.name,
@@ -103,7 +104,7 @@ def _measured(row: Row, iterations: int) -> dict:
     }
 
 
-def _print(results: list[dict]) -> None:
+def _print(results: list[dict[str, Any]]) -> None:
     headings = [
         "figure",
         "row",

@@ -7,7 +7,7 @@ that runs them. The functions import the example, which must be on the path by t
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -124,7 +124,7 @@ ROWS = (
 )
 
 
-def _of_history(history: list, meaning: str) -> Run:
+def _of_history(history: list[Any], meaning: str) -> Run:
     """Of records of ms.minimize."""
     seconds = _a_step([record.seconds for record in history])
     return Run(seconds, history[-1].iteration, history[-1].objective, meaning)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ ARCH_CELLS, ARCH_STEPS = (40, 4, 3), 200
 ALLOWED_ARCH = 0.1e9  # bytes with checkpoints; 15.7e9 there without
 
 
-def measure(rounds: int, quick: bool) -> dict:
+def measure(rounds: int, quick: bool) -> dict[str, Any]:
     """Prints the tables, returns their numbers."""
     return {
         "projective errors": _errors(rounds, quick),
@@ -38,7 +39,7 @@ def measure(rounds: int, quick: bool) -> dict:
     }
 
 
-def beam(material, cells: tuple[int, int, int]) -> ms.Scene:
+def beam(material: ms.bodies.materials.SolidMaterial, cells: tuple[int, int, int]) -> ms.Scene:
     """10 cm x 2.5 cm x 2.5 cm, clamped at one end, that falls."""
     mesh = ms.meshes.box((0.1, 0.025, 0.025), cells=cells)
     solid = ms.Solid(mesh, material=material, mass_density=1e3, element="linear")
@@ -61,7 +62,7 @@ def _seconds(call, rounds: int) -> float:
     return best
 
 
-def _errors(rounds: int, quick: bool) -> dict:
+def _errors(rounds: int, quick: bool) -> dict[str, Any]:
     """Root mean square of the positions of all steps, over the way of the point that moves farthest."""
     cells, counts = (QUICK_CELLS, ROUNDS[:3]) if quick else (CELLS, ROUNDS)
     results: dict = {}
@@ -131,7 +132,7 @@ def arch(cells: tuple[int, int, int] = ARCH_CELLS) -> ms.Scene:
     return ms.Scene(solid, supports=[ms.Pin(mesh.vertices_at(z=0.0, tolerance=1e-6))], gravity=(0, 0, -9.81))
 
 
-def _memory(quick: bool) -> list[dict]:
+def _memory(quick: bool) -> list[dict[str, Any]]:
     """Each run in a process of its own, because only the largest size of a process is told."""
     cells, steps = ((10, 2, 1), 20) if quick else (ARCH_CELLS, ARCH_STEPS)
     results, rows = [], []
@@ -154,7 +155,7 @@ def _memory(quick: bool) -> list[dict]:
     return results
 
 
-def _grown(cells, steps: int, keep: str) -> dict:
+def _grown(cells, steps: int, keep: str) -> dict[str, Any]:
     """Times, bytes kept, and by how much this process grew."""
     import torch
 

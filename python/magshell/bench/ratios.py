@@ -60,7 +60,9 @@ class Ratio(NamedTuple):
 _listening: list[list[Ratio]] = []
 
 
-def note(kind: str, name: str, value: float, *, at_most=None, at_least=None) -> str:
+def note(
+    kind: str, name: str, value: float, *, at_most: float | None = None, at_least: float | None = None
+) -> str:
     """Notes a number, smaller is better unless it has to be at_least something. Returns " MISSED" where its target is,
     to print beside it. A time is in s, or in any unit that stays."""
     ratio = Ratio(kind, name, float(value), at_most if at_least is None else at_least, at_least is not None)

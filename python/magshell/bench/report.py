@@ -9,6 +9,7 @@ import platform
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy
 import scipy
@@ -17,6 +18,9 @@ import magshell as ms
 from magshell import _core
 from magshell._machine.files import check_replaceable, replace_file
 from magshell._machine.progress import progress_bar
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,7 +57,7 @@ def settle_rounds(options: argparse.Namespace) -> None:
             raise SystemExit(f"--rounds must be at least 1, got {options.rounds}")
 
 
-def chosen(given, quick: bool, small, usual):
+def chosen(given: Any, quick: bool, small: Any, usual: Any) -> Any:
     """What was asked for, or else what `--quick` or its lack says."""
     return given if given is not None else small if quick else usual
 
@@ -84,7 +88,7 @@ def writable_folder(text: str) -> Path:
     return folder
 
 
-def read_results(text: str) -> dict:
+def read_results(text: str) -> dict[str, Any]:
     """What write_json wrote."""
     try:
         content = json.loads(Path(text).read_text())
@@ -99,7 +103,7 @@ def read_results(text: str) -> dict:
     return content
 
 
-def as_json(results: dict) -> dict:
+def as_json(results: dict[str, Any]) -> dict[str, Any]:
     """The same as JSON would hold it: figures draw what a run hands over and what a file holds."""
     return json.loads(json.dumps(results, default=_plain_number))
 
@@ -111,7 +115,7 @@ def _plain_number(value):
     raise TypeError(f"{type(value).__name__} is no JSON")
 
 
-def bar(title: str, total: int):
+def bar(title: str, total: int) -> tqdm[Any]:
     """A progress bar, where someone looks on."""
     return progress_bar(title, total, shown=sys.stderr.isatty(), leave=False, delay=2.0)
 
@@ -135,7 +139,7 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
         print(line(row))
 
 
-def write_json(path: Path, part: str, results: dict) -> None:
+def write_json(path: Path, part: str, results: dict[str, Any]) -> None:
     content = {"part": part, "setting": setting(), "results": results}
     text = json.dumps(content, indent=2, allow_nan=True) + "\n"
     replace_file(path, lambda file: file.write(text.encode()))

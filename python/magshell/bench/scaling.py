@@ -4,9 +4,11 @@ threads gain and cost."""
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_rounds(parser, 3)
 
 
-def run(options: argparse.Namespace) -> dict:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Prints the tables, returns their numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if min(faces) < 2:
@@ -92,7 +94,9 @@ def run(options: argparse.Namespace) -> dict:
     }
 
 
-def _sizes(faces: list[int], options: argparse.Namespace) -> tuple[list[dict], list[dict], int | None]:
+def _sizes(
+    faces: list[int], options: argparse.Namespace
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]], int | None]:
     """Costs on one thread and on two, by size; and the size whose process was ended, if one was."""
     one, two = [], []
     with bar("sizes", 2 * len(faces)) as shown:
@@ -109,26 +113,26 @@ def _sizes(faces: list[int], options: argparse.Namespace) -> tuple[list[dict], l
     return one, two, None
 
 
-def _exponents(sizes: list[dict]) -> dict[str, float | None]:
+def _exponents(sizes: list[dict[str, Any]]) -> dict[str, float | None]:
     faces = [size["faces"] for size in sizes]
     times = {name: fitted_exponent(faces, [size["processor"][name] for size in sizes]) for name in TIMES}
     return times | {name: fitted_exponent(faces, [size[name] for size in sizes]) for name in MEMORIES}
 
 
-def fitted_exponent(faces, values) -> float | None:
+def fitted_exponent(faces: Sequence[float], values: Sequence[float | None]) -> float | None:
     """p of values ~ faces^p, by least squares in the logarithms; None of a single size, or of what is not known."""
     if len(set(faces)) < 2 or any(value is None or value <= 0 for value in values):
         return None
     return float(np.polyfit(np.log(faces), np.log(values), 1)[0])
 
 
-def _in_its_own_process(faces: int, threads: int, options: argparse.Namespace) -> dict:
+def _in_its_own_process(faces: int, threads: int, options: argparse.Namespace) -> dict[str, Any]:
     """Because only the largest size of a process is told."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
         return executor.submit(costs, faces, threads, options.bending, options.rounds).result()
 
 
-def costs(faces: int, threads: int, bending: str, rounds: int) -> dict:
+def costs(faces: int, threads: int, bending: str, rounds: int) -> dict[str, Any]:
     """Of a square sheet that a field bends; times in s by both clocks, memory in bytes."""
     ms.set_num_threads(threads)
     other, inputs = strongly_bent(32, bending)
@@ -167,11 +171,11 @@ def costs(faces: int, threads: int, bending: str, rounds: int) -> dict:
     }
 
 
-def _in_field(inputs: dict, share: float) -> dict:
+def _in_field(inputs: dict[str, Any], share: float) -> dict[str, Any]:
     return {**inputs, "applied_flux_density": share * np.array(inputs["applied_flux_density"])}
 
 
-def _gradient(scene: ms.Scene, inputs: dict, found: ms.Equilibrium, rounds: int) -> Clocked:
+def _gradient(scene: ms.Scene, inputs: dict[str, Any], found: ms.Equilibrium, rounds: int) -> Clocked:
     """By everything that the solve takes, of a function of all positions, from the factorization that was kept."""
     options = ms.MixedNewton()._options()
     options.keep_factor = True
@@ -211,7 +215,7 @@ def _orderings(scene: ms.Scene, found: ms.Equilibrium) -> tuple[dict[str, float]
     return operations, clocked(lambda: _core.analyze(n, starts, rows, ordering="metis"), rounds=1).processor
 
 
-def _print_orderings(sizes: list[dict]) -> None:
+def _print_orderings(sizes: list[dict[str, Any]]) -> None:
     """What the ordering in use costs, and what it is worth beside others."""
     others = [name for name in sizes[0]["operations"] if name not in ("best", "dissection")]
     rows = []
@@ -226,7 +230,7 @@ def _print_orderings(sizes: list[dict]) -> None:
     print_table("The ordering; analyses in factorizations", ["faces", "", *headings], rows)
 
 
-def _print_times(one: list[dict], two: list[dict], exponents: dict) -> None:
+def _print_times(one: list[dict[str, Any]], two: list[dict[str, Any]], exponents: dict[str, Any]) -> None:
     rows = [
         [
             f"{size['faces']}",
@@ -248,7 +252,7 @@ def _print_times(one: list[dict], two: list[dict], exponents: dict) -> None:
     )
 
 
-def _print_memory(sizes: list[dict], exponents: dict) -> None:
+def _print_memory(sizes: list[dict[str, Any]], exponents: dict[str, Any]) -> None:
     rows = []
     for size in sizes:
         known = ["not told" if size[name] is None else f"{size[name] / 1e6:.1f}" for name in MEMORIES]
@@ -258,7 +262,7 @@ def _print_memory(sizes: list[dict], exponents: dict) -> None:
     print_table("Memory of a solve, MB", ["faces", "unknowns", *MEMORIES.values(), "over the factor's"], rows)
 
 
-def _print_targets(one: list[dict], two: list[dict], exponents: dict) -> None:
+def _print_targets(one: list[dict[str, Any]], two: list[dict[str, Any]], exponents: dict[str, Any]) -> None:
     first, last = one[0], one[-1]
     print(f"\nUp to {last['faces']} faces:")
     exponent = exponents["iteration"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import magshell as ms
@@ -59,7 +61,7 @@ def fleshed(cells: tuple[int, int, int]) -> ms.Scene:
     )
 
 
-def measure(rounds: int, quick: bool) -> dict:
+def measure(rounds: int, quick: bool) -> dict[str, Any]:
     """Prints the tables, returns their numbers; on one thread."""
     threads = ms.num_threads()
     ms.set_num_threads(1)
@@ -75,7 +77,7 @@ def measure(rounds: int, quick: bool) -> dict:
     return {"trees": trees, "share of bones": share}
 
 
-def _costs(links: int, children: int, rounds: int) -> dict:
+def _costs(links: int, children: int, rounds: int) -> dict[str, Any]:
     scene = tree(links, children)
     model, controls = scene._model, scene._control_layout.zeros()
     state = model.rest_state()
@@ -117,7 +119,7 @@ def _share(cells: tuple[int, int, int], rounds: int) -> float:
     return best[1] / best[0]
 
 
-def _print(trees: dict, share: float, quick: bool) -> None:
+def _print(trees: dict[str, Any], share: float, quick: bool) -> None:
     rows = [
         [
             name,

@@ -3,6 +3,8 @@ accuracy`."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import magshell as ms
 
 from .cases.solids import ELEMENTS, SolidCase, SolidOutcome
@@ -10,7 +12,7 @@ from .ratios import note
 from .report import print_table
 
 
-def measure(cases: list[SolidCase], coarse: bool) -> dict:
+def measure(cases: list[SolidCase], coarse: bool) -> dict[str, Any]:
     """Prints the table, returns its numbers, times in s of processor time."""
     outcomes = {
         (case.name, element): _outcome(case, element, coarse) for case in cases for element in ELEMENTS
@@ -31,7 +33,7 @@ def _outcome(case: SolidCase, element: str, coarse: bool) -> SolidOutcome | str:
         return str(error)
 
 
-def _rows(case: SolidCase, element: str, outcomes: dict) -> list[list[str]]:
+def _rows(case: SolidCase, element: str, outcomes: dict[str, Any]) -> list[list[str]]:
     run = outcomes[case.name, element]
     label = f"{case.name}, {case.title}" if element == ELEMENTS[0] else ""
     if isinstance(run, str):
@@ -51,7 +53,7 @@ def _rows(case: SolidCase, element: str, outcomes: dict) -> list[list[str]]:
     return rows
 
 
-def _plain(run: SolidOutcome | str) -> dict:
+def _plain(run: SolidOutcome | str) -> dict[str, Any]:
     """For JSON."""
     if isinstance(run, str):
         return {"failed": run}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import magshell as ms
@@ -13,7 +15,7 @@ CELLS, QUICK_CELLS = ((24, 6, 6), (52, 13, 13)), ((4, 1, 1),)
 ALLOWED = 0.10  # us a tetrahedron, gradient and Hessian, linear, NeoHookean, on one core
 
 
-def solids(quick: bool, rounds: int) -> list[dict]:
+def solids(quick: bool, rounds: int) -> list[dict[str, Any]]:
     """Prints the table of bars near their rest shape, held at one end; returns its numbers, times in s."""
     found = [
         cost(element, volume, cells, rounds)
@@ -38,7 +40,7 @@ def solids(quick: bool, rounds: int) -> list[dict]:
     return found
 
 
-FORMS: dict[str, dict] = {
+FORMS: dict[str, dict[str, Any]] = {
     "target stretch": {"stiffness": 1e5, "activation": 0.1},
     "active stress": {"peak_stress": 3e4, "activation": 0.5},
     "Hill": {
@@ -49,7 +51,7 @@ FORMS: dict[str, dict] = {
 }
 
 
-def muscles(quick: bool, rounds: int) -> list[dict]:
+def muscles(quick: bool, rounds: int) -> list[dict[str, Any]]:
     """Prints what a muscle in all of a solid adds to its gradient and Hessian, over what those of the solid alone cost."""
     found = []
     for element in ("linear", "quadratic"):
@@ -73,8 +75,8 @@ def muscles(quick: bool, rounds: int) -> list[dict]:
 
 
 def cost(
-    element: str, volume: str, cells: tuple[int, int, int], rounds: int, muscle: dict | None = None
-) -> dict:
+    element: str, volume: str, cells: tuple[int, int, int], rounds: int, muscle: dict[str, Any] | None = None
+) -> dict[str, Any]:
     material = ms.NeoHookean(volume, young_modulus=1e5, poisson_ratio=0.45 if volume == "isochoric" else 0.3)
     solid = ms.Solid(ms.meshes.box((4.0, 1.0, 1.0), cells=cells), material=material, element=element)
     actuators = [] if muscle is None else [ms.Muscle(solid, (1.0, 0.2, 0.1), **muscle)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +11,9 @@ import magshell as ms
 
 from .ratios import note
 from .report import print_table
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 TIME_STEP = 1e-2
 TOLERANCE = 1e-8
@@ -42,7 +46,14 @@ def turning(steps: int) -> np.ndarray:
     return 0.02 * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
 
 
-def drive(scene: ms.Scene, steps: int, tolerance: float = TOLERANCE, *, field=None, **options):
+def drive(
+    scene: ms.Scene,
+    steps: int,
+    tolerance: float = TOLERANCE,
+    *,
+    field: ArrayLike | None = None,
+    **options: Any,
+) -> ms.Trajectory:
     """A Trajectory."""
     return ms.simulate(
         scene,
@@ -57,12 +68,12 @@ def drive(scene: ms.Scene, steps: int, tolerance: float = TOLERANCE, *, field=No
     )
 
 
-def measure(rounds: int, quick: bool) -> dict:
+def measure(rounds: int, quick: bool) -> dict[str, Any]:
     """Prints the tables, returns their numbers."""
     return {"solid steps": _steps(rounds, quick), "solid gradients": _gradients(rounds, quick)}
 
 
-def _steps(rounds: int, quick: bool) -> list[dict]:
+def _steps(rounds: int, quick: bool) -> list[dict[str, Any]]:
     results, rows = [], []
     for cells, (allowed, allowed_linearized) in ALLOWED_STEP.items():
         cells = QUICK_CELLS if quick else cells
@@ -108,7 +119,7 @@ def _step(scene: ms.Scene, tolerance: float, steps: int, rounds: int) -> tuple[f
     return (min(times[many]) - min(times[few])) / steps, (iterations[many] - iterations[few]) / steps
 
 
-def _gradients(rounds: int, quick: bool) -> list[dict]:
+def _gradients(rounds: int, quick: bool) -> list[dict[str, Any]]:
     """By the field of every step, the moduli and the magnetization of every element."""
     scene = beam(QUICK_CELLS if quick else next(iter(ALLOWED_STEP)))
     steps, results, rows = 5 if quick else STEPS, [], []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ TIMES["iteration"] = "iteration of an Euler step"
 MEMORIES = {"model": "model", "entries": "entries of L", "peak": "process grew by"}
 
 
-def measure(rounds: int, quick: bool) -> list[dict]:
+def measure(rounds: int, quick: bool) -> list[dict[str, Any]]:
     """Prints the table, returns its numbers. Each size in a process of its own, because only its largest size is told."""
     sizes: list[dict] = []
     for cells in QUICK_CELLS if quick else CELLS:
@@ -43,7 +44,7 @@ def measure(rounds: int, quick: bool) -> list[dict]:
     return sizes
 
 
-def costs(cells: tuple[int, int, int], rounds: int) -> dict:
+def costs(cells: tuple[int, int, int], rounds: int) -> dict[str, Any]:
     """Of one thread; s of processor time, bytes."""
     ms.set_num_threads(1)
     drive(beam((4, 1, 1)), 1)  # what any motion needs of the process
@@ -76,7 +77,7 @@ def costs(cells: tuple[int, int, int], rounds: int) -> dict:
     }
 
 
-def exponents(sizes: list[dict]) -> dict[str, float]:
+def exponents(sizes: list[dict[str, Any]]) -> dict[str, float]:
     """p of values ~ tetrahedra^p between the first size and the last; what is not known is left out."""
     first, last = sizes[0], sizes[-1]
     growth = np.log(last["tetrahedra"] / first["tetrahedra"])
@@ -87,7 +88,7 @@ def exponents(sizes: list[dict]) -> dict[str, float]:
     }
 
 
-def _print(sizes: list[dict], quick: bool) -> None:
+def _print(sizes: list[dict[str, Any]], quick: bool) -> None:
     grown = exponents(sizes) if len(sizes) > 1 else {}
     rows = []
     for size in sizes:

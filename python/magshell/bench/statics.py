@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ ALLOWED_WORTH = 12.0  # of the whole solve from flat, in factorizations with the
 ALLOWED_RATIO = 1.25  # a Newton iteration over its factorization and back-substitution
 
 # Name: a scene of a bending, the controls, how many factorizations it may take from flat in one call.
-CASES: dict[str, tuple[Callable[[str], ms.Scene], dict, int]] = {
+CASES: dict[str, tuple[Callable[[str], ms.Scene], dict[str, Any], int]] = {
     "A1, full load": (lambda b: shear_strip.scene(shear_strip.strip((40, 4), b), b), {}, 12),
     "A4, full load": (lambda b: hemisphere.scene(hemisphere.quarter((64, 16), b), b, 400.0), {}, 25),
     "C1-90, beta 20": (
@@ -51,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_rounds(parser, 3)
 
 
-def run(options: argparse.Namespace) -> dict:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Prints the tables, returns their numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if faces < 2:
@@ -73,7 +74,7 @@ def run(options: argparse.Namespace) -> dict:
     }
 
 
-def strongly_bent(faces: int, bending: str = "midedge") -> tuple[ms.Scene, dict]:
+def strongly_bent(faces: int, bending: str = "midedge") -> tuple[ms.Scene, dict[str, Any]]:
     """A square sheet magnetised along one side and clamped across it, that a field turns up by almost a right angle."""
     cells = max(1, round((faces / 2) ** 0.5))
     mesh = ms.meshes.rectangle(0.1, 0.1, cells=(cells, cells))
@@ -82,7 +83,7 @@ def strongly_bent(faces: int, bending: str = "midedge") -> tuple[ms.Scene, dict]
     return scene, {"remanent_magnetization": (5e4, 0.0, 0.0), "applied_flux_density": (0.0, 0.0, 2e-3)}
 
 
-def _from_flat() -> dict:
+def _from_flat() -> dict[str, Any]:
     rows, results = [], {}
     for name, (build, controls, allowed) in CASES.items():
         for bending in BENDINGS:
@@ -127,14 +128,16 @@ def semi_cylinder(cells: int, force: float) -> ms.Scene:
     return ms.Scene(sheet, supports=supports, loads=[ms.PointLoad(top, (0, 0, force / 2))])
 
 
-def oblique_field(angle: float, beta: float, cells: tuple[int, int] = (10, 1)) -> tuple[ms.Scene, dict]:
+def oblique_field(
+    angle: float, beta: float, cells: tuple[int, int] = (10, 1)
+) -> tuple[ms.Scene, dict[str, Any]]:
     """C1: a strip in a field at an angle [degrees] to its magnetization; and the controls."""
     mesh = ms.meshes.rectangle(magnetic_strip.LENGTH, magnetic_strip.WIDTH, cells=cells)
     direction = (np.cos(np.radians(angle)), 0.0, np.sin(np.radians(angle)))
     return magnetic_strip.scene(mesh, "midedge"), magnetic_strip.controls(beta, direction)
 
 
-def _to_stable(quick: bool) -> dict:
+def _to_stable(quick: bool) -> dict[str, Any]:
     """Where steps of the load go astray, or snap: the stable state from rest in one call."""
     cases = [
         (f"C1-{angle}, beta {beta:g}", *oblique_field(angle, beta), allowed)
@@ -167,7 +170,7 @@ def _to_stable(quick: bool) -> dict:
     return results
 
 
-def _iteration(scene: ms.Scene, controls: dict, rounds: int) -> dict:
+def _iteration(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str, Any]:
     """The cost of an iteration: everything, over what the linear algebra takes."""
     runs = [ms.equilibrium(scene, **controls) for _ in range(rounds)]
     best = min(runs, key=lambda run: run.wall_time)
@@ -191,7 +194,7 @@ def _iteration(scene: ms.Scene, controls: dict, rounds: int) -> dict:
     }
 
 
-def _threads(scene: ms.Scene, controls: dict, rounds: int) -> dict:
+def _threads(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str, Any]:
     """Time and bits on one thread and on two."""
     before = ms.num_threads()
     times, positions = {}, {}
@@ -211,7 +214,7 @@ def _threads(scene: ms.Scene, controls: dict, rounds: int) -> dict:
     return {"one thread": times[1], "two threads": times[2], "same bits": same}
 
 
-def _backends(scene: ms.Scene, controls: dict, rounds: int) -> dict:
+def _backends(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str, Any]:
     """The Hessian of the bent sheet, factorized by each backend there is."""
     found = ms.equilibrium(scene, **controls)
     n, starts, matrix_rows, values = scene._model.hessian(found._state, found._controls)
@@ -234,7 +237,7 @@ def _backends(scene: ms.Scene, controls: dict, rounds: int) -> dict:
     return results
 
 
-def _worth(scene: ms.Scene, controls: dict, backends: dict, rounds: int) -> float:
+def _worth(scene: ms.Scene, controls: dict[str, Any], backends: dict[str, Any], rounds: int) -> float:
     """The whole solve from flat over a factorization with its back-substitution, in processor time."""
     whole = clocked(lambda: ms.equilibrium(scene, **controls), rounds=rounds).processor
     best = min(times["factorization"] + times["solve"] for times in backends.values())

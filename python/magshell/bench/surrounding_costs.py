@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,9 @@ CELLS, QUICK_CELLS = ((48, 8), (128, 32)), ((6, 2),)
 TIME_STEP, STEPS, QUICK_STEPS = 1e-3, 100, 20
 ALLOWED = 2.5  # times a step without contact
 EXACT = "contact, friction"
-SURROUNDINGS = {  # (friction in keywords for ms.Contact, or None without contact; whether in water)
+SURROUNDINGS: dict[
+    str, tuple[dict[str, Any] | None, bool]
+] = {  # (friction in keywords for ms.Contact, or None without contact; whether in water)
     "none": (None, False),
     "water": (None, True),
     "contact": ({}, False),
@@ -25,7 +28,7 @@ SURROUNDINGS = {  # (friction in keywords for ms.Contact, or None without contac
 }
 
 
-def falling(cells: tuple[int, int], friction: dict | None, in_water: bool) -> ms.Scene:
+def falling(cells: tuple[int, int], friction: dict[str, Any] | None, in_water: bool) -> ms.Scene:
     """12 cm x 2 cm, soft, 1 mm above the floor if there is one."""
     mesh = ms.meshes.rectangle(0.12, 0.02, cells=cells, irregular=0.2)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5, mass_density=1e3)
@@ -40,7 +43,7 @@ def falling(cells: tuple[int, int], friction: dict | None, in_water: bool) -> ms
     )
 
 
-def measure(rounds: int, quick: bool) -> dict:
+def measure(rounds: int, quick: bool) -> dict[str, Any]:
     """Prints the tables; {faces: {surroundings: {"step" s, "iterations", "halved", "way" m}}}, steps of implicit Euler."""
     results, steps = {}, QUICK_STEPS if quick else STEPS
     for cells in QUICK_CELLS if quick else CELLS:
@@ -75,7 +78,7 @@ def measure(rounds: int, quick: bool) -> dict:
     return results
 
 
-def _motion(scene: ms.Scene, steps: int, rounds: int) -> dict:
+def _motion(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
     best = np.inf
     for _ in range(rounds):
         began = time.process_time()

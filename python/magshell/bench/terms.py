@@ -86,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_rounds(parser, 5)
 
 
-def run(options: argparse.Namespace) -> dict:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Prints the table, returns its numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if faces < 2:
@@ -103,7 +103,9 @@ def run(options: argparse.Namespace) -> dict:
     return {"faces": mesh.n_faces, "parts": results}
 
 
-def _costs(mesh: ms.TriangleMesh, parts: tuple[Part, ...], rounds: int, of_rest: dict | None) -> dict:
+def _costs(
+    mesh: ms.TriangleMesh, parts: tuple[Part, ...], rounds: int, of_rest: dict[str, Any] | None
+) -> dict[str, Any]:
     """s: of gradient and Hessian, of a Newton iteration, of a time step and of an iteration of it."""
     if of_rest is None:
         scene, solve, _ = _together(mesh, parts, moving=False)
@@ -136,7 +138,9 @@ def _costs(mesh: ms.TriangleMesh, parts: tuple[Part, ...], rounds: int, of_rest:
     }
 
 
-def _together(mesh: ms.TriangleMesh, parts: tuple[Part, ...], moving: bool) -> tuple[ms.Scene, dict, dict]:
+def _together(
+    mesh: ms.TriangleMesh, parts: tuple[Part, ...], moving: bool
+) -> tuple[ms.Scene, dict[str, Any], dict[str, Any]]:
     """A scene with all parts, what its solves take and what its motions take beside."""
     shell = {"thickness": THICKNESS, "young_modulus": 1e6, "poisson_ratio": 0.45, "mass_density": 1e3}
     scene: dict[str, Any] = {"supports": [ms.Clamp(mesh.edges_at(x=0.0))]}
@@ -155,7 +159,7 @@ def _seconds(measured: Clocked) -> float:
     return measured.processor if ms.num_threads() == 1 else measured.wall
 
 
-def _print(faces: int, results: list[dict]) -> None:
+def _print(faces: int, results: list[dict[str, Any]]) -> None:
     rows = []
     for k, each in enumerate(results):
         before = results[max(0, k - 1)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,7 @@ def thrown(scene: ms.Scene, steps: int) -> ms.Trajectory:
     )
 
 
-def without_contact(scene: ms.Scene, motion: ms.Trajectory) -> dict:
+def without_contact(scene: ms.Scene, motion: ms.Trajectory) -> dict[str, Any]:
     """What the steps of a motion take without contact, each from where it began: what has collided vibrates."""
     steps = len(motion.positions) - 1
     counts = {"iterations": 0, "factorizations": 0}
@@ -62,7 +63,7 @@ def without_contact(scene: ms.Scene, motion: ms.Trajectory) -> dict:
     return counts
 
 
-def measure(rounds: int, quick: bool) -> dict:
+def measure(rounds: int, quick: bool) -> dict[str, Any]:
     """Prints the table; {"touching", "free": {"step" s, "iterations", "factorizations"}, "same states": the last two,
     "pairs", "share", "of iteration"}.
 

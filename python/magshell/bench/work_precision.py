@@ -136,7 +136,7 @@ def measure(studies: Iterable[Study] = STUDIES, *, quick: bool = False, rounds: 
     return points
 
 
-def _meshes(study: Study, bending: str, quick: bool) -> tuple:
+def _meshes(study: Study, bending: str, quick: bool) -> tuple[Any, ...]:
     """Of second order all but the finest, which has as many unknowns as others have on it."""
     meshes = study.meshes[:-1] if bending == "midedge2" else study.meshes
     return meshes[:QUICK_MESHES] if quick else meshes

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
+
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
 
 
 class Actuator(Owner):
@@ -27,11 +30,11 @@ class Actuator(Owner):
         return self._units[name]
 
     @property
-    def body(self):
+    def body(self) -> Any:
         """The one body, or None where there are several."""
         return self.bodies[0] if len(self.bodies) == 1 else None
 
-    def filling(self, scene) -> float:
+    def filling(self, scene: Scene) -> float:
         """How much of a volume at rest a load factor of 1 adds to it, or takes away."""
         return 0.0
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 from itertools import takewhile
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from .solid import Solid
 from .spans import Span, magnetized_rows, rotations_of, turning_edges
 from .ties import Tie, joined_components, originals
 
+if TYPE_CHECKING:
+    from ..surroundings.contact import Contact
+
 BODIES = (Shell, Solid)
 
 
@@ -34,7 +38,12 @@ class Bodies:
     original: (n_v of all,), the first of the vertices that each is welded to, or itself.
     """
 
-    def __init__(self, bodies, ties=(), touching=()):
+    def __init__(
+        self,
+        bodies: Shell | Solid | Rigid | Skeleton | Iterable[Shell | Solid | Rigid | Skeleton],
+        ties: Iterable[Tie] = (),
+        touching: Iterable[Rigid] = (),
+    ):
         self.touching: tuple[Rigid, ...] = tuple(touching)
         listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton))
         self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
@@ -218,7 +227,7 @@ class Bodies:
         """Of the largest body: the longest side of its bounding box [m]."""
         return max((float(np.ptp(mesh.rest_positions, axis=0).max()) for mesh in self.meshes), default=0.0)
 
-    def number(self, shell) -> int:
+    def number(self, shell: Shell | Solid) -> int:
         """Which of the bodies it is. Raises ValueError where it is none of them."""
         for k, each in enumerate(self.shells):
             if each is shell:
@@ -228,7 +237,7 @@ class Bodies:
         )
         raise ValueError(f"a body of the scene is one of scene.bodies, got {what}")
 
-    def rigid_number(self, part) -> int:
+    def rigid_number(self, part: Rigid) -> int:
         """Which of the rigid parts it is. Raises ValueError where it is none of them."""
         for k, each in enumerate(self.rigid):
             if each is part:
@@ -277,7 +286,7 @@ class Bodies:
         except ValueError:
             raise ValueError(f"a {kind} is about a body that is not in the scene: {item.body!r}") from None
 
-    def contact_points(self, contact) -> tuple[np.ndarray, np.ndarray]:
+    def contact_points(self, contact: Contact) -> tuple[np.ndarray, np.ndarray]:
         """Its points with the scene's vertices: (k, 3), -1 where there are fewer, and their weights (k, 3)."""
         span = self.of(contact)
         vertices, weights = contact.points(span.mesh)
@@ -307,7 +316,7 @@ class Bodies:
             before += len(kind) + others
         raise ValueError("a body of the scene is one of scene.bodies")
 
-    def sheets_before(self, body) -> tuple[Shell, ...]:
+    def sheets_before(self, body: Shell | Solid) -> tuple[Shell, ...]:
         """The sheets that come before one of them where there are rows of sheets alone."""
         return tuple(takewhile(lambda each: each is not body, self.sheets))
 
@@ -335,7 +344,7 @@ class Whole:
         return MeshQuality(self.mesh, self.thickness)
 
 
-def checked_body(body) -> Shell | None:
+def checked_body(body: Any) -> Shell | None:
     """The body that something is about, as it was given."""
     if body is not None and not isinstance(body, BODIES):
         raise ValueError(f"body must be a Shell or Solid of the scene, got {body!r:.60}")

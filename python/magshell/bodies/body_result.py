@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..mesh.triangle_mesh import TriangleMesh
 from .shell import Shell
 from .shell_stresses import ShellStresses, stresses_of
 from .strains import Strains
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Computed, SolveResult
 
 
 class BodyResult:
@@ -16,7 +21,7 @@ class BodyResult:
     body: Shell, as it is in the scene. mesh: its own.
     """
 
-    def __init__(self, result, body: Shell):
+    def __init__(self, result: SolveResult, body: Shell):
         bodies = result.scene._bodies
         self._result, self._span = result, bodies.spans[bodies.number(body)]
         self._first_row = sum(sheet.mesh.n_faces for sheet in bodies.sheets_before(body))
@@ -28,23 +33,23 @@ class BodyResult:
         return self.body.mesh
 
     @property
-    def positions(self):
+    def positions(self) -> Computed:
         """(..., n_v, 3) m."""
         return self._result.positions[..., self._span.vertices, :]
 
     @property
-    def displacements(self):
+    def displacements(self) -> Computed:
         """(..., n_v, 3) m, from the rest shape."""
         return self._result.displacements[..., self._span.vertices, :]
 
     @property
-    def edge_rotations(self):
+    def edge_rotations(self) -> Computed:
         """(..., n_e) rad, zero where an edge has none; of a SixNodeMesh (..., 2 n_e), two an edge, at its Gauss points from
         the lower to the higher corner."""
         return self._result.edge_rotations[..., self._span.rotations]
 
     @property
-    def velocities(self):
+    def velocities(self) -> Computed:
         """(n, n_v, 3) m/s, of a motion."""
         return self._result.velocities[..., self._span.vertices, :]
 
@@ -72,7 +77,7 @@ class BodyResult:
         return stresses_of(self._result._values_at(index), self.body, self._result._state_at(index))
 
     @property
-    def remanent_magnetization(self):
+    def remanent_magnetization(self) -> Computed:
         """(n_f, 3), of a SixNodeMesh one an element, or (3,) A/m, or None."""
         given = self._result.remanent_magnetization
         return given if np.ndim(given) < 2 else given[self._span.rows]

@@ -13,11 +13,17 @@ most caps on other triangles (assembly/membrane_faces.h); this is about those th
 from __future__ import annotations
 
 import warnings
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._machine.callers import callers_level
 from ..errors import MeshQualityWarning
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+    from ..scene.scene import Scene
+    from .shell import Shell
 
 LEAST_ANGLE = np.radians(120.0)  # of faces that are looked at
 # Share of the bending energy that is in the way of caps. Measured on strips of crossed cells, of 1/25 to 1/400 of their
@@ -29,7 +35,7 @@ _MOST_NAMED = 4  # faces in a warning
 class Caps:
     """Those of a sheet that stretch as they tilt. Costs nothing where there are none."""
 
-    def __init__(self, shell, recut=()):
+    def __init__(self, shell: Shell, recut: Numbers = ()):
         """recut: faces whose stretch is measured on other triangles."""
         mesh, quality = shell.mesh, shell.quality
         is_cap = quality.largest_angles > LEAST_ANGLE
@@ -44,7 +50,7 @@ class Caps:
         self._areas = np.where(new, mesh.face_areas[around], 0.0).sum(axis=1)
         self._rest_curvatures = self._curvatures(mesh.rest_positions)
 
-    def held_back(self, positions: np.ndarray, shell, bending_energy: float) -> np.ndarray:
+    def held_back(self, positions: np.ndarray, shell: Shell, bending_energy: float) -> np.ndarray:
         """(k,): the bending energy in the way of each cap, as a share of all of it. shell: with its values now."""
         if not (self.faces.size and bending_energy > 0.0 and np.isfinite(positions).all()):
             return np.zeros(len(self.faces))
@@ -70,7 +76,9 @@ class Caps:
         return ((normals[ends] - normals[starts]) * along).sum(axis=1) / (along**2).sum(axis=1)
 
 
-def warn_of_caps(scene, positions: np.ndarray, shell, bending_energy: float, where: str) -> None:
+def warn_of_caps(
+    scene: Scene, positions: np.ndarray, shell: Shell, bending_energy: float, where: str
+) -> None:
     """Says once a scene that caps stiffen the sheet where it is bent like this. where: the result, in words."""
     if scene._warned_of_caps or not scene.bodies or not scene._bodies.flat_sheets_alone:
         return
@@ -90,7 +98,7 @@ def warn_of_caps(scene, positions: np.ndarray, shell, bending_energy: float, whe
     )
 
 
-def describe_faces(shell, faces: np.ndarray) -> str:
+def describe_faces(shell: Shell, faces: np.ndarray) -> str:
     """The first few of them and the shape of the first, as the beginning of a sentence."""
     quality, first = shell.quality, faces[0]
     shape = (

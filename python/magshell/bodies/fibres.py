@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from .._checks.scalars import positive
 from .._checks.selections import indices, selection
 from ..mesh.tet_mesh import TetMesh
 from .solid import Solid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 _BACK = -0.98  # the cosine between two pieces beyond which what is between them has no direction
 _LEAST = 1e-3  # weights below are left out: the reach times 6.9
@@ -79,7 +83,9 @@ def checked_weights(values: Any, count: int) -> np.ndarray:
     return array
 
 
-def fibres_along(line, body, *, reach, elements=None) -> Fibres:
+def fibres_along(
+    line: Numbers, body: Solid | TetMesh, *, reach: Numbers, elements: Numbers | None = None
+) -> Fibres:
     """Fibres along a line through a solid: each tetrahedron near it has their direction at the nearest point of the line,
     the weight exp(-distance/reach), and its coordinate along the line, from the distance of its middle.
 
@@ -162,7 +168,9 @@ def _sizes(mesh: TetMesh) -> np.ndarray:
     return np.linalg.norm(corners - mesh.tetrahedron_barycenters[:, None], axis=2).max(axis=1)
 
 
-def fibres_of(fibres, mesh: TetMesh, elements) -> Fibres:
+def fibres_of(
+    fibres: Fibres | Numbers | Callable[[np.ndarray], Numbers], mesh: TetMesh, elements: Numbers
+) -> Fibres:
     """What a Muscle was given as a Fibres: one, a vector, one a tetrahedron, or a function of the place."""
     n = mesh.n_tetrahedra
     if isinstance(fibres, Fibres):

@@ -21,6 +21,9 @@ class Joint(Owner):
     child: the link (Rigid) that it carries. parent: the link that it is fixed to, or None for the world.
     """
 
+    child: Rigid
+    parent: Rigid | None
+
     _kind: ClassVar[str] = ""
     _defaults: ClassVar[dict[str, Any]] = {}  # by name: where it does not act
     _vectors: ClassVar[dict[str, str]] = {}  # the units of those that have three numbers
@@ -41,7 +44,8 @@ class Joint(Owner):
             raise ValueError(f"child and parent of a {type(self).__name__} must be two links")
         self.child, self.parent = child, parent
         self.origin: np.ndarray = np.array(quantity("origin", "m", origin, (3,)))
-        self.axis, self._axis_length = np.zeros(3), 1.0  # of what was given
+        self.axis: np.ndarray = np.zeros(3)
+        self._axis_length = 1.0  # of what was given
         if axis is not None:
             self.axis = np.array(quantity("axis", "", axis, (3,)))
             self._axis_length = np.linalg.norm(self.axis)

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .joint import Joint
 from .rigid_result import RigidResult, _cross
 from .skeleton_input import motor_rows
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Computed, SolveResult
+
 
 class JointResult:
     """A joint of a result. Of tensors in their graph, tensors."""
 
-    def __init__(self, result, joint: Joint):
+    joint: Joint
+
+    def __init__(self, result: SolveResult, joint: Joint):
         if not any(joint is each for each in result.scene.joints):
             raise ValueError(f"a joint of the scene is one of scene.joints, got {joint!r} that is not in it")
         self._result, self.joint = result, joint
@@ -20,7 +27,7 @@ class JointResult:
         self._parent = None if joint.parent is None else RigidResult(result, joint.parent)
 
     @property
-    def angle(self):
+    def angle(self) -> Computed:
         """(...) rad, of a Revolute, with its full turns over a motion; of a Ball, that of its rotation."""
         kind = self.joint._kind
         if kind not in ("revolute", "ball"):
@@ -41,7 +48,7 @@ class JointResult:
         return _unwrapped(angle)
 
     @property
-    def displacement(self):
+    def displacement(self) -> Computed:
         """(...) m, of a Prismatic."""
         if self.joint._kind != "prismatic":
             raise ValueError(f"a {type(self.joint).__name__} has no displacement")
@@ -51,7 +58,7 @@ class JointResult:
         return (along * (self.place - self._place_of(self._parent))).sum(-1)
 
     @property
-    def rate(self):
+    def rate(self) -> Computed:
         """(n,) rad/s of a Revolute, m/s of a Prismatic: how fast its coordinate changes, in a motion. Of a Ball (n, 3)
         rad/s, how its child turns to its parent, axes of the world."""
         kind = self.joint._kind
@@ -71,7 +78,7 @@ class JointResult:
         return (axis * velocity).sum(-1) + turned
 
     @property
-    def motor_torque(self):
+    def motor_torque(self) -> Computed:
         """(...) N m, with which the motor of a Revolute turns its child about the axis, against its parent; (..., 3) of a
         Ball, axes of the world. In a motion NaN in the state that it starts from."""
         if self.joint._kind == "ball":
@@ -79,7 +86,7 @@ class JointResult:
         return self._motor("revolute", "motor_angle")
 
     @property
-    def motor_force(self):
+    def motor_force(self) -> Computed:
         """(...) N, likewise of a Prismatic, along the axis."""
         return self._motor("prismatic", "motor_displacement")
 
@@ -89,12 +96,12 @@ class JointResult:
         return self._result._driving[..., motor_rows(self._result.scene._bodies.skeletons, self.joint)]
 
     @property
-    def place(self):
+    def place(self) -> Computed:
         """(..., 3) m, of the joint as the scene has it, on its child: that point where a solve has another origin."""
         return self._place_of(self._child)
 
     @property
-    def gap(self):
+    def gap(self) -> Computed:
         """(...) m, between its place on the child and on the parent: what is left of a Closure, and round-off of others but
         a Prismatic, whose displacement it is. Where a solve has another origin, that of the place as the scene has it."""
         return ((self.place - self._place_of(self._parent)) ** 2).sum(-1) ** 0.5

@@ -136,6 +136,8 @@ class NeoHookean(_Isotropic):
     NeoHookean(young_modulus 1e+06, poisson_ratio 0.45)
     """
 
+    isochoric: bool
+
     _VOLUMES = ("ln J", "J", "isochoric")
 
     def __init__(self, volume: str = "ln J", *, young_modulus: Numbers, poisson_ratio: Numbers):
@@ -265,7 +267,7 @@ class Guccione(SolidMaterial):
         cross_fibre_exponent: Numbers,
         fibre_shear_exponent: Numbers,
         bulk_modulus: Numbers,
-        fibres,
+        fibres: Numbers,
     ):
         super().__init__(
             stiffness=stiffness,

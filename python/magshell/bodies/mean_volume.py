@@ -17,12 +17,16 @@ directions as these leave free cost nothing, however the integrals are taken.
 from __future__ import annotations
 
 import warnings
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._machine.callers import callers_level
 from ..errors import MeshQualityWarning
 from ..mesh.tet_topology import FACES, face_table, groups, neighbours
+
+if TYPE_CHECKING:
+    from ..mesh.tet_mesh import TetMesh
 
 # Of what a region joins the rest by to its outside: measured 0 where a plate or bar is one cell thick, 0.04 of a fin
 # ten cells long, 0.6 and more along the edges of thick bodies.
@@ -34,7 +38,7 @@ FEWEST = 12  # tetrahedra of a region: of fewer none is slender
 _FLAT = 1e-6  # of the size of a body: centers this near to a plane lie in it
 
 
-def warn_of_mean_volume(mesh, isochoric: bool) -> None:
+def warn_of_mean_volume(mesh: TetMesh, isochoric: bool) -> None:
     """mesh: of a solid whose elements have the mean volume."""
     thin = thin_regions(mesh)
     if thin:
@@ -60,7 +64,7 @@ def _warn(text: str) -> None:
     warnings.warn(text, MeshQualityWarning, stacklevel=callers_level())
 
 
-def thin_regions(mesh) -> list[np.ndarray]:
+def thin_regions(mesh: TetMesh) -> list[np.ndarray]:
     """Tetrahedra of each slender region that is one cell thick, the largest first."""
     on_surface = np.zeros(mesh.n_vertices, dtype=bool)
     on_surface[mesh.boundary_vertices] = True
@@ -82,7 +86,7 @@ def thin_regions(mesh) -> list[np.ndarray]:
     return [chosen[region == k] for k in order[np.argsort(-volume[order], kind="stable")]]
 
 
-def free_modes(mesh) -> int:
+def free_modes(mesh: TetMesh) -> int:
     """How many shapes cost isochoric material nothing, of all separate pieces."""
     count = 0
     piece = mesh.components[mesh.corners[:, 0]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -16,6 +17,7 @@ from .solid import Solid
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from .fibres import Fibres
 
 
 _TABLES = ("force_length", "passive", "force_velocity")
@@ -62,6 +64,11 @@ class Muscle(Actuator):
     0.7331
     """
 
+    coordinates: np.ndarray | None
+    length: float | None
+    n_segments: int
+    segments: np.ndarray | None
+
     _replaceable = ("activation", "fibres", "weights", "stiffness", "peak_stress", "shortening_rate")
     _in_time = ("activation",)
     _units: ClassVar[dict[str, str]] = {"activation": "1"}
@@ -70,22 +77,22 @@ class Muscle(Actuator):
     def __init__(
         self,
         body: Solid,
-        fibres,
+        fibres: Fibres | Numbers | Callable[[np.ndarray], Numbers],
         *,
         activation: Numbers = 0.0,
         stiffness: Numbers | None = None,
         peak_stress: Numbers | None = None,
-        force_length=None,
-        passive=None,
-        force_velocity=None,
+        force_length: Numbers | None = None,
+        passive: Numbers | None = None,
+        force_velocity: Numbers | None = None,
         shortening_rate: Numbers | None = None,
-        segments=None,
-        weights=None,
-        elements=None,
+        segments: Numbers | None = None,
+        weights: Numbers | None = None,
+        elements: Numbers | None = None,
     ):
         if not isinstance(body, Solid):
             raise ValueError(f"body of a Muscle must be a Solid, got {body!r:.60}")
-        self.bodies = (body,)
+        self.bodies: tuple[Any, ...] = (body,)
         found = fibres_of(fibres, body.mesh, elements)
         count = body.mesh.n_tetrahedra
         self.elements: np.ndarray = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,10 @@ from .._checks.tensors import detached
 from .at_points import mean
 from .muscle import Muscle
 from .solid import Solid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import SolveResult
+    from ..scene.scene import Scene
 
 
 class FibreStates(NamedTuple):
@@ -29,7 +33,7 @@ class FibreStates(NamedTuple):
         return mean(self.volumes, of_points)
 
 
-def muscles_of(result, body: Solid, index: int) -> dict[str, np.ndarray] | None:
+def muscles_of(result: SolveResult, body: Solid, index: int) -> dict[str, np.ndarray] | None:
     """Of each tetrahedron of a solid (n_t,): activation and stretch as its muscles have them in the mean, by their weights,
     and the sum of their tensions; NaN without any. None where the solid has no muscle."""
     muscles = [each for each in muscles_in(result.scene) if each.body is body]
@@ -59,7 +63,9 @@ class MuscleResult:
     muscle: as it is in the scene.
     """
 
-    def __init__(self, result, muscle: Muscle):
+    muscle: Muscle
+
+    def __init__(self, result: SolveResult, muscle: Muscle):
         if not any(muscle is each for each in muscles_in(result.scene)):
             raise ValueError(
                 f"a muscle of the scene is one of scene.actuators, got {muscle!r} that is not in it"
@@ -116,6 +122,6 @@ class MuscleResult:
         )
 
 
-def muscles_in(scene) -> list[Muscle]:
+def muscles_in(scene: Scene) -> list[Muscle]:
     """In the core's numbers: the other actuators of a scene are not among them."""
     return [each for each in scene.actuators if isinstance(each, Muscle)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from .body_result import BodyResult
 from .joint import Joint
 from .joint_result import JointResult
@@ -13,9 +15,12 @@ from .shell import Shell
 from .solid import Solid
 from .solid_result import SolidResult
 
+if TYPE_CHECKING:
+    from .._checks.kinds import SolveResult
+
 
 def result_of(
-    result, body: Shell | Solid | Rigid | Joint | Muscle
+    result: SolveResult, body: Shell | Solid | Rigid | Joint | Muscle
 ) -> BodyResult | SolidResult | RigidResult | JointResult | MuscleResult:
     """`result[body]`, `result[joint]` or `result[actuator]`. Raises ValueError where the scene has no such one."""
     if hasattr(body, "_result_in"):  # an actuator

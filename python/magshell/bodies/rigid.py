@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .._checks.owner import Owner
@@ -14,6 +16,10 @@ from ..shapes import Shape
 from .filled_shape import filled
 from .shell import Shell
 from .solid import Solid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+    from ..scene.values import Gradient, Values
 
 _ROUNDING = 1e-9
 
@@ -54,14 +60,14 @@ class Rigid(Owner):
     @grouped()
     def __init__(
         self,
-        vertices=None,
+        vertices: Numbers | None = None,
         *,
-        mass=None,
-        inertia=None,
-        center=None,
-        magnetic_moment=None,
-        velocity=None,
-        angular_velocity=None,
+        mass: Numbers | None = None,
+        inertia: Numbers | None = None,
+        center: Numbers | None = None,
+        magnetic_moment: Numbers | None = None,
+        velocity: Numbers | None = None,
+        angular_velocity: Numbers | None = None,
         body: Shell | Solid | None = None,
         shape: TriangleMesh | Shape | None = None,
     ):
@@ -69,19 +75,19 @@ class Rigid(Owner):
             raise ValueError(f"body must be a Shell or a Solid of the scene, got {body!r:.60}")
         if vertices is None and body is not None:
             raise ValueError("a Rigid of a body needs its vertices: Rigid(vertices=..., body=...)")
-        self.shape = _checked_shape(shape)
-        self.vertices = None if vertices is None else selection("Rigid vertices", vertices)
+        self.shape: TriangleMesh | None = _checked_shape(shape)
+        self.vertices: np.ndarray | None = None if vertices is None else selection("Rigid vertices", vertices)
         self.body = body
-        self.mass = None if mass is None else float(quantity("mass", "kg", mass, ()))
+        self.mass: float | None = None if mass is None else float(quantity("mass", "kg", mass, ()))
         if self.mass is not None and not self.mass > 0:
             raise ValueError(f"mass [kg] must be positive, got {self.mass:g}")
-        self.inertia = None if inertia is None else _checked_inertia(inertia)
+        self.inertia: np.ndarray | None = None if inertia is None else _checked_inertia(inertia)
         if self.mass is None and self.inertia is not None:
             raise ValueError("inertia [kg m2] was given without a mass [kg]")
-        self.center = _vector("center", "m", center)
-        self.magnetic_moment = _vector("magnetic_moment", "A m2", magnetic_moment)
-        self.velocity = _vector("velocity", "m/s", velocity)
-        self.angular_velocity = _vector("angular_velocity", "rad/s", angular_velocity)
+        self.center: np.ndarray | None = _vector("center", "m", center)
+        self.magnetic_moment: np.ndarray | None = _vector("magnetic_moment", "A m2", magnetic_moment)
+        self.velocity: np.ndarray | None = _vector("velocity", "m/s", velocity)
+        self.angular_velocity: np.ndarray | None = _vector("angular_velocity", "rad/s", angular_velocity)
         if vertices is None:
             self._check_free()
         elif velocity is not None or angular_velocity is not None:
@@ -107,7 +113,7 @@ class Rigid(Owner):
         given = np.zeros(()) if self.inertia is None else self.inertia
         return given if given.ndim == 2 else given * np.eye(3)
 
-    def replaced(self, **values) -> Rigid:
+    def replaced(self, **values: Any) -> Rigid:
         """The same part with other values."""
         own = {name: getattr(self, name) for name in self._replaceable}
         for name in values:
@@ -116,7 +122,7 @@ class Rigid(Owner):
         return self._again({**own, **values})
 
     @classmethod
-    def of(cls, shape: TriangleMesh | Shape, mass_density: float, **others) -> Rigid:
+    def of(cls, shape: TriangleMesh | Shape, mass_density: float, **others: Any) -> Rigid:
         """The one that fills a closed surface, faces outwards: mass [kg], inertia and center by its density [kg/m3].
         others: of its arguments.
 
@@ -131,15 +137,15 @@ class Rigid(Owner):
             raise ValueError("shape must be a TriangleMesh or one of ms.shapes, got None")
         return cls(shape=surface, **filled(surface, mass_density), **others)
 
-    def _again(self, values: dict) -> Rigid:
+    def _again(self, values: dict[Any, Any]) -> Rigid:
         return type(self)(self.vertices, body=self.body, shape=self.shape, **values)
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         if self.magnetic_moment is not None:
             numbers[label, "magnetic_moment"] = self.magnetic_moment
             numbers[label, "center"] = values.rigid_place(self).center_of(self)
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
         place, found = values.rigid_place(self), {}
         by_center = np.zeros(3)
         if gradient.has(label, "magnetic_moment"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,6 +10,12 @@ from .._checks.selections import indices
 from .._checks.tensors import is_tensor
 from .rigid import Rigid, or_zero
 from .skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from ..dynamics.trajectory import MotionState
+    from ..scene.inputs import Inputs
+    from ..scene.scene import Scene
+    from .bodies import Bodies
 
 # The ten points of a part in units of its length: the corners of a tetrahedron, the middles of its edges. Any body has
 # the masses, center and inertia of ten point masses there, and of only one choice of them.
@@ -85,7 +91,7 @@ class Place(NamedTuple):
         return {"owner": owner, "points": points, "vertices": self.vertices.tolist(), "magnetic": magnetic}
 
 
-def places(bodies) -> list[Place]:
+def places(bodies: Bodies) -> list[Place]:
     """Where each rigid part of a scene is. Raises ValueError on vertices that do not make one."""
     found: list[Place] = []
     of_part: dict[int, int] = {}
@@ -149,7 +155,7 @@ def _place(
     return Place(vertices, slice(first, first + 10), points, center, axes, length, np.zeros((0, 3)))
 
 
-def check_rigid(scene, given: np.ndarray, settled: np.ndarray, name: str, size: float) -> None:
+def check_rigid(scene: Scene, given: np.ndarray, settled: np.ndarray, name: str, size: float) -> None:
     """Raises ValueError where rows of the vertices (n_v, 3) bend a rigid part. size: what counts as all of it."""
     for k, place in enumerate(scene._rigid):
         off = np.linalg.norm(given[place.vertices] - settled[place.vertices], axis=1)
@@ -163,7 +169,7 @@ def check_rigid(scene, given: np.ndarray, settled: np.ndarray, name: str, size: 
 _BENT = 1e-3
 
 
-def own_velocities(inputs, start, goes_on: bool) -> np.ndarray:
+def own_velocities(inputs: Inputs, start: MotionState, goes_on: bool) -> np.ndarray:
     """(n, 3) m/s: how the points of free rigid parts start, ten of each; those of surfaces follow them, and are zero here.
     goes_on: start is a motion, which knows it.
 
@@ -198,7 +204,7 @@ def _not_from(start, what: str) -> ValueError:
     )
 
 
-def check_joints(inputs, points: np.ndarray) -> None:
+def check_joints(inputs: Inputs, points: np.ndarray) -> None:
     """Raises ValueError where a motion goes on from points (n, 3) m whose joints had other origins or axes.
 
     points: as the core has them, those of rigid parts last.

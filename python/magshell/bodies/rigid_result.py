@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .rigid import Rigid
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Computed, SolveResult
 
 
 class RigidResult:
@@ -14,7 +19,9 @@ class RigidResult:
         that stays the same one where a solve has another center.
     """
 
-    def __init__(self, result, part: Rigid):
+    body: Rigid
+
+    def __init__(self, result: SolveResult, part: Rigid):
         scene = result.scene
         k = scene._bodies.rigid_number(part)
         self._result, self.body = result, part
@@ -22,29 +29,29 @@ class RigidResult:
         self._offsets = self._place.rest[:4] - self._place.center
 
     @property
-    def positions(self):
+    def positions(self) -> Computed:
         """(..., k, 3) m, of its vertices, in their order. Raises ValueError for a free body, which has none."""
         if not len(self._place.vertices):
             raise ValueError("a free Rigid has no vertices: ask for its center and rotation")
         return self._result.positions[..., self._place.vertices, :]
 
     @property
-    def rotation(self):
+    def rotation(self) -> Computed:
         """Rotation vector, rad: (3,), or (n, 3) of a motion."""
         return self._turned(self._result._own_points[..., self._rows, :])
 
     @property
-    def center(self):
+    def center(self) -> Computed:
         """m: (3,), or (n, 3) of a motion."""
         return self._result._own_points[..., self._rows, :].mean(-2)
 
     @property
-    def velocity(self):
+    def velocity(self) -> Computed:
         """(n, 3) m/s, of the center, of a motion."""
         return self._result._own_velocities[..., self._rows, :].mean(-2)
 
     @property
-    def angular_velocity(self):
+    def angular_velocity(self) -> Computed:
         """(n, 3) rad/s, in the world's axes, of a motion."""
         velocities = self._result._own_velocities[..., self._rows, :]
         corners = self._result._own_points[..., self._rows, :]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from ..mesh.six_node_integrals import shape_integrals, shape_products
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from .growth import Growth
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+    from ..scene.values import Gradient, Values
 
 BENDING = ("midedge", "midedge2", "hinge")
 # Of an element's mass at its nodes, in proportion to the diagonal of its mass matrix where it is flat (Hinton, Rock,
@@ -67,6 +72,9 @@ class Shell(Owner):
     Shell(40 faces, thickness 0.001 m, young_modulus 100000 Pa, poisson_ratio 0.5, bending midedge)
     """
 
+    growth: np.ndarray | None
+    rest_curvature: np.ndarray | None
+
     _replaceable = (
         "thickness",
         "young_modulus",
@@ -84,41 +92,43 @@ class Shell(Owner):
         self,
         mesh: TriangleMesh | SixNodeMesh,
         *,
-        thickness,
-        young_modulus,
-        poisson_ratio=0.5,
-        mass_density=None,
-        curvature_scale=1.0,
+        thickness: Numbers,
+        young_modulus: Numbers,
+        poisson_ratio: Numbers = 0.5,
+        mass_density: Numbers | None = None,
+        curvature_scale: Numbers = 1.0,
         bending: str | None = None,
-        remanent_magnetization=None,
-        growth=None,
-        rest_curvature=None,
+        remanent_magnetization: Numbers | None = None,
+        growth: Numbers | None = None,
+        rest_curvature: Numbers | None = None,
     ):
         if not isinstance(mesh, TriangleMesh | SixNodeMesh):
             raise ValueError(f"mesh must be a TriangleMesh or a SixNodeMesh, got {type(mesh).__name__}")
         self.mesh = mesh
-        self.bending = _checked_bending(bending, mesh)
+        self.bending: str = _checked_bending(bending, mesh)
         faces = ("n_f" if mesh.order == 1 else "n", mesh.n_elements)
-        self.thickness = _positive("thickness", "m", thickness, faces)
-        self.young_modulus = _positive("young_modulus", "Pa", young_modulus, faces)
-        self.poisson_ratio = _property("poisson_ratio", "1", poisson_ratio, faces)
+        self.thickness: np.ndarray = _positive("thickness", "m", thickness, faces)
+        self.young_modulus: np.ndarray = _positive("young_modulus", "Pa", young_modulus, faces)
+        self.poisson_ratio: np.ndarray = _property("poisson_ratio", "1", poisson_ratio, faces)
         _refuse(
             "poisson_ratio [1]",
             "in (-1, 1/2]",
             self.poisson_ratio,
             (self.poisson_ratio <= -1) | (self.poisson_ratio > 0.5),
         )
-        self.mass_density = (
+        self.mass_density: np.ndarray | None = (
             None if mass_density is None else _positive("mass_density", "kg/m3", mass_density, faces)
         )
-        self.curvature_scale = _positive("curvature_scale", "1", curvature_scale, ("n_e", mesh.n_edges))
+        self.curvature_scale: np.ndarray = _positive(
+            "curvature_scale", "1", curvature_scale, ("n_e", mesh.n_edges)
+        )
         if mesh.order == 2:
             if (self.curvature_scale != 1.0).any():
                 raise ValueError(
                     'curvature_scale [1] must be 1 with bending="midedge2": make the thickness or the modulus another'
                 )
             self._replaceable = tuple(name for name in self._replaceable if name != "curvature_scale")
-        self.remanent_magnetization = (
+        self.remanent_magnetization: np.ndarray | None = (
             None
             if remanent_magnetization is None
             else magnetization_of(
@@ -134,7 +144,7 @@ class Shell(Owner):
         self._replaceable = tuple(name for name in self._replaceable if name not in absent)
         self._in_time = tuple(name for name in type(self)._in_time if name not in absent)
 
-    def replaced(self, **values) -> Shell:
+    def replaced(self, **values: Any) -> Shell:
         """The same sheet with other properties."""
         properties = {name: getattr(self, name) for name in self._replaceable}
         grown = {
@@ -144,13 +154,13 @@ class Shell(Owner):
         }
         return Shell(self.mesh, bending=self.bending, **{**properties, **values, **grown})
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         for name in self._stiffnesses:
             numbers[label, name] = getattr(self, name)
         if self.remanent_magnetization is not None:  # else a solve brings it
             numbers[label, "remanent_magnetization"] = self.remanent_magnetization
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
         """With what its values do to the masses of the vertices, and to what contacts make of the thickness."""
         found = {name: gradient.value(label, name) for name in self._stiffnesses}
         if gradient.has(label, "remanent_magnetization"):
@@ -203,7 +213,7 @@ class Shell(Owner):
         """Of a value over time. Raises ValueError."""
         self._growth.check(name, rows)
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[Any, Any]:
         """What a copy is made from: not what was looked up meanwhile."""
         return {name: value for name, value in vars(self).items() if name != "quality"}
 
@@ -306,7 +316,7 @@ def _checked_bending(bending, mesh) -> str:
     return bending
 
 
-def magnetization_of(given, count: int, rows: str = "(n_f, 3)") -> np.ndarray:
+def magnetization_of(given: Numbers, count: int, rows: str = "(n_f, 3)") -> np.ndarray:
     """One row for each of `count`, of one vector for all or one each."""
     given = real_numbers("remanent_magnetization [A/m]", given)
     if given.shape not in ((3,), (count, 3)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,8 @@ from .joints import Closure
 from .rigid import Rigid
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import FilePath, Numbers
+    from .link import Link
 
 
 class Skeleton:
@@ -38,7 +40,7 @@ class Skeleton:
     True
     """
 
-    def __init__(self, links, joints=()):
+    def __init__(self, links: Link | Iterable[Link], joints: Joint | Iterable[Joint] = ()):
         self.links: tuple[Rigid, ...] = checked_list("links", links, (Rigid,))
         self.joints: tuple[Joint, ...] = checked_list("joints", joints, (Joint,))
         if not self.links:
@@ -56,7 +58,7 @@ class Skeleton:
     @classmethod
     def from_urdf(
         cls,
-        path,
+        path: FilePath,
         *,
         fixed_base: bool = True,
         limits: bool = True,

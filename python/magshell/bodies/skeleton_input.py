@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,8 +11,11 @@ from .joint import Joint
 from .joints import Closure
 from .skeleton import Skeleton
 
+if TYPE_CHECKING:
+    from .bodies import Bodies
 
-def skeleton_inputs(bodies, labels: list[tuple[object, str]]) -> dict[str, list[dict[Any, Any]]]:
+
+def skeleton_inputs(bodies: Bodies, labels: list[tuple[object, str]]) -> dict[str, list[dict[Any, Any]]]:
     """Of a scene's Bodies. labels: the core's name of every object."""
     part = {id(link): k for k, link in enumerate(bodies.rigid)}
     label = {id(item): name for item, name in labels if isinstance(item, Joint)}
@@ -59,7 +63,7 @@ def _joint(joint: Joint | None, place: dict[int, int]) -> dict[Any, Any]:
     }
 
 
-def motor_rows(skeletons, joint: Joint) -> int | slice:
+def motor_rows(skeletons: Sequence[Skeleton], joint: Joint) -> int | slice:
     """Where the numbers of a joint's motor stand among those of all, in the core's order: one, or of a Ball three."""
     leading = [skeleton.joint_to(link) for skeleton in skeletons for link in skeleton.in_order]
     first = 0

@@ -65,7 +65,9 @@ class Skin(Owner):
         self.remanent_magnetization = None
         if remanent_magnetization is not None:
             given = real_numbers("remanent_magnetization [A/m]", remanent_magnetization)
-            self.remanent_magnetization = quantity("remanent_magnetization", "A/m", given, given.shape)
+            self.remanent_magnetization: np.ndarray | None = quantity(
+                "remanent_magnetization", "A/m", given, given.shape
+            )
         if self.faces is not None and self.faces.dtype != bool:
             self._check_rows(len(self.faces))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from .materials import Projective, SolidMaterial
 from .mean_volume import warn_of_mean_volume
 from .shell import magnetization_of
 from .skin import Skin
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+    from ..scene.values import Gradient, Values
 
 ELEMENTS = ("quadratic", "linear")
 
@@ -56,11 +61,11 @@ class Solid(Owner):
         mesh: TetMesh,
         *,
         material: SolidMaterial,
-        mass_density=None,
+        mass_density: Numbers | None = None,
         element: str = "quadratic",
         mean_volume: bool | None = None,
         skin: Skin | None = None,
-        remanent_magnetization=None,
+        remanent_magnetization: Numbers | None = None,
     ):
         if not isinstance(mesh, TetMesh):
             raise ValueError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
@@ -76,19 +81,19 @@ class Solid(Owner):
             raise ValueError(
                 "mean_volume is not for Projective: no part of its energy depends on the volume alone"
             )
-        self.mesh = mesh.second_order() if element == "quadratic" else mesh.first_order()
+        self.mesh: TetMesh = mesh.second_order() if element == "quadratic" else mesh.first_order()
         self.element = element
         for name in material.names:
             material.rows(name, self.mesh.n_tetrahedra)
         self.material = material
-        self.mean_volume = (
+        self.mean_volume: bool = (
             element == "quadratic" and material.nearly_incompressible if mean_volume is None else mean_volume
         )
-        self.mass_density = None if mass_density is None else self._density(mass_density)
+        self.mass_density: np.ndarray | None = None if mass_density is None else self._density(mass_density)
         if skin is not None and not isinstance(skin, Skin):
             raise ValueError(f"skin must be a Skin, got {skin!r:.60}")
-        self.skin = None if skin is None else skin._on(mesh, self.mesh)
-        self.remanent_magnetization = self._magnetization(remanent_magnetization)
+        self.skin: Skin | None = None if skin is None else skin._on(mesh, self.mesh)
+        self.remanent_magnetization: np.ndarray | None = self._magnetization(remanent_magnetization)
         if self.mean_volume:
             warn_of_mean_volume(self.mesh, material.isochoric)
 
@@ -130,7 +135,7 @@ class Solid(Owner):
             raise ValueError(f"mass_density [kg/m3] must be positive, but entry {index} is {array[index]:g}")
         return array
 
-    def replaced(self, **values) -> Solid:
+    def replaced(self, **values: Any) -> Solid:
         """The same solid with other values: those of its material, and the mass density."""
         other = copy(self)  # not made anew, which would warn anew
         if "mass_density" in values:
@@ -143,7 +148,7 @@ class Solid(Owner):
             other.material.rows(name, self.mesh.n_tetrahedra)
         return other
 
-    def _core_input(self, owner: str, vertices: np.ndarray) -> dict:
+    def _core_input(self, owner: str, vertices: np.ndarray) -> dict[Any, Any]:
         """As the core takes it. vertices: the scene's, (n_v,)."""
         return {
             "owner": owner,
@@ -157,14 +162,14 @@ class Solid(Owner):
             "magnetic": self.remanent_magnetization is not None,
         }
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         for name in self.material.names:
             rows = self.material.rows(name, self.mesh.n_tetrahedra)
             numbers[label, name] = _unit(rows) if name == "fibres" else rows
         if self.remanent_magnetization is not None:
             numbers[label, "remanent_magnetization"] = self.remanent_magnetization
 
-    def gradients(self, label: str, values, gradient) -> dict[str, np.ndarray]:
+    def gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
         """With what its values do to the masses and the weights of the vertices."""
         names = [*self.material.names, "remanent_magnetization"]
         found = {name: gradient.value(label, name) for name in names if gradient.has(label, name)}

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.tensors import detached
 from .body_result import BodyResult
 from .muscle_result import muscles_of
 from .solid_states import SolidStates, states_at
+
+if TYPE_CHECKING:
+    from .._checks.kinds import SolveResult
 
 # Tetrahedra that are looked at unasked, when a result is printed: some 30 ms.
 AFFORDABLE_TETRAHEDRA = 20_000
@@ -40,7 +45,7 @@ class SolidResult(BodyResult):
         return self.strains(index)
 
 
-def told_strains(result, of_sheets) -> str:
+def told_strains(result: SolveResult, of_sheets: str) -> str:
     """For a repr, one line for all sheets and one a solid, of the last state. of_sheets: what is said of the sheets."""
     bodies = result.scene._bodies
     lines = [str(of_sheets)] if bodies.sheets or not bodies.solids else []

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
 from .at_points import mean, von_mises
 from .solid import Solid
+
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
 
 
 class SolidStates(NamedTuple):
@@ -58,7 +61,7 @@ def states_at(values: Any, body: Solid, positions: np.ndarray) -> SolidStates:
         return states_of(scene, body, scene._model.state(np.ascontiguousarray(positions), rotations))
 
 
-def states_of(scene, body: Solid, state: np.ndarray) -> SolidStates:
+def states_of(scene: Scene, body: Solid, state: np.ndarray) -> SolidStates:
     """Of a state of the scene's core, with the values that are in it. Raises ValueError where the body is no solid of the
     scene."""
     for k, each in enumerate(scene._bodies.solids):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..mesh.six_node_mesh import SixNodeMesh
 from ..mesh.triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from ..mesh.mesh_base import MeshBase
 
 
 class Span(NamedTuple):
@@ -45,16 +48,16 @@ class Span(NamedTuple):
         return slice(self.first_row, self.first_row + magnetized_rows(self.mesh))
 
 
-def turning_edges(mesh) -> int:
+def turning_edges(mesh: MeshBase) -> int:
     """How many edges the core has for a mesh: of a solid, none."""
     return mesh.n_edges if isinstance(mesh, TriangleMesh | SixNodeMesh) else 0
 
 
-def rotations_of(mesh) -> int:
+def rotations_of(mesh: MeshBase) -> int:
     """How many rotations it has: one an edge, two where there are six nodes, of a solid none."""
     return turning_edges(mesh) * getattr(mesh, "order", 1)
 
 
-def magnetized_rows(mesh) -> int:
+def magnetized_rows(mesh: MeshBase) -> int:
     """How many rows it has in a magnetization of all bodies: one an element of a sheet, of a solid one a face."""
     return mesh.n_elements if isinstance(mesh, TriangleMesh | SixNodeMesh) else mesh.n_faces

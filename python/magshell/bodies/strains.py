@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,8 @@ from .._machine.callers import callers_level
 from ..errors import LargeStrainWarning
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Numbers, SolveResult
+    from ..scene.scene import Scene
 
 
 SMALL = 0.2  # the largest strain for which St. Venant-Kirchhoff material is of use
@@ -60,7 +62,7 @@ class StrainHistory(NamedTuple):
     bending: np.ndarray
 
     @staticmethod
-    def of(rows) -> StrainHistory:
+    def of(rows: Sequence[Any]) -> StrainHistory:
         """From what the core says of each state."""
         numbers = np.array([(membrane, bending) for membrane, _, bending, _ in rows]).reshape(-1, 2)
         return StrainHistory(numbers[:, 0], numbers[:, 1])
@@ -90,7 +92,7 @@ def is_small(strain: float) -> bool:
     return strain <= SMALL
 
 
-def strains_of(scene, state: np.ndarray, thickness: np.ndarray) -> Strains:
+def strains_of(scene: Scene, state: np.ndarray, thickness: np.ndarray) -> Strains:
     """Of a state of the core. Raises ValueError where the scene has solids only."""
     if scene._bodies.solids and not scene._bodies.sheets:
         raise ValueError("strains() has those of shells, and the scene has none: ask result[solid].strains()")
@@ -98,11 +100,11 @@ def strains_of(scene, state: np.ndarray, thickness: np.ndarray) -> Strains:
     return Strains(rows[:, :2], rows[:, 2:])
 
 
-def largest_of(scene, state: np.ndarray, thickness: np.ndarray) -> Largest:
+def largest_of(scene: Scene, state: np.ndarray, thickness: np.ndarray) -> Largest:
     return StrainHistory.of([scene._model.largest_strains(state, thickness)]).at(0)
 
 
-def warn_if_large(result, largest: Largest, where: str, index: tuple[Any, ...] = ()) -> None:
+def warn_if_large(result: SolveResult, largest: Largest, where: str, index: tuple[Any, ...] = ()) -> None:
     """Says once a scene that a result leaves the model, and again where strains have doubled since: a design that is
     solved a thousand times says it a few times, wherever it goes. index: what result.strains takes."""
     scene, worst = result.scene, max(largest)

@@ -39,6 +39,9 @@ class Tie:
     15
     """
 
+    a: Shell | Solid
+    b: Shell | Solid
+
     def __init__(
         self,
         a: Shell | Solid,

@@ -12,11 +12,11 @@ from .joints import Fixed, Prismatic, Revolute
 from .link import Link
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import FilePath, Numbers
 
 
 def read_urdf(
-    path, *, fixed_base: bool, limits: bool, limit_stiffness: Numbers, limit_smoothing: Numbers
+    path: FilePath, *, fixed_base: bool, limits: bool, limit_stiffness: Numbers, limit_smoothing: Numbers
 ) -> tuple[list[Link], list[Joint], dict[str, Link | Joint]]:
     """Links, joints, and both by their names in the file. See Skeleton.from_urdf."""
     robot = _parsed(Path(path))

@@ -46,7 +46,7 @@ class Trials:
 
     def drawn(
         self, planned, given: Any, first: int, known: int, end: int, lower: Numbers, upper: Numbers, rng
-    ) -> Iterator:
+    ) -> Iterator[Any]:
         """Rows first ... end, each as planned until a random row before `known`, and then something else, every other one
         of them a repetition if enough is known; entries without a spread stay as planned."""
         for number in range(self.number):

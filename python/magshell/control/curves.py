@@ -18,6 +18,8 @@ from .._checks.tensors import require_torch
 from ._arguments import tensor
 
 if TYPE_CHECKING:
+    import torch
+
     from .._checks.kinds import Numbers
 
 
@@ -30,25 +32,25 @@ class Curve(ABC):
     length: float
 
     @abstractmethod
-    def nearest(self, points: Numbers):
+    def nearest(self, points: Numbers) -> torch.Tensor:
         """The point of the curve nearest to each of the points: (n, 3) m to (n, 3) m."""
 
     @abstractmethod
-    def at(self, shares: Numbers):
+    def at(self, shares: Numbers) -> torch.Tensor:
         """Points (n, 3) m of the curve at shares (n,) of its length, from 0, its start, to 1, its end."""
 
-    def squared_distance(self, points: Numbers):
+    def squared_distance(self, points: Numbers) -> torch.Tensor:
         """(n,) m2, of points (n, 3) m from the curve."""
         points = tensor("points", "m", points, ("n", 3))
         return ((points - self.nearest(points)) ** 2).sum(-1)
 
     @property
-    def start(self):
+    def start(self) -> torch.Tensor:
         """(3,) m, where it begins."""
         return self.at([0.0])[0]
 
     @property
-    def end(self):
+    def end(self) -> torch.Tensor:
         """(3,) m, where it ends."""
         return self.at([1.0])[0]
 
@@ -71,16 +73,16 @@ class Polyline(Curve):
         if not lengths.all():
             k = int(np.argmin(lengths))
             raise ValueError(f"points[{k}] and points[{k + 1}] are the same point")
-        self.length = float(lengths.sum())
+        self.length: float = float(lengths.sum())
         self._corners, self._knots = tensor("points", "m", corners, ("k", 3)), _knots(lengths)
 
-    def nearest(self, points: Numbers):
+    def nearest(self, points: Numbers) -> torch.Tensor:
         points = tensor("points", "m", points, ("n", 3))
         begin, along = self._corners[:-1], self._corners.diff(dim=0)
         shares = ((points[:, None] - begin) * along).sum(-1) / (along**2).sum(-1)
         return _nearest_of(points, begin + shares.clamp(0, 1)[..., None] * along)
 
-    def at(self, shares: Numbers):
+    def at(self, shares: Numbers) -> torch.Tensor:
         piece, share = _located(shares, self._knots)
         return self._corners[piece] + share[:, None] * self._corners.diff(dim=0)[piece]
 
@@ -96,7 +98,9 @@ class Arc(Curve):
     tensor([0.0200, 0.0000, 0.0200], dtype=torch.float64)
     """
 
-    def __init__(self, center: Numbers, start, axis: Numbers, angle: float):
+    length: float
+
+    def __init__(self, center: Numbers, start: Numbers, axis: Numbers, angle: float):
         center = quantity("center", "m", center, (3,))
         arm = quantity("start", "m", start, (3,)) - center
         axis = quantity("axis", "1", axis, (3,))
@@ -116,7 +120,7 @@ class Arc(Curve):
         self._center = tensor("center", "m", center, (3,))
         self._plane = tensor("plane", "1", np.stack([outwards, onwards]), (2, 3))
 
-    def nearest(self, points: Numbers):
+    def nearest(self, points: Numbers) -> torch.Tensor:
         torch = require_torch("ms.control.Arc")
         points = tensor("points", "m", points, ("n", 3))
         center, plane = self._center, self._plane
@@ -131,7 +135,7 @@ class Arc(Curve):
         ends = torch.stack([self.start, self.end]).expand(len(points), 2, 3)
         return torch.where((angles <= self._angle)[:, None], on_circle, _nearest_of(points, ends))
 
-    def at(self, shares: Numbers):
+    def at(self, shares: Numbers) -> torch.Tensor:
         angles = _shares(shares)[:, None] * self._angle
         return self._center + self._radius * (angles.cos() * self._plane[0] + angles.sin() * self._plane[1])
 
@@ -148,6 +152,8 @@ class Chain(Curve):
     (tensor([0., 0., 0.], dtype=torch.float64), tensor([1., 1., 0.], dtype=torch.float64))
     """
 
+    length: float
+
     def __init__(self, pieces: Sequence[Curve]):
         self._pieces = list(pieces)
         if not self._pieces or not all(isinstance(piece, Curve) for piece in self._pieces):
@@ -159,12 +165,12 @@ class Chain(Curve):
             if gap > 1e-6 * self.length:
                 raise ValueError(f"pieces[{k}] starts {gap:.3g} m away from the end of the piece before it")
 
-    def nearest(self, points: Numbers):
+    def nearest(self, points: Numbers) -> torch.Tensor:
         torch = require_torch("ms.control.Chain")
         points = tensor("points", "m", points, ("n", 3))
         return _nearest_of(points, torch.stack([piece.nearest(points) for piece in self._pieces], dim=1))
 
-    def at(self, shares: Numbers):
+    def at(self, shares: Numbers) -> torch.Tensor:
         torch = require_torch("ms.control.Chain")
         piece, share = _located(shares, self._knots)
         return _picked(torch.stack([each.at(share) for each in self._pieces], dim=1), piece)

@@ -58,11 +58,11 @@ class Receding:
 def receding(
     objective: Callable[..., Any],
     advance: Callable[..., Any],
-    controls,
+    controls: Numbers,
     *,
     horizon: int,
     stride: int,
-    start=None,
+    start: Any = None,
     lower: Numbers = -np.inf,
     upper: Numbers = np.inf,
     trials: int = 0,

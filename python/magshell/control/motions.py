@@ -6,7 +6,8 @@ A frame is an index into the recorded states, 0 the start, -1 the last. [Chen22]
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,10 +18,12 @@ from ._arguments import indices, tensor
 from .curves import Curve
 
 if TYPE_CHECKING:
+    import torch
+
     from .._checks.kinds import Numbers
 
 
-def frames_at(times: Numbers, wanted):
+def frames_at(times: Numbers, wanted: Numbers) -> Any:
     """The frames at wanted times [s], (k,) or one.
 
     times: (n,) s, of the frames, ascending. Raises ValueError if the nearest frame is further off than half a step.
@@ -43,7 +46,7 @@ def frames_at(times: Numbers, wanted):
     return frames
 
 
-def track(positions: Numbers, vertices: Numbers, weights=None):
+def track(positions: Numbers, vertices: Numbers, weights: Numbers | None = None) -> torch.Tensor:
     """The track (n, 3) m of a vertex, or of the mean of some.
 
     positions: (n, n_v, 3) m. vertices: an index, or (m,). weights: (m,), for example masses; by default equal.
@@ -63,7 +66,13 @@ def track(positions: Numbers, vertices: Numbers, weights=None):
     return (weights[:, None] * chosen).sum(1) / total
 
 
-def key_frames(positions: Numbers, frames, targets, vertices: Numbers | None = None, weights=None):
+def key_frames(
+    positions: Numbers,
+    frames: Numbers,
+    targets: Numbers,
+    vertices: Numbers | None = None,
+    weights: Numbers | None = None,
+) -> torch.Tensor:
     """Sum of squared distances of vertices from their targets at some frames [m2]; [Chen22] (34).
 
     positions: (n, n_v, 3) m. frames: (k,). targets: (k, m, 3) m. vertices: (m,) indices, by default all.
@@ -85,7 +94,7 @@ def key_frames(positions: Numbers, frames, targets, vertices: Numbers | None = N
     return (tensor("weights", "1", weights, tuple(squares.shape)) * squares).sum()
 
 
-def path_following(track, targets, weights=None):
+def path_following(track: Numbers, targets: Numbers, weights: Numbers | None = None) -> torch.Tensor:
     """Sum of squared distances of a track from a target a frame [m2].
 
     track: (n, 3) m. targets: (n, 3) m. weights: (n,), by default 1; 0 where it does not matter.
@@ -102,7 +111,9 @@ def path_following(track, targets, weights=None):
     return (tensor("weights", "1", weights, tuple(squares.shape)) * squares).sum()
 
 
-def successive_targets(targets, begin: Numbers, times: Numbers, delay: float = 0.0):
+def successive_targets(
+    targets: Numbers, begin: Numbers, times: Numbers, delay: float = 0.0
+) -> tuple[torch.Tensor, torch.Tensor]:
     """Targets (n, 3) m and weights (n,), a frame, for `path_following`: each target holds until the next appears, and
     counts once the delay has passed, as in [Chen22] Figure 13.
 
@@ -133,7 +144,7 @@ def _checked_curve(curve) -> Curve:
     return curve
 
 
-def curve_distance(track, curve: Curve, smoothing: float | None = None):
+def curve_distance(track: Numbers, curve: Curve, smoothing: float | None = None) -> torch.Tensor:
     """Sum over the frames of a track of its squared distance from a curve [m2].
 
     track: (n, 3) m. smoothing: m; with it the distances themselves are summed [m], smooth at zero:
@@ -152,13 +163,13 @@ def curve_distance(track, curve: Curve, smoothing: float | None = None):
 
 
 def track_fitting(
-    track,
+    track: Numbers,
     curve: Curve,
     start_frame: int,
     end_frame: int,
-    weights=(1.0, 1.0, 1.0),
+    weights: Sequence[Numbers] = (1.0, 1.0, 1.0),
     smoothing: Numbers | None = None,
-):
+) -> dict[str, torch.Tensor]:
     """The three terms of [Chen22] 6.1, "Track Fitting", for `ms.minimize`: {"start", "end", "curve"}.
 
     The squared distances [m2] from the curve's start at one frame and from its end at another, and `curve_distance` of

@@ -11,10 +11,12 @@ from ._arguments import tensor
 from .signals import oscillation
 
 if TYPE_CHECKING:
+    import torch
+
     from .._checks.kinds import Numbers
 
 
-def field_strength(flux_density: Numbers):
+def field_strength(flux_density: Numbers) -> torch.Tensor:
     """Mean of |B|^2 [T2]. flux_density: (n, 3) T.
 
     >>> import magshell as ms
@@ -26,7 +28,7 @@ def field_strength(flux_density: Numbers):
     return (tensor("flux_density", "T", flux_density, ("n", 3)) ** 2).sum(-1).mean()
 
 
-def field_rate(flux_density: Numbers, time_step: Numbers):
+def field_rate(flux_density: Numbers, time_step: Numbers) -> torch.Tensor:
     """Mean of |dB/dt|^2 [T2/s2], from the differences of neighbours. flux_density: (n, 3) T, n > 1. time_step: s.
 
     >>> import magshell as ms
@@ -41,7 +43,7 @@ def field_rate(flux_density: Numbers, time_step: Numbers):
     return ((flux_density.diff(dim=0) / positive_number("time_step", "s", time_step)) ** 2).sum(-1).mean()
 
 
-def field_excess(flux_density: Numbers, limit: float):
+def field_excess(flux_density: Numbers, limit: float) -> torch.Tensor:
     """Mean of sum_i max(|B_i| - limit, 0)^2 [T2]: zero within the limit, with a continuous derivative.
 
     For optimizers without bounds; those of ms.optim hold them exactly. flux_density: (n, 3) T. limit: T.
@@ -56,7 +58,7 @@ def field_excess(flux_density: Numbers, limit: float):
     return ((flux_density.abs() - positive_number("limit", "T", limit)).clamp(min=0) ** 2).sum(-1).mean()
 
 
-def field_cap(flux_density: Numbers, limit: float, sharpness: float | None = None):
+def field_cap(flux_density: Numbers, limit: float, sharpness: float | None = None) -> torch.Tensor:
     """Constraints g <= 0 that keep all components within a limit: (B_i / limit)^2 - 1.
 
     For MMA and GCMMA, with fields that are not bounded by their parameters: Fourier series. flux_density: (n, 3) T.
@@ -79,7 +81,7 @@ def dmp(
     angular_frequencies: Numbers,
     cosine_amplitudes: Numbers,
     sine_amplitudes: Numbers,
-):
+) -> torch.Tensor:
     """How far a field is from a sum of a few oscillations: the regulariser of [Chen22] 6.3, there after Pan and Manocha
     2018. It draws a field to a low-frequency one; all its arguments may be optimized. The mean over the times [T2] of
 

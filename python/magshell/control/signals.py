@@ -20,10 +20,12 @@ from ..methods.clock import Clock, clock_of
 from ._arguments import tensor
 
 if TYPE_CHECKING:
+    import torch
+
     from .._checks.kinds import Numbers
 
 
-def step_times(steps: int, time_step: Numbers, start: Trajectory | MotionState | None = None):
+def step_times(steps: int, time_step: Numbers, start: Trajectory | MotionState | None = None) -> torch.Tensor:
     """The times of the ends of all steps, the start first: (steps + 1,) s.
 
     time_step: s. start: the motion that goes on with these steps, and whose times do; by default they begin at 0.
@@ -42,7 +44,7 @@ def step_times(steps: int, time_step: Numbers, start: Trajectory | MotionState |
     return clock.moment(torch.arange(steps + 1, dtype=torch.float64), 0.0, time_step)
 
 
-def held(values: Any, steps: int):
+def held(values: Any, steps: int) -> torch.Tensor:
     """A value a step, (steps, 3) T, from fewer: each is held equally long, to within one step.
 
     values: (k, 3) T, k <= steps. Bounds of the values are bounds of the field.
@@ -57,7 +59,7 @@ def held(values: Any, steps: int):
     return values[np.arange(steps) * len(values) // steps]
 
 
-def harmonics(number: int, duration: Numbers):
+def harmonics(number: int, duration: Numbers) -> torch.Tensor:
     """The angular frequencies 2 pi j / duration, j = 1 ... number: (number,) rad/s. duration: s.
 
     >>> import magshell as ms
@@ -72,7 +74,7 @@ def harmonics(number: int, duration: Numbers):
 
 def oscillation(
     times: Numbers, angular_frequencies: Numbers, cosine_amplitudes: Numbers, sine_amplitudes: Numbers
-):
+) -> torch.Tensor:
     """sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), with alpha and beta both (J,) or both (J, 3) [T]; as `fourier`."""
     frequencies = tensor("angular_frequencies", "rad/s", angular_frequencies, ("J",))
     one = len(shape_of("cosine_amplitudes [T]", cosine_amplitudes)) == 1
@@ -89,7 +91,7 @@ def fourier(
     cosine_amplitudes: Numbers,
     sine_amplitudes: Numbers,
     mean: Numbers = (0.0, 0.0, 0.0),
-):
+) -> torch.Tensor:
     """B(t) = mean + sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), T.
 
     times: (n,) or one, s. angular_frequencies w: (J,) rad/s. cosine_amplitudes alpha, sine_amplitudes beta: (J, 3) T.
@@ -106,7 +108,9 @@ def fourier(
     return tensor("mean", "T", mean, (3,)) + signal
 
 
-def fit_fourier(values: Any, times: Numbers, angular_frequencies: Numbers):
+def fit_fourier(
+    values: Any, times: Numbers, angular_frequencies: Numbers
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """The mean (3,) T and amplitudes (J, 3), (J, 3) T whose `fourier` is nearest to a series in the least squares.
 
     values: (n, 3) T at times (n,) s. angular_frequencies: (J,) rad/s, positive. Raises ValueError where the series does
@@ -136,7 +140,9 @@ def fit_fourier(values: Any, times: Numbers, angular_frequencies: Numbers):
     return torch.tensor(mean[0]), torch.tensor(cosines), torch.tensor(sines)
 
 
-def rotating(times: Numbers, magnitude: Numbers, axis: Numbers, angular_frequency: Numbers, start):
+def rotating(
+    times: Numbers, magnitude: Numbers, axis: Numbers, angular_frequency: Numbers, start: Numbers
+) -> torch.Tensor:
     """A field of given magnitude that turns about an axis, perpendicular to it, T.
 
     times: (n,) or one, s. magnitude: T, a number or, as times, one a time. axis: (3,), of any length but zero; seen
@@ -166,6 +172,6 @@ def rotating(times: Numbers, magnitude: Numbers, axis: Numbers, angular_frequenc
     return magnitude[..., None] * (angle.cos() * first + angle.sin() * torch.linalg.cross(axis, first))
 
 
-def at_times(times: Numbers):
+def at_times(times: Numbers) -> torch.Tensor:
     """One time or a row of them, s."""
     return tensor("times", "s", times, ("n",) if shape_of("times [s]", times) else ())

@@ -13,12 +13,14 @@ from ._arguments import tensor
 from .signals import at_times
 
 if TYPE_CHECKING:
+    import torch
+
     from .._checks.kinds import Numbers
 
 
 def spline(
     times: Numbers, control_points: Numbers, duration: Numbers, degree: int = 3, periodic: bool = False
-):
+) -> torch.Tensor:
     """B(t) = sum_i N_i(t) P_i, T, with the B-splines N_i of a degree on evenly spaced knots; C2 for cubic ones.
 
     The N_i are not negative and their sum is 1, so each component stays within the bounds of the control points', and
@@ -35,7 +37,9 @@ def spline(
     return spline_weights(times, len(control_points), duration, degree, periodic) @ control_points
 
 
-def spline_weights(times: Numbers, number: int, duration: Numbers, degree: int = 3, periodic: bool = False):
+def spline_weights(
+    times: Numbers, number: int, duration: Numbers, degree: int = 3, periodic: bool = False
+) -> torch.Tensor:
     """The weights N_i(t) of the control points: (n, number), or (number,) at one time. Arguments as in `spline`."""
     torch = require_torch("ms.control.spline")
     degree = count("degree", degree)
@@ -61,7 +65,7 @@ def fit_spline(
     degree: int = 3,
     periodic: bool = False,
     limit: float | None = None,
-):
+) -> torch.Tensor:
     """The control points (number, 3) T whose spline is nearest to a series in the least squares.
 
     values: (n, 3) T at times (n,) s. limit: T, that no component of a control point may exceed; by default none. Raises

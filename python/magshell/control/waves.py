@@ -11,6 +11,8 @@ from ._arguments import tensor
 from .signals import at_times
 
 if TYPE_CHECKING:
+    import torch
+
     from .._checks.kinds import Numbers
 
 
@@ -19,7 +21,7 @@ _STEEP = 4.0  # the exponent of a pulse: exp(-4) a width from its middle
 
 def wave(
     times: Numbers,
-    places,
+    places: Numbers,
     *,
     speed: Numbers,
     wavelength: Numbers,
@@ -27,7 +29,7 @@ def wave(
     mean: Numbers = 0.5,
     delay: Numbers = 0.0,
     ramp: Numbers | None = None,
-):
+) -> torch.Tensor:
     """A harmonic wave along a muscle, of one activation a segment:
 
         a(s, t) = R(t) (mean + amplitude sin(2 pi (speed (t - delay) - s) / wavelength)).
@@ -56,14 +58,14 @@ def wave(
 
 def pulse(
     times: Numbers,
-    places,
+    places: Numbers,
     *,
     speed: Numbers,
     width: Numbers,
     amplitude: Numbers = 1.0,
     delay: Numbers = 0.0,
     period: Numbers | None = None,
-):
+) -> torch.Tensor:
     """A bump of activation that runs along a muscle:
 
         a(s, t) = amplitude exp(-4 (s - speed (t - delay))^2 / width^2).

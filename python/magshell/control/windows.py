@@ -48,7 +48,7 @@ class Windows:
 
 def in_windows(
     objective: Callable[..., Any],
-    controls,
+    controls: Numbers,
     *,
     lengths: Sequence[int],
     lower: Numbers = -np.inf,

@@ -18,7 +18,7 @@ class Answer:
     constraints: Any
 
     @staticmethod
-    def of(result) -> Answer:
+    def of(result: Any) -> Answer:
         head, *rest = result if isinstance(result, tuple) else (result,)
         terms, constraints = {}, None
         if isinstance(head, dict):

@@ -31,7 +31,7 @@ def load(path: str | Path, parts: Iterable[str]) -> dict[Any, Any]:
     return contents
 
 
-def encoded(value: Any, label: str):
+def encoded(value: Any, label: str) -> Any:
     """A state of tensors, arrays and plain values as what a safe file may hold; anything else is refused."""
     if isinstance(value, dict):
         return {key: encoded(entry, f"{label}[{key!r}]") for key, entry in value.items()}
@@ -51,7 +51,7 @@ def encoded(value: Any, label: str):
     )
 
 
-def decoded(value: Any):
+def decoded(value: Any) -> Any:
     """What was given to `encoded`."""
     if isinstance(value, dict):
         if value.keys() == {_ARRAY}:

@@ -137,7 +137,7 @@ class _Digester:
             *(self._loosely(v) for _, v in used_globals(value)),
         ]
 
-    def _class_parts(self, value: type) -> list[bytes | str]:
+    def _class_parts(self, value: type[Any]) -> list[bytes | str]:
         parts: list[Any] = ["class", _name(value), *map(self.of, value.__bases__)]
         for name, each in sorted(vars(value).items()):
             if name in _NOT_CONTENT:
@@ -179,7 +179,7 @@ def closure(function: types.FunctionType) -> dict[str, object]:
     return held
 
 
-def _is_own_class(value: type) -> bool:
+def _is_own_class(value: type[Any]) -> bool:
     if value.__module__ in sys.builtin_module_names or not value.__flags__ & _HEAP_TYPE:
         return False
     return _is_own(getattr(sys.modules.get(value.__module__), "__file__", None) or "<prompt>")

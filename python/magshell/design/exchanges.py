@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..errors import DesignRejected
@@ -12,7 +14,7 @@ _MEMORY = 0.8  # of the mean curvature, at each trial
 _SAME = 1e-12  # in squares of the strength
 
 
-def exchange(search, count: int) -> float:
+def exchange(search: Any, count: int) -> float:
     """Changes the face that promises most, `count` times, also where the objective rises for a while (a tabu search), and
     leaves the faces at the lowest design seen. Returns its objective.
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from typing import Any
 
 
-def checked_stateful(stateful: Sequence) -> list:
+def checked_stateful(stateful: Sequence[Any]) -> list[Any]:
     for each in stateful:
         for method in ("state_dict", "load_state_dict"):
             if not callable(getattr(each, method, None)):
@@ -16,13 +17,13 @@ def checked_stateful(stateful: Sequence) -> list:
     return list(stateful)
 
 
-def offering(objective: Callable, stateful: Sequence) -> list:
+def offering(objective: Callable[..., Any], stateful: Sequence[Any]) -> list[Any]:
     """Those that have accept_jumps(), each once."""
     return list({id(each): each for each in (objective, *stateful) if hasattr(each, "accept_jumps")}.values())
 
 
 @contextmanager
-def jumps_accepted(offering: Sequence) -> Iterator[None]:
+def jumps_accepted(offering: Sequence[Any]) -> Iterator[None]:
     """Inside, the equilibrium may jump, as far as these offer it."""
     with ExitStack() as stack:
         for each in offering:

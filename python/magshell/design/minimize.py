@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .._checks.tensors import require_torch
 from .._machine.log import log
@@ -18,13 +18,16 @@ from .checkpoint import load, save
 from .minimum import Minimum, Record
 from .run import PARTS, Run
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Optimizing
+
 _TIME_TO_READ = 0.2  # s, between two texts of the progress bar
 
 
 def minimize(
     objective: Callable[..., Any],
     parameters: Sequence[Any],
-    optimizer,
+    optimizer: Optimizing,
     *,
     max_iterations: int = 100,
     tolerance: float = 0.0,

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..ink import Ink
+
+if TYPE_CHECKING:
+    import torch
 
 
 class PrintedFaces:
@@ -13,6 +18,12 @@ class PrintedFaces:
     A face that is free has the axes of the ink and the box around all that can be printed. One that is held has its
     direction as the first axis, and of that only the share is left to find, or nothing where the ink has levels.
     """
+
+    axes: np.ndarray
+    held: np.ndarray
+    lower: np.ndarray
+    shares: np.ndarray
+    upper: np.ndarray
 
     def __init__(self, ink: Ink, remanent_magnetization: np.ndarray):
         count = len(remanent_magnetization)
@@ -35,7 +46,7 @@ class PrintedFaces:
         """(n_f, 3) A/m."""
         return self.ink.strength * np.einsum("fi,fij->fj", self.shares, self.axes)
 
-    def magnetization_of(self, shares):
+    def magnetization_of(self, shares: Any) -> torch.Tensor:
         """(n_f, 3) A/m of other shares, a tensor in their graph."""
         import torch
 
@@ -51,7 +62,7 @@ class PrintedFaces:
         directions, shares = (each[faces] for each in self.ink.choices(self.magnetization))
         self.put(faces, directions, shares)
 
-    def put(self, faces, directions, shares) -> None:
+    def put(self, faces: np.ndarray, directions: np.ndarray, shares: Any) -> None:
         """Gives faces a direction of the ink and a share of its strength, and holds them. All (n,)."""
         self.held[faces] = True
         self.axes[faces] = _with_first(self.ink.rays_of(faces, directions))
@@ -60,11 +71,11 @@ class PrintedFaces:
         if self.ink.levels is None:
             self.lower[faces, 0], self.upper[faces, 0] = 0.0, 1.0
 
-    def kept(self) -> tuple:
+    def kept(self) -> tuple[Any, ...]:
         """What `restore` goes back to."""
         return tuple(each.copy() for each in (self.axes, self.lower, self.upper, self.held, self.shares))
 
-    def restore(self, kept: tuple) -> None:
+    def restore(self, kept: tuple[Any, ...]) -> None:
         self.axes, self.lower, self.upper, self.held, self.shares = (each.copy() for each in kept)
 
 

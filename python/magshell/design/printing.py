@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,12 +25,15 @@ from .minimize import minimize
 from .printable_minimum import PrintableMinimum, PrintableStage
 from .printed_faces import PrintedFaces
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 _LINE_SEARCH = 8  # evaluations: a stage is to go on, not to end at a kink
 
 
 def minimize_printable(
-    objective: Callable,
-    remanent_magnetization,
+    objective: Callable[..., Any],
+    remanent_magnetization: Numbers,
     ink: Ink,
     *,
     max_iterations: int = 40,
@@ -38,7 +42,7 @@ def minimize_printable(
     stage_iterations: int = 15,
     exchanges: int = 60,
     tolerance: float = 1e-3,
-    stateful: Sequence = (),
+    stateful: Sequence[Any] = (),
     progress: bool = True,
 ) -> PrintableMinimum:
     """Minimizes objective(remanent_magnetization) over what an ink can print.
@@ -118,7 +122,9 @@ def minimize_printable(
 class _Search:
     """One search: its faces, and the stages so far."""
 
-    def __init__(self, objective: Callable, faces: PrintedFaces, stateful: list, tolerance: float, bar):
+    def __init__(
+        self, objective: Callable[..., Any], faces: PrintedFaces, stateful: list[Any], tolerance: float, bar
+    ):
         self.objective, self.faces, self.stateful, self.tolerance, self.bar = (
             objective,
             faces,
@@ -196,11 +202,11 @@ class _Search:
         self.back_to(before)
         self.note("exchange", 0.0, reached)
 
-    def kept(self) -> tuple:
+    def kept(self) -> tuple[Any, ...]:
         """A design and the states that objects have at it: the way back to it need not be the way there."""
         return self.faces.kept(), [copy.deepcopy(each.state_dict()) for each in self.stateful]
 
-    def back_to(self, kept: tuple) -> None:
+    def back_to(self, kept: tuple[Any, ...]) -> None:
         self.faces.restore(kept[0])
         for each, state in zip(self.stateful, kept[1], strict=True):
             each.load_state_dict(copy.deepcopy(state))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .answer import Answer
 from .configuration import changes
+
+if TYPE_CHECKING:
+    from .run import Run
 
 _SAME_OBJECTIVE = 1e-6  # of the objective: another thread count or release may round otherwise
 _ROUNDING = 1e-12  # of the largest objective so far: one that has all but vanished is round-off
 
 
-def check_same(run, snapshot: dict[Any, Any]) -> None:
+def check_same(run: Run, snapshot: dict[Any, Any]) -> None:
     """Raises ValueError where parameters, method or options are others than the snapshot's."""
     shapes, now = ([tuple(each.shape) for each in of] for of in (snapshot["parameters"], run.parameters))
     if shapes != now:
@@ -35,7 +38,7 @@ def check_same(run, snapshot: dict[Any, Any]) -> None:
         )
 
 
-def check_objective(run, snapshot: dict[Any, Any]) -> None:
+def check_objective(run: Run, snapshot: dict[Any, Any]) -> None:
     """Evaluates the best design as it was evaluated then, from the same states. Raises ValueError where the objective
     says something else of it now, with parameters and states as they were before."""
     best = snapshot["best"]

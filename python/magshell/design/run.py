@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 from .._checks.arrays import number
 from .._checks.tensors import is_tensor, require_torch
@@ -21,6 +22,11 @@ from .jumps import checked_stateful, jumps_accepted, offering
 from .minimum import Minimum, Record
 from .rejections import conflict, effort_in_words, reason_of, total
 from .resume import check_objective, check_same
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Optimizing
+    from ..optim.any_torch import AnyTorch
+    from ..optim.base import BoxOptimizer
 
 PARTS = (
     "method",
@@ -38,43 +44,50 @@ PARTS = (
 class _Seen:
     """A design that was evaluated, its terms, and the states from which: None where no checkpoint needs them."""
 
-    design: list
+    design: list[Any]
     terms: dict[str, float]
-    states: list | None = None
+    states: list[Any] | None = None
 
 
 class Run:
     """One minimization, an iteration at a time. Arguments as in `ms.minimize`; cross: whether jumps are crossed;
     checkpointed: whether snapshots will be asked for."""
 
+    feasibility: float
+    objective: Callable[..., Any]
+
     def __init__(
         self,
-        objective: Callable,
-        parameters: Sequence,
-        optimizer,
+        objective: Callable[..., Any],
+        parameters: Sequence[Any],
+        optimizer: Optimizing,
         feasibility: float,
-        stateful: Sequence,
+        stateful: Sequence[Any],
         cross: bool,
         checkpointed: bool,
     ):
         if not callable(objective):
             raise ValueError(f"objective must be a function of the parameters, got {objective!r:.60}")
-        self.parameters = _checked_parameters(parameters)
-        self.optimizer = _driven(optimizer(self.parameters) if callable(optimizer) else optimizer)
+        self.parameters: list[Any] = _checked_parameters(parameters)
+        self.optimizer: BoxOptimizer | AnyTorch = _driven(
+            optimizer(self.parameters) if callable(optimizer) else optimizer
+        )
         if {id(p) for p in self.parameters} != {id(p) for p in self.optimizer.parameters}:
             raise ValueError("the optimizer must have been made with the same tensors as `parameters`")
-        self.stateful = checked_stateful(stateful)
+        self.stateful: list[Any] = checked_stateful(stateful)
         self.objective, self.feasibility = objective, number("feasibility", feasibility)
         if not self.feasibility >= 0:
             raise ValueError(f"feasibility must not be negative, got {feasibility}")
         self.history: list[Record] = []
-        self.best: dict | None = None
+        self.best: dict[str, Any] | None = None
         self._offering, self._cross, self._checkpointed = (
             offering(objective, self.stateful),
             cross,
             checkpointed,
         )
-        self.configuration = kept({"feasibility": feasibility, **self.optimizer.configuration()})
+        self.configuration: dict[str, Any] = kept(
+            {"feasibility": feasibility, **self.optimizer.configuration()}
+        )
         self._evaluations = 0
         self.rejections: Counter[str] = Counter()  # of the iteration under way
         self.watch: Callable[[], None] = lambda: None  # called after every evaluation
@@ -97,7 +110,7 @@ class Run:
     def iteration(self) -> int:
         return self.history[-1].iteration if self.history else 0
 
-    def closure(self):
+    def closure(self) -> Any:
         self._evaluations += 1
         before = self.states() if self._checkpointed else None
         try:
@@ -146,7 +159,7 @@ class Run:
         told = self._all_rejections, conflict(self.history, self._lost, self._stuck)
         return Minimum(best, self.best["objective"], self.best["violation"], self.history, reason, *told)
 
-    def snapshot(self) -> dict:
+    def snapshot(self) -> dict[Any, Any]:
         return {
             "method": self.method,
             "parameters": self.values(),
@@ -158,7 +171,7 @@ class Run:
             "configuration": self.configuration,
         }
 
-    def restore(self, snapshot: dict) -> None:
+    def restore(self, snapshot: dict[Any, Any]) -> None:
         """Goes on from a snapshot. Raises ValueError where it is of something else, and changes nothing then."""
         check_same(self, snapshot)
         check_objective(self, snapshot)
@@ -218,14 +231,14 @@ class Run:
         """Feasible designs by their objective, before all others by how far they are from it."""
         return (0.0, objective) if violation <= self.feasibility else (violation, objective)
 
-    def values(self) -> list:
+    def values(self) -> list[Any]:
         return [parameter.detach().clone() for parameter in self.parameters]
 
-    def states(self) -> list:
+    def states(self) -> list[Any]:
         """Of the stateful objects, as a checkpoint holds them."""
         return [encoded(each.state_dict(), f"state of {_name(each)}") for each in self.stateful]
 
-    def load_states(self, states: list) -> None:
+    def load_states(self, states: list[Any]) -> None:
         for each, state in zip(self.stateful, states, strict=True):
             each.load_state_dict(decoded(state))
 
@@ -235,7 +248,7 @@ class Run:
         with jumps_accepted(self._offering if accepted else []):
             yield
 
-    def set(self, values: list) -> None:
+    def set(self, values: list[Any]) -> None:
         with require_torch("minimize").no_grad():
             for parameter, value in zip(self.parameters, values, strict=True):
                 parameter.copy_(value)
@@ -256,7 +269,7 @@ def _driven(optimizer):
     )
 
 
-def _checked_parameters(parameters) -> list:
+def _checked_parameters(parameters) -> list[Any]:
     parameters = [parameters] if is_tensor(parameters) else list(parameters)
     if not parameters:
         raise ValueError("there are no parameters to optimize")

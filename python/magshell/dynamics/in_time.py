@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ..surroundings.supports import Support
 from .obstacle_paths import ObstaclePath
 from .supports_in_time import check_supports
 
+if TYPE_CHECKING:
+    from .inputs import MotionInputs
+
 
 class InTime:
     """What of a scene's values changes during one motion.
@@ -23,7 +26,7 @@ class InTime:
     obstacle: its poses at the knots (knots, 4, 3)}. varied: {(actuator, shell or field, name): (knots, ...)}.
     """
 
-    def __init__(self, asked, courses: list[Course]):
+    def __init__(self, asked: MotionInputs, courses: list[Course]):
         self._asked = asked
         self._layout = list(asked.inputs.scene._value_layout)
         self._places: dict[tuple[int, str], list[slice]] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,8 @@ from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from ..methods.keep import Keep
+    from ..scene.courses import Course
 
 
 _CONTROLS = {  # (unit, of one time)
@@ -40,15 +43,23 @@ _CONTROLS = {  # (unit, of one time)
 class MotionInputs:
     """The inputs of one simulation. Adds to the leaves of `inputs` what of them is a tensor with a gradient."""
 
+    inputs: Inputs
+    integrator: Integrator
+    record_every: int
+    steps: int
+    keep: Any
+    memory_budget: int
+    given_time_step: Numbers
+
     def __init__(
         self,
         inputs: Inputs,
         *,
-        steps,
+        steps: int,
         time_step: Numbers,
-        record_every,
-        keep,
-        start,
+        record_every: int,
+        keep: Keep,
+        start: Any,
         velocities: Numbers,
         damping: Numbers,
         stiffness_damping: Numbers,
@@ -56,7 +67,7 @@ class MotionInputs:
         maxwell_time: Numbers,
         integrator: Integrator,
         solver: Newton,
-        courses=(),
+        courses: Iterable[Course] = (),
         **controls: Any,
     ):
         self.inputs, self.integrator = inputs, integrator
@@ -75,7 +86,7 @@ class MotionInputs:
         self._in_time = InTime(self, list(courses))
         if self._outside is not None:
             check_outside(inputs.scene, inputs.values, self._outside, 0.0)
-        self.core = _core.MotionInput(
+        self.core: _core.MotionInput = _core.MotionInput(
             inputs.scene._model,
             {
                 "state": self.start.state,
@@ -139,7 +150,7 @@ class MotionInputs:
         knots = self.at_knots(name, unit, value, row)
         return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
 
-    def at_knots(self, name: str, unit: str, value: Any, row: tuple[int, ...]):
+    def at_knots(self, name: str, unit: str, value: Any, row: tuple[int, ...]) -> Any:
         """A value in time, as in `scheduled`, at all knots: a tensor in its graph if it is one."""
         time_step = self.given_time_step
         knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)

@@ -15,6 +15,7 @@ from .schedule import scheduled
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from .inputs import MotionInputs
 
 
 class ObstaclePath:
@@ -27,7 +28,7 @@ class ObstaclePath:
     order, as the places are. Functions are differentiated over 1e-4 s to fourth order, as an obstacle's motion is.
     """
 
-    def __init__(self, asked, obstacle, courses: dict[str, object]):
+    def __init__(self, asked: MotionInputs, obstacle: Any, courses: dict[str, object]):
         self._clock, self._time_step = asked.clock, asked.given_time_step
         self._given = {
             "center": courses.get("center", obstacle.center),
@@ -79,7 +80,7 @@ class ReadPath:
     rotations: np.ndarray
 
     @classmethod
-    def of(cls, path, recorded: np.ndarray) -> ReadPath:
+    def of(cls, path: ObstaclePath, recorded: np.ndarray) -> ReadPath:
         early = (recorded >= 0) & (recorded < 2 * STEP)  # as `rates` has it
         ahead = recorded[early][:, None] + np.array(list(FORWARD)) * STEP
         around = recorded[~early][:, None] + np.array([0, *CENTRAL]) * STEP
@@ -114,7 +115,7 @@ def _slope(function, time):
     return sum(weight / STEP * each for weight, each in zip(weights.values(), found, strict=True))
 
 
-def spin(xp: ModuleType, vector, rate: Numbers):
+def spin(xp: ModuleType, vector: Any, rate: Numbers) -> Any:
     """J(w) dw/dt (n, 3), J the left Jacobian of rotations: how fast R(w) turns, in world axes, as w changes."""
     square = (vector * vector).sum(-1)[:, None]
     small = square < 1e-4  # where the closed forms cancel, and have no derivative at zero
@@ -139,7 +140,7 @@ def _cross(xp: ModuleType, a, b):
     )
 
 
-def alike(values: Any):
+def alike(values: Any) -> tuple[ModuleType, Any]:
     """numpy or torch, and the values as arrays or tensors of it, float64: tensors if one of them is."""
     if any(is_tensor(each) for each in _flat(values)):
         torch = require_torch("a path")

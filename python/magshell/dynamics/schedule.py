@@ -23,7 +23,7 @@ def scheduled(
     times: tuple[float, ...],
     clock: Clock,
     time_step: Numbers,
-):
+) -> Any:
     """The values at all (steps, stages + 1) knots, in one row after another: (steps (stages + 1), *row).
 
     value: constant, row; one a step, (steps, *row); at the ends of the steps, (steps + 1, *row), with straight lines

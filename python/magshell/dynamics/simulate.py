@@ -31,6 +31,7 @@ from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
     from .._checks.kinds import InTime, Numbers
+    from ..statics.equilibrium import Equilibrium
 
 
 @grouped(solver=MixedNewton, keep=Keep)
@@ -50,7 +51,7 @@ def simulate(
     stiffness_damping: Any = 0.0,
     maxwell_modulus: Any = 0.0,
     maxwell_time: InTime | None = None,
-    start=None,
+    start: Numbers | Equilibrium | Trajectory | MotionState | None = None,
     velocities: InTime | None = None,
     thickness: InTime | None = None,
     young_modulus: InTime | None = None,

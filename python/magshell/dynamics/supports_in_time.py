@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._checks.tensors import detached
 from ..surroundings import constraints
 
+if TYPE_CHECKING:
+    from .inputs import MotionInputs
 
-def check_supports(asked, courses: list[Any]) -> None:
+
+def check_supports(asked: MotionInputs, courses: list[Any]) -> None:
     """Raises ValueError where a support is moved, at the end of a step, against another that holds the same vertex.
 
     courses: (course, its value at all knots) of supports.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import near_kinks
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane
 from .obstacle_paths import ObstaclePath, ReadPath
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Computed
 
 
 @dataclass(frozen=True)
@@ -182,7 +185,7 @@ class Trajectory:
         return result_of(self, body)
 
     @property
-    def displacements(self):
+    def displacements(self) -> Computed:
         """(n, n_v, 3) m, from the rest shape."""
         rest = self.scene.mesh.rest_positions
         if isinstance(self.positions, np.ndarray):

@@ -12,6 +12,7 @@ from ..scene.courses import changes_at_once, names_in_time, row_in_time
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from ..scene.scene import Scene
 
 
 class Actuator:
@@ -32,6 +33,11 @@ class Actuator:
     >>> ms.envs.Actuator(hinge, "torque", lower=-2.0, upper=2.0)
     Actuator(torque of Revolute, 1 number from -2 to 2)
     """
+
+    name: str
+    owner: Any
+    lower: np.ndarray
+    upper: np.ndarray
 
     def __init__(self, owner: Any, name: str, *, lower: Numbers, upper: Numbers):
         self.owner, self.name = owner, name
@@ -85,7 +91,7 @@ class Actuator:
         """As its owner has it, or None."""
         return getattr(getattr(self.owner, "_move", self.owner), self.name, None)
 
-    def check_in(self, scene) -> None:
+    def check_in(self, scene: Scene) -> None:
         """Raises ValueError unless its owner is the scene or among its objects."""
         if not any(self.owner is each for each in (scene, *scene.objects)):
             raise ValueError(f"{self!r} is about something that is neither the scene nor one of its objects")

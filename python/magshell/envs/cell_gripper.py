@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ..surroundings.cells import Cells
 from ..surroundings.contact import Contact
 from ..surroundings.supports import Pin
 from .robot import Robot
+
+if TYPE_CHECKING:
+    import torch
 
 CUBE = 0.085  # m: of these it is built; with the ball 1.1 x 1.6 x 1.1 m, [Qiao21]'s is 1.1 x 1.5 x 1.1
 LEVELS = 14  # of an arm, a cell in each: 56 in all
@@ -42,21 +45,27 @@ class CellGripper(Robot):
     the speed of the drone along three axes, up to SPEED.
     """
 
-    numbers, steps, time_step, target = 4 * LEVELS + 3, STEPS, TIME_STEP, TARGET
-    keep = "factors"  # of 50 steps
+    arms: Solid
+    ball: Solid
+
+    numbers: int = 4 * LEVELS + 3
+    steps: int = STEPS
+    time_step: float = TIME_STEP
+    target: tuple[float, float, float] = TARGET
+    keep: str = "factors"  # of 50 steps
 
     def __init__(
         self, levels: int = LEVELS, ball_cells: int = BALL_CELLS, friction_coefficient: float = FRICTION
     ):
         mesh, groups = gripper_mesh(levels)
-        self.numbers = 4 * levels + 3
+        self.numbers: int = 4 * levels + 3
         material = NeoHookean(young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO)
         round_mesh = meshes.ball(RADIUS, cells=ball_cells)
         self.arms, self.ball = (
             Solid(each, material=material, mass_density=mass / each.volumes.sum(), element="linear")
             for each, mass in ((mesh, MASS), (round_mesh, BALL_MASS))
         )
-        self.traveller = self.ball
+        self.traveller: Solid = self.ball
         self.cells: Cells = Cells(self.arms, groups, stiffness=STIFFNESS)
         top = mesh.rest_positions[:, 1].max()
         plate = mesh.vertices_where(lambda x: x[:, 1] > top - 1e-6)
@@ -66,7 +75,7 @@ class CellGripper(Robot):
         self.ends: np.ndarray = np.array([tips[side == k] for k in range(4)])
         table = obstacles.Plane(center=(0, -RADIUS, 0), normal=(0, 1, 0))
         self.grip: BodyContact = BodyContact(self.arms, self.ball, friction_coefficient=friction_coefficient)
-        self.scene = Scene(
+        self.scene: Scene = Scene(
             [self.arms, self.ball],
             supports=[self.drone],
             actuators=[self.cells],
@@ -75,7 +84,7 @@ class CellGripper(Robot):
             allow_rigid_motions=True,
         )
 
-    def values(self, controls) -> dict[Any, Any]:
+    def values(self, controls: torch.Tensor | np.ndarray) -> dict[Any, Any]:
         """controls: (steps, 59)."""
         ago = np.subtract.outer(np.arange(len(controls)), np.arange(len(controls)))
         filling = np.where(ago >= 0, RESPONSE * (1.0 - RESPONSE) ** np.maximum(ago, 0), 0.0)

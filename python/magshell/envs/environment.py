@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,7 +22,14 @@ from .frames import Camera
 from .library import require_gymnasium
 from .snapshot import Snapshot
 
-gymnasium = require_gymnasium("envs.Environment")
+if TYPE_CHECKING:
+    import gymnasium
+
+    from .._checks.kinds import EnvActuator
+    from ..plotting.view import View
+
+if not TYPE_CHECKING:
+    gymnasium = require_gymnasium("envs.Environment")
 
 _OWN = ("steps", "time_step", "start", "velocities", "values", "record_every", "progress")  # of ms.simulate
 _ROUNDING = 1e-6  # beyond the bounds, of actions that were single precision on their way
@@ -69,11 +76,14 @@ class Environment(gymnasium.Env):
     ([0.0, 0.0], True, False, False, 0.05)
     """
 
+    actuators: tuple[Any, ...]
+    scene: Scene
+
     def __init__(
         self,
         scene: Scene,
         *,
-        actuators,
+        actuators: EnvActuator | Sequence[EnvActuator],
         observation: Callable[[Snapshot], object],
         reward: Callable[[Snapshot], float],
         time_step: float,
@@ -85,7 +95,7 @@ class Environment(gymnasium.Env):
         simulate: dict[Any, Any] | None = None,
         render_mode: str | None = None,
         render_width: int = 480,
-        view=None,
+        view: View | Sequence[float] | str | None = None,
     ):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
@@ -146,7 +156,7 @@ class Environment(gymnasium.Env):
         self._begin({**named_values("what `start` returns", begun), **named_values("options", options)})
         return self._observed(self._now), {"time": 0.0}
 
-    def step(self, action) -> tuple[np.ndarray, float, bool, bool, dict[Any, Any]]:
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[Any, Any]]:
         """One action: (observation, reward, terminated, truncated, info)."""
         if self._now is None:
             raise RuntimeError("reset must be called before the first step of an episode")

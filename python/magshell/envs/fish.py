@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ..bodies.solid import Solid
 from ..scene.scene import Scene
 from .robot import Robot
 from .water import water
+
+if TYPE_CHECKING:
+    import torch
 
 TETRAHEDRA = 3268  # as [Qiao21]'s, of 0.22 x 0.09 x 0.40 m
 YOUNG_MODULUS, POISSON_RATIO, MASS = 2e5, 0.4, 10.0  # Pa, 1, kg
@@ -55,8 +58,14 @@ class Fish(Robot):
     """scene: in water, without gravity. flesh: the Solid. joints: head to front, front to rear, rear to tail, right fin,
     left fin."""
 
-    numbers, steps, time_step, target = len(TORQUES), STEPS, TIME_STEP, TARGET
-    stiffness_damping = 2e-3  # without it some torques make the motion jump
+    flesh: Solid
+    traveller: Solid
+
+    numbers: int = len(TORQUES)
+    steps: int = STEPS
+    time_step: float = TIME_STEP
+    target: tuple[float, float, float] = TARGET
+    stiffness_damping: float = 2e-3  # without it some torques make the motion jump
 
     def __init__(self, n_tetrahedra: int = TETRAHEDRA):
         mesh = meshes.from_distance(body_shape(), n_tetrahedra=n_tetrahedra)
@@ -66,14 +75,14 @@ class Fish(Robot):
         self.links: dict[str, Link] = {
             name: Link(self._near(*bone), body=self.flesh) for name, bone in _BONES.items()
         }
-        self.joints = tuple(
+        self.joints: tuple[Revolute, ...] = tuple(
             Revolute(
                 self.links[child], self.links[parent], origin=place, axis=axis, torque=0.0, damping=damping
             )
             for (child, parent, place, axis), damping in zip(_JOINTS, DAMPING, strict=True)
         )
         skeleton = Skeleton(list(self.links.values()), self.joints)
-        self.scene = Scene([self.flesh, skeleton], water=water(), allow_rigid_motions=True)
+        self.scene: Scene = Scene([self.flesh, skeleton], water=water(), allow_rigid_motions=True)
 
     def _near(self, start, end, distance: float) -> np.ndarray:
         """Vertices that are near a segment."""
@@ -82,7 +91,7 @@ class Fish(Robot):
         share = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
         return np.flatnonzero(np.linalg.norm(points - a - share[:, None] * (b - a), axis=1) < distance)
 
-    def values(self, controls) -> dict[Any, Any]:
+    def values(self, controls: torch.Tensor | np.ndarray) -> dict[Any, Any]:
         """controls: torques over the largest."""
         return {
             joint: {"torque": most * controls[:, k]}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,13 +18,22 @@ from ..states.state import State, states_of
 from ..states.units import length_unit
 from .snapshot import Snapshot
 
+if TYPE_CHECKING:
+    from ..plotting.view import View
+
 _AROUND = 0.5  # of the rest shape's size: how much room is around it in the window
 
 
 class Camera:
     """Paints snapshots. Made with the first; a context of the plotting library is open until `close`."""
 
-    def __init__(self, first: Snapshot, width: int, view, strongest=None):
+    def __init__(
+        self,
+        first: Snapshot,
+        width: int,
+        view: View | Sequence[float] | str | None,
+        strongest: np.ndarray | None = None,
+    ):
         """strongest: (3,) T, the uniform field that its arrow is scaled by."""
         state = _state(first)
         size = size_of([state])

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
 
-def require_gymnasium(what: str):
+if TYPE_CHECKING:
+    from types import ModuleType
+
+
+def require_gymnasium(what: str) -> ModuleType:
     """The gymnasium module. Raises ImportError that says how to get it."""
     try:
         import gymnasium

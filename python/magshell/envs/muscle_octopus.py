@@ -18,6 +18,8 @@ from .robot import Robot
 from .water import water
 
 if TYPE_CHECKING:
+    import torch
+
     from .._checks.kinds import Numbers
 
 
@@ -45,22 +47,28 @@ class MuscleOctopus(Robot):
     half a period later.
     """
 
-    numbers, steps, time_step, target = 2 * LEGS * NUMBERS, STEPS, TIME_STEP, TARGET
-    stiffness_damping = 2e-3
+    flesh: Solid
+    traveller: Solid
+
+    numbers: int = 2 * LEGS * NUMBERS
+    steps: int = STEPS
+    time_step: float = TIME_STEP
+    target: tuple[float, float, float] = TARGET
+    stiffness_damping: float = 2e-3
 
     def __init__(self, cells: int = CELLS):
         mesh, legs, upper = octopus_mesh(cells)
         material = NeoHookean(young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO)
         density = MASS / mesh.volumes.sum()
         self.flesh = self.traveller = Solid(mesh, material=material, mass_density=density, element="linear")
-        self.muscles = tuple(
+        self.muscles: tuple[Muscle, ...] = tuple(
             self._muscle(leg, height, np.flatnonzero((legs == leg) & (upper == above)))
             for leg in range(LEGS)
             for above, height in ((True, 0.75), (False, 0.25))
         )
         ends = around(placed(np.array([(HEAD + LEG, 0.0, 0.5)] * LEGS)), np.arange(LEGS))
         self.tips: Any = np.linalg.norm(mesh.rest_positions - ends[:, None], axis=2).argmin(axis=1)
-        self.scene = Scene(self.flesh, actuators=self.muscles, water=water(), allow_rigid_motions=True)
+        self.scene: Scene = Scene(self.flesh, actuators=self.muscles, water=water(), allow_rigid_motions=True)
 
     def _muscle(self, leg: int, height: float, elements: np.ndarray) -> Muscle:
         outwards = np.linspace(HEAD, HEAD + LEG, 13)
@@ -68,7 +76,7 @@ class MuscleOctopus(Robot):
         fibres = fibres_along(around(placed(flat), leg), self.flesh, reach=REACH, elements=elements)
         return Muscle(self.flesh, fibres, peak_stress=PEAK_STRESS, segments=SEGMENTS)
 
-    def activations(self, controls, times: Numbers):
+    def activations(self, controls: torch.Tensor | np.ndarray, times: Numbers) -> torch.Tensor:
         """(n, 16, SEGMENTS), a tensor. controls: (n, 16, 4), a tensor; times: (n,) s."""
         strength, depth, delay, waves = controls.unbind(-1)
         along = WAVES[0] + (WAVES[1] - WAVES[0]) * 0.5 * (waves + 1.0)
@@ -84,7 +92,7 @@ class MuscleOctopus(Robot):
             delay=(DELAY * delay + later) / FREQUENCY,
         )
 
-    def values(self, controls) -> dict[Any, Any]:
+    def values(self, controls: torch.Tensor | np.ndarray) -> dict[Any, Any]:
         """controls: (steps, 64), of one muscle after another."""
         import torch
 

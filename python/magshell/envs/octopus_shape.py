@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .. import meshes
 from ..mesh.tet_mend import coincident
 from ..mesh.tet_mesh import TetMesh
 from ..mesh.triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 LEGS = 8
 HEAD, LEG = 0.1, 0.5  # m: from the middle to where legs begin; along a leg
@@ -42,7 +47,7 @@ def placed(points: np.ndarray) -> np.ndarray:
     return np.stack([x, across * (1.0 - TAPER * share), y], axis=1)
 
 
-def around(points: np.ndarray, leg) -> np.ndarray:
+def around(points: np.ndarray, leg: Numbers) -> np.ndarray:
     """As `placed` returns them, in the world: y up, the legs around it. leg: of all, or of each."""
     angle = 2.0 * np.pi * leg / LEGS
     outwards, across, up = points.T

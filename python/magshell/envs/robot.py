@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,11 @@ from ..dynamics.trajectory import Trajectory
 from ..methods.integrators import ImplicitEuler
 from ..methods.solvers import MixedNewton
 from ..scene.scene import Scene
+
+if TYPE_CHECKING:
+    import torch
+
+    from .._checks.kinds import Computed, Numbers
 
 
 class Robot:
@@ -34,7 +39,7 @@ class Robot:
     scene: Scene
     traveller: Solid
 
-    def values(self, controls) -> dict[Any, Any]:
+    def values(self, controls: torch.Tensor | np.ndarray) -> dict[Any, Any]:
         """Of the scene's objects over the time of a motion, as ms.simulate takes them."""
         raise TypeError(f"{type(self).__name__} does not say what its controls are")
 
@@ -42,7 +47,7 @@ class Robot:
         """Where a search begins."""
         raise TypeError(f"{type(self).__name__} does not say where a search begins")
 
-    def motion(self, controls, solver: MixedNewton | None = None) -> Trajectory:
+    def motion(self, controls: torch.Tensor | np.ndarray, solver: MixedNewton | None = None) -> Trajectory:
         """From rest, of as many steps as controls has rows."""
         return simulate(
             self.scene,
@@ -62,13 +67,13 @@ class Robot:
         masses = self.traveller.vertex_masses
         return masses / masses.sum()
 
-    def way(self, motion: Trajectory):
+    def way(self, motion: Trajectory) -> Computed:
         """(3,) m, of the center of mass until the end."""
         moved = motion[self.traveller].displacements[-1]
         weights = self.weights if isinstance(moved, np.ndarray) else moved.new_tensor(self.weights)
         return weights @ moved
 
-    def miss(self, motion: Trajectory, target=None):
+    def miss(self, motion: Trajectory, target: Numbers | None = None) -> Computed:
         """How far from the target, (3,) m, the center of mass ends, over the way there. By gradient minimize its square,
         which has no kink at the target."""
         goal = np.array(self.target if target is None else target, dtype=float)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from .library import require_gymnasium
 from .muscle_octopus import CELLS, FREQUENCY, NUMBERS, MuscleOctopus
 from .robot import Robot
 from .steered import Steered
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 __all__ = ["cell_gripper", "fish", "magnetic_strip", "muscle_octopus", "soft_arm"]
 
@@ -109,7 +112,10 @@ def soft_arm(target: float = 0.6, render_mode: str | None = None) -> Environment
 
 
 def fish(
-    n_tetrahedra: int = TETRAHEDRA, target=TARGET, render_mode: str | None = None, disturbed: bool = True
+    n_tetrahedra: int = TETRAHEDRA,
+    target: Numbers = TARGET,
+    render_mode: str | None = None,
+    disturbed: bool = True,
 ) -> Environment:
     """A soft fish with six bones in water; torques in its neck, back, tail and two fins are to take its center of mass to a
     target, (3,) m from where it was. An action lasts 20 ms, an episode 2 s: [Qiao21] Figure 4c. Observed: way and velocity
@@ -136,7 +142,7 @@ def fish(
 
 def muscle_octopus(
     cells: int = CELLS,
-    target=MuscleOctopus.target,
+    target: Numbers = MuscleOctopus.target,
     render_mode: str | None = None,
     disturbed: bool = True,
 ) -> Environment:
@@ -166,7 +172,10 @@ def muscle_octopus(
 
 
 def cell_gripper(
-    target=CellGripper.target, render_mode: str | None = None, disturbed: bool = True, **changes: Any
+    target: Numbers = CellGripper.target,
+    render_mode: str | None = None,
+    disturbed: bool = True,
+    **changes: Any,
 ) -> Environment:
     """Four arms of 56 pneumatic cells under a drone, to grip a ball on a table and to carry it to a target, (3,) m from
     where it was. An action, the volumes of all cells and the speed of the drone, lasts 10 ms, an episode 0.5 s: [Qiao21]

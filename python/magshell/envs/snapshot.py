@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..bodies.of_body import result_of
 from ..dynamics.trajectory import Trajectory
 from ..scene.scene import Scene
+
+if TYPE_CHECKING:
+    from ..bodies.strains import Strains
 
 
 @dataclass(frozen=True)
@@ -73,11 +76,11 @@ class Snapshot:
         """(3,) T, the uniform part."""
         return self.motion.applied_flux_density[self.index]
 
-    def strains(self):
+    def strains(self) -> Strains:
         """The principal strains of every face."""
         return self.motion.strains(self.index)
 
-    def __getitem__(self, item: Any):
+    def __getitem__(self, item: Any) -> Any:
         """What it says of one body, link or joint."""
         return result_of(self, item)
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._checks.arrays import count
 from .._checks.quantity import quantity
 from .actuator import Actuator
+
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
 
 
 class Steered(Actuator):
@@ -64,7 +67,7 @@ class Steered(Actuator):
         first = super().at_start
         return np.stack([first, *(each.at_start for each in self._further)]) if self._several else first
 
-    def check_in(self, scene) -> None:
+    def check_in(self, scene: Scene) -> None:
         super().check_in(scene)
         for each in self._further:
             each.check_in(scene)

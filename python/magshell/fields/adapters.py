@@ -64,7 +64,7 @@ class MagpylibField(AppliedField):
     array([0.     , 0.     , 0.01042])
     """
 
-    def __init__(self, sources, *, length_scale: float) -> None:
+    def __init__(self, sources: Any, *, length_scale: float) -> None:
         magpylib = _import_magpylib()
         self.length_scale: float = positive("length_scale", "m", length_scale)
         listed = list(sources) if isinstance(sources, list | tuple) else [sources]

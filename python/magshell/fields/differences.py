@@ -29,7 +29,9 @@ RELATIVE_STEP = 4e-3
 Function = Callable[[np.ndarray], np.ndarray]
 
 
-def along_lines(f: Function, points: np.ndarray, directions: np.ndarray, step: float):
+def along_lines(
+    f: Function, points: np.ndarray, directions: np.ndarray, step: float
+) -> tuple[np.ndarray, ...]:
     """f at the points (n, ...), and forwards and backwards along each direction (directions, 3, n, ...)."""
     moves = step * np.arange(1, 4)[:, None, None] * directions[:, None, None, :]
     lines = np.stack([points + moves, points - moves])

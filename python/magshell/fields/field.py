@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +17,10 @@ from .regridded import as_they_lie, interpolated
 from .table import read_table
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import FilePath, Numbers
 
 
-def residual_to_remanent(residual_flux_density: Numbers):
+def residual_to_remanent(residual_flux_density: Numbers) -> Any:
     """The remanent magnetization M_r = B_r / mu_0 [A/m] of the residual flux density B_r [T] of a data sheet.
 
     Numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph. Raises ValueError on
@@ -172,7 +172,11 @@ class SampledField(AppliedField):
 
     @classmethod
     def from_function(
-        cls, function: Callable[[np.ndarray], np.ndarray], lower: Numbers, upper: Numbers, counts
+        cls,
+        function: Callable[[np.ndarray], np.ndarray],
+        lower: Numbers,
+        upper: Numbers,
+        counts: Sequence[int],
     ) -> SampledField:
         """Samples a function of points (n, 3) [m] that returns B (n, 3) [T]: a slow field is worth it.
 
@@ -196,12 +200,12 @@ class SampledField(AppliedField):
     @classmethod
     def from_table(
         cls,
-        path,
+        path: FilePath,
         *,
         length_unit: str | None = None,
         flux_density_unit: str | None = None,
-        columns=None,
-        counts=None,
+        columns: Sequence[str | int] | None = None,
+        counts: Sequence[int] | None = None,
         lower: Numbers | None = None,
         upper: Numbers | None = None,
     ) -> SampledField:

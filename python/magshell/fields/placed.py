@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import _core as core
 from .._checks.quantity import quantity
 from .field import AppliedField, UniformField
@@ -47,8 +49,8 @@ class PlacedField(AppliedField):
         if field._core is None:
             raise ValueError("field is an AppliedField without a value: use a CustomField")
         self.field = field
-        self.center = quantity("center", "m", center, (3,))
-        self.rotation = quantity("rotation", "rad", rotation, (3,))
+        self.center: np.ndarray = quantity("center", "m", center, (3,))
+        self.rotation: np.ndarray = quantity("rotation", "rad", rotation, (3,))
         self._replaceable = (*field._replaceable, "center", "rotation")
         self._made_from = {"field": field, "center": self.center, "rotation": self.rotation}
         self._core = core.PlacedField(field._core, self.center, self.rotation)

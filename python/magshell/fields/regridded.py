@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -51,7 +52,9 @@ def as_they_lie(points: np.ndarray, values: np.ndarray) -> Grid | None:
     return Grid(lower, np.array(spacing), rows.reshape(*counts, 3), None)
 
 
-def interpolated(points: np.ndarray, values: np.ndarray, lower: Numbers, upper: Numbers, counts) -> Grid:
+def interpolated(
+    points: np.ndarray, values: np.ndarray, lower: Numbers, upper: Numbers, counts: Sequence[int]
+) -> Grid:
     """On a grid of `counts` between two corners, by cubic functions of the distance to the nearest points.
 
     Raises ValueError where points lie on each other, or where the grid goes beyond them.

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .._checks.kinds import FilePath
 
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6}
 _FLUX_DENSITIES = {"T": 1.0, "mT": 1e-3, "uT": 1e-6, "µT": 1e-6, "μT": 1e-6, "G": 1e-4}
@@ -22,7 +26,9 @@ class Table(NamedTuple):
     flux_density: np.ndarray
 
 
-def read_table(path, length_unit: str | None, flux_density_unit: str | None, columns) -> Table:
+def read_table(
+    path: FilePath, length_unit: str | None, flux_density_unit: str | None, columns: Sequence[str | int]
+) -> Table:
     """The columns x, y, z, Bx, By, Bz of a text file. Raises ValueError as SampledField.from_table says."""
     path = Path(path)
     lines = path.read_text(encoding="utf-8", errors="replace").lstrip("\ufeff").splitlines()

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    from .. import _core
 
-def mode_shapes(model, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+
+def mode_shapes(model: _core.Model, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Displacements (k, n_v, 3), the largest component of each mode 1, and edge rotations (k, n_e) of vectors (n, k)."""
     shapes = [_normalized(model, vector) for vector in vectors.T]
     return (

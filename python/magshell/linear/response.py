@@ -15,7 +15,7 @@ from ..scene.scene import Scene
 from .rest import RestStiffness, forces_at_rest
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Computed, Numbers
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,7 +33,7 @@ class LinearResponse:
     wall_time: float
 
     @property
-    def positions(self):
+    def positions(self) -> Computed:
         """(n_v, 3) m. They mean something as long as the displacements are small."""
         rest = self.scene.mesh.rest_positions
         if isinstance(self.displacements, np.ndarray):

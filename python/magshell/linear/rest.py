@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy
 
@@ -55,7 +57,7 @@ class RestStiffness:
                 "acts: ms.equilibrium, ms.follow and ms.vibration_modes have it"
             )
         self._model = scene._model
-        self.rest = self._model.rest_state()
+        self.rest: np.ndarray = self._model.rest_state()
         refuse_what_acts(inputs)
         *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())
         self._at_rest = self._model.last_gradient
@@ -111,7 +113,7 @@ class RestStiffness:
         return moved + model.expand(self._answer(model.reduce(forces)))
 
 
-def pulling_joints(inputs: Inputs) -> dict:
+def pulling_joints(inputs: Inputs) -> dict[Any, Any]:
     """{joint of the scene: itself without what pulls at rest} of those in which something does."""
     joints = {own: inputs.values.current(own) for own in inputs.scene.joints}
     return {own: joint.resting for own, joint in joints.items() if joint.resting is not joint}

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from .triangle_mesh import TriangleMesh
 
 # Faces that are looked at unasked, when a result is printed or drawn: some 30 ms.
 AFFORDABLE_FACES = 20_000
 
 
-def told(mesh, states: np.ndarray) -> str:
+def told(mesh: TriangleMesh, states: np.ndarray) -> str:
     """In words, of states (n, n_v, 3), m: all of them, or the last, or none, whatever is affordable."""
     count = len(states)
     if not count or mesh.n_faces > AFFORDABLE_FACES:

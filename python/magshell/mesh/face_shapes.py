@@ -6,6 +6,8 @@ shared out over all six nodes.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .six_node_integrals import edge_integrals, shape_integrals
@@ -13,8 +15,11 @@ from .six_node_mesh import SixNodeMesh
 from .tet_mesh import TetMesh
 from .tet_topology import FLAT
 
+if TYPE_CHECKING:
+    from .triangle_mesh import TriangleMesh
 
-def sides(mesh) -> tuple[np.ndarray, int]:
+
+def sides(mesh: TriangleMesh | SixNodeMesh | TetMesh) -> tuple[np.ndarray, int]:
     """The nodes of each side, (n, 3) or (n, 6), and how many of the mesh's faces it is: face f is part f % parts of side
     f // parts."""
     if isinstance(mesh, SixNodeMesh):
@@ -33,7 +38,7 @@ def corner_axes(corners: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normal, first)], axis=1)
 
 
-def shares(mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def shares(mesh: TriangleMesh | SixNodeMesh | TetMesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whose nodes feel what acts on the area at rest of some faces (k,), and how much of it: (k, 3) or (k, 6) vertices,
     and the integrals of their shape functions over the face, m2, likewise."""
     nodes, parts = sides(mesh)
@@ -47,7 +52,9 @@ def shares(mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return nodes, weights
 
 
-def edge_shares(mesh, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def edge_shares(
+    mesh: TriangleMesh | SixNodeMesh | TetMesh, edges: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Likewise along some edges (k,): (k, 2) or (k, 3) vertices, and m."""
     if not isinstance(mesh, SixNodeMesh):
         return mesh.edges[edges], np.repeat(mesh.edge_lengths[edges, None] / 2.0, 2, axis=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,7 +24,7 @@ from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh, checked_mesh
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import FilePath, Numbers
 
 
 _MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
@@ -41,7 +42,7 @@ class Fields(NamedTuple):
 
 
 @grouped()
-def read_mesh(path, drop_unused: bool = False, unit: str = "m") -> TriangleMesh | Any:
+def read_mesh(path: FilePath, drop_unused: bool = False, unit: str = "m") -> TriangleMesh | Any:
     """The mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`): a TetMesh where a VTU or
     MSH file holds tetrahedra, a SixNodeMesh where it holds triangles of six points (gmsh's second order), else a
     TriangleMesh.
@@ -76,7 +77,7 @@ def read_mesh(path, drop_unused: bool = False, unit: str = "m") -> TriangleMesh 
     return mesh if unit == "m" else mesh.scaled(1e-3)
 
 
-def read_fields(path, drop_unused: bool = False) -> Fields | TetFields:
+def read_fields(path: FilePath, drop_unused: bool = False) -> Fields | TetFields:
     """The fields in a file, for the vertices and faces, or tetrahedra, of `read_mesh` with the same arguments.
 
     path, drop_unused: as in `read_mesh`.
@@ -92,12 +93,12 @@ def read_fields(path, drop_unused: bool = False) -> Fields | TetFields:
 
 
 def write_mesh(
-    path,
+    path: FilePath,
     mesh: TriangleMesh | SixNodeMesh | TetMesh,
     positions: Numbers | None = None,
-    vertex_fields=None,
-    face_fields=None,
-    tetrahedron_fields=None,
+    vertex_fields: Mapping[str, Numbers] | None = None,
+    face_fields: Mapping[str, Numbers] | None = None,
+    tetrahedron_fields: Mapping[str, Numbers] | None = None,
 ) -> None:
     """Writes a mesh and fields on it to VTU (needs the extra `io`) or, of triangles, binary PLY.
 
@@ -290,7 +291,7 @@ def _merge_coincident(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray
     return points[first], vertex.ravel()[faces]
 
 
-def check_field_name(kind: str, name) -> None:
+def check_field_name(kind: str, name: str) -> None:
     """Refuses what one of the formats could not hold: PLY ends a name at a space, and XML has signs of its own."""
     if not (isinstance(name, str) and name and name.isprintable()) or set(name) & set(' "<>&'):
         raise ValueError(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy
 
 from .six_node_mesh import SixNodeMesh
 from .tet_mesh import TetMesh
+
+if TYPE_CHECKING:
+    from .triangle_mesh import TriangleMesh
 
 _SAME_PLACE = 1e-6  # of the shortest edge
 _REMEDY = (
@@ -25,7 +28,11 @@ class Nesting(NamedTuple):
     vertices: np.ndarray
 
 
-def nesting(coarse, fine, names: tuple[str, str]) -> Nesting:
+def nesting(
+    coarse: TriangleMesh | SixNodeMesh | TetMesh,
+    fine: TriangleMesh | SixNodeMesh | TetMesh,
+    names: tuple[str, str],
+) -> Nesting:
     """Raises ValueError, which names the meshes, unless each cell of the coarse one is a union of fine ones, each edge
     divided alike. Vertices on a curved surface may lie beside the coarse one's edges. Of six-node elements the corners are
     compared alone, and other vertices are at -1."""

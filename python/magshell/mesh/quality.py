@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .six_node_mesh import SixNodeMesh
+    from .triangle_mesh import TriangleMesh
 
 
 class MeshQuality:
@@ -21,7 +26,7 @@ class MeshQuality:
       largest angles: 90.0 deg (face 0), 90.0 deg (face 1), 90.0 deg (face 2)
     """
 
-    def __init__(self, mesh, thickness: np.ndarray | None = None):
+    def __init__(self, mesh: TriangleMesh | SixNodeMesh, thickness: np.ndarray | None = None):
         self._mesh = mesh
         self.thickness = thickness
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .signed_distance import Distance, middles_on_surface
+
+if TYPE_CHECKING:
+    from .triangle_mesh import TriangleMesh
 
 # local nodes: 0 to 2 corners, 3 to 5 the middles of the edges opposite them
 _CHILDREN = np.array([(0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5)])
 
 
-def refined(mesh, surface: Distance | None):
+def refined(mesh: TriangleMesh, surface: Distance | None) -> TriangleMesh:
     """The mesh of the children, those of face f at 4 f; vertices keep their numbers, edge k gets vertex n_v + k."""
     middles = mesh.edge_midpoints
     if surface is not None:

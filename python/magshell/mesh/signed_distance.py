@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .mesh_base import MeshBase
 
 Distance = Callable[[np.ndarray], np.ndarray]
 
@@ -13,7 +17,7 @@ _ROUNDS = 20
 _ON_SURFACE = 1e-3  # of an edge: both its ends lie this near to the surface that its middle moves onto
 
 
-def checked_distance(name: str, function) -> Distance:
+def checked_distance(name: str, function: Distance) -> Distance:
     """The function, which then raises ValueError where it does not return a finite number for each point."""
     if not callable(function):
         raise ValueError(
@@ -86,7 +90,7 @@ def onto_surface(distance: Distance, points: np.ndarray, lengths: np.ndarray) ->
     return np.where((arrived & near)[:, None], moved, points)
 
 
-def middles_on_surface(mesh, edges: np.ndarray, surface: Distance) -> tuple[np.ndarray, np.ndarray]:
+def middles_on_surface(mesh: MeshBase, edges: np.ndarray, surface: Distance) -> tuple[np.ndarray, np.ndarray]:
     """Those of the edges (k,) whose ends both lie on the surface, and where their middles are once moved onto it."""
     distance = checked_distance("surface", surface)
     lengths = mesh.edge_lengths[edges]

@@ -22,7 +22,7 @@ from .transforms import moved
 from .triangle_mesh import TriangleMesh, checked_mesh
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Numbers, Rotates
 
 
 _MIRRORED = [0, 2, 1, 5, 4, 3]
@@ -56,7 +56,7 @@ class SixNodeMesh(MeshBase):
 
     order = 2
 
-    def __init__(self, rest_positions: Numbers, elements):
+    def __init__(self, rest_positions: Numbers, elements: Numbers):
         positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
         nodes = index_array("elements", elements)
         check_elements(nodes, len(positions))
@@ -311,7 +311,7 @@ class SixNodeMesh(MeshBase):
         """The same surface with its normals on the other side; elements and vertices keep their numbers."""
         return SixNodeMesh(self.rest_positions, self.elements[:, _MIRRORED])
 
-    def transformed(self, rotation=None, translation: Numbers | None = None) -> SixNodeMesh:
+    def transformed(self, rotation: Rotates | None = None, translation: Numbers | None = None) -> SixNodeMesh:
         """The mesh moved by x -> rotation x + translation, as a TriangleMesh is."""
         return SixNodeMesh(moved(self.rest_positions, rotation, translation), self.elements)
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .six_node_integrals import shapes
 from .tet_topology import FLAT
 
+if TYPE_CHECKING:
+    from .six_node_mesh import SixNodeMesh
+
 _INNER = [(3, 4), (4, 5), (5, 3)]  # nodes of an element between which edges inside it run
 _PARAMETERS = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)])
 
 
-def divided(mesh) -> tuple[np.ndarray, np.ndarray]:
+def divided(mesh: SixNodeMesh) -> tuple[np.ndarray, np.ndarray]:
     """Positions of the new nodes (2 n_e + 3 n, 3), and the elements (4 n, 6): of element k those at its corners, then the
     one between its middle nodes. Edge k gets two nodes, the first nearer to its first end; then each element gets three."""
     n_v, n_e, elements = mesh.n_vertices, mesh.n_edges, mesh.elements

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    from .triangle_mesh import TriangleMesh
 
-def summary(mesh) -> str:
+
+def summary(mesh: TriangleMesh) -> str:
     extent = np.ptp(mesh.rest_positions, axis=0)
     parts = "1 part" if mesh.n_components == 1 else f"{mesh.n_components} parts"
     loops = [len(loop) for loop in mesh.boundary_loops]
@@ -26,7 +31,7 @@ def summary(mesh) -> str:
     )
 
 
-def boundary_loops(mesh) -> list[np.ndarray]:
+def boundary_loops(mesh: TriangleMesh) -> list[np.ndarray]:
     """Vertices of each boundary curve in the order its faces run them, from the lowest boundary edge on."""
     starts = {}  # boundary edge -> the vertex its face leaves
     for edge in mesh.boundary_edges:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 
 from .tet_jacobian import bent, jacobians, not_positive, straight_volumes
@@ -13,7 +16,7 @@ _MEND = "TetMesh.mended(...) mends this, and says what it did"
 _GMSH_ORDER = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
-def listed(numbers, most: int = 5) -> str:
+def listed(numbers: Iterable[Any], most: int = 5) -> str:
     numbers = [tuple(n) if isinstance(n, list) else n for n in np.asarray(numbers).tolist()]
     return ", ".join(map(str, numbers[:most])) + (", ..." if len(numbers) > most else "")
 

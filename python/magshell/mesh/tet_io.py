@@ -42,7 +42,7 @@ class TetContent:
         return mesh, TetFields(self.vertex_fields, fields)
 
 
-def tetrahedra_of(content) -> TetContent | None:
+def tetrahedra_of(content: Any) -> TetContent | None:
     """What meshio's mesh holds of tetrahedra; None where it holds none."""
     kinds = {block.type for block in content.cells}
     there = [kind for kind in _KINDS if kind in kinds]

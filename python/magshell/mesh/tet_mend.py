@@ -17,6 +17,7 @@ from .tet_topology import MIRRORED, groups
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from .tet_mesh import TetMesh
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,14 @@ class Mended(NamedTuple):
     report: MendReport
 
 
-def mended(kind, rest_positions: Numbers, tetrahedra, parts, part_names, merge_tolerance: Numbers) -> Mended:
+def mended(
+    kind: type[TetMesh],
+    rest_positions: Numbers,
+    tetrahedra: Numbers,
+    parts: Numbers,
+    part_names: dict[str, int],
+    merge_tolerance: Numbers,
+) -> Mended:
     positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
     nodes = index_array("tetrahedra", tetrahedra)
     n_given = len(positions)

@@ -43,7 +43,7 @@ from .transforms import moved
 from .triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Numbers, Rotates
 
 
 class TetMesh(TetSelection):
@@ -70,7 +70,13 @@ class TetMesh(TetSelection):
     [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]
     """
 
-    def __init__(self, rest_positions: Numbers, tetrahedra, parts=None, part_names=None):
+    def __init__(
+        self,
+        rest_positions: Numbers,
+        tetrahedra: Numbers,
+        parts: Numbers | None = None,
+        part_names: dict[str, int] | None = None,
+    ):
         positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
         nodes = index_array("tetrahedra", tetrahedra)
         check_range(nodes, len(positions))
@@ -115,9 +121,9 @@ class TetMesh(TetSelection):
     def mended(
         cls,
         rest_positions: Numbers,
-        tetrahedra,
-        parts=None,
-        part_names=None,
+        tetrahedra: Numbers,
+        parts: Numbers | None = None,
+        part_names: dict[str, int] | None = None,
         merge_tolerance: Numbers | None = None,
     ) -> Mended:
         """A mesh of what the constructor would refuse: (mesh, vertex_map, tetrahedron_map, report).
@@ -303,7 +309,7 @@ class TetMesh(TetSelection):
 
     # Other meshes from this one
 
-    def with_parts(self, parts, names=None) -> TetMesh:
+    def with_parts(self, parts: Numbers, names: dict[str, int] | None = None) -> TetMesh:
         """The same mesh with other parts (n_t,), integers or booleans, and names {name: number} for them."""
         return TetMesh(self.rest_positions, self.tetrahedra, parts, names)
 
@@ -328,7 +334,7 @@ class TetMesh(TetSelection):
         """
         return refined(self, surface)
 
-    def transformed(self, rotation=None, translation: Numbers | None = None) -> TetMesh:
+    def transformed(self, rotation: Rotates | None = None, translation: Numbers | None = None) -> TetMesh:
         """The mesh moved by x -> rotation x + translation.
 
         rotation: a (3, 3) matrix or a scipy Rotation. Any invertible matrix will do; under one that mirrors, corners 0

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import count
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .signed_distance import Distance, middles_on_surface
 from .tet_jacobian import jacobians, not_positive, straight_volumes
 
+if TYPE_CHECKING:
+    from .tet_mesh import TetMesh
+
 Projection = Distance
 _LEAST_JACOBIAN = 0.1  # of the straight tetrahedron's
 
 
-def quadratic(mesh, surface: Projection | None):
+def quadratic(mesh: TetMesh, surface: Projection | None) -> TetMesh:
     nodes = ten_nodes(mesh)
     positions = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
     if surface is None:
@@ -25,7 +29,7 @@ def quadratic(mesh, surface: Projection | None):
     return type(mesh)(held_back(positions, target, nodes), nodes, mesh.parts, mesh.part_names)
 
 
-def curved(mesh, place: Callable[[np.ndarray, np.ndarray], np.ndarray]):
+def curved(mesh: TetMesh, place: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> TetMesh:
     """The mesh with ten nodes, those on edges at place(midpoints, edges (n_e, 2)), or as far towards it as tetrahedra
     keep a tenth of their Jacobian."""
     nodes = ten_nodes(mesh)
@@ -34,7 +38,7 @@ def curved(mesh, place: Callable[[np.ndarray, np.ndarray], np.ndarray]):
     return type(mesh)(held_back(straight, target, nodes), nodes, mesh.parts, mesh.part_names)
 
 
-def ten_nodes(mesh) -> np.ndarray:
+def ten_nodes(mesh: TetMesh) -> np.ndarray:
     return np.concatenate([mesh.tetrahedra, mesh.n_vertices + mesh.tetrahedron_edges], axis=1)
 
 
@@ -52,7 +56,7 @@ def held_back(straight: np.ndarray, target: np.ndarray, nodes: np.ndarray) -> np
         share[np.unique(nodes[bad])] *= 0.5 if halving < 4 else 0.0
 
 
-def linear(mesh):
+def linear(mesh: TetMesh) -> TetMesh:
     used = np.unique(mesh.corners)
     return type(mesh)(
         mesh.rest_positions[used], np.searchsorted(used, mesh.corners), mesh.parts, mesh.part_names

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .tet_jacobian import jacobians, least_jacobians
 from .tet_topology import EDGES, FACES
+
+if TYPE_CHECKING:
+    from .tet_mesh import TetMesh
 
 
 class TetQuality:
@@ -24,7 +28,7 @@ class TetQuality:
       smallest angles: 45.0 deg (tetrahedron 0), 45.0 deg (tetrahedron 1), 45.0 deg (tetrahedron 2)
     """
 
-    def __init__(self, mesh):
+    def __init__(self, mesh: TetMesh):
         self._mesh = mesh
 
     @cached_property

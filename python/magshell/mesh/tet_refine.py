@@ -7,11 +7,17 @@ second division.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .tet_jacobian import shape_values, straight_volumes
 from .tet_order import quadratic, ten_nodes
 from .tet_topology import EDGES, MIRRORED, edge_table
+
+if TYPE_CHECKING:
+    from .tet_mesh import TetMesh
+    from .tet_order import Projection
 
 # local nodes: 0 to 3 corners, 4 to 9 the middles of 01 12 20 03 13 23
 _CHILDREN = np.array(
@@ -39,7 +45,7 @@ def _turned(children: np.ndarray) -> np.ndarray:
 CHILDREN = _turned(_CHILDREN)
 
 
-def refined(mesh, surface=None):
+def refined(mesh: TetMesh, surface: Projection | None = None) -> TetMesh:
     parts = np.repeat(mesh.parts, 8)
     if mesh.order == 1:
         nodes = ten_nodes(mesh)

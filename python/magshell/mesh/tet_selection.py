@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,7 +39,7 @@ class TetSelection(MeshBase):
         """Tetrahedra where predicate((n_t, 3) barycenters [m]) -> (n_t,) bool holds."""
         return _where("tetrahedron", predicate, self.tetrahedron_barycenters, np.arange(self.n_tetrahedra))
 
-    def tetrahedra_in(self, part) -> np.ndarray:
+    def tetrahedra_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
         """Tetrahedra of a part, by its number or name, or of several.
 
         >>> import magshell as ms
@@ -50,11 +50,11 @@ class TetSelection(MeshBase):
         """
         return np.flatnonzero(self._in_parts(part))
 
-    def vertices_in(self, part) -> np.ndarray:
+    def vertices_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
         """Vertices of the tetrahedra of a part; those on its border belong to both sides."""
         return np.unique(self.tetrahedra[self._in_parts(part)]).astype(np.int64)
 
-    def faces_in(self, part) -> np.ndarray:
+    def faces_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
         """Faces of the surface whose tetrahedron belongs to a part. ValueError where none does."""
         found = np.flatnonzero(self._in_parts(part)[self.face_tetrahedra])
         if len(found) == 0:
@@ -79,7 +79,7 @@ class TetSelection(MeshBase):
         return int(part)
 
 
-def checked_parts(parts, n_tetrahedra: int) -> np.ndarray:
+def checked_parts(parts: Numbers, n_tetrahedra: int) -> np.ndarray:
     """(n_t,) int32, zeros for None."""
     if parts is None:
         return np.zeros(n_tetrahedra, dtype=np.int32)
@@ -96,7 +96,7 @@ def checked_parts(parts, n_tetrahedra: int) -> np.ndarray:
     return array.astype(np.int32)
 
 
-def checked_part_names(names) -> dict[str, int]:
+def checked_part_names(names: dict[str, int]) -> dict[str, int]:
     """name -> number; a name may be of a part that has no tetrahedron any more."""
     if not isinstance(names, Mapping | None):
         raise ValueError(f"part_names must be a dictionary of name: number, got {type(names).__name__}")

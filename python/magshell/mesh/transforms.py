@@ -9,10 +9,12 @@ import numpy as np
 from .._checks.quantity import quantity
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Numbers, Rotates
 
 
-def moved(positions: np.ndarray, rotation=None, translation: Numbers | None = None) -> np.ndarray:
+def moved(
+    positions: np.ndarray, rotation: Rotates | None = None, translation: Numbers | None = None
+) -> np.ndarray:
     """rotation x + translation. rotation: an invertible (3, 3) matrix or a scipy Rotation. translation: (3,), m."""
     if rotation is not None:
         positions = positions @ matrix_of(rotation).T

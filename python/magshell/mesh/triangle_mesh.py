@@ -20,7 +20,7 @@ from .summary import boundary_loops, summary
 from .transforms import moved
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Numbers, Rotates
 
 
 class TriangleMesh(MeshBase):
@@ -209,7 +209,9 @@ class TriangleMesh(MeshBase):
         """
         return refined(self, surface)
 
-    def transformed(self, rotation=None, translation: Numbers | None = None) -> TriangleMesh:
+    def transformed(
+        self, rotation: Rotates | None = None, translation: Numbers | None = None
+    ) -> TriangleMesh:
         """The mesh moved by x -> rotation x + translation.
 
         Args:

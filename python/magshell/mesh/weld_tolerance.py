@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from .._checks.quantity import quantity
 from .selection import RELATIVE_TOLERANCE
 
+if TYPE_CHECKING:
+    from .mesh_base import MeshBase
 
-def weld_tolerance(meshes, tolerance: float | None) -> float:
+
+def weld_tolerance(meshes: Sequence[MeshBase], tolerance: float | None) -> float:
     """m; by default 1e-6 of the largest mesh's size. Raises ValueError from half the shortest edge on."""
     if tolerance is None:
         tolerance = RELATIVE_TOLERANCE * max(mesh.size for mesh in meshes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 # Everything that decides what the mesh looks like: the user's own settings must not reach in.
 _OPTIONS = {
@@ -28,7 +29,7 @@ _OPTIONS = {
 
 
 @contextmanager
-def gmsh_session(mesh_size: float) -> Iterator:
+def gmsh_session(mesh_size: float) -> Iterator[Any]:
     """Yields the gmsh module with an empty model of its own, quiet, on one thread."""
     try:
         import gmsh

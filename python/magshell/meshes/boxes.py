@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.quantity import quantity
@@ -17,9 +19,14 @@ from ._tet_cells import (
     twenty_four_each,
 )
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 @grouped()
-def box(size, cells, diagonals: str = "alternating", order: int = 1) -> TetMesh:
+def box(
+    size: Numbers, cells: tuple[int, int, int], diagonals: str = "alternating", order: int = 1
+) -> TetMesh:
     """The block [0, a] x [0, b] x [0, c] of tetrahedra.
 
     Args:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import scipy
 
@@ -9,9 +11,12 @@ from .._checks.arrays import index_array
 from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh, checked_mesh
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 
 @grouped()
-def cut(mesh: TriangleMesh, edges) -> TriangleMesh:
+def cut(mesh: TriangleMesh, edges: Numbers) -> TriangleMesh:
     """The mesh cut along interior edges: both sides of the cut get vertices of their own.
 
     The ends of a cut stay joined unless they lie on the boundary or on another cut, so a slit needs at least

@@ -54,7 +54,7 @@ def stacked(sheet: TriangleMesh, height: float, layers: int) -> TetMesh:
 
 
 @grouped()
-def solid_cylinder(radius: float, length: float, cells, order: int = 1) -> TetMesh:
+def solid_cylinder(radius: float, length: float, cells: tuple[int, int], order: int = 1) -> TetMesh:
     """A round bar around the z axis, 0 <= z <= length.
 
     Args:

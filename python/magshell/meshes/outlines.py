@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,13 +25,16 @@ from ._polygon import (
 from ._six_nodes import check_order, sheet_of_order
 from .cuts import cut
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 _GROWTH = 0.3  # of the mesh size, with the distance from a short side
 _ON_BOUNDARY = 1e-7  # of the outline's extent: a slit that ends this close to the boundary reaches it
 
 
 @grouped()
 def outline(
-    outer, holes: Sequence = (), slits: Sequence = (), *, size: float, order: int = 1
+    outer: Numbers, holes: Sequence[Any] = (), slits: Sequence[Any] = (), *, size: float, order: int = 1
 ) -> TriangleMesh | Any:
     """The sheet inside a polygon in the plane z = 0, its normal along +z. Needs the extra `gmsh`.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.arrays import count
@@ -17,6 +19,9 @@ from ._lost import warn_of_loss
 from ._stuffing import Cuts, stuffed
 from ._tet_cells import check_order, check_size, turned
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+
 _PER_CELL = 12  # tetrahedra
 _SAMPLES = 40_000  # that a volume is estimated from
 _TRIES = 4  # of spacings for a wanted number of tetrahedra
@@ -26,7 +31,12 @@ _ROUNDS = 50  # of mending where the surface touches itself
 
 @grouped()
 def from_distance(
-    shape, spacing: float | None = None, *, n_tetrahedra: int | None = None, bounds=None, order: int = 1
+    shape: Shape | Distance,
+    spacing: float | None = None,
+    *,
+    n_tetrahedra: int | None = None,
+    bounds: Numbers | None = None,
+    order: int = 1,
 ) -> TetMesh:
     """The solid where a signed distance is negative, by isosurface stuffing.
 

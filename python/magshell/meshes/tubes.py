@@ -27,7 +27,7 @@ def tube(
     length: float,
     angle: float | tuple[float, float] = TURN,
     *,
-    cells,
+    cells: tuple[int, int, int],
     diagonals: str = "alternating",
     order: int = 1,
 ) -> TetMesh:

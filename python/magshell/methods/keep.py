@@ -37,6 +37,6 @@ class Keep:
         object.__setattr__(self, "memory_budget", not_negative("memory_budget", "bytes", self.memory_budget))
 
 
-def kept(keep) -> Keep:
+def kept(keep: str | Keep | None) -> Keep:
     """What a caller hands in, as a Keep. Raises ValueError."""
     return keep if isinstance(keep, Keep) else Keep(keep)

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .._checks.arrays import count
 from .._checks.quantity import quantity
+
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ class ProjectiveDynamics:
         if self.tolerance is not None and not 0.0 < quantity("tolerance", "1", self.tolerance, ()) < 1.0:
             raise ValueError(f"tolerance must be in (0, 1), or None, got {self.tolerance}")
 
-    def without_gradient(self, scene) -> str:
+    def without_gradient(self, scene: Scene) -> str:
         """Why motions of a scene have no gradient; empty where they do."""
         if self.tolerance is None:
             return (

@@ -112,7 +112,7 @@ class Capsule(Obstacle):
 
     def __init__(
         self,
-        ends,
+        ends: Numbers,
         radius: float,
         inside: bool = False,
         *,

@@ -36,6 +36,9 @@ class HeightField(Obstacle):
     0.707107
     """
 
+    x: np.ndarray
+    y: np.ndarray
+
     def __init__(
         self,
         x: Numbers,

@@ -16,6 +16,7 @@ from .obstacle import Obstacle, Surface
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from ..mesh.six_node_mesh import SixNodeMesh
 
 
 MOST_CELLS = 256  # cells; 140 MB of samples
@@ -50,7 +51,7 @@ class MeshObstacle(Obstacle):
 
     def __init__(
         self,
-        mesh,
+        mesh: TriangleMesh | SixNodeMesh,
         faces: Numbers | None = None,
         resolution: int = 64,
         *,

@@ -111,7 +111,7 @@ class Obstacle(Owner, ABC):
         """(..., 3) unit vectors away from the body, the gradient of the distance, at points (..., 3) m."""
         return self._distances(points, time)[1] @ self._frame(time)[0].T
 
-    def surface(self, time: float = 0.0, extent: float = 1.0, around=None) -> Surface:
+    def surface(self, time: float = 0.0, extent: float = 1.0, around: Numbers | None = None) -> Surface:
         """A triangle mesh for pictures: vertices (n, 3) m in world coordinates, faces (m, 3).
 
         extent: m, the side of the square that stands for a plane. around: (3,) m, the point that the square is nearest

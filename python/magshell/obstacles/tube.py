@@ -38,6 +38,9 @@ class Tube(Obstacle):
     0.06
     """
 
+    closed: bool
+    inside: bool
+
     def __init__(
         self,
         points: Numbers,

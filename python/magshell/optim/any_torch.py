@@ -25,6 +25,9 @@ class AnyTorch(Iterate):
     the optimizer's state as they were.
     """
 
+    max_shortenings: int
+    optimizer: Any
+
     def __init__(self, optimizer: torch.optim.Optimizer, max_shortenings: int = 6):
         super().__init__()
         self.optimizer, self.max_shortenings = optimizer, max_shortenings

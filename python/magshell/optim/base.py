@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
 
     standstill = STANDSTILL  # what it means when a step moves nothing
 
-    def __init__(self, params, defaults: dict[Any, Any], max_shortenings: int):
+    def __init__(self, params: Iterable[Any], defaults: dict[Any, Any], max_shortenings: int):
         if not (isinstance(max_shortenings, int) and max_shortenings >= 0):
             raise ValueError(f"max_shortenings must be an integer, 0 or more, got {max_shortenings!r}")
         self.max_shortenings = max_shortenings

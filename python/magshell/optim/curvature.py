@@ -24,7 +24,7 @@ class Curvature:
         inner = steps @ changes.T
         below = np.tril(inner, -1)
         inverse = np.block([[-np.diag(np.diag(inner)), below.T], [below, theta * steps @ steps.T]])
-        self.m = np.linalg.inv(inverse)
+        self.m: np.ndarray = np.linalg.inv(inverse)
 
     def times(self, v: np.ndarray) -> np.ndarray:
         """B v."""

@@ -98,7 +98,7 @@ class Restoring:
     def __enter__(self) -> None:
         self._kept = [(p, p.detach().clone(), p.grad) for p in self._iterate.parameters]
 
-    def __exit__(self, kind, *_) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None:
             with torch.no_grad():
                 for parameter, value, gradient in self._kept:
@@ -106,9 +106,9 @@ class Restoring:
                     parameter.grad = gradient
 
 
-def as_tensor(value: Any):
+def as_tensor(value: Any) -> Any:
     return torch.from_numpy(value.copy()) if isinstance(value, np.ndarray) else value
 
 
-def as_array(value: Any):
+def as_array(value: Any) -> Any:
     return value.detach().cpu().numpy().copy() if isinstance(value, torch.Tensor) else value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -49,11 +50,15 @@ class LBFGS(BoxOptimizer):
     0.75
     """
 
+    first_step: float
+    max_evaluations: int
+    memory: int
+
     _copied = (*BoxOptimizer._copied, "memory", "first_step", "max_evaluations")
 
     def __init__(
         self,
-        params,
+        params: Iterable[Any],
         *,
         lower: Numbers = -math.inf,
         upper: Numbers = math.inf,
@@ -144,7 +149,7 @@ class LBFGS(BoxOptimizer):
         if len(rejections) > self.max_shortenings:
             raise rejections[-1]
         if probes == self.max_evaluations:
-            self.standstill = (
+            self.standstill: str = (
                 f"no lower design in as many evaluations of a line search as max_evaluations allows, {probes}"
             )
         return None

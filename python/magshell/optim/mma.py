@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,7 +52,7 @@ class MMA(BoxOptimizer):
 
     def __init__(
         self,
-        params,
+        params: Iterable[Any],
         *,
         lower: Numbers = -math.inf,
         upper: Numbers = math.inf,

@@ -42,7 +42,7 @@ class Trial:
         self.objective: float = float(self._objective.detach())
         self.constraints = np.zeros(0)
         if self._constraints is not None:
-            self.constraints = self._constraints.detach().double().cpu().numpy().copy()
+            self.constraints: Any = self._constraints.detach().double().cpu().numpy().copy()
         _require_finite("the objective", np.array([self.objective]))
         _require_finite("the constraints", self.constraints)
 

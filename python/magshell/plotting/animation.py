@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,26 +25,30 @@ from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
 from .view import View, view_of
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Fielded, FilePath, Numbers, Shown
+    from ..obstacles.obstacle import Obstacle
+
 SLOWEST, FASTEST = 0.01, 1000.0  # frames a second that the formats can hold
 PALETTE_FRAMES = 12  # that a GIF's colours are chosen from
 
 
 @grouped(color=Color, view=View, style=Style)
 def animate(
-    what,
-    path,
+    what: Shown,
+    path: FilePath,
     *,
-    positions=None,
-    times=None,
-    remanent_magnetization=None,
-    applied_flux_density=None,
-    field=None,
-    obstacles=None,
+    positions: Numbers | None = None,
+    times: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    field: Fielded | None = None,
+    obstacles: Obstacle | Sequence[Obstacle] | None = None,
     speed: float | None = None,
     fps: float = 25.0,
     color: Any = "auto",
     title: str | None = None,
-    view=None,
+    view: View | Sequence[float] | str | None = None,
     width: int = 1000,
     style: Style | None = None,
     progress: bool = True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from ..bodies.solid_states import SolidStates
 from ..states.element_fields import element_fields
 from ..states.state import State
 from ..states.units import LengthUnit, prefixed
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 
 def rgb(code: str) -> np.ndarray:
@@ -73,7 +77,7 @@ def scale_colors(scale: str, values: np.ndarray, limits: tuple[float, float]) ->
 
 
 def scalar_of(
-    states: list[State], color, label: str | None, limits, unit: LengthUnit, cut: bool = False
+    states: list[State], color: Any, label: str | None, limits: Numbers, unit: LengthUnit, cut: bool = False
 ) -> Scalar | None:
     """The scalar that `color` asks for: None, "auto", a name, an array, or one array a state. cut: the scale holds what is
     inside too.

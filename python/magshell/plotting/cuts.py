@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from ..states.state import State
 from .colors import NO_VALUE, SHEET, Scalar, rgb, scale_colors
 from .solids import Solid
 from .view import View
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Cutting
 
 EDGE_ON = 0.02  # of a plane's normal towards the eye: less is seen as a line
 _FORM = "cut must be 'x', 'y' or 'z', such a letter and where [m], or a point [m] and a normal, (3,) each"
@@ -46,7 +50,7 @@ class Section:
     share: np.ndarray
 
 
-def checked_cut(cut, states: list[State], view: View) -> Cut | None:
+def checked_cut(cut: Cutting | None, states: list[State], view: View) -> Cut | None:
     """The plane that is asked for, turned to the eye. Raises ValueError where it is none, is seen edge-on, or leaves
     nothing."""
     if cut is None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,26 +23,30 @@ from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
 from .view import View, view_of
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Cutting, Fielded, Numbers, Shown
+    from ..obstacles.obstacle import Obstacle
+
 MOST_STATES = 9  # of a path, unless asked for more
 
 
 @grouped(color=Color, view=View, style=Style)
 def plot(
-    what,
+    what: Shown,
     *,
-    positions=None,
-    remanent_magnetization=None,
-    applied_flux_density=None,
-    field=None,
-    obstacles=None,
-    states=None,
+    positions: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    field: Fielded | None = None,
+    obstacles: Obstacle | Sequence[Obstacle] | None = None,
+    states: int | Sequence[int] | None = None,
     color: Any = "auto",
-    titles=None,
+    titles: str | Sequence[str] | None = None,
     overlay: bool = False,
     fade: bool = False,
     columns: int | None = None,
-    view=None,
-    cut=None,
+    view: View | Sequence[float] | str | None = None,
+    cut: Cutting | None = None,
     width: int = 1600,
     style: Style | None = None,
 ) -> Picture:
@@ -114,7 +119,7 @@ def check_contacts(style: Style, states: list[State]) -> None:
         raise ValueError("contacts are drawn of a result of a scene with contacts: there is none")
 
 
-def checked_titles(titles, states: list[State]) -> list[str]:
+def checked_titles(titles: str | Sequence[str] | None, states: list[State]) -> list[str]:
     """One title a state; by default what its result calls it."""
     if titles is None:
         return [state.title for state in states]

@@ -9,10 +9,14 @@ import subprocess
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._machine.files import replacing
+
+if TYPE_CHECKING:
+    from .._checks.kinds import FilePath
 
 _NO_PILLOW = 'a GIF needs pillow: pip install "magshell[plot]"'
 _NO_FFMPEG = (
@@ -21,7 +25,7 @@ _NO_FFMPEG = (
 COLORS = 256
 
 
-def checked_path(path, fps: float) -> Path:
+def checked_path(path: FilePath, fps: float) -> Path:
     """Raises ValueError on another ending or a pace that the format cannot hold, ImportError without its writer,
     FileNotFoundError without the folder."""
     path = Path(path)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..states.state import State
@@ -37,12 +39,17 @@ DPI = 140
 class Scenery:
     """What all frames share, and the drawing of each. `states`: all that the motion goes through."""
 
+    options: Options
+    scalar: Scalar | None
+    unit: LengthUnit
+    view: View
+
     def __init__(
         self, states: list[State], scalar: Scalar | None, view: View, unit: LengthUnit, options: Options
     ):
         self.scalar, self.view, self.unit, self.options = scalar, view, unit, options
-        self.size = size_of(states)
-        self.strongest = glyphs.largest(states)
+        self.size: float = size_of(states)
+        self.strongest: float = glyphs.largest(states)
         some = spread(states, SAMPLES) if options.contacts else []
         self._strongest_contact = strongest_contact(some)
         self._points, self._full_length = self._surroundings(states)
@@ -68,7 +75,7 @@ class Scenery:
         shown += [contacts_key(self._strongest_contact)] if self._strongest_contact else []
         return shown + ([sources_key(self._full_length)] if self._full_length else [])
 
-    def _magnetization(self, state: State) -> list:
+    def _magnetization(self, state: State) -> list[Any]:
         return magnetization_solids(state, self.strongest, self.options.arrows) if self.options.arrows else []
 
     def _surroundings(self, states: list[State]) -> tuple[np.ndarray, float]:
@@ -132,7 +139,7 @@ class Reel:
         self._screen = self._screens.__enter__()
         return self
 
-    def __exit__(self, *error) -> None:
+    def __exit__(self, *error: object) -> None:
         self._screens.__exit__(*error)
 
     def image(self, drawing: Drawing) -> np.ndarray:

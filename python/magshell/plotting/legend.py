@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from .colors import Scalar, scale_colors
 from .panels import Drawing
 from .placing import Box, Room
 from .texts import Ruler
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 TEXT = 8.0  # points
 ROW = 0.72  # inches
@@ -96,7 +100,7 @@ def _length(drawing: Drawing, length: float) -> str:
 
 
 def write(
-    axes, drawing: Drawing, legend: Legend, inches: float, inches_per_meter: float, ruler: Ruler
+    axes: Axes, drawing: Drawing, legend: Legend, inches: float, inches_per_meter: float, ruler: Ruler
 ) -> None:
     """Into axes as wide as the picture and as high as the legend."""
     scale = legend.scale

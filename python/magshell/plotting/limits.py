@@ -6,6 +6,8 @@ paint up to 16384 pixels a side, and a panel is painted twice as fine as it is s
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._checks.quantity import quantity
@@ -18,14 +20,14 @@ MOST_FRAMES = 20_000
 MOST_ARROWS = 20_000
 
 
-def checked_width(width) -> int:
+def checked_width(width: Any) -> int:
     number = quantity("width", "pixels", width, ())
     if not NARROWEST <= number <= WIDEST:
         raise ValueError(f"width must be at least {NARROWEST} pixels and at most {WIDEST}, got {width}")
     return int(number)
 
 
-def check_columns(columns, width: int) -> None:
+def check_columns(columns: Any, width: int) -> None:
     if columns is None:
         return
     most = width // SMALLEST_PANEL

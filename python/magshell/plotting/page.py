@@ -6,10 +6,11 @@ import base64
 import html
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,20 +29,23 @@ from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
 from .view import View, view_of
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Fielded, FilePath, Numbers, Shown
+
 
 @grouped(color=Color, view=View, style=Style)
 def write_page(
-    what,
-    path,
+    what: Shown,
+    path: FilePath,
     *,
-    positions=None,
-    times=None,
-    remanent_magnetization=None,
-    applied_flux_density=None,
-    field=None,
-    color=None,
-    titles=None,
-    view=None,
+    positions: Numbers | None = None,
+    times: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    field: Fielded | None = None,
+    color: Any = None,
+    titles: str | Sequence[str] | None = None,
+    view: View | Sequence[float] | str | None = None,
     title: str = "magshell",
     speed: float | None = None,
     size_limit: float = 10e6,
@@ -148,7 +152,7 @@ def _is_constant(scalar: Scalar) -> bool:
     return all(np.array_equal(value, scalar.values[0], equal_nan=True) for value in scalar.values)
 
 
-def _scalar(scalar: Scalar, kept: list[int], dtype: str) -> dict:
+def _scalar(scalar: Scalar, kept: list[int], dtype: str) -> dict[Any, Any]:
     """One array if it is the same in all states, else one a state."""
     values = scalar.values[:1] if _is_constant(scalar) else [scalar.values[k] for k in kept]
     return {
@@ -181,7 +185,7 @@ def _sources(states: list[State], size: float) -> tuple[list[glyphs.Glyphs | Non
 
 def _states(
     states: list[State], kept: list[int], titles: list[str], fields, count: int, dtype: str
-) -> list[dict]:
+) -> list[dict[Any, Any]]:
     strongest, (around, full_length) = glyphs.largest(states), fields
     magnitude = max(
         (np.linalg.norm(s.flux_density) for s in states if s.flux_density is not None), default=0.0
@@ -206,12 +210,12 @@ def _states(
     return packed
 
 
-def _arrows(chosen: glyphs.Glyphs, dtype: str) -> dict:
+def _arrows(chosen: glyphs.Glyphs, dtype: str) -> dict[Any, Any]:
     """Six numbers an arrow: start, vector."""
     return {"radius": chosen.radius, "arrows": _packed(np.hstack([chosen.starts, chosen.vectors]), dtype)}
 
 
-def _packed(array: np.ndarray, dtype: str) -> str | dict:
+def _packed(array: np.ndarray, dtype: str) -> str | dict[Any, Any]:
     """Base64; for "<u2" with the numbers that 0 and a step of 1 stand for, unless an entry is NaN."""
     if dtype != "<u2":
         return base64.b64encode(np.ascontiguousarray(array, dtype=dtype).tobytes()).decode("ascii")

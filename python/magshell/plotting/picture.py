@@ -6,6 +6,7 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +18,12 @@ from .limits import check_pixels
 from .panels import Drawing, Label, Panel
 from .placing import NEAR, Box, Room, beside, places_around
 from .texts import Ruler
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .._checks.kinds import FilePath
 
 DPI = 200
 MARGIN = 0.08  # inches
@@ -39,11 +46,11 @@ class Picture:
     figure: the matplotlib Figure, to add to. backend: what painted it.
     """
 
-    def __init__(self, figure, backend: str = "matplotlib"):
+    def __init__(self, figure: Figure, backend: str = "matplotlib"):
         self.figure = figure
         self.backend = backend
 
-    def save(self, path, dpi: float | None = None) -> Path:
+    def save(self, path: FilePath, dpi: float | None = None) -> Path:
         """Writes a PNG. dpi: dots an inch, by default the figure's own. An older file is replaced when it is complete.
 
         Raises ValueError on another ending or too many pixels, FileNotFoundError or another OSError on a bad folder.
@@ -123,7 +130,7 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: 
 
 
 @contextmanager
-def screen_of(axes, backend: str, samples: bool = True) -> Iterator[vtk.Screen | None]:
+def screen_of(axes: Axes, backend: str, samples: bool = True) -> Iterator[vtk.Screen | None]:
     """What pyvista paints on before it comes into axes that have their place in the figure; matplotlib needs none."""
     if backend != "pyvista":
         yield None
@@ -137,7 +144,13 @@ def screen_of(axes, backend: str, samples: bool = True) -> Iterator[vtk.Screen |
 
 
 def paint_panel(
-    axes, panel: Panel, drawing: Drawing, window, screen: vtk.Screen | None, title: float, ruler: Ruler
+    axes: Axes,
+    panel: Panel,
+    drawing: Drawing,
+    window: Any,
+    screen: vtk.Screen | None,
+    title: float,
+    ruler: Ruler,
 ) -> None:
     """Into axes that have their place in the figure, with so many inches for a title above them, by pyvista if there is a
     screen."""
@@ -173,7 +186,7 @@ def _drawn(panel: Panel, drawing: Drawing, window, size: np.ndarray) -> np.ndarr
     return np.einsum("ks,fsi->fki", shares, corners).reshape(-1, 2)
 
 
-def title_height(axes) -> float:
+def title_height(axes: Axes) -> float:
     """Inches that a title has above axes at the top of a figure."""
     figure = axes.figure
     return figure.get_size_inches()[1] - axes.get_window_extent().y1 / figure.dpi - MARGIN

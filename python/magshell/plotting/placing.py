@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
 
 GAP = 0.02  # inches that stay free between texts
 NEAR = 0.055  # inches between a point and its text
@@ -21,7 +25,7 @@ class Box:
     high: np.ndarray
 
     @classmethod
-    def around(cls, center, size) -> Box:
+    def around(cls, center: Numbers, size: Numbers) -> Box:
         half = 0.5 * np.asarray(size)
         return cls(center - half, center + half)
 
@@ -47,7 +51,7 @@ class Room:
     drawn: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     taken: list[Box] = field(default_factory=list)
 
-    def take(self, size, centers: Iterable[np.ndarray]) -> Box | None:
+    def take(self, size: Numbers, centers: Iterable[np.ndarray]) -> Box | None:
         """The first of the places for a text of this size (width, height) that is free, which it then is no more; None where
         there is none."""
         boxes = (Box.around(center, size) for center in centers)
@@ -62,7 +66,7 @@ class Room:
         return found
 
 
-def places_around(point: np.ndarray, size, towards) -> Iterator[np.ndarray]:
+def places_around(point: np.ndarray, size: Numbers, towards: np.ndarray) -> Iterator[np.ndarray]:
     """Centers of a text of this size beside a point: on the side that is asked for first, close by before farther off."""
     begin = np.arctan2(towards[1], towards[0])
     turns = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
@@ -73,7 +77,7 @@ def places_around(point: np.ndarray, size, towards) -> Iterator[np.ndarray]:
             yield beside(point, size, np.array([np.cos(angle), np.sin(angle)]), distance)
 
 
-def beside(point: np.ndarray, size, towards: np.ndarray, distance: float = NEAR) -> np.ndarray:
+def beside(point: np.ndarray, size: Numbers, towards: np.ndarray, distance: float = NEAR) -> np.ndarray:
     """The center of a text of this size whose side or corner is at a distance [inches] from a point."""
     return point + distance * towards + 0.5 * np.asarray(size) * _side(towards)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def duration_of(states: list[State]) -> float:
     return 0.0 if first is None or last is None else last - first
 
 
-def speed_of(states: list[State], speed) -> float:
+def speed_of(states: list[State], speed: float | None) -> float:
     """Seconds of the motion that one second shows: as asked for, else 1 or the round number that shows it well."""
     if speed is not None:
         return positive("speed", "", speed)
@@ -115,7 +116,7 @@ def _moved(starts, ends, share: float):
     return [a if a is b else b.replaced(**values_between(a, b, share)) for a, b in pairs]
 
 
-def _form(each) -> tuple:
+def _form(each) -> tuple[Any, ...]:
     return type(each), *(np.shape(getattr(each, name)) for name in names_in_time(each))
 
 
@@ -123,7 +124,7 @@ def between(start: np.ndarray, end: np.ndarray, share: float) -> np.ndarray:
     return (1.0 - share) * start + share * end
 
 
-def spread(these: list, count: int) -> list:
+def spread(these: list[Any], count: int) -> list[Any]:
     """At most so many of them, evenly spread, the first and the last among them."""
     numbers = np.round(np.linspace(0, len(these) - 1, min(len(these), count))).astype(np.int64)
     return [these[k] for k in numbers]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .panels import Panel
@@ -9,8 +11,11 @@ from .shading import shade
 from .solids import Solid
 from .view import View
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-def paint(axes, panel: Panel, view: View) -> None:
+
+def paint(axes: Axes, panel: Panel, view: View) -> None:
     """Adds the triangles of a panel to matplotlib axes whose coordinates are metres on the screen."""
     from matplotlib.collections import PolyCollection
 

@@ -38,7 +38,7 @@ class Style:
     contacts: bool = False
     backend: str | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         arrow_count(self.arrows)
         for name in ("show_field", "rest", "mesh_lines", "contacts"):
             flag(name, getattr(self, name))
@@ -46,7 +46,7 @@ class Style:
             raise ValueError(f"backend must be 'pyvista' or 'matplotlib', got {self.backend!r:.60}")
 
 
-def style_of(style) -> Style:
+def style_of(style: Style | None) -> Style:
     """Of a caller, None for the default. Raises ValueError."""
     if style is None:
         return Style()
@@ -76,7 +76,7 @@ class Color:
     range: Any = None
     scale: str | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not isinstance(self.label, str | None):
             raise ValueError(f"the label of a color must be a string, got {self.label!r:.60}")
         if self.scale is not None and self.scale not in SCALES:
@@ -85,7 +85,7 @@ class Color:
             )
 
 
-def colored(states: list[State], color, unit: LengthUnit, cut: bool = False) -> Scalar | None:
+def colored(states: list[State], color: Any, unit: LengthUnit, cut: bool = False) -> Scalar | None:
     """The scalar that a caller asks for, as in `scalar_of`, or by a Color."""
     asked = color if isinstance(color, Color) else Color(color)
     scalar = scalar_of(states, asked.values, asked.label, asked.range, unit, cut)

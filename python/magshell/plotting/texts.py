@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Callable
 
 SMALLEST = 4.0  # points, below which a text is cut instead
 _STEP = 0.9  # from one size to the next smaller one
@@ -19,7 +20,7 @@ class Ruler:
         figure = Figure(dpi=dpi)
         FigureCanvasAgg(figure)
         self._dpi, self._text = dpi, figure.text(0.0, 0.0, "")
-        self.size = functools.cache(self._size)
+        self.size: Callable[[str, float], tuple[float, float]] = functools.cache(self._size)
 
     def _size(self, text: str, points: float) -> tuple[float, float]:
         """Width and height, inches."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,7 +38,7 @@ class View:
     azimuth: float
     frame: Any = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("elevation", "azimuth"):
             object.__setattr__(self, name, float(quantity(name, "degrees", getattr(self, name), ())))
         if self.frame is None:
@@ -69,7 +70,7 @@ class View:
         return points @ self.axes.T
 
 
-def view_of(states: list[State], view) -> View:
+def view_of(states: list[State], view: View | Sequence[float] | str | None) -> View:
     """The view asked for, a View, (elevation, azimuth) or a word, or one that suits the sheets."""
     if isinstance(view, str):
         if view not in NAMED:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from .panels import Panel
 from .shading import AMBIENT, DIFFUSE, LIGHT
 from .solids import Solid
 from .view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 OVERSAMPLING = 2
 
@@ -23,7 +27,7 @@ class Screen:
         _quiet_without_a_screen()
         self.pixels = pixels
         size = tuple(OVERSAMPLING * each for each in pixels)
-        self.plotter = pyvista.Plotter(off_screen=True, window_size=size, lighting="none")
+        self.plotter: Any = pyvista.Plotter(off_screen=True, window_size=size, lighting="none")
         self.plotter.set_background("white")
         if not samples:
             self.plotter.render_window.SetMultiSamples(0)
@@ -32,7 +36,7 @@ class Screen:
         self.plotter.close()
 
 
-def paint(axes, panel: Panel, view: View, window: np.ndarray, screen: Screen) -> None:
+def paint(axes: Axes, panel: Panel, view: View, window: np.ndarray, screen: Screen) -> None:
     """Adds the image of a panel to matplotlib axes whose coordinates are metres on the screen.
 
     window: (left, right, bottom, top), m.

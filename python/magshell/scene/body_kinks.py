@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..surroundings.contact_inputs import LARGEST_SMOOTH_TURN
 from .touching import Touching
 
+if TYPE_CHECKING:
+    from .scene import Scene
+
 _NEXT = np.array([[1, 2], [2, 3], [3, 1]])  # of a point and a triangle, the sides of this
 
 
-def near_body_kinks(scene, touching: Touching, smoothing: float, positions: np.ndarray) -> np.ndarray:
+def near_body_kinks(scene: Scene, touching: Touching, smoothing: float, positions: np.ndarray) -> np.ndarray:
     """Vertices (k,) of the first parts of pairs whose closest points are nearer than the smoothing [m] to where they change
     over to a neighbour that turns away by more than LARGEST_SMOOTH_TURN, or to nothing. positions: of all points."""
     pairs = touching.pairs[touching.normal_forces > 0.0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,8 +18,11 @@ from ..surroundings.face_energies import FaceEnergy
 from ..surroundings.pressure import Pressure
 from ..surroundings.tendon import Tendon
 
+if TYPE_CHECKING:
+    from .scene import Scene
 
-def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict[Any, Any]]]:
+
+def body_inputs(scene: Scene, directed_edges: np.ndarray) -> dict[str, list[dict[Any, Any]]]:
     """Sheets, solids, skins, rigid parts. directed_edges: (k, 2), the scene's edges and the rows of their directions."""
     return {
         "sheets": _sheets(scene, directed_edges),
@@ -33,7 +36,7 @@ def body_inputs(scene, directed_edges: np.ndarray) -> dict[str, list[dict[Any, A
     }
 
 
-def muscle_inputs(scene) -> list[dict[Any, Any]]:
+def muscle_inputs(scene: Scene) -> list[dict[Any, Any]]:
     bodies = scene._bodies
     first = len(bodies.flat_sheets)
     return [
@@ -43,7 +46,7 @@ def muscle_inputs(scene) -> list[dict[Any, Any]]:
     ]
 
 
-def face_inputs(scene) -> dict[str, list[dict[Any, Any]]]:
+def face_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
     """Energies of faces, and pressures."""
     bodies, n_skins = scene._bodies, len(_skins(scene))
     return {
@@ -58,7 +61,7 @@ def face_inputs(scene) -> dict[str, list[dict[Any, Any]]]:
     }
 
 
-def actuator_inputs(scene) -> dict[str, list[dict[Any, Any]]]:
+def actuator_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
     """Volumes and tendons."""
     bodies = scene._bodies
     volumes = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ..bodies.shell import Shell
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
 from ..surroundings.supports import Support
+
+if TYPE_CHECKING:
+    from .scene import Scene
 
 _JUMPING = (AppliedField, Joint, Actuator, Shell)  # their values may change at once, others move
 
@@ -70,7 +73,7 @@ _UNITS = {
 
 
 def over_time(
-    scene, replaced: dict[object, dict[Any, Any]]
+    scene: Scene, replaced: dict[object, dict[Any, Any]]
 ) -> tuple[dict[object, dict[Any, Any]], list[Course]]:
     """What of the values of a solve is the same all the time, and what is not. Raises ValueError on what cannot change."""
     still: dict[object, dict[Any, Any]] = {}
@@ -120,7 +123,7 @@ def changes_at_once(owner: Any) -> bool:
     return isinstance(owner, _JUMPING)
 
 
-def values_between(before, after, share: float) -> dict[str, np.ndarray]:
+def values_between(before: Any, after: Any, share: float) -> dict[str, np.ndarray]:
     """The values that may move of an object that is `before`, and then `after`, a share of the way: on straight lines."""
     at = [each._move.as_arguments() if isinstance(each, Support) else vars(each) for each in (before, after)]
     named = {}

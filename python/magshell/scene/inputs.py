@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +18,8 @@ from .scene import Scene
 from .values import Values
 
 if TYPE_CHECKING:
+    import torch
+
     from .._checks.kinds import Numbers
 
 
@@ -68,7 +71,7 @@ class Inputs:
                 "rests, or ms.equilibrium(..., at_rest=True), which leaves them out"
             )
         self.scene = scene
-        self.given = []
+        self.given: list[Any] = []
         self.leaves: list[Leaf] = []
         self.given_flux_density = applied_flux_density
         self._differentiable = differentiable
@@ -88,7 +91,7 @@ class Inputs:
         controls["scene", "applied_flux_density"] = flux_density
         self.controls: np.ndarray = scene._control_layout.packed(controls, scene._control_layout.zeros())
         self.values: Values = self._values(replaced)
-        self.given_magnetization = (
+        self.given_magnetization: Numbers = (
             of_all_bodies(scene, replaced) if remanent_magnetization is None else remanent_magnetization
         )
 
@@ -97,11 +100,11 @@ class Inputs:
         """Those of the leaves."""
         return [leaf.tensor for leaf in self.leaves]
 
-    def take(self, name: str, value: Any, owner: Any = None):
+    def take(self, name: str, value: Any, owner: Any = None) -> Any:
         """The numbers of another input, which joins the leaves if it asks for a gradient."""
         return self._numbers(name, value, owner)
 
-    def refuse(self, name: str, tensor, why: str) -> None:
+    def refuse(self, name: str, tensor: torch.Tensor, why: str) -> None:
         """Where a tensor asks for a gradient that there is not, whoever takes gradients is told."""
         if wants_gradient(tensor):
             self.leaves = [leaf for leaf in self.leaves if leaf.tensor is not tensor or leaf.name != name]
@@ -146,13 +149,15 @@ class Inputs:
         return there
 
     @contextmanager
-    def in_core(self):
+    def in_core(self) -> Iterator[None]:
         """The scene's core with this magnetization in it, for one solve; those of other threads wait."""
         with self.values.in_core():
             yield
 
 
-def plain_inputs(scene, remanent_magnetization, applied_flux_density, values: Any, **factors: Any) -> Inputs:
+def plain_inputs(
+    scene: Scene, remanent_magnetization: Numbers, applied_flux_density: Numbers, values: Any, **factors: Any
+) -> Inputs:
     """Of a solve whose values may be replaced, without gradients."""
     replaced = requested(scene, None, values) if isinstance(scene, Scene) else None
     return Inputs(scene, remanent_magnetization, applied_flux_density, replaced=replaced, **factors)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,14 +24,14 @@ class Place(NamedTuple):
 class Layout:
     """One of the two vectors: what the terms of a scene have registered, by owner and name."""
 
-    def __init__(self, entries):
+    def __init__(self, entries: Iterable[Any]):
         self._places = {(owner, name): Place(*place) for owner, name, *place in entries}
         self.size: int = sum(place.rows * place.width for place in self._places.values())
 
     def __contains__(self, key: tuple[str, str]) -> bool:
         return key in self._places
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[tuple[str, str]]:
         """(owner, name) of each, in the order of the vector."""
         return iter(self._places)
 

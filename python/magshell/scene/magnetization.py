@@ -3,17 +3,21 @@ own."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._checks.tensors import is_tensor, require_torch
 from ..bodies.solid import Solid
 
+if TYPE_CHECKING:
+    from .scene import Scene
+
 _NAME = "remanent_magnetization"
 
 
-def check_given_once(scene, given: Any, replaced: dict[object, dict[Any, Any]]) -> None:
+def check_given_once(scene: Scene, given: Any, replaced: dict[object, dict[Any, Any]]) -> None:
     """Raises ValueError where it is given twice, or without a field, or not for every shell and skin."""
     replacing = any(_NAME in replaced.get(carrier, {}) for _, carrier, _ in _carriers(scene))
     if not scene.fields:
@@ -35,7 +39,7 @@ def check_given_once(scene, given: Any, replaced: dict[object, dict[Any, Any]]) 
             raise ValueError(f"the scene has a field, so remanent_magnetization{whose}{skin} [A/m] is needed")
 
 
-def check_on_skins(scene, given: np.ndarray) -> None:
+def check_on_skins(scene: Scene, given: np.ndarray) -> None:
     """Raises ValueError where one of all faces (3,), or of single ones (n_f of all, 3), is of none that can have one."""
     if given.ndim == 1:
         if given.any() and scene.bodies and not any(True for _ in _carriers(scene)):
@@ -55,14 +59,14 @@ def check_on_skins(scene, given: np.ndarray) -> None:
         )
 
 
-def of_carriers(scene, magnetization: np.ndarray):
+def of_carriers(scene: Scene, magnetization: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     """(core owner, its rows) of shells and skins, of one for all faces (n_f of all, 3)."""
     labels = {id(each): label for each, label in scene._labels}
     for _, carrier, faces in _carriers(scene):
         yield labels[id(carrier)], magnetization[faces]
 
 
-def gradient_by_all(scene, gradient: Any) -> np.ndarray:
+def gradient_by_all(scene: Scene, gradient: Any) -> np.ndarray:
     """(n_f of all, 3): the transpose of `of_carriers`."""
     labels = {id(each): label for each, label in scene._labels}
     found = np.zeros((scene._bodies.n_magnetized, 3))
@@ -71,7 +75,7 @@ def gradient_by_all(scene, gradient: Any) -> np.ndarray:
     return found
 
 
-def of_all_bodies(scene, replaced: dict[object, dict[Any, Any]]):
+def of_all_bodies(scene: Scene, replaced: dict[object, dict[Any, Any]]) -> Any:
     """(n_f of all, 3) A/m where it was not an argument, zero on what has none: a tensor in its graph where there is one,
     None without a field.
 

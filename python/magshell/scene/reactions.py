@@ -12,6 +12,8 @@ from ..surroundings.constraints import held_directions
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from ..surroundings.supports import Support
+    from .scene import Scene
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Reaction:
         return f"Reaction: ({numbers}) N on {len(self.vertices)} vertices"
 
 
-def reaction_in(scene, support, state: np.ndarray, held: np.ndarray) -> Reaction:
+def reaction_in(scene: Scene, support: Support, state: np.ndarray, held: np.ndarray) -> Reaction:
     """held: (m, 3) N, of the constraints' held nodes. Raises ValueError where the support is none of the scene's."""
     if not any(each is support for each in scene.supports):
         raise ValueError(f"support must be one of scene.supports, got {support!r:.80}")

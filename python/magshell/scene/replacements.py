@@ -12,6 +12,7 @@ from .courses import refuse_functions
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from .scene import Scene
 
 
 # Those of a scene's one body that have a keyword of their own.
@@ -21,7 +22,12 @@ SHELL_NAMES = tuple(
 
 
 def requested(
-    scene, vertex_loads: Numbers, values: Any, moving: bool = False, in_time: bool = False, **shell: Any
+    scene: Scene,
+    vertex_loads: Numbers,
+    values: Any,
+    moving: bool = False,
+    in_time: bool = False,
+    **shell: Any,
 ) -> dict[object, dict[str, object]]:
     """{object of the scene: {name: value}} from a solve's arguments. Raises ValueError on what has no place.
 
@@ -50,7 +56,7 @@ def requested(
     return asked
 
 
-def checked(scene, owner: Any, name: str, value: Any):
+def checked(scene: Scene, owner: Any, name: str, value: Any) -> Any:
     """The values that no constructor checks."""
     if owner is not scene:
         return value

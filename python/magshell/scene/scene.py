@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterable
 from contextlib import contextmanager
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -46,6 +47,10 @@ from ..surroundings.water import Water
 from .core_inputs import actuator_inputs, body_inputs, face_inputs, muscle_inputs
 from .layout import Layout
 from .values import Values
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Fielded, Load, Numbers
+    from ..surroundings.supports import Support
 
 _LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure)
 _SUPPORTS = (Pin, Clamp, SymmetryPlane)
@@ -95,32 +100,38 @@ class Scene:
         self,
         bodies: Shell | Solid | Rigid | Skeleton | Iterable[Shell | Solid | Rigid | Skeleton],
         *,
-        ties=(),
-        supports=(),
-        loads=(),
-        actuators=(),
-        field=None,
-        gravity=None,
-        contacts=(),
+        ties: Tie | Iterable[Tie] = (),
+        supports: Support | Iterable[Support] = (),
+        loads: Load | Iterable[Load] = (),
+        actuators: Actuator | Iterable[Actuator] = (),
+        field: Fielded | None = None,
+        gravity: Numbers | None = None,
+        contacts: Contact | BodyContact | Iterable[Contact | BodyContact] = (),
         water: Water | None = None,
         allow_rigid_motions: bool = False,
     ):
-        self.contacts = checked_list("contacts", contacts, (Contact, BodyContact))
+        self.contacts: tuple[Contact | BodyContact, ...] = checked_list(
+            "contacts", contacts, (Contact, BodyContact)
+        )
         self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
         self._bodies = Bodies(bodies, ties, shapes_that_touch(self._body_contacts))
-        self.supports = checked_list("supports", supports, _SUPPORTS)
-        self.loads = checked_list("loads", loads, _LOADS)
-        self.actuators = checked_list("actuators", actuators, (Actuator,), _ACTUATORS)
+        self.supports: tuple[Pin | Clamp | SymmetryPlane, ...] = checked_list("supports", supports, _SUPPORTS)
+        self.loads: tuple[Any, ...] = checked_list("loads", loads, _LOADS)
+        self.actuators: tuple[Actuator, ...] = checked_list("actuators", actuators, (Actuator,), _ACTUATORS)
         for k, each in enumerate(self.actuators):
             if any(each is other for other in self.actuators[:k]):
                 raise ValueError(f"actuators must differ, but actuator {k} is there twice")
-        self.fields = () if field is None else checked_list("field", field, (AppliedField,))
-        self.obstacles = obstacles_of(self._obstacle_contacts)
+        self.fields: tuple[AppliedField, ...] = (
+            () if field is None else checked_list("field", field, (AppliedField,))
+        )
+        self.obstacles: tuple[Any, ...] = obstacles_of(self._obstacle_contacts)
         if water is not None and not isinstance(water, Water):
             raise ValueError(f"water must be a Water, got {type(water).__name__}")
         self.water = water
         _refuse_idle_magnetization(self)
-        self.gravity = np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
+        self.gravity: np.ndarray = (
+            np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
+        )
         if any(f._core is None and not isinstance(f, UniformField) for f in self.fields):
             raise ValueError("field holds an AppliedField without a value: use a CustomField")
         if not isinstance(allow_rigid_motions, bool):
@@ -132,7 +143,7 @@ class Scene:
         self._allow_rigid_motions = allow_rigid_motions
         self._build(allow_rigid_motions)
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[Any, Any]:
         """What a copy, or another process, makes the scene from again."""
         return {
             "bodies": self._bodies.listed,
@@ -147,7 +158,7 @@ class Scene:
             "allow_rigid_motions": self._allow_rigid_motions,
         }
 
-    def __setstate__(self, arguments: dict) -> None:
+    def __setstate__(self, arguments: dict[Any, Any]) -> None:
         self.__init__(**arguments)
 
     def _build(self, allow_rigid_motions: bool) -> None:
@@ -296,7 +307,7 @@ class Scene:
         return self._bodies.mesh
 
     @property
-    def objects(self) -> tuple:
+    def objects(self) -> tuple[Any, ...]:
         """Every object of it, always in the same order. What a solve's `values` may name beside the scene itself."""
         water = () if self.water is None else (self.water,)
         return (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from .. import _core
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.contact import Contact
 from .touching_obstacles import pairs_with_obstacles
+
+if TYPE_CHECKING:
+    from .scene import Scene
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ class Touching:
 
 
 def touching_in(
-    scene,
+    scene: Scene,
     values: Any,
     contact: BodyContact | Contact,
     state: np.ndarray,

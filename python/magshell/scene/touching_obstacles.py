@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..obstacles import Obstacle
+
+if TYPE_CHECKING:
+    from ..surroundings.contact import Contact
+    from .scene import Scene
 
 
 class Standing(NamedTuple):
@@ -33,7 +37,12 @@ def standing(obstacle: Obstacle, time: float | None) -> Standing:
 
 
 def pairs_with_obstacles(
-    scene, values: Any, contact, positions: np.ndarray, velocities: np.ndarray, time: float | None
+    scene: Scene,
+    values: Any,
+    contact: Contact,
+    positions: np.ndarray,
+    velocities: np.ndarray,
+    time: float | None,
 ) -> dict[str, np.ndarray]:
     """What touching_pairs of the core has of bodies; positions and velocities (n_v, 3)."""
     vertices, weights = scene._bodies.contact_points(contact)

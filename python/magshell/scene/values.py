@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import copy, deepcopy
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +15,16 @@ from ..bodies.bodies import Whole, joined
 from ..bodies.shell import Shell
 from ..surroundings.constraints import Constraints, gather
 from .magnetization import gradient_by_all, of_carriers
+
+if TYPE_CHECKING:
+    from ..bodies.joint import Joint
+    from ..bodies.rigid import Rigid
+    from ..bodies.skin import Skin
+    from ..bodies.solid import Solid
+    from ..obstacles.obstacle import Obstacle
+    from ..surroundings.body_contact import BodyContact
+    from ..surroundings.contact import Contact
+    from .scene import Scene
 
 
 class Values:
@@ -27,12 +38,14 @@ class Values:
 
     def __init__(
         self,
-        scene,
+        scene: Scene,
         replaced: dict[object, dict[Any, Any]] | None = None,
         magnetization: np.ndarray | None = None,
     ):
         self.scene = scene
-        self.replaced = {item: deepcopy(values) for item, values in (replaced or {}).items()}
+        self.replaced: dict[object, dict[Any, Any]] = {
+            item: deepcopy(values) for item, values in (replaced or {}).items()
+        }
         self._now = {
             item: item.replaced(**values) for item, values in (replaced or {}).items() if item is not scene
         }
@@ -40,8 +53,8 @@ class Values:
             if body.skin in self._now:
                 self._now[body] = copy(self.current(body))
                 self._now[body].skin = self._now[body.skin]
-        self.sheets = tuple(self.current(body) for body in scene.bodies)
-        self.rigid = tuple(self.current(span) for span in scene.rigid_parts)
+        self.sheets: tuple[Any, ...] = tuple(self.current(body) for body in scene.bodies)
+        self.rigid: tuple[Any, ...] = tuple(self.current(span) for span in scene.rigid_parts)
         self.constraints: Constraints = scene._constraints
         if any(support in self._now for support in scene.supports):
             self.constraints = self._moved()
@@ -66,7 +79,7 @@ class Values:
         self.numbers = scene._value_layout.packed(numbers)
 
     @contextmanager
-    def in_core(self):
+    def in_core(self) -> Iterator[None]:
         """The scene's core with these values in it; solves of other threads wait."""
         scene = self.scene
         with scene._exclusive():
@@ -76,7 +89,7 @@ class Values:
             yield
 
     @contextmanager
-    def growth_in_core(self):
+    def growth_in_core(self) -> Iterator[None]:
         """For who looks at strains: as `in_core` where sheets grow, and only then."""
         if any(self.current(body)._in_time for body in self.scene._bodies.sheets):
             with self.in_core():
@@ -122,17 +135,17 @@ class Values:
             return sheets[0]
         return Whole(self.scene.mesh if flat else None, sheets)
 
-    def touching(self, contact) -> tuple[Any, ...]:
+    def touching(self, contact: Contact | BodyContact) -> tuple[Any, ...]:
         """The sheets that a contact is about, as they are in this solve."""
         return self.sheets[self.scene._bodies.of(contact).bodies]
 
-    def part_of(self, sheet):
+    def part_of(self, sheet: Shell | Solid) -> Any:
         """Where one of `sheets` stands among them."""
         return next(
             span for span, each in zip(self.scene._bodies.spans, self.sheets, strict=True) if each is sheet
         )
 
-    def part_of_skin(self, skin):
+    def part_of_skin(self, skin: Skin) -> Any:
         """Where the solid that has it, as it is in this solve, stands among the bodies."""
         return self.part_of(next(each for each in self.sheets if getattr(each, "skin", None) is skin))
 
@@ -159,17 +172,17 @@ class Values:
         masses = [place.masses(part) for place, part in zip(self.scene._rigid, self.rigid, strict=True)]
         return [*masses, np.zeros(self.scene._bodies.n_on_surfaces)]
 
-    def rigid_place(self, part):
+    def rigid_place(self, part: Rigid) -> Any:
         """Where one of `rigid` is."""
         return next(place for place, each in zip(self.scene._rigid, self.rigid, strict=True) if each is part)
 
-    def started_by(self, part) -> list[Any]:
+    def started_by(self, part: Rigid) -> list[Any]:
         """The places of all that starts with one of `rigid`."""
         scene = self.scene
         own = next(each for each, now in zip(scene.rigid_parts, self.rigid, strict=True) if now is part)
         return [scene._rigid[k] for k in scene._bodies.started_by(own)]
 
-    def moved_by(self, joint) -> list[Any]:
+    def moved_by(self, joint: Joint) -> list[Any]:
         """The places of all that one of the joints carries."""
         scene = self.scene
         own = next(each for each in scene.joints if self.current(each) is joint)
@@ -193,7 +206,7 @@ class Values:
             return None
         return gradient.value("gravity", "forces")
 
-    def current(self, item: Any):
+    def current(self, item: Any) -> Any:
         """An object of the scene as it is in this solve."""
         return self._now.get(item, item)
 
@@ -220,13 +233,13 @@ class Values:
         return {"replaced": self.replaced, "numbers": self.numbers}
 
     @classmethod
-    def again(cls, scene, kept: dict[Any, Any]) -> Values:
+    def again(cls, scene: Scene, kept: dict[Any, Any]) -> Values:
         """Raises ValueError where they do not fit the scene."""
         values = cls(scene, kept["replaced"])
         values.numbers = quantity("values", "SI", kept["numbers"], (scene._value_layout.size,))
         return scene._values if not values.replaced and values.same_as(scene._values) else values
 
-    def move(self, obstacle, path) -> None:
+    def move(self, obstacle: Obstacle, path: Any) -> None:
         """Has an obstacle, whose own place is the origin in `numbers`, follow a path."""
         self._now[obstacle] = obstacle._on(path)
 
@@ -249,7 +262,9 @@ class Gradient:
     values: (n,); controls: (m,), or (knots, m) of a motion; others: by what a motion has beside them, by name.
     """
 
-    def __init__(self, scene, values: np.ndarray, controls: np.ndarray, others: dict[Any, Any] | None = None):
+    def __init__(
+        self, scene: Scene, values: np.ndarray, controls: np.ndarray, others: dict[Any, Any] | None = None
+    ):
         self._scene, self._values, self._controls = scene, values, controls
         self.others: dict[Any, Any] = others or {}
         self.of_owners: dict[Any, Any] = {}  # by the values of objects, as they were asked for

@@ -50,7 +50,7 @@ def ball(radius: float, center: Numbers = _ORIGIN) -> Shape:
     return Primitive(distance, center - radius, center + radius, f"ball({radius:g})")
 
 
-def capsule(start, end, radius: float, end_radius: float | None = None) -> Shape:
+def capsule(start: Numbers, end: Numbers, radius: float, end_radius: float | None = None) -> Shape:
     """All that is within a radius of a segment: a finger.
 
     Args:
@@ -116,7 +116,7 @@ def box(size: Numbers, center: Numbers = _ORIGIN, rounding: float = 0.0) -> Shap
     return Primitive(distance, center - half, center + half, f"box({_listed(2 * half)})")
 
 
-def cylinder(start, end, radius: float) -> Shape:
+def cylinder(start: Numbers, end: Numbers, radius: float) -> Shape:
     """A round bar with flat ends at start and end (3,) m.
 
     >>> cylinder((0, 0, 0), (0, 0, 5), radius=1.0)([0, 0, 6]).item()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from .._checks.scalars import positive
 from ..mesh.transforms import matrix_of
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Numbers, Rotates
 
 
 Bounds = tuple[np.ndarray, np.ndarray]
@@ -54,13 +55,13 @@ class Shape:
     # Put together
 
     # NotImplemented is how an operator tells Python to ask the other side, and then to raise TypeError.
-    def __or__(self, other) -> Shape:
+    def __or__(self, other: Shape) -> Shape:
         return Union([self, other]) if isinstance(other, Shape) else NotImplemented
 
-    def __and__(self, other) -> Shape:
+    def __and__(self, other: Shape) -> Shape:
         return Intersection([self, other]) if isinstance(other, Shape) else NotImplemented
 
-    def __sub__(self, other) -> Shape:
+    def __sub__(self, other: Shape) -> Shape:
         return Difference([self, other]) if isinstance(other, Shape) else NotImplemented
 
     def smooth_union(self, *others: Shape, radius: float) -> Shape:
@@ -73,7 +74,7 @@ class Shape:
         """Moved by (3,) m."""
         return Placed(self, np.eye(3), quantity("translation", "m", translation, (3,)), 1.0)
 
-    def rotated(self, rotation, center: Numbers = (0.0, 0.0, 0.0)) -> Shape:
+    def rotated(self, rotation: Rotates, center: Numbers = (0.0, 0.0, 0.0)) -> Shape:
         """Turned about a center (3,) m by a rotation matrix (3, 3) or a scipy Rotation."""
         matrix = matrix_of(rotation)
         if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-9:
@@ -95,6 +96,8 @@ class Shape:
 
 
 class Named(Shape):
+    name: str
+
     def __init__(self, shape: Shape, name: str):
         self._shape, self.name = shape, name
 
@@ -105,7 +108,7 @@ class Named(Shape):
     def _distance(self, points: np.ndarray) -> np.ndarray:
         return self._shape._distance(points)
 
-    def nearest(self, points: np.ndarray):
+    def nearest(self, points: np.ndarray) -> np.ndarray:
         return self._distance(points), np.zeros(len(points), dtype=int), [self.name]
 
     def __repr__(self) -> str:
@@ -136,7 +139,7 @@ class Placed(Shape):
     def _distance(self, points: np.ndarray) -> np.ndarray:
         return self._factor * self._shape._distance(self._back(points))
 
-    def nearest(self, points: np.ndarray):
+    def nearest(self, points: np.ndarray) -> np.ndarray:
         distance, number, names = self._shape.nearest(self._back(points))
         return self._factor * distance, number, names
 
@@ -161,7 +164,7 @@ class Offset(Shape):
     def _distance(self, points: np.ndarray) -> np.ndarray:
         return self._shape._distance(points) - self._by
 
-    def nearest(self, points: np.ndarray):
+    def nearest(self, points: np.ndarray) -> np.ndarray:
         distance, number, names = self._shape.nearest(points)
         return distance - self._by, number, names
 
@@ -169,7 +172,7 @@ class Offset(Shape):
         return f"{self._shape!r}.offset({self._by:g})"
 
 
-def several(name: str, shapes) -> list[Shape]:
+def several(name: str, shapes: Iterable[Shape]) -> list[Shape]:
     listed = checked_list("shapes", list(shapes), (Shape,), "shapes of ms.shapes")
     if len(listed) < 2:
         raise ValueError(f"{name} needs at least two shapes, got {len(listed)}")
@@ -210,7 +213,7 @@ class Union(_Combined):
     def _distance(self, points: np.ndarray) -> np.ndarray:
         return np.min([shape._distance(points) for shape in self._shapes], axis=0)
 
-    def nearest(self, points: np.ndarray):
+    def nearest(self, points: np.ndarray) -> np.ndarray:
         distances, number, names = self._nearest(self._shapes, points)
         return distances.min(axis=0), number, names
 
@@ -237,7 +240,7 @@ class SmoothUnion(Union):
     def _distance(self, points: np.ndarray) -> np.ndarray:
         return self._blended([shape._distance(points) for shape in self._shapes])
 
-    def nearest(self, points: np.ndarray):
+    def nearest(self, points: np.ndarray) -> np.ndarray:
         distances, number, names = self._nearest(self._shapes, points)
         return self._blended(distances), number, names
 
@@ -256,7 +259,7 @@ class Intersection(_Combined):
     def _distance(self, points: np.ndarray) -> np.ndarray:
         return np.max([shape._distance(points) for shape in self._shapes], axis=0)
 
-    def nearest(self, points: np.ndarray):
+    def nearest(self, points: np.ndarray) -> np.ndarray:
         distances, number, names = self._nearest(self._shapes, points)
         return distances.max(axis=0), number, names
 
@@ -274,6 +277,6 @@ class Difference(_Combined):
         taken = np.min([shape._distance(points) for shape in self._shapes[1:]], axis=0)
         return np.maximum(self._shapes[0]._distance(points), -taken)
 
-    def nearest(self, points: np.ndarray):
+    def nearest(self, points: np.ndarray) -> np.ndarray:
         _, number, names = self._shapes[0].nearest(points)
         return self._distance(points), number, names

@@ -10,6 +10,7 @@ import platform
 import sys
 import time
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,7 +37,7 @@ class Outcome:
         return bool(self.error)
 
 
-def attempt(run, start) -> Outcome:
+def attempt(run: Callable[..., Any], start: Any) -> Outcome:
     """run(start) on one thread and without progress bars. The start is copied, as a minimization moves it in place."""
     began = time.perf_counter()
     try:
@@ -73,7 +74,7 @@ class CallOff:
         return CallOff, ()
 
 
-def attempt_sent(run, start, sender: str, call_off: CallOff) -> Outcome:
+def attempt_sent(run: Callable[..., Any], start: Any, sender: str, call_off: CallOff) -> Outcome:
     """`attempt` for executors that send things in a way of their own. Some wait forever for what cannot be sent."""
     if (
         call_off.done

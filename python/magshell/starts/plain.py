@@ -21,7 +21,7 @@ _RECORDS = {each.__name__: each for each in (Minimum, Record, MotionState, Clock
 _ADVICE = "return numbers, arrays and tensors, such as (minimum, equilibrium.positions)"
 
 
-def to_plain(value: Any, arrays: list[np.ndarray], label: str):
+def to_plain(value: Any, arrays: list[np.ndarray], label: str) -> Any:
     """What JSON can hold, with the arrays appended to a list. Raises TypeError, with the label, on what is not data."""
     if value is None or type(value) in (bool, int, float, str):
         return value
@@ -48,7 +48,7 @@ def to_plain(value: Any, arrays: list[np.ndarray], label: str):
     raise TypeError(f"{label} is a {what}, and the files of a checkpoint hold data only: {_ADVICE}")
 
 
-def from_plain(held, array: Callable[[int], np.ndarray]):
+def from_plain(held: Any, array: Callable[[int], np.ndarray]) -> Any:
     """What was given to `to_plain`; array: the one of a number. Raises an error on anything else."""
     if not isinstance(held, dict):
         return held

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import types
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..design.digest import closure, digest, is_own_function, used_globals
 _LONGEST_TOLD = 60  # characters of a value that is told in full
 
 
-def described(run) -> dict[str, str]:
+def described(run: Callable[..., Any]) -> dict[str, str]:
     """{what: its value in words, or its digest} of a function, with the arguments that are bound to it, what it holds
     and what it looks up. Raises ValueError where something bound to it neither is plain nor can be pickled."""
     told: dict[str, str] = {}

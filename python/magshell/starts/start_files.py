@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ class StartFiles:
     Raises ValueError where run or a start cannot be told from another.
     """
 
-    def __init__(self, folder: str | Path, run, starts: list[Any], resume: bool):
+    def __init__(self, folder: str | Path, run: Callable[..., Any], starts: list[Any], resume: bool):
         self.folder: Path = Path(folder)
         if self.folder.exists() and not self.folder.is_dir():
             raise ValueError(f"checkpoint must be a folder, and {folder} is a file")

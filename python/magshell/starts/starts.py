@@ -38,7 +38,7 @@ class FailedStart:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Multistart(Sequence):
+class Multistart(Sequence[Any]):
     """The finished starts as a sequence, best first. failed: FailedStarts, by number. unfinished: numbers of the starts
     that an interruption left. seconds: in all. resumed: numbers of the starts whose results came from the checkpoint."""
 
@@ -48,7 +48,7 @@ class Multistart(Sequence):
     seconds: float
     resumed: tuple[int, ...] = ()
 
-    def __getitem__(self, index):
+    def __getitem__(self, index: Any) -> Any:
         return self.finished[index]
 
     def __len__(self) -> int:

@@ -7,10 +7,14 @@ import pickle
 import queue
 import signal
 import threading
+from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .one_thread import one_thread_in_children
+
+if TYPE_CHECKING:
+    from types import TracebackType
 
 _TIME_TO_LEAVE = 1.0  # s, that an idle process may take to end
 
@@ -41,10 +45,12 @@ class WorkerProcesses(Executor):
         self._idle.put(self._started())
         return self
 
-    def __exit__(self, kind, error, traceback) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
         self.shutdown(cancel_futures=error is not None)
 
-    def submit(self, function, /, *arguments) -> Future:
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
         return self._threads.submit(self._call, function, arguments)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..dynamics.trajectory import Trajectory
 from ..fields.field import AppliedField
 from ..obstacles import Obstacle
 from ..statics.path import Path
+
+if TYPE_CHECKING:
+    from .._checks.kinds import SolveResult
 
 
 class Surroundings(NamedTuple):
@@ -20,7 +23,7 @@ class Surroundings(NamedTuple):
     obstacles: list[tuple[Obstacle, ...]]
 
 
-def surroundings_of(result) -> Surroundings:
+def surroundings_of(result: SolveResult) -> Surroundings:
     """Of anything with a scene."""
     scene = result.scene
     if not hasattr(result, "_values_at"):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,11 +13,16 @@ from ..bodies.skeleton import Skeleton
 from ..mesh.triangle_mesh import TriangleMesh
 from ..obstacles import Capsule, Sphere
 
+if TYPE_CHECKING:
+    from .._checks.kinds import SolveResult
+    from ..bodies.rigid import Rigid
+    from ..scene.scene import Scene
+
 _THICK = 0.06  # the radius of a rod, in its length
 _KNOB = 1.4  # and of its ends, in that
 
 
-def surface_of(skeleton: Skeleton, link, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def surface_of(skeleton: Skeleton, link: Rigid, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """At rest: vertices (n, 3) m, faces (m, 3). center: (3,) m, of the link."""
     shape = getattr(link, "shape", None)
     if shape is not None:
@@ -33,7 +39,7 @@ def surface_of(skeleton: Skeleton, link, center: np.ndarray) -> tuple[np.ndarray
     return joined(parts)
 
 
-def joined(parts) -> tuple[np.ndarray, np.ndarray]:
+def joined(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
     """Several surfaces as one."""
     first = np.cumsum([0, *(len(points) for points, _ in parts)])
     faces = [faces + start for (_, faces), start in zip(parts, first[:-1], strict=True)]
@@ -48,7 +54,7 @@ def _rod(a: np.ndarray, b: np.ndarray, radius: float):
     return Capsule(np.stack([a, b]), radius=radius).surface()
 
 
-def bones_of(result) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+def bones_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
     """Of every state of a result (one, or k of them), the surfaces of its links, where they are."""
     return _where(
         result,
@@ -60,12 +66,12 @@ def bones_of(result) -> list[list[tuple[np.ndarray, np.ndarray]]]:
     )
 
 
-def shapes_of(result) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+def shapes_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
     """Likewise of the free parts that have a shape."""
     return _where(result, _shapes(result.scene))
 
 
-def shapes_at_rest(scene) -> list[tuple[np.ndarray, np.ndarray]]:
+def shapes_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
     """Of a scene."""
     return [(points, faces) for _, points, faces in _shapes(scene)]
 
@@ -91,7 +97,7 @@ def _where(result, surfaces) -> list[list[tuple[np.ndarray, np.ndarray]]]:
     return found
 
 
-def bones_at_rest(scene) -> list[tuple[np.ndarray, np.ndarray]]:
+def bones_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
     """Of a scene: the surfaces of its links."""
     places = dict(zip(map(id, scene.rigid_parts), scene._rigid, strict=True))
     return [

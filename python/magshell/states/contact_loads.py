@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..dynamics.trajectory import Trajectory
 from ..scene.touching import touching_in
+
+if TYPE_CHECKING:
+    from .._checks.kinds import SolveResult
 
 
 class ContactLoads(NamedTuple):
@@ -30,7 +33,7 @@ class ContactLoads(NamedTuple):
         return ContactLoads(self.forces[vertices], self.pushed[vertices])
 
 
-def contact_loads(result, index: int) -> ContactLoads:
+def contact_loads(result: SolveResult, index: int) -> ContactLoads:
     """In one of its states."""
     scene, moving = result.scene, isinstance(result, Trajectory)
     values, state = result._values_at(index), result._state_at(index)

@@ -143,7 +143,7 @@ def _numbered(of_objects: dict[Any, Any], numbers: dict[int, int]) -> dict[Any, 
     return {numbers[id(each)]: value for each, value in of_objects.items()}
 
 
-def _made(kind: type, held: dict[Any, Any], scene: Scene):
+def _made(kind: type[Any], held: dict[Any, Any], scene: Scene):
     """The other way round. Raises an error where it does not fit the scene."""
     objects = (scene, *scene.objects)
     if held.keys() != _expected(kind):
@@ -161,7 +161,7 @@ def _made(kind: type, held: dict[Any, Any], scene: Scene):
     return result
 
 
-def _expected(kind: type) -> set[str]:
+def _expected(kind: type[Any]) -> set[str]:
     return kind.__dataclass_fields__.keys() - {"scene"}
 
 

@@ -25,19 +25,19 @@ from .solid_files import write_solids
 from .state import State, states_of, with_times
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Fielded, FilePath, Numbers, Shown
 
 
 def write_series(
-    path,
-    what,
+    path: FilePath,
+    what: Shown,
     *,
     positions: Numbers | None = None,
     times: Numbers | None = None,
     velocities: Numbers | None = None,
     remanent_magnetization: Numbers | None = None,
     applied_flux_density: Numbers | None = None,
-    field=None,
+    field: Fielded | None = None,
     vertex_fields: dict[Any, Any] | None = None,
     face_fields: dict[Any, Any] | None = None,
     tetrahedron_fields: dict[Any, Any] | None = None,

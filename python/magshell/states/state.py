@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +35,7 @@ from .tendons import tendons_at_rest, tendons_of
 from .units import clock
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Fielded, Numbers, Shown
 
 
 @dataclass(frozen=True)
@@ -125,13 +125,13 @@ class State:
 
 
 def states_of(
-    what,
+    what: Shown,
     *,
     positions: Numbers | None = None,
     remanent_magnetization: Numbers | None = None,
     applied_flux_density: Numbers | None = None,
-    field=None,
-    obstacles=None,
+    field: Fielded | None = None,
+    obstacles: Obstacle | Sequence[Obstacle] | None = None,
 ) -> list[State]:
     """The states in a mesh, a Shell, a Solid, a Scene, a result, or a list of those; keywords come before their own.
 

@@ -21,7 +21,7 @@ from ..scene.scene import Scene
 from .state import State, states_of
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import FilePath, Numbers, Shown
 
 
 _WRITERS = {".stl": write_stl, ".obj": write_obj}
@@ -29,8 +29,8 @@ _UNITS = {"m": 1.0, "mm": 1e3}
 
 
 def write_surface(
-    path,
-    what,
+    path: FilePath,
+    what: Shown,
     *,
     thickness: Numbers | None = None,
     index: int = -1,

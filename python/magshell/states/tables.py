@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +13,15 @@ from ..statics.equilibria import Equilibria
 from ..statics.equilibrium import Equilibrium
 from ..statics.path import Path
 
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
 _RESULTS = Equilibrium | Equilibria | Path | Trajectory
 _PER = ("state", "vertex")
 
 
-def to_xarray(result: Equilibrium | Equilibria | Path | Trajectory):
+def to_xarray(result: Equilibrium | Equilibria | Path | Trajectory) -> xarray.Dataset:
     """A result as an xarray.Dataset (needs the package xarray).
 
     Along `time` [s] of a Trajectory, `parameter` of a Path or `case` of Equilibria: `positions`, `displacements` and, of a
@@ -53,7 +58,7 @@ def to_xarray(result: Equilibrium | Equilibria | Path | Trajectory):
     return xarray.Dataset(variables, labels, {"kind": type(result).__name__})
 
 
-def to_pandas(result: Equilibrium | Equilibria | Path | Trajectory, per: str = "state"):
+def to_pandas(result: Equilibrium | Equilibria | Path | Trajectory, per: str = "state") -> pandas.DataFrame:
     """A result as a pandas.DataFrame (needs the package pandas), the units in the names of its columns.
 
     per: "state": a row for each state, of energies, strains and the uniform field; "vertex": a row for each vertex in each

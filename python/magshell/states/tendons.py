@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.tensors import detached
@@ -9,11 +11,15 @@ from ..obstacles import Capsule
 from ..surroundings.tendon import Tendon
 from .bones import joined
 
+if TYPE_CHECKING:
+    from .._checks.kinds import SolveResult
+    from ..scene.scene import Scene
+
 _THICK = 0.012  # the radius, in the length of a tendon at rest, and at most so much of its shortest segment
 _MOST = 0.2
 
 
-def tendons_of(result) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+def tendons_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
     """Of every state of a result (one, or k of them), the surfaces of its tendons; none without any."""
     found: list[list[tuple[np.ndarray, np.ndarray]]] = []
     for tendon in _tendons(result.scene):
@@ -25,7 +31,7 @@ def tendons_of(result) -> list[list[tuple[np.ndarray, np.ndarray]]]:
     return found
 
 
-def tendons_at_rest(scene) -> list[tuple[np.ndarray, np.ndarray]]:
+def tendons_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
     """Of a scene."""
     return [_rods(tendon, tendon.points) for tendon in _tendons(scene)]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from ..scene.courses import names_in_time, values_between
 from ..scene.inputs import Inputs
 from ..scene.values import Values
 from ..surroundings.supports import Support
+
+if TYPE_CHECKING:
+    from .start import Origin
 
 
 class AlongPath:
@@ -19,7 +23,10 @@ class AlongPath:
     Raises ValueError where anything differs that cannot move.
     """
 
-    def __init__(self, inputs: Inputs, start):
+    after: np.ndarray
+    before: np.ndarray
+
+    def __init__(self, inputs: Inputs, start: Origin):
         self._layout = inputs.scene._value_layout
         self._after = inputs.values
         self._before = inputs.values if start is None else start._values
@@ -58,7 +65,7 @@ class AlongPath:
         return self._layout.of(values.numbers, *key)
 
 
-def all_can_move(inputs: Inputs, start) -> bool:
+def all_can_move(inputs: Inputs, start: Origin) -> bool:
     """Whether all values that `start` has elsewhere can vary on the way from there."""
     can = _keys_that_move(inputs)
     return all(key in can for key in _differing(inputs.scene._value_layout, start._values, inputs.values))

@@ -41,7 +41,7 @@ def join(found: Sequence[Equilibrium], of_cases: bool) -> Equilibrium | Equilibr
     return Equilibria(found) if of_cases else found[0]
 
 
-def starts_of(start, count: int) -> Sequence[Any]:
+def starts_of(start: Any, count: int) -> Sequence[Any]:
     """Where each case starts."""
     if not isinstance(start, Equilibria):
         return [start] * count
@@ -50,7 +50,7 @@ def starts_of(start, count: int) -> Sequence[Any]:
     return start
 
 
-def of_case(error: BaseException, number: int, count: int, last_good) -> BaseException:
+def of_case(error: BaseException, number: int, count: int, last_good: Any) -> BaseException:
     """The error that says which load case failed."""
     told = f"load case {number} of {count}: {error}"
     if isinstance(error, DesignRejected):

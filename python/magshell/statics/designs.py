@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
 from .._checks.quantity import real_numbers
 from .._checks.tensors import detached
 
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
 
-def numbers_only(design: dict) -> dict:
+
+def numbers_only(design: dict[Any, Any]) -> dict[Any, Any]:
     """Copies without a graph, without what was left out."""
     kept = {name: value for name, value in design.items() if value is not None}
     return {
@@ -17,7 +25,7 @@ def numbers_only(design: dict) -> dict:
     }
 
 
-def between(old: dict, new: dict, share: float) -> dict:
+def between(old: dict[Any, Any], new: dict[Any, Any], share: float) -> dict[Any, Any]:
     """The design at a share of the way. Raises ValueError where one of them has what the other lacks."""
     if old.keys() != new.keys():
         names = ", ".join(sorted(str(name) for name in old.keys() ^ new.keys()))
@@ -30,7 +38,7 @@ def between(old: dict, new: dict, share: float) -> dict:
     }
 
 
-def packed(scene, design: dict, form) -> dict:
+def packed(scene: Scene, design: dict[Any, Any], form: Callable[[np.ndarray], Any]) -> dict[Any, Any]:
     """With numbers in place of the scene's objects, and form(array) in place of each array."""
     objects, own = (
         [id(each) for each in _objects(scene)],
@@ -45,7 +53,7 @@ def packed(scene, design: dict, form) -> dict:
     }
 
 
-def unpacked(scene, design: dict) -> dict:
+def unpacked(scene: Scene, design: dict[Any, Any]) -> dict[Any, Any]:
     """The other way; a design without values has none then. Raises ValueError where the scene lacks an object."""
     objects = _objects(scene)
     if any(number >= len(objects) for number in design["values"]):
@@ -54,5 +62,5 @@ def unpacked(scene, design: dict) -> dict:
     return numbers_only({**design, "values": values or None})
 
 
-def _objects(scene) -> list:
+def _objects(scene) -> list[Any]:
     return [scene, *scene.objects]

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..bodies.caps import describe_faces
 from ..surroundings.constraints import free_rigid_motions
+
+if TYPE_CHECKING:
+    from .. import _core
+    from ..scene.inputs import Inputs
 
 # Of a face, over the usual length of an edge: below, round-off hides what is stiff less.
 SHORTEST_HEIGHT = 1e-4
@@ -14,7 +20,7 @@ _MOST_NAMED = 4  # places in a message
 _SMALLEST_MOVE = 1e-6  # of the sheet's size, in one step of relaxation
 
 
-def why_not(inputs, found, at_rest: bool) -> str:
+def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
     """The text of a NotConverged. found: what the core handed back; at_rest: whether it started from an equilibrium."""
     scene, failed = inputs.scene, found.failed
     whole = found.progress >= 1.0

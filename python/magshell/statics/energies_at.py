@@ -17,6 +17,7 @@ from .start import check_faces
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from ..scene.scene import Scene
 
 
 _ELASTIC = ("membrane", "bending")  # of shells
@@ -24,7 +25,7 @@ _ELASTIC = ("membrane", "bending")  # of shells
 
 @solve_entry
 def energies(
-    scene,
+    scene: Scene,
     positions: Numbers,
     *,
     edge_rotations: Numbers | None = None,

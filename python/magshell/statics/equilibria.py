@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +13,12 @@ from ..bodies.of_body import result_of
 from ..bodies.strains import Strains
 from .equilibrium import Equilibrium
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Computed
+    from ..scene.scene import Scene
 
-class Equilibria(Sequence):
+
+class Equilibria(Sequence[Equilibrium]):
     """A scene at rest in each of k load cases, or in k ways in one; a sequence of Equilibrium.
 
     positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
@@ -42,12 +46,12 @@ class Equilibria(Sequence):
         self.__init__(kept["_cases"])
 
     @property
-    def scene(self):
+    def scene(self) -> Scene:
         """Of all cases."""
         return self._cases[0].scene
 
     @property
-    def displacements(self):
+    def displacements(self) -> Computed:
         """(k, n_v, 3) m, from the rest shape."""
         return stacked([case.displacements for case in self._cases])
 
@@ -98,7 +102,7 @@ class Equilibria(Sequence):
     def __len__(self) -> int:
         return len(self._cases)
 
-    def __getitem__(self, index) -> Any:
+    def __getitem__(self, index: Any) -> Any:
         """A case, some of them, or what all say of one body of the scene."""
         if isinstance(index, BODIES) or hasattr(index, "_result_in"):
             return result_of(self, index)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from ..scene.values import Values
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.contact import Contact
 from ..surroundings.supports import Clamp, Pin, SymmetryPlane
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Computed
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,7 +63,7 @@ class Equilibrium:
     memory: int
     factorization: str
     _state: np.ndarray = field(repr=False)
-    _turns: list = field(repr=False)
+    _turns: list[Any] = field(repr=False)
     _controls: Any = field(repr=False)
     _values: Any = field(repr=False)
     _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
@@ -69,11 +72,11 @@ class Equilibrium:
     def __copy__(self) -> Equilibrium:
         return self  # nothing of it changes
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[Any, Any]:
         """What a copy, another process or a file makes it from again: tensors as arrays, without their gradients."""
         return {**plain_arrays(vars(self)), "_values": self._values.kept()}
 
-    def __setstate__(self, kept: dict) -> None:
+    def __setstate__(self, kept: dict[Any, Any]) -> None:
         vars(self).update(kept, _values=Values.again(kept["scene"], kept["_values"]))
 
     def __getitem__(self, body: Any) -> Any:
@@ -81,7 +84,7 @@ class Equilibrium:
         return result_of(self, body)
 
     @property
-    def displacements(self):
+    def displacements(self) -> Computed:
         """(n_v, 3) m, from the rest shape."""
         rest = self.scene.mesh.rest_positions
         if isinstance(self.positions, np.ndarray):

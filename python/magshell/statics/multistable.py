@@ -24,7 +24,7 @@ from .search import Search, Solution, find, inputs_of, solve
 from .start import starting_point
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Numbers, Starting
 
 
 _MODES = 4  # that each equilibrium is pushed along, beside its unstable ones
@@ -56,7 +56,7 @@ def equilibria(
     curvature_scale: Numbers | None = None,
     vertex_loads: Numbers | None = None,
     values: dict[Any, Any] | None = None,
-    start=None,
+    start: Starting | None = None,
     unstable: bool = False,
     attempts: int = 24,
     same_within: float | None = None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,10 @@ from .along_path import AlongPath, all_can_move
 from .diagnosis import why_not
 from .equilibrium import Equilibrium
 from .start import starting_point
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Starting
+    from .start import Origin
 
 
 class Solution(NamedTuple):
@@ -54,7 +58,7 @@ class Search:
     at_rest: bool = False
     note: Callable[[str], None] = _unnoted
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not isinstance(self.solver, Newton):
             raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(self.solver).__name__}")
         if not isinstance(self.require_stable, bool):
@@ -68,7 +72,11 @@ class Search:
 
 
 def find(
-    scene: Scene, arguments: dict, start=None, search: Search | None = None, keep_factor: bool = False
+    scene: Scene,
+    arguments: dict[Any, Any],
+    start: Starting | Origin | None = None,
+    search: Search | None = None,
+    keep_factor: bool = False,
 ) -> Solution:
     """The equilibrium at the arguments of ms.equilibrium, cases apart. Raises as it does."""
     search = Search() if search is None else search
@@ -88,7 +96,7 @@ def find(
     return solve(inputs, state, turns, from_, inputs.controls, options, search.progress, moving)
 
 
-def inputs_of(scene: Scene, arguments: dict, at_rest: bool = False) -> Inputs:
+def inputs_of(scene: Scene, arguments: dict[Any, Any], at_rest: bool = False) -> Inputs:
     """The arguments of ms.equilibrium, checked against the scene."""
     given = dict(arguments)
     shell = {name: given.pop(name, None) for name in SHELL_NAMES}
@@ -113,11 +121,11 @@ def inputs_of(scene: Scene, arguments: dict, at_rest: bool = False) -> Inputs:
 def solve(
     inputs: Inputs,
     state: np.ndarray,
-    turns: list,
-    from_,
-    to,
-    options,
-    progress=None,
+    turns: list[Any],
+    from_: np.ndarray,
+    to: np.ndarray,
+    options: _core.StaticsOptions,
+    progress: Callable[[float, float], None] | None = None,
     moving: AlongPath | None = None,
 ) -> Solution:
     """The core's search for an equilibrium at the controls `to`, from a state at `from_`; moving: values that go along."""
@@ -165,7 +173,9 @@ def _energies(scene: Scene, found) -> dict[str, float] | None:
         return None
 
 
-def _result(scene: Scene, inputs: Inputs, found, energies: dict | None, wall_time: float) -> Equilibrium:
+def _result(
+    scene: Scene, inputs: Inputs, found, energies: dict[Any, Any] | None, wall_time: float
+) -> Equilibrium:
     points, edge_rotations, driving = _outputs(inputs, found)
     n_v = scene.mesh.n_vertices
     strain = largest_of(scene, found.state, inputs.values.whole.thickness)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ..scene.scene import Scene
 from ..surroundings.contact_inputs import check_outside
 from .equilibrium import Equilibrium
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Starting
+
 
 class Origin(NamedTuple):
     """A state that is an equilibrium for these inputs, and the turns that its terms have made on the way."""
@@ -24,7 +27,9 @@ class Origin(NamedTuple):
     inputs: Inputs
 
 
-def starting_point(scene: Scene, start, inputs: Inputs):
+def starting_point(
+    scene: Scene, start: Starting | Origin, inputs: Inputs
+) -> tuple[np.ndarray, list[Any], np.ndarray, bool]:
     """State, the turns its terms have made, controls at which it holds, and whether it is an equilibrium there."""
     model = scene._model
     if start is None:

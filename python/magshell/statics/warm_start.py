@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from .equilibria import Equilibria
 from .equilibrium import Equilibrium
 from .search import Search, Solution, find, inputs_of
 from .start import Origin
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Starting
 
 _LARGEST_SECOND_ORDER = 0.5  # of the first-order change: a step that ends farther from it is taken in halves
 _NO_JUMP = 1e-3  # of the mesh's size: so little is no jump
@@ -52,7 +55,7 @@ class WarmStart:
     ((2, 33, 3), 1)
     """
 
-    def __init__(self, scene: Scene, *, start=None, solver: Newton | None = None):
+    def __init__(self, scene: Scene, *, start: Starting | None = None, solver: Newton | None = None):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
         self.scene = scene

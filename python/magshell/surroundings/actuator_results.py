@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .._checks.tensors import stacked
 from .closed_surface import of_tetrahedra
 
+if TYPE_CHECKING:
+    from .._checks.kinds import Computed, SolveResult
+    from ..bodies.actuator import Actuator
+
 
 class ActuatorResult:
     """One actuator of a result."""
 
-    def __init__(self, result, actuator):
+    actuator: Actuator
+
+    def __init__(self, result: SolveResult, actuator: Actuator):
         if not any(actuator is each for each in result.scene.actuators):
             raise ValueError(
                 f"an actuator of the scene is one of scene.actuators, got {actuator!r} that is not in it"
@@ -37,12 +45,12 @@ class CavityResult(ActuatorResult):
     """A Cavity of a result."""
 
     @property
-    def volume(self):
+    def volume(self) -> Computed:
         """(...) m3."""
         return self._surface.volume(self._result.positions)
 
     @property
-    def pressure(self):
+    def pressure(self) -> Computed:
         """(...) Pa, over that outside, as it acts under the load factor."""
         rest = float(self._surface.volume(self._result.scene.mesh.rest_positions))
         return self._by_law(
@@ -58,7 +66,7 @@ class CellsResult(ActuatorResult):
     """Cells of a result."""
 
     @property
-    def volume_ratios(self):
+    def volume_ratios(self) -> Computed:
         """(..., k): J, the volume of each cell over that at rest."""
         span = self._result.scene._bodies.of(self.actuator)
         positions = self._result.positions[..., span.vertices, :]
@@ -70,7 +78,7 @@ class CellsResult(ActuatorResult):
         return stacked(volumes, axis=-1)
 
     @property
-    def pressures(self):
+    def pressures(self) -> Computed:
         """(..., k) Pa: K (a - J), a as the load factor has it."""
         return self._by_law(
             lambda cells, ratios, factor: cells.pressure_at(ratios, factor), self.volume_ratios
@@ -81,7 +89,7 @@ class TendonResult(ActuatorResult):
     """A Tendon of a result."""
 
     @property
-    def positions(self):
+    def positions(self) -> Computed:
         """(..., k, 3) m, of its points."""
         scene = self._result.scene
         own = np.zeros((0, 3)) if not scene.rigid_parts else self._result._own_points
@@ -94,18 +102,18 @@ class TendonResult(ActuatorResult):
         return stacked(points, axis=-2)
 
     @property
-    def lengths(self):
+    def lengths(self) -> Computed:
         """(..., segments) m."""
         points = self.positions
         return ((points[..., 1:, :] - points[..., :-1, :]) ** 2).sum(-1) ** 0.5
 
     @property
-    def length(self):
+    def length(self) -> Computed:
         """(...) m."""
         return self.lengths.sum(-1)
 
     @property
-    def tension(self):
+    def tension(self) -> Computed:
         """(...) N; of a tendon that does not slide, one a segment, (..., segments). Times the load factor."""
         return self._by_law(
             lambda tendon, length, factor: factor * tendon.tension_at(length),

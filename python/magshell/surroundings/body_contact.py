@@ -77,6 +77,10 @@ class BodyContact(Owner):
     True
     """
 
+    a: Shell | Solid | Rigid
+    b: Shell | Solid | Rigid
+    lagged_friction: bool
+
     body = None
     for_all = True
     _replaceable = (
@@ -91,11 +95,11 @@ class BodyContact(Owner):
 
     def __init__(
         self,
-        a,
-        b,
+        a: Shell | Solid | Rigid,
+        b: Shell | Solid | Rigid,
         *,
         minimal_distance: Numbers | None = None,
-        reach=None,
+        reach: Numbers | None = None,
         contact_stiffness: Numbers | None = None,
         law: str = "barrier",
         smoothing: Numbers | None = None,
@@ -128,16 +132,18 @@ class BodyContact(Owner):
         def number(name, unit, default, check=positive):
             return default if given[name] is None else check(name, unit, given[name])
 
-        self.distance_given = given["minimal_distance"] is not None
-        self.minimal_distance = number("minimal_distance", "m", self._distance(bodies), not_negative)
-        self.reach = number("reach", "m", self._reach(bodies))
+        self.distance_given: bool = given["minimal_distance"] is not None
+        self.minimal_distance: float = number("minimal_distance", "m", self._distance(bodies), not_negative)
+        self.reach: float = number("reach", "m", self._reach(bodies))
         stiffness = min(map(_modulus, bodies))
         if stiffness == np.inf and given["contact_stiffness"] is None:
             raise ValueError("contact_stiffness [Pa] is needed between rigid shapes, which have no modulus")
-        self.contact_stiffness = number("contact_stiffness", "Pa", stiffness)
-        self.smoothing = number("smoothing", "m", _SMOOTHING * self.reach)
-        self.friction_coefficient = number("friction_coefficient", "1", None, not_negative)
-        self.static_friction_coefficient = number("static_friction_coefficient", "1", None, not_negative)
+        self.contact_stiffness: float = number("contact_stiffness", "Pa", stiffness)
+        self.smoothing: float = number("smoothing", "m", _SMOOTHING * self.reach)
+        self.friction_coefficient: float | None = number("friction_coefficient", "1", None, not_negative)
+        self.static_friction_coefficient: float | None = number(
+            "static_friction_coefficient", "1", None, not_negative
+        )
         if self.static_friction_coefficient is not None:
             if self.friction_coefficient is None:
                 raise ValueError(
@@ -149,7 +155,7 @@ class BodyContact(Owner):
                     f"{self.friction_coefficient:g}, got {self.static_friction_coefficient:g}"
                 )
         extent = max(width_of(body.mesh) for body in bodies)
-        self.sticking_speed = number("sticking_speed", "m/s", _STICKING * extent)
+        self.sticking_speed: float = number("sticking_speed", "m/s", _STICKING * extent)
 
     def _distance(self, bodies) -> float:
         return sum(0.5 * _thickness(body) for body in bodies)
@@ -222,12 +228,14 @@ class SelfContact(BodyContact):
     SelfContact(Shell; barrier, 1e+06 Pa within 0.0001 m beyond 0.001 m)
     """
 
+    b: Shell | Solid
+
     def __init__(
         self,
-        a,
+        a: Shell | Solid | Rigid,
         *,
         minimal_distance: Numbers | None = None,
-        reach=None,
+        reach: Numbers | None = None,
         contact_stiffness: Numbers | None = None,
         law: str = "barrier",
         smoothing: Numbers | None = None,
@@ -239,7 +247,8 @@ class SelfContact(BodyContact):
         if not isinstance(a, BODIES):
             raise ValueError(f"a must be a Shell or Solid of the scene, got {a!r:.60}")
         _check_does_not_cross(a)
-        self.a = self.b = a
+        self.a: Shell | Solid | Rigid = a
+        self.b: Shell | Solid | Rigid = a
         self._take(
             minimal_distance=minimal_distance,
             reach=reach,
@@ -270,11 +279,11 @@ class RigidShape(NamedTuple):
     mesh: TriangleMesh
 
 
-def touches_with_shape(side) -> bool:
+def touches_with_shape(side: Shell | Solid | Rigid) -> bool:
     return isinstance(side, Rigid) and side.shape is not None
 
 
-def checked_side(name: str, side):
+def checked_side(name: str, side: Shell | Solid | Rigid) -> Shell | Solid | Rigid:
     """A body in contact, as it was given."""
     if isinstance(side, BODIES) or touches_with_shape(side):
         return side
@@ -298,7 +307,7 @@ def _check_does_not_cross(body) -> None:
         )
 
 
-def side_of(side) -> Shell | Solid | RigidShape:
+def side_of(side: Shell | Solid | Rigid) -> Shell | Solid | RigidShape:
     """What it touches with."""
     if touches_with_shape(side):
         return RigidShape(side.shape)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -15,7 +16,8 @@ from .actuator_results import CavityResult
 from .closed_surface import ClosedSurface, of_faces
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Computed, Numbers
+    from ..scene.scene import Scene
 
 
 ATMOSPHERE = 101325.0  # Pa
@@ -77,7 +79,7 @@ class Cavity(Actuator):
 
     def __init__(
         self,
-        body,
+        body: Shell | Solid | Sequence[Any],
         faces: Numbers | None = None,
         *,
         pressure: Numbers | None = None,
@@ -88,7 +90,7 @@ class Cavity(Actuator):
         cap_rims: bool = False,
     ):
         self._parts = _parts(body, faces)
-        self.bodies = tuple(each for each, _ in self._parts)
+        self.bodies: tuple[Any, ...] = tuple(each for each, _ in self._parts)
         if not isinstance(cap_rims, bool):
             raise ValueError(f"cap_rims must be True or False, got {cap_rims!r:.60}")
         self.cap_rims = cap_rims
@@ -132,16 +134,16 @@ class Cavity(Actuator):
         """In a scene's bodies. Raises ValueError where it is not closed."""
         return of_faces(bodies, [(body, _chosen(body, faces)) for body, faces in self._parts], self.cap_rims)
 
-    def rest_volume(self, scene) -> float:
+    def rest_volume(self, scene: Scene) -> float:
         """m3, in a scene that has it."""
         return float(self.surface(scene._bodies).volume(scene.mesh.rest_positions))
 
-    def filling(self, scene) -> float:
+    def filling(self, scene: Scene) -> float:
         if self.law != "liquid":
             return 0.0
         return abs(self.volume / self.rest_volume(scene) - 1.0)
 
-    def pressure_at(self, volume: Numbers, rest_volume: float, load_factor: float):
+    def pressure_at(self, volume: Numbers, rest_volume: float, load_factor: float) -> Computed:
         """Pa, over that outside, at a volume (m3)."""
         if self.law == "pressure":
             return load_factor * self.pressure + 0.0 * volume

@@ -14,7 +14,8 @@ from .actuator_results import CellsResult
 from .closed_surface import of_tetrahedra
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Computed, Numbers
+    from ..scene.scene import Scene
 
 
 # Of the nodes of a cell: up to so many are coupled all with each other in the matrix, more are bordered.
@@ -50,10 +51,12 @@ class Cells(Actuator):
     _replaceable = _in_time = ("volume_ratio", "stiffness")
     _units: ClassVar[dict[str, str]] = {"volume_ratio": "1", "stiffness": "Pa"}
 
-    def __init__(self, body: Solid, groups=None, *, stiffness: Numbers, volume_ratio: Numbers = 1.0):
+    def __init__(
+        self, body: Solid, groups: Numbers | None = None, *, stiffness: Numbers, volume_ratio: Numbers = 1.0
+    ):
         if not isinstance(body, Solid):
             raise ValueError(f"Cells are of a Solid, got {body!r:.60}")
-        self.bodies = (body,)
+        self.bodies: tuple[Any, ...] = (body,)
         self._groups = _groups(groups, body.mesh.n_tetrahedra)
         self.stiffness: np.ndarray = numbers(
             "stiffness", "Pa", stiffness, self.count, "cell", 0.0, above=True
@@ -76,10 +79,10 @@ class Cells(Actuator):
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cells(self.body, self._groups, **now))
 
-    def filling(self, scene) -> float:
+    def filling(self, scene: Scene) -> float:
         return float(np.abs(np.asarray(self.volume_ratio) - 1.0).max(initial=0.0))
 
-    def pressure_at(self, ratios: Numbers, load_factor: float):
+    def pressure_at(self, ratios: Numbers, load_factor: float) -> Computed:
         """(k,) Pa, at volume ratios (k,)."""
         target = 1.0 + load_factor * (self.volume_ratio - 1.0)
         if isinstance(ratios, np.ndarray):

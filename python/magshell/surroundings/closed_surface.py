@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,9 @@ from ..mesh.six_node_integrals import rule, shapes
 from ..mesh.tet_topology import FACE_NODES, FACES, groups
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Computed, Numbers
+    from ..bodies.bodies import Bodies
+    from ..bodies.shell import Shell
 
 
 _NAMED = 4  # edges that an error names
@@ -43,7 +46,7 @@ class ClosedSurface:
     def vertices(self) -> np.ndarray:
         return np.unique(np.concatenate([self.triangles.ravel(), self.curved.ravel()]))
 
-    def volume(self, positions: Numbers):
+    def volume(self, positions: Numbers) -> Computed:
         """(...) m3, of positions (..., n_v, 3) m, numpy's or a tensor in its graph."""
         origin = positions[..., self.vertices[:1], :]
         total = 0.0
@@ -59,7 +62,9 @@ class ClosedSurface:
             yield self.curved[:, triple], self.curved_weights * coefficient
 
 
-def of_faces(bodies, parts, cap_rims: bool) -> ClosedSurface:
+def of_faces(
+    bodies: Bodies, parts: Sequence[tuple[Shell | Solid, np.ndarray | None]], cap_rims: bool
+) -> ClosedSurface:
     """parts: [(body, faces or None)] of a scene's Bodies; the faces of a solid look into the cavity, those of a shell out of
     it.
 

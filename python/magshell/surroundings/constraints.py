@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..bodies.bodies import Bodies
 from ..bodies.spans import Span
 from .supports import DirectedEdges, Held, RigidMove
+
+if TYPE_CHECKING:
+    from ..bodies.joint import Joint
+    from .supports import Support
 
 
 class Hold(NamedTuple):
@@ -34,7 +39,7 @@ class Constraints:
     direction_owners: tuple[Any, ...]  # (n_d,), the support that holds each direction, or None
 
 
-def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints:
+def gather(bodies: Bodies, supports: Sequence[Support], free_directions: np.ndarray) -> Constraints:
     """All supports of a scene as one. `free_directions` (k, 3) are appended to the directions, held and still."""
     moves: list[RigidMove] = []
     mesh, places = bodies.mesh, [(s, bodies.of(s)) for s in supports]
@@ -57,7 +62,7 @@ def gather(bodies: Bodies, supports, free_directions: np.ndarray) -> Constraints
     )
 
 
-def check_shared(bodies: Bodies, supports, vertices: np.ndarray) -> None:
+def check_shared(bodies: Bodies, supports: Sequence[Support], vertices: np.ndarray) -> None:
     """Raises ValueError where supports disagree on where one of these vertices of the scene is."""
     found = []
     for held in (h for s in supports for h in held_by(s, bodies.of(s), bodies)):
@@ -66,7 +71,7 @@ def check_shared(bodies: Bodies, supports, vertices: np.ndarray) -> None:
     _held_vertices(bodies, found, [])
 
 
-def held_by(support, span: Span, bodies: Bodies) -> list[Held]:
+def held_by(support: Support, span: Span, bodies: Bodies) -> list[Held]:
     """With the scene's vertices."""
     return [
         held._replace(vertices=bodies.original[held.vertices + span.first_vertex])
@@ -74,7 +79,7 @@ def held_by(support, span: Span, bodies: Bodies) -> list[Held]:
     ]
 
 
-def held_directions(bodies: Bodies, supports) -> list[tuple[object, int, np.ndarray]]:
+def held_directions(bodies: Bodies, supports: Sequence[Support]) -> list[tuple[object, int, np.ndarray]]:
     """(support, vertex of the scene, (m, 3) orthonormal) of all that they hold; what an earlier support holds of a vertex is
     left out of the later ones'."""
     found = []
@@ -96,7 +101,9 @@ def _directed(support, span: Span) -> list[DirectedEdges]:
     return [each._replace(edges=each.edges + span.first_edge) for each in support.directed(span.mesh)]
 
 
-def free_rigid_motions(bodies: Bodies, constraints: Constraints, on_joints=()) -> list[str]:
+def free_rigid_motions(
+    bodies: Bodies, constraints: Constraints, on_joints: Sequence[Joint] = ()
+) -> list[str]:
     """The rigid motions that no support prevents, in words; of every connected part.
 
     on_joints: vertices that a skeleton holds, as far as its joints do: their parts are not asked.

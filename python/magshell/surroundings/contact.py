@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .._checks.checked_list import checked_list
@@ -17,6 +20,10 @@ from ..mesh.triangle_mesh import TriangleMesh
 from ..obstacles import Obstacle
 from .body_contact import BodyContact
 from .widths import width_of
+
+if TYPE_CHECKING:
+    from .._checks.kinds import Numbers
+    from ..scene.values import Gradient, Values
 
 _FACE_POINTS = {  # barycentric coordinates of the points on a face
     0: np.zeros((0, 3)),
@@ -60,7 +67,7 @@ class Contact(Owner):
 
     _replaceable = ("contact_stiffness", "smoothing", "offset", "friction_coefficient", "sticking_speed")
 
-    def __new__(cls, *given, **options):
+    def __new__(cls, *given: Any, **options: Any) -> Contact | BodyContact:
         if given and isinstance(given[0], (*BODIES, Rigid)):
             return BodyContact(*given, **options)
         if {"a", "b"} & set(options):
@@ -70,43 +77,45 @@ class Contact(Owner):
     @grouped()
     def __init__(
         self,
-        obstacles,
+        obstacles: Obstacle | Sequence[Obstacle],
         *,
-        contact_stiffness=1e4,
-        friction_coefficient=None,
-        sticking_speed=None,
-        smoothing=None,
-        offset=0.0,
+        contact_stiffness: Numbers = 1e4,
+        friction_coefficient: Numbers | None = None,
+        sticking_speed: Numbers | None = None,
+        smoothing: Numbers | None = None,
+        offset: Numbers = 0.0,
         lagged_friction: bool = False,
-        vertices=None,
+        vertices: Numbers | None = None,
         face_samples: int = 0,
         body: Shell | Solid | None = None,
     ):
-        self.body = checked_body(body)
+        self.body: Shell | Solid | None = checked_body(body)
         listed = checked_list("obstacles", obstacles, (Obstacle,), "objects of ms.obstacles")
         if not listed or len({id(item) for item in listed}) < len(listed):
             raise ValueError("obstacles must hold at least one obstacle, and each of them once")
         self.obstacles = listed
-        self.contact_stiffness = positive("contact_stiffness", "N/m", contact_stiffness)
-        self.friction_coefficient = (
+        self.contact_stiffness: float = positive("contact_stiffness", "N/m", contact_stiffness)
+        self.friction_coefficient: float | None = (
             None
             if friction_coefficient is None
             else not_negative("friction_coefficient", "1", friction_coefficient)
         )
-        self.sticking_speed = (
+        self.sticking_speed: float | None = (
             None if sticking_speed is None else positive("sticking_speed", "m/s", sticking_speed)
         )
-        self.smoothing = None if smoothing is None else positive("smoothing", "m", smoothing)
-        self.offset = not_negative("offset", "m", offset)
+        self.smoothing: float | None = None if smoothing is None else positive("smoothing", "m", smoothing)
+        self.offset: float = not_negative("offset", "m", offset)
         if not isinstance(lagged_friction, bool):
             raise ValueError(f"lagged_friction must be True or False, got {lagged_friction!r}")
         self.lagged_friction = lagged_friction
-        self.vertices = None if vertices is None else selection("Contact vertices", vertices)
+        self.vertices: np.ndarray | None = (
+            None if vertices is None else selection("Contact vertices", vertices)
+        )
         if isinstance(face_samples, bool) or face_samples not in _FACE_POINTS:
             raise ValueError(f"face_samples must be 0, 1 or 3, got {face_samples!r}")
-        self.face_samples = int(face_samples)
+        self.face_samples: int = int(face_samples)
 
-    def replaced(self, **values) -> Contact:
+    def replaced(self, **values: Any) -> Contact:
         """The same contact with other numbers of its law."""
         if "friction_coefficient" in values and self.friction_coefficient is None:
             raise ValueError(
@@ -163,11 +172,11 @@ class Contact(Owner):
             _STICKING * extent if self.sticking_speed is None else self.sticking_speed,
         )
 
-    def add_numbers(self, label: str, values, numbers: dict) -> None:
+    def add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         for name, number in zip(self._replaceable, self.law(*values.touching(self)), strict=True):
             numbers[label, name] = number
 
-    def by_thickness(self, label: str, sheets, gradient) -> float:
+    def by_thickness(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:
         """By the thickness of each face of the sheets that touch, which a default in `law` is made from."""
         by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
         return (

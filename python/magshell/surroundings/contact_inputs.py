@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,19 +16,29 @@ from ..bodies.solid import Solid
 from ..errors import MeshQualityWarning
 from .body_contact import BodyContact, side_of, touches_with_shape
 
+if TYPE_CHECKING:
+    from ..bodies.bodies import Bodies
+    from ..bodies.rigid_place import Place
+    from ..bodies.shell import Shell
+    from ..obstacles.obstacle import Obstacle
+    from ..scene.scene import Scene
+    from .contact import Contact
 
-def obstacles_of(contacts) -> tuple[Any, ...]:
+
+def obstacles_of(contacts: Sequence[Contact | BodyContact]) -> tuple[Any, ...]:
     """Every obstacle once, in the order in which contacts name them."""
     return tuple({id(each): each for contact in contacts for each in contact.obstacles}.values())
 
 
-def split_contacts(contacts) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+def split_contacts(contacts: Sequence[Contact | BodyContact]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """Those with obstacles, and those of bodies."""
     of_bodies = tuple(each for each in contacts if isinstance(each, BodyContact))
     return tuple(each for each in contacts if not isinstance(each, BodyContact)), of_bodies
 
 
-def body_contact_inputs(contacts, bodies) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
+def body_contact_inputs(
+    contacts: Sequence[Contact | BodyContact], bodies: Bodies
+) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
     """What of the contacts of bodies no solve can change: surfaces, and which of them touch."""
     _check_each_pair_once(contacts)
     sides = list({id(side): side for contact in contacts for side in contact.sides}.values())
@@ -54,7 +65,7 @@ def _check_each_pair_once(contacts) -> None:
             )
 
 
-def shapes_that_touch(contacts) -> tuple[Rigid, ...]:
+def shapes_that_touch(contacts: Sequence[Contact | BodyContact]) -> tuple[Rigid, ...]:
     """Rigid parts that contacts are about with their shapes, each once."""
     sides = [side for contact in contacts for side in contact.sides if touches_with_shape(side)]
     return tuple({id(side): side for side in sides}.values())
@@ -87,7 +98,7 @@ def _surface(side, bodies) -> dict[Any, Any]:
     }
 
 
-def check_neighbours(scene, warns: bool = False) -> None:
+def check_neighbours(scene: Scene, warns: bool = False) -> None:
     """Neighbours along a surface cannot keep more from each other than they have at rest: a minimal distance that was asked
     for is refused where they do not, and one that a thickness gave is told, if it warns."""
     for k, contact in enumerate(scene._body_contacts):
@@ -112,14 +123,16 @@ def check_neighbours(scene, warns: bool = False) -> None:
             )
 
 
-def check_apart(scene, state: np.ndarray) -> None:
+def check_apart(scene: Scene, state: np.ndarray) -> None:
     """Bodies in contact that intersect, or are nearer than they may be, cannot start so."""
     check_neighbours(scene)
     if scene._body_contacts and (reason := scene._model.refusal(state)):
         raise ValueError(f"the start cannot be: {reason}")
 
 
-def check_shapes(contacts, parts, places) -> None:
+def check_shapes(
+    contacts: Sequence[Contact | BodyContact], parts: Sequence[Rigid], places: list[Place]
+) -> None:
     """Obstacles keep out vertices of sheets and solids: a contact that would seem to be about the shape of a rigid part
     that has none of these has to say what it is about."""
     bare = [
@@ -136,7 +149,7 @@ def check_shapes(contacts, parts, places) -> None:
             )
 
 
-def contact_inputs(contacts, bodies) -> list[dict[Any, Any]]:
+def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) -> list[dict[Any, Any]]:
     """What of the contacts no solve can change."""
     numbers = {id(each): k for k, each in enumerate(obstacles_of(contacts))}
     inputs = []
@@ -158,7 +171,7 @@ def contact_inputs(contacts, bodies) -> list[dict[Any, Any]]:
     return inputs
 
 
-def poses(obstacle, times: np.ndarray) -> np.ndarray:
+def poses(obstacle: Obstacle, times: np.ndarray) -> np.ndarray:
     """Displacements, rotation vectors, velocities and spins of a moving one at these times, (len(times), 4, 3)."""
     return np.array([(*obstacle.pose(time), *obstacle.rates(time)) for time in times]).reshape(-1, 4, 3)
 
@@ -168,7 +181,14 @@ LARGEST_SMOOTH_TURN = (
 )
 
 
-def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: float) -> np.ndarray:
+def near_kinks(
+    contact: Contact,
+    obstacles: Sequence[Obstacle],
+    sheets: Sequence[Shell | Solid],
+    bodies: Bodies,
+    positions: np.ndarray,
+    time: float,
+) -> np.ndarray:
     """Vertices (k,) of points that touch one of the obstacles closer than the smoothing to a kink of its distance.
 
     sheets: those that touch, as they are in this solve.
@@ -187,7 +207,7 @@ def near_kinks(contact, obstacles, sheets, bodies, positions: np.ndarray, time: 
     return every[every >= 0]
 
 
-def check_outside(scene, values: Any, positions: np.ndarray, time: float) -> None:
+def check_outside(scene: Scene, values: Any, positions: np.ndarray, time: float) -> None:
     """A sheet that starts deeper in an obstacle than half its thickness would be shot out of it, or a solid that starts
     deeper than a hundredth of its size."""
     if not scene._obstacle_contacts:

@@ -28,7 +28,7 @@ class FaceEnergy(Owner):
     """
 
     _units: tuple[str, ...] = ()
-    _energy: type
+    _energy: type[Any]
     for_all = False
 
     def __init__(self, values: dict[str, object], faces: Numbers, body: Shell | None):

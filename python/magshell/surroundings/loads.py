@@ -26,6 +26,8 @@ class DeadLoad(Owner):
     body: the Shell that they act on, or None. Meshes are that body's, and so are indices.
     """
 
+    body: Shell | Solid | None
+
     for_all = False  # whether it acts on all bodies where it names none
 
     def __init__(self, label: str, values: Any, body: Shell | Solid | None):
@@ -98,7 +100,7 @@ class EdgeLoad(DeadLoad):
 
     _replaceable = ("force_per_length",)
 
-    def __init__(self, edges, force_per_length: Numbers, body: Shell | Solid | None = None):
+    def __init__(self, edges: Numbers, force_per_length: Numbers, body: Shell | Solid | None = None):
         self.edges: np.ndarray = selection("EdgeLoad edges", edges)
         super().__init__("force_per_length [N/m]", force_per_length, body)
 
@@ -163,7 +165,7 @@ class EdgeCouple(Owner):
     _replaceable = ("couple_per_length",)
     for_all = False
 
-    def __init__(self, edges, couple_per_length: Numbers, body: Shell | Solid | None = None):
+    def __init__(self, edges: Numbers, couple_per_length: Numbers, body: Shell | Solid | None = None):
         self.body: Shell | None = checked_body(body)
         self.edges: np.ndarray = selection("EdgeCouple edges", edges)
         array = real_numbers("couple_per_length [N]", couple_per_length)

@@ -15,6 +15,7 @@ from ..mesh.tet_topology import EDGES, FLAT
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
+    from ..bodies.rigid_place import Place
 
 
 _OUTSIDE = 1e-6  # of a body's size: a point farther from every element is outside
@@ -27,7 +28,9 @@ _CORNERS_OF_FACES = np.concatenate([np.eye(3), 0.5 * (np.eye(3) + np.roll(np.eye
 ]
 
 
-def riding_points(points: Numbers, bodies: Bodies, places) -> list[tuple[np.ndarray, np.ndarray]]:
+def riding_points(
+    points: Numbers, bodies: Bodies, places: list[Place]
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """points: [(body, (3,) m)]; places: of a scene's rigid parts. Of each, vertices of the scene (then of rigid parts, ten
     each) and weights, which add up to 1. Raises ValueError where a point lies outside its body."""
     found = []

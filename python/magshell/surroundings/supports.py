@@ -158,7 +158,7 @@ class Clamp(Support):
 
     def __init__(
         self,
-        edges,
+        edges: Numbers,
         *,
         displacement: Numbers | None = None,
         rotation: Numbers | None = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -16,7 +17,8 @@ from .actuator_results import TendonResult
 from .riding import riding_points
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._checks.kinds import Computed, Numbers
+    from ..bodies.rigid_place import Place
 
 
 _SMOOTHING = 1e-3  # of the length at rest
@@ -60,8 +62,8 @@ class Tendon(Actuator):
 
     def __init__(
         self,
-        points,
-        body=None,
+        points: Numbers | Sequence[tuple[Shell | Solid | Rigid, Numbers]],
+        body: Shell | Solid | Rigid | None = None,
         *,
         tension: Numbers = 0.0,
         stiffness: Numbers = 0.0,
@@ -73,7 +75,7 @@ class Tendon(Actuator):
         if not isinstance(sliding, bool):
             raise ValueError(f"sliding must be True or False, got {sliding!r:.60}")
         self.sliding = sliding
-        self.bodies = tuple({id(each): each for each, _ in self._points}.values())
+        self.bodies: tuple[Any, ...] = tuple({id(each): each for each, _ in self._points}.values())
         self._shares = np.linalg.norm(np.diff([point for _, point in self._points], axis=0), axis=1)
         length = float(self._shares.sum())
         if not self._shares.min() > 1e-9 * length:
@@ -99,7 +101,7 @@ class Tendon(Actuator):
         return np.array([point for _, point in self._points])
 
     @property
-    def body(self):
+    def body(self) -> Shell | Solid | None:
         """The first shell or solid that it goes through, or None."""
         return next((each for each in self.bodies if isinstance(each, BODIES)), None)
 
@@ -107,7 +109,7 @@ class Tendon(Actuator):
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Tendon(self._points, sliding=self.sliding, **now))
 
-    def tension_at(self, length: Numbers):
+    def tension_at(self, length: Numbers) -> Computed:
         """N, at a length, m; of a tendon that does not slide, at those of its segments, (..., segments)."""
         shares = 1.0 if self.sliding else _like(self._shares, length)
         beyond = length - shares * float(self.rest_length)
@@ -118,7 +120,7 @@ class Tendon(Actuator):
         )
         return float(self.tension) + float(self.stiffness) / shares * pull
 
-    def riding(self, scene_bodies: Bodies, places) -> list[tuple[np.ndarray, np.ndarray]]:
+    def riding(self, scene_bodies: Bodies, places: list[Place]) -> list[tuple[np.ndarray, np.ndarray]]:
         """Of each point the core's vertices that it rides on, and their weights."""
         return riding_points(self._points, scene_bodies, places)
 

@@ -77,8 +77,8 @@ class Water(Owner):
         self.drag_coefficient: float = not_negative("drag_coefficient", "1", drag_coefficient)
         self.thrust_coefficient: float = not_negative("thrust_coefficient", "1", thrust_coefficient)
         self.added_mass: float = not_negative("added_mass", "kg/m2", added_mass)
-        self.attack_table = _table("attack_table", attack_table)
-        self.thrust_table = _table("thrust_table", thrust_table)
+        self.attack_table: Any = _table("attack_table", attack_table)
+        self.thrust_table: Any = _table("thrust_table", thrust_table)
         self._drag_curve = _curve(self.attack_table)
         self._thrust_curve = self._drag_curve if thrust_table is None else _curve(self.thrust_table)
         self._core = _core.Water(

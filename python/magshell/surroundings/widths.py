@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    from ..mesh.mesh_base import MeshBase
 
-def width_of(mesh) -> float:
+
+def width_of(mesh: MeshBase) -> float:
     """m, of a mesh at rest: twice the way from the middle of its surface to the vertex that is farthest from it. Of a
     rectangle and a box that is the diagonal."""
     corners = mesh.rest_positions[mesh.faces]

@@ -32,7 +32,7 @@ class Counted:
         if self._began is None:
             self._began = time.process_time()
 
-    def __call__(self, unknowns) -> float:
+    def __call__(self, unknowns: np.ndarray) -> float:
         self.begin()
         return self.counted(float(self.objective(np.clip(np.asarray(unknowns, dtype=float), -1.0, 1.0))))
 

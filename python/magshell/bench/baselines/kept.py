@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from magshell._machine.files import replace_file
 
@@ -18,7 +19,7 @@ class Kept:
         self._path = path
         self._runs = {} if path is None or not path.exists() else _read(path)
 
-    def known(self, task: str, method: str, seed: int, budget: int) -> dict | None:
+    def known(self, task: str, method: str, seed: int, budget: int) -> dict[str, Any] | None:
         """{"best", "seconds"} of a run, if one was kept: what a larger budget began with, too, and all of one that ended
         before its own budget was spent."""
         for (*which, given), run in self._runs.items():
@@ -26,7 +27,9 @@ class Kept:
                 return {name: values[:budget] for name, values in run.items()}
         return None
 
-    def run(self, task: str, method: str, seed: int, budget: int, make: Callable[[], dict]) -> dict:
+    def run(
+        self, task: str, method: str, seed: int, budget: int, make: Callable[[], dict[str, Any]]
+    ) -> dict[str, Any]:
         """The one known, or what `make` returns, which is kept."""
         known = self.known(task, method, seed, budget)
         if known is not None:
@@ -41,7 +44,7 @@ class Kept:
         return run
 
 
-def _read(path: Path) -> dict:
+def _read(path: Path) -> dict[str, Any]:
     try:
         rows = json.loads(path.read_text())
         return {

@@ -6,10 +6,15 @@ coax's is for discrete ones. SAC is what its authors made of it.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from .counted import BudgetSpent, Counted
 
+if TYPE_CHECKING:
+    from .tasks import Task
 
-def sac(task, counted: Counted, seed: int) -> None:
+
+def sac(task: Task, counted: Counted, seed: int) -> None:
     from stable_baselines3 import SAC
 
     _learn(
@@ -19,7 +24,7 @@ def sac(task, counted: Counted, seed: int) -> None:
     )
 
 
-def ppo(task, counted: Counted, seed: int) -> None:
+def ppo(task: Task, counted: Counted, seed: int) -> None:
     from stable_baselines3 import PPO
 
     steps = 5 * task.actions

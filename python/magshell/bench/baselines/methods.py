@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,24 +15,27 @@ import magshell as ms
 
 from .counted import BudgetSpent, Counted
 
+if TYPE_CHECKING:
+    from .tasks import Task
+
 _SPREAD = 0.2  # of unknowns in -1 to 1: how far methods without a gradient look around at first
 
 
-def lbfgs(task, counted: Counted, seed: int) -> None:
+def lbfgs(task: Task, counted: Counted, seed: int) -> None:
     _by_gradient(lambda x: ms.optim.LBFGS([x], lower=-1.0, upper=1.0), task, counted, seed)
 
 
-def mma(task, counted: Counted, seed: int) -> None:
+def mma(task: Task, counted: Counted, seed: int) -> None:
     _by_gradient(lambda x: ms.optim.MMA([x], lower=-1.0, upper=1.0), task, counted, seed)
 
 
-def adam(task, counted: Counted, seed: int) -> None:
+def adam(task: Task, counted: Counted, seed: int) -> None:
     import torch
 
     _by_gradient(lambda x: torch.optim.Adam([x], lr=0.1), task, counted, seed)
 
 
-def _by_gradient(make: Callable, task, counted: Counted, seed: int) -> None:
+def _by_gradient(make: Callable[..., Any], task, counted: Counted, seed: int) -> None:
     """A motion with its gradient counts as one simulation; the time says what it costs."""
     import torch
 
@@ -59,7 +63,7 @@ def _by_gradient(make: Callable, task, counted: Counted, seed: int) -> None:
             return
 
 
-def cma_es(task, counted: Counted, seed: int) -> None:
+def cma_es(task: Task, counted: Counted, seed: int) -> None:
     import cma
 
     options = {"bounds": [-1, 1], "seed": seed + 1, "verbose": -9, "maxfevals": counted.budget}
@@ -71,7 +75,7 @@ def cma_es(task, counted: Counted, seed: int) -> None:
         search.tell(asked, [counted(each) for each in asked])
 
 
-def nelder_mead(task, counted: Counted, seed: int) -> None:
+def nelder_mead(task: Task, counted: Counted, seed: int) -> None:
     from scipy.optimize import minimize
 
     start = task.start(seed)
@@ -81,7 +85,7 @@ def nelder_mead(task, counted: Counted, seed: int) -> None:
     minimize(counted, start, method="Nelder-Mead", bounds=[(-1, 1)] * task.unknowns, options=options)
 
 
-def bobyqa(task, counted: Counted, seed: int) -> None:
+def bobyqa(task: Task, counted: Counted, seed: int) -> None:
     import nlopt
 
     search = nlopt.opt(nlopt.LN_BOBYQA, task.unknowns)
@@ -93,7 +97,7 @@ def bobyqa(task, counted: Counted, seed: int) -> None:
     search.optimize(np.clip(task.start(seed), -1 + _SPREAD, 1 - _SPREAD))
 
 
-def evolution(task, counted: Counted, seed: int) -> None:
+def evolution(task: Task, counted: Counted, seed: int) -> None:
     """As LEAP's usual pipeline: parents by tournaments of two, Gaussian mutation of their copies, the best is kept."""
     rng, size = np.random.default_rng(seed), 10
     people = np.clip(task.start(seed) + _SPREAD * rng.standard_normal((size, task.unknowns)), -1, 1)
@@ -110,7 +114,7 @@ def evolution(task, counted: Counted, seed: int) -> None:
         people, values = children, found
 
 
-SEARCHES: dict[str, Callable] = {
+SEARCHES: dict[str, Callable[..., Any]] = {
     "L-BFGS": lbfgs,
     "MMA": mma,
     "Adam": adam,
@@ -121,7 +125,7 @@ SEARCHES: dict[str, Callable] = {
 }
 
 
-def run(search: Callable, task, budget: int, seed: int) -> dict:
+def run(search: Callable[..., Any], task: Task, budget: int, seed: int) -> dict[str, Any]:
     """{"best": (k,), "seconds": (k,)} of one run."""
     counted = Counted(task.objective, budget, task.goal)
     with suppress(BudgetSpent):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import ngsolve as ng
 import numpy as np
@@ -28,7 +28,7 @@ class Found(NamedTuple):
 Run = Callable[[tuple[int, int], float | None, int], list[Found]]
 
 
-def roof(cells, irregular, order: int) -> list[Found]:
+def roof(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
     """B1."""
     radius, half = linear_cylinders.ROOF_RADIUS, linear_cylinders.ROOF_HALF_ANGLE
     middle = linear_cylinders.ROOF_LENGTH / 2
@@ -59,7 +59,7 @@ def roof_on(mesh: ms.TriangleMesh | ms.SixNodeMesh, order: int, onto: bool) -> n
     return ngsolve_linear.shell(other, order, material, fixed, "crown|middle", weight)
 
 
-def cylinder(cells, irregular, order: int) -> list[Found]:
+def cylinder(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
     """B2."""
     radius, end = linear_cylinders.PINCHED_RADIUS, linear_cylinders.PINCHED_LENGTH / 2
     mesh = linear_cylinders.eighth(cells, irregular, order=1)
@@ -80,7 +80,7 @@ def cylinder(cells, irregular, order: int) -> list[Found]:
     return [Found(abs(-solved.displacements[loaded, 2] / 1.82842e-5 - 1.0), solved.seconds)]
 
 
-def square_plate(cells, irregular, order: int) -> list[Found]:
+def square_plate(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
     """B5: its four deflections, each with a matrix of its own."""
     mesh = plates.graded_quarter(cells, irregular)
     names = {"rim": lambda x: x[:2].max() > 0.5 - 1e-9, "symmetry": lambda _: True}
@@ -95,7 +95,7 @@ def square_plate(cells, irregular, order: int) -> list[Found]:
     return found
 
 
-def end_shear(cells, irregular, order: int) -> list[Found]:
+def end_shear(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
     """A1 at its full load."""
     mesh = _strip(shear_strip, cells, irregular)
     material = Material(shear_strip.THICKNESS, shear_strip.YOUNG_MODULUS, 0.0)
@@ -109,7 +109,7 @@ def end_shear(cells, irregular, order: int) -> list[Found]:
     return [Found(max(abs(u[2] / deflection - 1.0), abs(-u[0] / shortening - 1.0)), seconds)]
 
 
-def shear_by_a_field(cells, irregular, order: int) -> list[Found]:
+def shear_by_a_field(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
     """C4."""
     mesh = _strip(shear_strip, cells, irregular)
     thickness, magnetization = shear_strip.THICKNESS, magnetic_strip.MAGNETIZATION
@@ -122,7 +122,9 @@ def shear_by_a_field(cells, irregular, order: int) -> list[Found]:
     return [Found(max(abs(u[2] / deflection - 1.0), abs(-u[0] / shortening - 1.0)), seconds)]
 
 
-def field_across(cells, irregular, order: int, beta: float = 20.0) -> list[Found]:
+def field_across(
+    cells: tuple[int, int], irregular: float | None, order: int, beta: float = 20.0
+) -> list[Found]:
     """C1-90."""
     mesh = _strip(magnetic_strip, cells, irregular)
     length, thickness = magnetic_strip.LENGTH, magnetic_strip.THICKNESS
@@ -135,7 +137,7 @@ def field_across(cells, irregular, order: int, beta: float = 20.0) -> list[Found
     return [Found(max(abs(1.0 + u[0] / length - x), abs(abs(u[2]) / length - y)), seconds)]
 
 
-def _in_a_field(thickness: float, density: float) -> Callable:
+def _in_a_field(thickness: float, density: float) -> Callable[..., Any]:
     """density: M B, J/m3, magnetised along x in a field along z."""
 
     def energy(share, _, deformed):
@@ -148,7 +150,7 @@ def _strip(case, cells, irregular) -> ms.TriangleMesh:
     return ms.meshes.rectangle(case.LENGTH, case.WIDTH, cells, irregular=irregular)
 
 
-def _ends(length: float) -> dict:
+def _ends(length: float) -> dict[str, Any]:
     close = 1e-9 * length
     return {
         "left": lambda x: x[0] < close,

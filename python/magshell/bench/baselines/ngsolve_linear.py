@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import ngsolve as ng
 import numpy as np
@@ -34,16 +34,23 @@ class Solved(NamedTuple):
     unknowns: int
 
 
-def inside(order: int):
+def inside(order: int) -> Any:
     """dx or ds with the points of integration that `midedge2` has where the order is 2."""
     return {ng.TRIG: ng.IntegrationRule(ng.TRIG, 2 * order)}
 
 
-def on_edges(order: int):
+def on_edges(order: int) -> Any:
     return {ng.SEGM: ng.IntegrationRule(ng.SEGM, 2 * order - 1)}
 
 
-def shell(mesh: ng.Mesh, order: int, material: Material, fixed: dict[str, str], clamped: str, load) -> Solved:
+def shell(
+    mesh: ng.Mesh,
+    order: int,
+    material: Material,
+    fixed: dict[str, str],
+    clamped: str,
+    load: Callable[..., Any],
+) -> Solved:
     """fixed: {"x": names of edges on the border that do not move along x, "a|b"}; clamped: those that do not turn.
     load(v): the work of the loads on displacements v, a sum of integrals; or {vertex: force (3,) N}."""
     t, modulus, nu = material
@@ -83,7 +90,9 @@ def shell(mesh: ng.Mesh, order: int, material: Material, fixed: dict[str, str], 
     return _solved(space, form, lambda: _work(space, places, load, v))
 
 
-def plate(mesh: ng.Mesh, order: int, stiffness: float, nu: float, fixed: str, clamped: str, load) -> Solved:
+def plate(
+    mesh: ng.Mesh, order: int, stiffness: float, nu: float, fixed: str, clamped: str, load: Callable[..., Any]
+) -> Solved:
     """Of a flat sheet the part across it alone, on a mesh of dimension 2. stiffness: D, N m. fixed, clamped, load as for a
     shell, of the one displacement that there is."""
     places = ng.H1(mesh, order=order, dirichlet=fixed)
@@ -117,7 +126,7 @@ def _work(space, places, load, tests):
     return work.vec
 
 
-def _solved(space, form, work: Callable) -> Solved:
+def _solved(space, form, work: Callable[..., Any]) -> Solved:
     solution = ng.GridFunction(space)
     began = time.process_time()
     form.Assemble()

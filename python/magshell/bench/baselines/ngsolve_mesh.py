@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import netgen.meshing as netgen
 import ngsolve as ng
@@ -68,7 +69,7 @@ def onto_cylinder(other: ng.Mesh, radius: float, order: int) -> None:
     other.SetDeformation(bent)
 
 
-def by_axis(of) -> tuple:
+def by_axis(of: Any) -> tuple[Any, ...]:
     """The parts along the axes of a function or a space of NGSolve's VectorH1; of H1, which has one, itself."""
     space = of.space if isinstance(of, ng.GridFunction) else of
     return tuple(of.components) if isinstance(space, ng.VectorH1) else (of,)

@@ -6,6 +6,8 @@ Neunteufel and Schoeberl 2019, 2021. The averaged normals at edges are found ane
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from typing import Any
 
 import ngsolve as ng
 
@@ -23,7 +25,7 @@ def strip(
     mesh: ng.Mesh,
     order: int,
     material: Material,
-    load,
+    load: Callable[..., Any],
     loads: int,
     tolerance: float = 1e-13,
 ) -> Solved:

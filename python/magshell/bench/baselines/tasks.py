@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 import magshell as ms
+
+if TYPE_CHECKING:
+    import torch
+
+    from ...envs.environment import Environment
+    from ...envs.robot import Robot
 
 _NOISE = 0.05  # of unknowns in -1 to 1: how far the starts of the seeds are apart
 
@@ -16,8 +24,8 @@ class Task:
     name: str
     unknowns: int
     goal: float | None = None
-    squared = False  # differentiable is: of a distance, which has a kink at its goal
-    learned = (
+    squared: bool = False  # differentiable is: of a distance, which has a kink at its goal
+    learned: bool = (
         False  # whether it is an environment too: then with `actions` an episode, `environment` and `lost`
     )
     searches: tuple[str, ...] | None = None  # names of those that are tried; None: all
@@ -35,7 +43,8 @@ class Task:
 class BridgeTask(Task):
     """[Qiao21] Figure 3: the miss of the mean node, over the sag that is asked for. Needs examples/."""
 
-    goal, squared = 0.01, True
+    goal: float | None = 0.01
+    squared: bool = True
 
     def __init__(self, name: str):
         from _bridges import shape, task
@@ -43,16 +52,16 @@ class BridgeTask(Task):
         self.name = name
         self._task = task.Task(getattr(shape, name)())
         self._low, self._high = self._task.bounds
-        self.unknowns = len(self._low)
+        self.unknowns: int = len(self._low)
 
     @property
     def middle(self) -> np.ndarray:
         return 2 * (self._task.start - self._low) / (self._high - self._low) - 1
 
-    def objective(self, unknowns) -> float:
+    def objective(self, unknowns: Any) -> float:
         return float(self.differentiable(unknowns)) ** 0.5
 
-    def differentiable(self, unknowns):
+    def differentiable(self, unknowns: Any) -> torch.Tensor:
         return self._task.loss(self._moduli(unknowns))
 
     def _moduli(self, unknowns):
@@ -66,20 +75,21 @@ class StripTask(Task):
     """The registered magnetic strip without its disturbance: 50 actions of three numbers. The mean miss of the tip, over
     the strip's length. An episode counts as one simulation."""
 
-    name, learned = "strip", True
+    name: str = "strip"
+    learned: bool = True
 
     def __init__(self):
         self._environment = self.environment()
-        self.actions = self._environment.actions_per_episode
-        self.unknowns = 3 * self.actions
+        self.actions: int = self._environment.actions_per_episode
+        self.unknowns: int = 3 * self.actions
 
     @staticmethod
-    def environment():
+    def environment() -> Environment:
         from magshell.envs.robots import magnetic_strip
 
         return magnetic_strip(disturbed=False)
 
-    def objective(self, unknowns) -> float:
+    def objective(self, unknowns: Any) -> float:
         self._environment.reset(seed=0)
         rewards = [self._environment.step(action)[1] for action in unknowns.reshape(self.actions, 3)]
         return -sum(rewards) / self.actions
@@ -88,7 +98,7 @@ class StripTask(Task):
         """The value of an episode, of all its rewards."""
         return -rewarded / self.actions
 
-    def differentiable(self, unknowns):
+    def differentiable(self, unknowns: Any) -> torch.Tensor:
         from magshell.envs.robots import STRIP_LENGTH, STRIP_TARGET
 
         one = self._environment
@@ -113,21 +123,28 @@ class StripTask(Task):
 class RobotTask(Task):
     """[Qiao21] Figure 4: controls of a robot in every step; how far from the target it ends, over the way there."""
 
-    learned, goal, squared = True, 0.01, True
-    searches = ("L-BFGS", "CMA-ES")  # as [Qiao21]'s; some others would need n + 1 motions before they begin
+    name: str
+
+    learned: bool = True
+    goal: float | None = 0.01
+    squared: bool = True
+    searches: tuple[str, ...] | None = (
+        "L-BFGS",
+        "CMA-ES",
+    )  # as [Qiao21]'s; some others would need n + 1 motions before they begin
 
     _FAILED = 2.0  # the miss where a motion fails: as an episode that ends where it began, and is fined
 
-    def __init__(self, name: str, robot, environment: str):
+    def __init__(self, name: str, robot: Robot, environment: str):
         self.name, self._robot, self._environment = name, robot, environment
-        self.actions = robot.steps
-        self.unknowns = robot.steps * robot.numbers
+        self.actions: int = robot.steps
+        self.unknowns: int = robot.steps * robot.numbers
 
     @property
     def middle(self) -> np.ndarray:
         return self._robot.first_controls(self._robot.steps).ravel()
 
-    def environment(self):
+    def environment(self) -> Environment:
         from magshell.envs import robots
 
         return getattr(robots, self._environment)(disturbed=False)
@@ -135,13 +152,13 @@ class RobotTask(Task):
     def lost(self, rewarded: float) -> float:
         return 1.0 - rewarded
 
-    def objective(self, unknowns) -> float:
+    def objective(self, unknowns: Any) -> float:
         try:
             return float(self._miss(unknowns))
         except ms.NotConverged:
             return self._FAILED
 
-    def differentiable(self, unknowns):
+    def differentiable(self, unknowns: Any) -> torch.Tensor:
         return self._miss(unknowns) ** 2
 
     def _miss(self, unknowns):

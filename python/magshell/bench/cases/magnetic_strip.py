@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def _strip(cells, bending: str, irregular: float | None, seed: int) -> ms.Triang
     return ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending))
 
 
-def controls(beta: float, direction: tuple[float, float, float]) -> dict:
+def controls(beta: float, direction: tuple[float, float, float]) -> dict[str, Any]:
     """Magnetised along x, in the field [T] along `direction` that makes beta."""
     flux_density = beta * YOUNG_MODULUS * THICKNESS**2 / (12.0 * MAGNETIZATION * LENGTH**2)
     return {
@@ -104,7 +105,9 @@ def field_against(
     return _against_elastica(mesh_name(cells, irregular), mesh, bending, references, (-1.0, 0.0, 0.0), solver)
 
 
-def _against_elastica(name: str, mesh, bending: str, references: dict, direction, solver) -> Outcome:
+def _against_elastica(
+    name: str, mesh, bending: str, references: dict[str, Any], direction, solver
+) -> Outcome:
     states = sweep(scene(mesh, bending), [controls(beta, direction) for beta in references], solver=solver)
     tips = np.array([tip(mesh, state.positions, x=LENGTH) for state in states]) / LENGTH
     x, y = np.array(list(references.values())).T

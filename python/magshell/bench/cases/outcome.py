@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import magshell as ms
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class Comparison:
@@ -19,13 +23,22 @@ class Comparison:
     """
 
     def __init__(
-        self, quantity: str, computed, reference, *, at=None, scale=None, allowed: float | None = None
+        self,
+        quantity: str,
+        computed: ArrayLike,
+        reference: ArrayLike,
+        *,
+        at: Iterable[str] | None = None,
+        scale: ArrayLike | None = None,
+        allowed: float | None = None,
     ):
         self.quantity = quantity
-        self.computed = np.atleast_1d(np.asarray(computed, dtype=np.float64))
-        self.reference = np.atleast_1d(np.asarray(reference, dtype=np.float64))
-        self.at = tuple("" for _ in self.reference) if at is None else tuple(at)
-        self.scale = np.broadcast_to(np.abs(self.reference) if scale is None else scale, self.reference.shape)
+        self.computed: np.ndarray = np.atleast_1d(np.asarray(computed, dtype=np.float64))
+        self.reference: np.ndarray = np.atleast_1d(np.asarray(reference, dtype=np.float64))
+        self.at: tuple[str, ...] = tuple("" for _ in self.reference) if at is None else tuple(at)
+        self.scale: np.ndarray = np.broadcast_to(
+            np.abs(self.reference) if scale is None else scale, self.reference.shape
+        )
         self.allowed = allowed
         if not self.computed.shape == self.reference.shape == (len(self.at),):
             raise ValueError(
@@ -76,7 +89,7 @@ class Outcome:
 
 
 def outcome(
-    mesh_name: str, mesh: ms.TriangleMesh, comparisons: Iterable[Comparison], results: Iterable
+    mesh_name: str, mesh: ms.TriangleMesh, comparisons: Iterable[Comparison], results: Iterable[Any]
 ) -> Outcome:
     """An Outcome from what the solves handed back: Equilibrium, LinearResponse, Buckling or Path objects."""
     results = list(results)
@@ -91,7 +104,7 @@ def outcome(
     )
 
 
-def sweep(scene: ms.Scene, controls: Iterable[dict], **common) -> list[ms.Equilibrium]:
+def sweep(scene: ms.Scene, controls: Iterable[dict[str, Any]], **common: Any) -> list[ms.Equilibrium]:
     """Equilibria at one set of controls after the other, each from the one before and the first from rest."""
     found: list[ms.Equilibrium] = []
     for each in controls:

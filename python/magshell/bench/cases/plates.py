@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import magshell as ms
@@ -113,17 +115,17 @@ def _rim(mesh) -> np.ndarray:
     return mesh.edges_where(lambda midpoints: midpoints[:, :2].max(axis=1) > 0.5 - 1e-9)
 
 
-def _symmetry() -> list:
+def _symmetry() -> list[Any]:
     return [ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]
 
 
 def _middle_deflections(
     mesh: ms.TriangleMesh,
     rim: np.ndarray,
-    symmetry: list,
+    symmetry: list[Any],
     parts: int,
     bending: str,
-    references: dict,
+    references: dict[str, Any],
     name: str,
     allowed: float | None,
 ) -> Outcome:
@@ -137,7 +139,7 @@ def _middle_deflections(
     return outcome(name, mesh, comparisons, responses)
 
 
-def _response(mesh, rim, symmetry: list, parts: int, bending: str, support: str, load: str):
+def _response(mesh, rim, symmetry: list[Any], parts: int, bending: str, support: str, load: str):
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
     )

@@ -8,14 +8,17 @@ tests/test_solid_validation.py.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 import magshell as ms
 
 from .outcome import Comparison
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 ELEMENTS = ("linear", "quadratic")
 
@@ -49,7 +52,7 @@ def at(solid: ms.Solid, **where: float) -> np.ndarray:
     return np.flatnonzero(np.all(on, axis=0))
 
 
-def pulled_end(solid: ms.Solid, axis_value: float, force) -> ms.PointLoad:
+def pulled_end(solid: ms.Solid, axis_value: float, force: ArrayLike) -> ms.PointLoad:
     """A force [N] that is spread evenly over the plane face at x = axis_value: to the corners of its triangles, or to the
     middles of their edges where the element has them, as their shape functions integrate."""
     end = np.zeros(len(solid.mesh.rest_positions), dtype=bool)
@@ -67,13 +70,15 @@ def pulled_end(solid: ms.Solid, axis_value: float, force) -> ms.PointLoad:
     return ms.PointLoad(vertices, weights[vertices, None] / weights.sum() * np.asarray(force, dtype=float))
 
 
-def solved(scene: ms.Scene, **controls) -> tuple[ms.Equilibrium, float]:
+def solved(scene: ms.Scene, **controls: Any) -> tuple[ms.Equilibrium, float]:
     began = time.process_time()
     found = ms.equilibrium(scene, **controls)
     return found, time.process_time() - began
 
 
-def outcome(cells, scene: ms.Scene, comparisons, iterations, seconds: float) -> SolidOutcome:
+def outcome(
+    cells: Sequence[int], scene: ms.Scene, comparisons: Iterable[Comparison], iterations: int, seconds: float
+) -> SolidOutcome:
     name = "x".join(str(count) for count in cells)
     tetrahedra = scene.bodies[0].mesh.n_tetrahedra
     return SolidOutcome(name, tetrahedra, scene.n_unknowns, iterations, seconds, tuple(comparisons))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
@@ -10,7 +12,7 @@ from .style import COLOURS, INK, machine, new_figure, note, panel_title, tidy
 _MARKERS = "osD^"
 
 
-def draw(results: dict, setting: dict) -> Figure:
+def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     figure = new_figure(11.5, 4.3)
     by_steps, by_time, lost = figure.subplots(1, 3, width_ratios=(1, 1, 0.9))
     errors, energies = results["errors"], results["energies"]
@@ -51,7 +53,7 @@ def draw(results: dict, setting: dict) -> Figure:
     return figure
 
 
-def _energies(axes, energies: dict, looks: dict) -> None:
+def _energies(axes, energies: dict[str, Any], looks: dict[str, Any]) -> None:
     """What is lost of that of a vibration, by how far its tip swings; some methods gain as little as they lose."""
     for name, rows in energies.items():
         swings = [float(each) for each in rows["kept"]]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -13,7 +15,7 @@ _BY_GRADIENT = ("L-BFGS", "MMA", "Adam")
 _ROW = 3  # tasks; where there are more, only what they need of simulations is drawn
 
 
-def draw(results: dict, setting: dict) -> Figure:
+def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     tasks, memory = results["tasks"], results.get("memory")
     panels = len(tasks) + bool(memory)
     both = len(tasks) <= _ROW
@@ -56,7 +58,7 @@ def draw(results: dict, setting: dict) -> Figure:
     return figure
 
 
-def _told(task: dict) -> str:
+def _told(task: dict[str, Any]) -> str:
     """How many runs the curves are of; methods may have different numbers of them."""
     counts = {len(found["runs"]) for found in task["methods"].values() if found.get("runs")} or {0}
     fewest, most = min(counts), max(counts)
@@ -64,7 +66,7 @@ def _told(task: dict) -> str:
     return "one run" if most == 1 else f"mean and range of {many} runs"
 
 
-def _looks(tasks: dict) -> dict:
+def _looks(tasks: dict[str, Any]) -> dict[str, Any]:
     names = list(dict.fromkeys(name for task in tasks.values() for name in task["methods"]))
     colours = (*COLOURS, "#7F7F7F", "#B07AA1", "#000000")
     return {
@@ -73,7 +75,7 @@ def _looks(tasks: dict) -> dict:
     }
 
 
-def _curves(axes, task: dict, looks: dict, of_what: str) -> None:
+def _curves(axes, task: dict[str, Any], looks: dict[str, Any], of_what: str) -> None:
     for name, found in task["methods"].items():
         runs = found.get("runs")
         if not runs:
@@ -93,12 +95,12 @@ def _curves(axes, task: dict, looks: dict, of_what: str) -> None:
     axes.set_xlabel("simulations" if of_what == "simulations" else "time of the processor / s", fontsize=9)
 
 
-def _filled(values: list, length: int) -> np.ndarray:
+def _filled(values: list[Any], length: int) -> np.ndarray:
     """A run that ended early keeps what it had."""
     return np.array([*values, *[values[-1]] * (length - len(values))])
 
 
-def _memory(axes, rows: list[dict]) -> None:
+def _memory(axes, rows: list[dict[str, Any]]) -> None:
     steps = [row["steps"] for row in rows]
     for (keep, name), colour in zip(
         {"factors": "factors kept", "stages": "states kept", "checkpoints": "checkpoints"}.items(),

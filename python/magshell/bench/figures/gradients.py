@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 
 from ..gradients import ALLOWED_SHARE
@@ -14,7 +16,7 @@ BARS = {
 }
 
 
-def draw(results: dict, setting: dict) -> Figure:
+def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     figure = new_figure(7.5, 0.9 + 1.2 * len(results))
     axes = figure.subplots()
     width = 0.26

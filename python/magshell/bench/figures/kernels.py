@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 
 from ..kernels import ALLOWED
 from .style import BLUE, FAINT, INK, SKY, label_bars, machine, new_figure, note, panel_title, tidy
 
 
-def draw(results: dict, setting: dict) -> Figure:
+def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     sheets = results["sheets"]
     sizes = [cost["faces"] for cost in next(iter(sheets.values()))]
     figure = new_figure(4.2 * len(sizes) + 2.2, 1.5 + 0.42 * len(sheets))

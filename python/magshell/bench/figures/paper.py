@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from .style import BLUE, FAINT, INK, machine, new_figure, note, panel_title, tidy
 
 
-def draw(results: dict, setting: dict) -> Figure:
+def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     rows = [row for row in results["rows"] if not row["absent"] and row["ratio"] is not None]
     figure = new_figure(8.0, 1.6 + 0.42 * max(1, len(rows)))
     axes = figure.subplots()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, NullLocator
 
@@ -28,7 +30,7 @@ _TIME_COLOURS["iteration"] = INK
 _MEMORY_COLOURS = dict(zip(MEMORIES, (GREEN, SKY, BLUE, VERMILION), strict=True))
 
 
-def draw(results: dict, setting: dict) -> Figure:
+def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     one, two = (results["sizes"][threads] for threads in ("1", "2"))
     faces = [size["faces"] for size in one]
     figure = new_figure(14.5, 4.4)
@@ -80,7 +82,7 @@ def draw(results: dict, setting: dict) -> Figure:
     return figure
 
 
-def _company(axes, results: dict) -> None:
+def _company(axes, results: dict[str, Any]) -> None:
     """Two threads' time over one's, with what each may be at most."""
     places, ratios = range(len(COMPANY)), [ratio(results["company"][name]) for name in COMPANY]
     axes.barh(places, ratios, color=SKY, height=0.55)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 
 from ..statics import BENDINGS, CASES, SOLVERS
@@ -21,7 +23,7 @@ from .style import (
 STEPS = ("analysis", "factorization", "solve")
 
 
-def draw(results: dict, setting: dict) -> Figure:
+def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     figure = new_figure(11.0, 4.2)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1))
     _from_flat(left, results["from flat"])
@@ -39,7 +41,7 @@ def draw(results: dict, setting: dict) -> Figure:
     return figure
 
 
-def _from_flat(axes, found: dict) -> None:
+def _from_flat(axes, found: dict[str, Any]) -> None:
     ways = [(bending, solver) for bending in BENDINGS for solver in SOLVERS]
     width = 0.8 / len(ways)
     for k, (bending, solver) in enumerate(ways):
@@ -63,7 +65,7 @@ def _from_flat(axes, found: dict) -> None:
     panel_title(axes, "Factorizations from flat in one call", "dashed: what midedge, mixed may take")
 
 
-def _backends(axes, backends: dict) -> None:
+def _backends(axes, backends: dict[str, Any]) -> None:
     width = 0.8 / len(STEPS)
     for k, (step, colour) in enumerate(zip(STEPS, COLOURS, strict=False)):
         places = [row + (k - 1) * width for row in range(len(backends))]

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
 from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # By Okabe and Ito, which most eyes tell apart.
 BLUE, SKY, VERMILION, ORANGE, GREEN, PURPLE = "#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73", "#AA4499"
@@ -16,7 +22,7 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained", facecolor="white")
 
 
-def tidy(axes, *, grid: str | None = "both") -> None:
+def tidy(axes: Axes, *, grid: str | None = "both") -> None:
     """Two spines, small ticks, a grid that keeps back."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(FAINT)
@@ -26,7 +32,7 @@ def tidy(axes, *, grid: str | None = "both") -> None:
     axes.set_axisbelow(True)
 
 
-def panel_title(axes, text: str, below: str = "") -> None:
+def panel_title(axes: Axes, text: str, below: str = "") -> None:
     """Bold, to the left; what explains it below, small."""
     axes.set_title(text, loc="left", fontsize=9.5, fontweight="bold", color=INK, pad=16 if below else 6)
     if below:
@@ -46,13 +52,13 @@ def note(figure: Figure, text: str) -> None:
     figure.supxlabel(text, fontsize=8, color=FAINT, x=0.01, ha="left")
 
 
-def machine(setting: dict) -> str:
+def machine(setting: dict[str, Any]) -> str:
     """On what the numbers were made, in a line."""
     threads = setting["threads"]
     return f"{setting['processor']}, {threads} thread{'s' if threads != 1 else ''}, magshell {setting['magshell']}"
 
 
-def label_bars(axes, places, values, form: str) -> None:
+def label_bars(axes: Axes, places: Iterable[float], values: Iterable[float], form: str) -> None:
     """Writes each value at the end of its horizontal bar."""
     for place, value in zip(places, values, strict=True):
         axes.annotate(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 
 from .style import BLUE, FAINT, GREEN, VERMILION, label_bars, machine, new_figure, note, panel_title, tidy
@@ -13,7 +15,7 @@ PANELS = {
 }
 
 
-def draw(results: dict, setting: dict) -> Figure:
+def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     parts = results["parts"]
     figure = new_figure(11.0, 1.5 + 0.34 * len(parts))
     places = range(len(parts))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -15,7 +17,7 @@ COLUMNS = 5
 _SMALLEST, _LARGEST = 2e-5, 1.5  # errors that the panels show
 
 
-def draw(results: dict, setting: dict) -> Figure:
+def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     points = results["error against time"]
     others = results.get("beside NGSolve", {}).get("points", [])
     studies = [study for study in STUDIES if any(point["case"] == study.name for point in points)]
@@ -41,7 +43,7 @@ def draw(results: dict, setting: dict) -> Figure:
     return figure
 
 
-def _panel(axes, study: Study, points: list[dict]) -> None:
+def _panel(axes, study: Study, points: list[dict[str, Any]]) -> None:
     axes.set(xscale="log", yscale="log", ylim=(_SMALLEST, _LARGEST))
     axes.xaxis.set_major_locator(LogLocator(numticks=8))
     axes.xaxis.set_major_formatter(_time)
@@ -64,14 +66,14 @@ def _panel(axes, study: Study, points: list[dict]) -> None:
     panel_title(axes, f"{study.name}  {study.title}", study.reference)
 
 
-def _others(axes, points: list[dict]) -> None:
+def _others(axes, points: list[dict[str, Any]]) -> None:
     """NGSolve's, regular meshes alone: the number of its order at each."""
     for point in points:
         if not point["irregular"]:
             axes.plot(point["time"], max(point["error"], _SMALLEST), **_number(point["order"]))
 
 
-def _number(order) -> dict:
+def _number(order) -> dict[str, Any]:
     return {
         "color": INK,
         "linestyle": "none",
@@ -83,7 +85,7 @@ def _number(order) -> dict:
     }
 
 
-def _curve(axes, points: list[dict], colour: str, irregular: bool, plain: bool) -> None:
+def _curve(axes, points: list[dict[str, Any]], colour: str, irregular: bool, plain: bool) -> None:
     if not points:
         return
     times = np.array([point["time"] for point in points])
@@ -91,7 +93,7 @@ def _curve(axes, points: list[dict], colour: str, irregular: bool, plain: bool) 
     axes.plot(times, errors, **_look(colour, irregular, plain))
 
 
-def _look(colour: str, irregular: bool, plain: bool) -> dict:
+def _look(colour: str, irregular: bool, plain: bool) -> dict[str, Any]:
     """Filled: the mixed method, or linear theory; hollow: plain Newton. Dashed: irregular."""
     return {
         "color": colour,
