@@ -49,6 +49,7 @@ format: $(VENV)/.with-dev  ## put the sources into the form that lint wants
 
 stubs: $(VENV)/.with-dev  ## write python/magshell/_core.pyi again, from the built extension
 	$(VENV)/bin/pybind11-stubgen magshell._core --output-dir python --exit-code
+	$(VENV)/bin/python scripts/complete_stub.py python/magshell/_core.pyi
 	$(VENV)/bin/ruff check --quiet --fix python/magshell/_core.pyi
 	$(VENV)/bin/ruff format --quiet python/magshell/_core.pyi
 

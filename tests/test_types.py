@@ -80,4 +80,4 @@ def test_share_of_what_has_its_types(tmp_path):
     """Of all public names and what they hold; what is not typed completely says so to a strict checker."""
     told = run_checker(tmp_path, "--ignoreexternal", "--verifytypes", "magshell")["typeCompleteness"]
     assert sum(told["exportedSymbolCounts"].values()) > 4000
-    assert told["completenessScore"] > 0.69
+    assert told["completenessScore"] == 1.0

@@ -223,7 +223,7 @@ class SampledField(AppliedField):
     def contains(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> list[bool]: ...
 
 class PythonField(AppliedField):
-    def __init__(self, sampler: collections.abc.Callable) -> None: ...
+    def __init__(self, sampler: collections.abc.Callable[..., typing.Any]) -> None: ...
 
 class PlacedField(AppliedField):
     def __init__(
@@ -340,7 +340,9 @@ class BroadPhase:
             ]
         ],
     ) -> None: ...
-    def crossings(self, positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict: ...
+    def crossings(
+        self, positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> dict[str, typing.Any]: ...
     def make_room(
         self,
         rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -350,7 +352,7 @@ class BroadPhase:
         self,
         positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         margins: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> dict:
+    ) -> dict[str, typing.Any]:
         """
         Columns of the pairs that are nearer than the margins [m].
         """
@@ -359,7 +361,7 @@ class BroadPhase:
         positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         margins: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> dict: ...
+    ) -> dict[str, typing.Any]: ...
 
 class FaceEnergy:
     pass
@@ -368,7 +370,7 @@ class SurfaceTension(FaceEnergy):
     def __init__(self) -> None: ...
 
 class Model:
-    def __init__(self, **kwargs) -> None: ...
+    def __init__(self, **kwargs: typing.Any) -> None: ...
     def assemble(
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -384,7 +386,7 @@ class Model:
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    ) -> dict: ...
+    ) -> dict[str, typing.Any]: ...
     def energy(
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -443,7 +445,7 @@ class Model:
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
-    ) -> tuple: ...
+    ) -> tuple[typing.Any, ...]: ...
     @property
     def last_gradient(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
@@ -457,14 +459,14 @@ class Model:
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    ) -> tuple: ...
+    ) -> tuple[typing.Any, ...]: ...
     def points(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
         Positions, then the own points of rigid parts (10 each).
         """
-    def low_rank(self, reduced: bool = True) -> tuple:
+    def low_rank(self, reduced: bool = True) -> tuple[typing.Any, ...]:
         """
         What hessian(), called last, leaves out: columns u (n, k) and stiffnesses s (k,), the sum of s u u^T. Of cavities, cells and tendons, which couple all of their nodes.
         """
@@ -522,7 +524,7 @@ class Model:
             collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
         ],
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    ) -> list:
+    ) -> list[typing.Any]:
         """
         [(name, J)] of each term, at a state with these turns.
         """
@@ -531,7 +533,7 @@ class Model:
     @property
     def bytes(self) -> int: ...
     @property
-    def controls(self) -> list:
+    def controls(self) -> list[typing.Any]:
         """
         Likewise, in the flat vectors of controls.
         """
@@ -545,7 +547,7 @@ class Model:
     @property
     def n_strains(self) -> int: ...
     @property
-    def parameters(self) -> list:
+    def parameters(self) -> list[typing.Any]:
         """
         (owner, name, unit, first, rows, width) of each, in the flat vector of set_values.
         """
@@ -557,7 +559,7 @@ class Model:
     @property
     def size(self) -> int: ...
     @property
-    def term_names(self) -> list: ...
+    def term_names(self) -> list[typing.Any]: ...
 
 class NewtonOptions:
     def __init__(
@@ -785,7 +787,7 @@ class PathResult:
     def reason(self) -> str: ...
 
 class MotionInput:
-    def __init__(self, model: Model, given: dict) -> None: ...
+    def __init__(self, model: Model, given: dict[str, typing.Any]) -> None: ...
 
 class Keep:
     """
@@ -836,7 +838,7 @@ class MotionResult:
         """
     def largest_strains(
         self, model: Model, thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
-    ) -> list: ...
+    ) -> list[typing.Any]: ...
     def last_maxwell_strain_rates(
         self, arg0: Model
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
@@ -894,7 +896,9 @@ def analyze(
     """
 
 def build_info() -> list[tuple[str, str]]: ...
-def distances(obstacle: Obstacle, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple:
+def distances(
+    obstacle: Obstacle, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+) -> tuple[typing.Any, ...]:
     """
     At points (n, 3) [m] of the obstacle's own frame: signed distances (n,) [m], normals (n, 3) and second derivatives (n, 3, 3) [1/m].
     """
@@ -904,7 +908,7 @@ def drag_faces(
     positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     accelerations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> dict:
+) -> dict[str, typing.Any]:
     """
     The force of water on each corner of every face (n, 3) [N], and its derivatives by the position of each corner (n, 3, 3, 3) as [face, corner, force, position], by the mean velocity and by the mean acceleration of the corners (n, 3, 3). All arguments are (n, 3, 3), a row a corner.
     """
@@ -915,7 +919,7 @@ def drag_gradients(
     velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     accelerations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     multipliers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> dict:
+) -> dict[str, typing.Any]:
     """
     For each face the gradient of multiplier . f by what describes the water; f is the force on the face, multipliers are (n, 3).
     """
@@ -926,7 +930,7 @@ def loaded_part(
     rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
     values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> tuple | None:
+) -> tuple[typing.Any, ...] | None:
     """
     Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its unknowns, column_starts, rows and values. Nothing but zeros couples it with the rest. None where it is all of them, or no force acts.
     """
@@ -938,7 +942,7 @@ def fibre_states(
     muscle: typing.SupportsInt | typing.SupportsIndex,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None,
-) -> tuple:
+) -> tuple[typing.Any, ...]:
     """
     (stretches |F m|, tensions [Pa] a rest area, rest volumes [m3]) at the points of integration of a muscle's elements, (n, p) each. v: velocities of all unknowns [m/s], or None.
     """
@@ -960,7 +964,7 @@ def lowest_modes(
     controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     count: typing.SupportsInt | typing.SupportsIndex,
     progress: typing.Any = None,
-) -> tuple:
+) -> tuple[typing.Any, ...]:
     """
     Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of unstable directions of an equilibrium; none where it is neutral.
     """
@@ -1010,10 +1014,10 @@ def pair_energies(
     places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     area: typing.SupportsFloat | typing.SupportsIndex,
     parallel: typing.SupportsFloat | typing.SupportsIndex,
-    law: dict,
+    law: dict[str, typing.Any],
     cautious: bool = False,
     room: typing.SupportsFloat | typing.SupportsIndex = ...,
-) -> dict:
+) -> dict[str, typing.Any]:
     """
     energy (n,), gradient (n, 4, 3), hessian (n, 12, 12), normal_force (n,) and normal_force_by_place (n, 4, 3) of pairs with nodes at (n, 4, 3) [m].
     """
@@ -1023,7 +1027,7 @@ def pair_energies_by_law(
     places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     area: typing.SupportsFloat | typing.SupportsIndex,
     parallel: typing.SupportsFloat | typing.SupportsIndex,
-    law: dict,
+    law: dict[str, typing.Any],
     lambda_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_normal_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     room: typing.SupportsFloat | typing.SupportsIndex = ...,
@@ -1048,18 +1052,20 @@ def pair_frictions(
     places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     area: typing.SupportsFloat | typing.SupportsIndex,
     parallel: typing.SupportsFloat | typing.SupportsIndex,
-    law: dict,
+    law: dict[str, typing.Any],
     velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     friction: typing.Annotated[
         collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
     ],
     lambda_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> dict:
+) -> dict[str, typing.Any]:
     """
     force (n, 4, 3) of pairs that act, with friction = (kinetic, fixed, sticking speed), its derivatives, and those of lambda . force.
     """
 
-def pair_proximities(kind: str, places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple:
+def pair_proximities(
+    kind: str, places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+) -> tuple[typing.Any, ...]:
     """
     (distances (n,), weights (n, 4), normals (n, 3), free places (n,)) of pairs with nodes at (n, 4, 3) [m].
     """
@@ -1069,9 +1075,9 @@ def pair_sums(
     places: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     area: typing.SupportsFloat | typing.SupportsIndex,
     parallel: typing.SupportsFloat | typing.SupportsIndex,
-    law: dict,
+    law: dict[str, typing.Any],
     cautious: bool = False,
-) -> tuple:
+) -> tuple[typing.Any, ...]:
     """
     Sums over pairs of their gradients (4, 3) and of the lower blocks of their Hessians (10, 3, 3).
     """
@@ -1082,7 +1088,7 @@ def pull_back(
     by_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
-) -> tuple:
+) -> tuple[typing.Any, ...]:
     """
     The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations (n_e,) and what motors do (m,) with these gradients. The model must hold the values of that solve.
     """
@@ -1096,14 +1102,14 @@ def pull_back_motion(
     by_velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
     progress: typing.Any = None,
-) -> dict: ...
+) -> dict[str, typing.Any]: ...
 def sample_fields(
     fields: collections.abc.Sequence[AppliedField],
     scales: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
     points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     moments: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     order: typing.SupportsInt | typing.SupportsIndex,
-) -> tuple:
+) -> tuple[typing.Any, ...]:
     """
     The sum of scale * field at the points (n, 3) [m]: flux density, gradient, and second derivative contracted with the moments (n, 3); empty beyond the order.
     """
@@ -1113,7 +1119,7 @@ def sheet_stresses(
     model: Model,
     sheet: typing.SupportsInt | typing.SupportsIndex,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> tuple:
+) -> tuple[typing.Any, ...]:
     """
     (Green's strain, change of curvature [1/m], membrane force [N/m], bending moment [N]) of a sheet's faces at rest, in world axes: (n_f, 3, 3) each.
     """
@@ -1130,7 +1136,7 @@ def solid_point_states(
     model: Model,
     solid: typing.SupportsInt | typing.SupportsIndex,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> tuple:
+) -> tuple[typing.Any, ...]:
     """
     (F, Cauchy stress [Pa], rest volumes [m3]) at the points of integration of a solid's elements: (n_t, p, 3, 3) twice and (n_t, p).
     """
@@ -1139,7 +1145,7 @@ def touching_pairs(
     model: Model,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> dict:
+) -> dict[str, typing.Any]:
     """
     Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) [N], forces (n, 4, 3) [N], weights (n, 4) of the difference of the closest points, normals (n, 3) on the first part, friction_forces (n, 3) [N] on it and sliding_velocities (n, 3) [m/s] of it.
     """

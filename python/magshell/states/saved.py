@@ -69,7 +69,7 @@ def save(path: str | Path, result: Equilibrium | Equilibria | Trajectory) -> Non
     replace_file(path, lambda file: np.savez_compressed(file, **{_CONTENTS: text}, **named))
 
 
-def load(path: str | Path, scene: Scene) -> Equilibrium | Equilibria | Trajectory:
+def load(path: str | Path, scene: Scene) -> Any:  # which of them, the file tells
     """What `save` wrote, as a result of the scene that it is of, to look at, to draw and to go on from with the same bits.
 
     scene: made by the same script as the one that was solved.

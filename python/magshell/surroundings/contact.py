@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -67,6 +67,10 @@ class Contact(Owner):
 
     _replaceable = ("contact_stiffness", "smoothing", "offset", "friction_coefficient", "sticking_speed")
 
+    @overload
+    def __new__(cls, obstacles: Obstacle | Iterable[Obstacle], **options: Any) -> Contact: ...
+    @overload
+    def __new__(cls, a: Shell | Solid | Rigid, b: Shell | Solid | Rigid, **options: Any) -> BodyContact: ...
     def __new__(cls, *given: Any, **options: Any) -> Contact | BodyContact:
         if given and isinstance(given[0], (*BODIES, Rigid)):
             return BodyContact(*given, **options)
