@@ -90,22 +90,9 @@ HIDDEN_MODULES = {
     "pyvista": ("plotting/",),
     "gymnasium": ("envs/", "bench/"),
 }
-OPTIONAL_MODULES = [
-    "torch",
-    "matplotlib",
-    "pyvista",
-    "PIL",
-    "imageio_ffmpeg",
-    "meshio",
-    "gmsh",
-    "magpylib",
-    "ipctk",
-    "distributed",
-    "cloudpickle",
-    "gymnasium",
-    "pandas",
-    "xarray",
-]
+OPTIONAL_MODULES = (
+    "torch matplotlib pyvista PIL imageio_ffmpeg meshio gmsh magpylib ipctk distributed cloudpickle gymnasium pandas xarray"
+).split()
 LONGEST_FILE = 400
 SPELLINGS = {"cent" + "re": "center"}  # in two halves, as this file is read as well
 

@@ -42,9 +42,10 @@ from ..surroundings.contact_inputs import (
 from ..surroundings.face_energies import FaceEnergy
 from ..surroundings.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..surroundings.pressure import Pressure
-from ..surroundings.supports import Clamp, Pin, SymmetryPlane, continuations
+from ..surroundings.supports import Clamp, Pin, SymmetryPlane
 from ..surroundings.water import Water
 from .core_inputs import actuator_inputs, body_inputs, face_inputs, muscle_inputs
+from .couples import couple_directions, couple_edges
 from .layout import Layout
 from .values import Values
 
@@ -163,8 +164,8 @@ class Scene:
 
     def _build(self, allow_rigid_motions: bool) -> None:
         bodies, mesh = self._bodies, self.mesh
-        edges = _couple_edges(bodies, self.loads)
-        self._couple_directions = _couple_directions(bodies, edges)
+        edges = couple_edges(bodies, self.loads)
+        self._couple_directions = couple_directions(bodies, edges)
         constraints = gather(bodies, self.supports, self._couple_directions)
         self._rigid = places(bodies)
         check_shapes(self._obstacle_contacts, self.rigid_parts, self._rigid)
@@ -393,19 +394,3 @@ def _refuse_idle_magnetization(scene: Scene) -> None:
         if idle or body.remanent_magnetization is not None:
             what = "a skin" if idle else "a remanent_magnetization"
             raise ValueError(f"body {k} has {what}, but the scene has no field: Scene(..., field=...)")
-
-
-def _couple_edges(bodies: Bodies, loads) -> np.ndarray:
-    """The scene's edges that couples turn, ascending, (k,)."""
-    places = [(load, bodies.of(load)) for load in loads if isinstance(load, EdgeCouple)]
-    edges = [span.first_edge + load.edge_couples(span.mesh)[0] for load, span in places]
-    return np.unique(np.concatenate(edges)) if edges else np.zeros(0, dtype=np.int64)
-
-
-def _couple_directions(bodies: Bodies, edges: np.ndarray) -> np.ndarray:
-    """What each couple's edge angle is measured to: outwards in the plane of its face at rest, (k, 3)."""
-    of, own = bodies.split(edges)
-    directions = np.zeros((len(edges), 3))
-    for k in np.unique(of):
-        directions[of == k] = continuations(bodies.meshes[k], own[of == k])
-    return directions
