@@ -20,7 +20,7 @@ MADE = HERE / "_gallery"
 # Arguments of `main` that make a picture in seconds, those that take longest first; examples that are not here take minutes,
 # and have words alone.
 SMALL = {
-    "gripper": "iterations=2, steps=40",
+    "gripper": "iterations=4, steps=60",
     "hexagram": "edges_per_side=6, n_vertices=280, iterations=25",
     "muscle_strip": "cells=(12, 2, 2), steps=40, time_step=2e-2",
     "folding": "cells=(21, 20), angles=(4, 5)",
@@ -72,7 +72,7 @@ def _draw(name: str, picture: Path) -> None:
     }
     run = [sys.executable, "-c", script]
     found = subprocess.run(
-        run, cwd=MADE, env=environment, capture_output=True, text=True, timeout=240
+        run, cwd=MADE, env=environment, capture_output=True, text=True, timeout=600
     )
     if found.returncode:
         raise RuntimeError(
