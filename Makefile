@@ -27,7 +27,7 @@ test: $(VENV)/.with-test  ## every test, the notebooks and examples included
 	$(VENV)/bin/python -m pytest
 
 docs: $(VENV)/.with-docs  ## the manual, in docs/_build/html; warnings are errors
-	$(VENV)/bin/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	$(VENV)/bin/python -m sphinx -W --keep-going -q -j auto -b html docs docs/_build/html
 	@echo "The manual is $(CURDIR)/docs/_build/html/index.html"
 
 wheel: $(VENV)/.created  ## a wheel for other machines and the sdist, in dist/, tried in a bare environment

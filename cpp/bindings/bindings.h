@@ -5,12 +5,17 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <Eigen/Core>
+
 namespace magshell::bindings {
 
 namespace py = pybind11;
 
 // C order and float64 (int32 for indices); anything else is converted by numpy on the way in.
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// How numpy has a matrix.
+using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using IndexArray = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
 
 void register_adjoint(py::module_& module);

@@ -76,8 +76,8 @@ Pairs pairs_of(const std::string& kind, double area, double parallel, const py::
 }
 
 // energy (n,), gradient (n, 4, 3), Hessian (n, 12, 12), normal force (n,) and its derivative by places (n, 4, 3).
-py::dict energies(const std::string& kind, const Array& places, double area, double parallel,
-                  const py::dict& law, bool cautious, double room) {
+py::dict pair_energies_of(const std::string& kind, const Array& places, double area, double parallel,
+                          const py::dict& law, bool cautious, double room) {
     const Pairs with = pairs_of(kind, area, parallel, law, room);
     const PairRows x(places, "places [m]");
     const py::ssize_t n = x.count();
@@ -265,8 +265,8 @@ void register_contact(py::module_& module) {
                "(distances (n,), weights (n, 4), normals (n, 3), free places (n,)) of pairs with nodes at "
                "(n, 4, 3) [m].");
     module.def(
-        "pair_energies", &energies, py::arg("kind"), py::arg("places"), py::arg("area"), py::arg("parallel"),
-        py::arg("law"), py::arg("cautious") = false,
+        "pair_energies", &pair_energies_of, py::arg("kind"), py::arg("places"), py::arg("area"),
+        py::arg("parallel"), py::arg("law"), py::arg("cautious") = false,
         py::arg("room") = std::numeric_limits<double>::infinity(),
         "energy (n,), gradient (n, 4, 3), hessian (n, 12, 12), normal_force (n,) and normal_force_by_place "
         "(n, 4, 3) of pairs with nodes at (n, 4, 3) [m].");

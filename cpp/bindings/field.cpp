@@ -33,8 +33,6 @@ Array from_vectors(std::span<const Vec3> vectors) {
     return result;
 }
 
-using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 Array from_matrices(std::span<const Mat3> matrices) {
     Array result({static_cast<py::ssize_t>(matrices.size()), py::ssize_t{3}, py::ssize_t{3}});
     for (std::size_t k = 0; k < matrices.size(); ++k) {

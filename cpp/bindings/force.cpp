@@ -63,8 +63,6 @@ struct MovingFaces {
     }
 };
 
-using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 py::dict drag_faces(const Water& water, const Array& positions, const Array& velocities,
                     const Array& accelerations) {
     const MovingFaces faces(positions, velocities, accelerations);

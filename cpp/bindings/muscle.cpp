@@ -28,7 +28,7 @@ FibreLaw law_of(const py::handle& muscle) {
 }
 
 // (n, p) of n elements, p points each.
-py::array_t<double> rows_of(const std::vector<double>& numbers, int points) {
+py::array_t<double> muscle_rows_of(const std::vector<double>& numbers, int points) {
     py::array_t<double> rows(
         {static_cast<py::ssize_t>(numbers.size()) / points, static_cast<py::ssize_t>(points)});
     std::copy(numbers.begin(), numbers.end(), rows.mutable_data());
@@ -42,8 +42,9 @@ py::tuple fibre_states(const Model& model, Index muscle, const VectorXd& q,
         const py::gil_scoped_release unlocked;
         states = model.muscle_term(muscle).states(q.data(), v ? v->data() : nullptr);
     }
-    return py::make_tuple(rows_of(states.stretches, states.points), rows_of(states.tensions, states.points),
-                          rows_of(states.volumes, states.points));
+    return py::make_tuple(muscle_rows_of(states.stretches, states.points),
+                          muscle_rows_of(states.tensions, states.points),
+                          muscle_rows_of(states.volumes, states.points));
 }
 
 }  // namespace

@@ -34,7 +34,8 @@ VectorXd SkeletonCarrier::driven_increment(const VectorXd& q) const {
             else
                 rounds = reach + std::abs(motor.target[0]);
         }
-        if (off.norm() > round_off * rounds) increment.segment(motor.first, n) = off.head(n);
+        if (off.norm() > round_off * rounds)
+            for (Index k = 0; k < n; ++k) increment[motor.first + k] = off[k];
     }
     return increment;
 }

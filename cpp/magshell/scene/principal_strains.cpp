@@ -115,7 +115,10 @@ PrincipalStrains principal_strains(const Model& model, const VectorXd& q, const 
     for (Index sheet = 0; sheet < static_cast<Index>(model.bodies().six_node_sheets().size()); ++sheet)
         for (const auto& [green, curvature] : six_node_strains(model, sheet, q)) {
             const Eigen::Vector2d stretched = principal_in_plane(green), bent = principal_in_plane(curvature);
-            out.row(first_row) << stretched.transpose(), 0.5 * thickness[first_row] * bent.transpose();
+            for (Index k = 0; k < 2; ++k) {
+                out(first_row, k) = stretched[k];
+                out(first_row, 2 + k) = 0.5 * thickness[first_row] * bent[k];
+            }
             ++first_row;
         }
     return out;

@@ -9,13 +9,13 @@ namespace magshell {
 namespace {
 
 constexpr std::size_t most_pairs = 12;
-constexpr double longest_step = 0.1;                      // of the extent
+constexpr double longest_way = 0.1;                       // of the extent
 constexpr double longest_part = 4.0;                      // of a step
 constexpr double falls_enough = 1e-4, flat_enough = 0.5;  // of the slope at the beginning of a step
 constexpr int most_trials = 8;
-constexpr double round_off = 1e-13;        // of an energy
-constexpr double little_left = 1e-6;       // of what the first step was to lower the energy by
-constexpr double least_curvature = 1e-10;  // cosine between a step and what it changed
+constexpr double energy_round_off = 1e-13;  // of an energy
+constexpr double little_gained = 1e-6;      // of what the first step was to lower the energy by
+constexpr double least_curvature = 1e-10;   // cosine between a step and what it changed
 
 /// What L-BFGS knows of the Hessian; all vectors are reduced.
 class Learned {
@@ -82,14 +82,14 @@ class Descent {
                 slope = here_.gradient.dot(d);
             }
             if (k == 0) first = -slope;
-            if (!(slope < 0.0) || -slope < little_left * first) break;
+            if (!(slope < 0.0) || -slope < little_gained * first) break;
             const double before = here_.energy;
             if (!go(d, slope)) {
                 model_.set_turns(here_.turns);
                 model_.evaluate(here_.q, controls_);
                 if (learned_.empty()) break;
                 learned_.forget();
-            } else if (before - here_.energy <= round_off * std::abs(before)) {
+            } else if (before - here_.energy <= energy_round_off * std::abs(before)) {
                 break;
             }
         }
@@ -108,12 +108,12 @@ class Descent {
         const VectorXd step = model_.reduction().expand(d);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (!std::isfinite(length)) return false;
-        double most = std::min(longest_part, longest_step * model_.extent() / length);
+        double most = std::min(longest_part, longest_way * model_.extent() / length);
         if (model_.refuses_states()) {
             const double asked = std::max(1.0, most);
             most = std::min(most, asked * model_.share_of_step(here_.q, asked * step));
         }
-        const double allowed = round_off * std::abs(here_.energy);
+        const double allowed = energy_round_off * std::abs(here_.energy);
         double part = std::min(1.0, most), last = 0.0, last_slope = slope, best = 0.0;
         bool too_far = false;
         Place end;

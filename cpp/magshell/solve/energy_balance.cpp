@@ -8,9 +8,9 @@
 namespace magshell {
 namespace {
 
-constexpr double tolerated = 1e-3;   // of the energy that an impact can turn over
-constexpr double unseen = 0.1;       // of what is put in, between the stages at which it is looked at
-constexpr double round_off = 1e-11;  // of the energies of a state
+constexpr double tolerated = 1e-3;           // of the energy that an impact can turn over
+constexpr double unseen = 0.1;               // of what is put in, between the stages at which it is looked at
+constexpr double balance_round_off = 1e-11;  // of the energies of a state
 
 }  // namespace
 
@@ -45,7 +45,7 @@ bool EnergyBalance::gains(const StepAlgebra& step, const SubstepRecord& record, 
     const double at_begin = at_first.energy, at_end = end_.energy;
     const double moving = kinetic(begin), kept = at_first.of_contact;
     const double gain = at_end + kinetic(end) - at_begin - moving - tolerated * (moving + kept) -
-                        round_off * (std::abs(at_begin) + std::abs(at_end));
+                        balance_round_off * (std::abs(at_begin) + std::abs(at_end));
     if (!(gain > 0.0)) return false;
     double put_in = std::max(work(step, record, controls), 0.0);
     if (first != last) {

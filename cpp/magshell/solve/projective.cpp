@@ -11,7 +11,7 @@ namespace magshell {
 namespace {
 
 // A shorter share of a step than that leads nowhere.
-constexpr double shortest_share = 1e-9;
+constexpr double shortest_move = 1e-9;
 // How far a node may be from where Coulomb's law has it, of the extent of the scene.
 constexpr double law_tolerance = 1e-10;
 
@@ -130,7 +130,7 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
         }
         const VectorXd from = q;
         VectorXd step = move + reduction.expand(direction);
-        double share = newton_.advance(q, step, shortest_share, report);
+        double share = newton_.advance(q, step, shortest_move, report);
         if (share < 0.0) return report;
         move *= 1.0 - share;
         newton_.evaluate(q, controls, anchor);
@@ -151,7 +151,7 @@ NewtonReport ProjectiveSolver::solve_touching(VectorXd& q, const Controls& contr
     };
     const Reduction& reduction = model_.reduction();
     VectorXd first_move = reduction.prescribed_increment(q, controls);
-    if (const double share = newton_.advance(q, first_move, shortest_share, report); share < 1.0)
+    if (const double share = newton_.advance(q, first_move, shortest_move, report); share < 1.0)
         return fail(share < 0.0 ? report.reason : "what supports move is in the way of another body");
     if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
     newton_.evaluate(q, controls, anchor);
@@ -182,11 +182,11 @@ NewtonReport ProjectiveSolver::solve_touching(VectorXd& q, const Controls& contr
         VectorXd move = reduction.expand(direction);
         contact.settle(q, move);
         VectorXd end = q;
-        const double share = newton_.advance(end, move, shortest_share, report);
+        const double share = newton_.advance(end, move, shortest_move, report);
         if (share < 0.0) return report;
         VectorXd ahead =
             share < 1.0 || last_round(report) ? VectorXd(end - q) : VectorXd(anderson.next(end, move) - q);
-        if (newton_.advance(q, ahead, shortest_share, report) < 0.0) return report;
+        if (newton_.advance(q, ahead, shortest_move, report) < 0.0) return report;
         target = *anchor.target;
         for (Index k = 0; k < model_.n_coordinates(); ++k)
             if (contact.forces()[k] != 0.0) target[k] += contact.forces()[k] / (*anchor.weights)[k];

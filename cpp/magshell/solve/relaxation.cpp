@@ -11,7 +11,7 @@ namespace magshell {
 namespace {
 
 constexpr int iterations_a_step = 10, quick_iterations = 6;
-constexpr double above_instability = 1.3;  // the rate, over the most negative eigenvalue's size
+constexpr double damped_above_instability = 1.3;  // the rate, over the most negative eigenvalue's size
 constexpr double rate_growth = 2.0, rate_decay = 4.0;
 
 class Flow : private Relaxing {
@@ -34,7 +34,7 @@ class Flow : private Relaxing {
             const bool at_rest = newton_.relative_residual(q_, {}) <= newton_.options().tolerance;
             Mode mode = most_unstable_mode(newton_, q_, controls_, factor.negative_pivots);
             // Not far below a rate that was needed a moment ago.
-            rate_ = std::max(above_instability * std::abs(mode.eigenvalue), rate_);
+            rate_ = std::max(damped_above_instability * std::abs(mode.eigenvalue), rate_);
             if (mode.eigenvalue < 0.0 && (at_rest || last_move_ < settled_)) energy_ = leave_saddle(mode);
             if (mode.eigenvalue < 0.0) report_.falling = std::move(mode.shape);
         }

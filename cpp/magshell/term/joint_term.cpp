@@ -189,7 +189,7 @@ void JointTerm::vjp(const double* q, const Controls&, const double* lambda, Grad
             continue;
         }
         const State now = state(k, q);
-        const double along = now.share * now.form.first.cwiseProduct(rate).sum();
+        const double along = now.share * CornerForm::inner(now.form.first, rate);
         const JointEnergy law = law_at(each, now.coordinate);
         for (int n = 0; n < JointLaw::size; ++n)
             if (each.slots[n].size() > 0) out.values[each.slots[n].first] += along * law.force_by[n];
@@ -212,7 +212,7 @@ void JointTerm::closure_vjp(const Each& each, const double* q, const Corners& ra
 void JointTerm::place_vjp(const Each& each, const State& now, const double* q, const Corners& rate,
                           Gradient& out) const {
     const Corners at = each.links.positions(q);
-    const double along = now.form.first.cwiseProduct(rate).sum();
+    const double along = CornerForm::inner(now.form.first, rate);
     const Vec3& axis = each.joint.axis;
     const Mat3 turn = rotation(each.wanted);
     Vec3 by = Vec3::Zero();
