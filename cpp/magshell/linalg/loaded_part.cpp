@@ -35,15 +35,42 @@ class Coupled {
     std::vector<Index> above_;
 };
 
-std::vector<char> loaded(const SparsePattern& pattern, std::span<const double> values,
-                         const VectorXd& forces) {
+// The diagonal, and what else is not zero. Most is: counted first, what is kept needs little fresh memory.
+LoadedPart without_zeros(const SparsePattern& pattern, std::span<const double> values) {
+    Index count = 0;
+    for (const double value : values) count += value != 0.0;
+    LoadedPart all;
+    all.pattern.size = pattern.size;
+    all.pattern.column_starts.reserve(pattern.size + 1);
+    all.pattern.column_starts.push_back(0);
+    all.pattern.rows.resize(count + pattern.size + 1);  // what is passed over is written behind the last
+    all.values.resize(count + pattern.size + 1);
+    Index* const rows = all.pattern.rows.data();
+    double* const kept = all.values.data();
+    Index to = 0;
+    for (Index j = 0; j < pattern.size; ++j) {
+        Index k = pattern.column_starts[j];
+        rows[to] = j;
+        kept[to++] = values[k];
+        for (++k; k < pattern.column_starts[j + 1]; ++k) {
+            rows[to] = pattern.rows[k];  // without a branch, which would be as good as random
+            kept[to] = values[k];
+            to += values[k] != 0.0;
+        }
+        all.pattern.column_starts.push_back(to);
+    }
+    all.pattern.rows.resize(to);
+    all.values.resize(to);
+    return all;
+}
+
+// Whether each unknown is coupled with a force.
+std::vector<char> loaded(const SparsePattern& pattern, const VectorXd& forces) {
     Coupled coupled(pattern.size);
     for (Index j = 0; j < pattern.size; ++j) {
         Index first = coupled.first(j);
         for (Index k = pattern.column_starts[j] + 1; k < pattern.column_starts[j + 1]; ++k)
-            // Both at once: either by itself is as good as random, and most of what is coupled is known to be.
-            if ((values[k] != 0.0) & !coupled.is_known(first, pattern.rows[k]))
-                first = coupled.join(first, pattern.rows[k]);
+            if (!coupled.is_known(first, pattern.rows[k])) first = coupled.join(first, pattern.rows[k]);
     }
     std::vector<char> is_loaded(pattern.size, false);
     for (Index j = 0; j < pattern.size; ++j)
@@ -52,41 +79,38 @@ std::vector<char> loaded(const SparsePattern& pattern, std::span<const double> v
     return is_loaded;
 }
 
-}  // namespace
-
-std::optional<LoadedPart> loaded_part(const SparsePattern& pattern, std::span<const double> values,
-                                      const VectorXd& forces) {
-    check_finite(values);
-    const std::vector<char> is_loaded = loaded(pattern, values, forces);
-    const Index count = static_cast<Index>(std::count(is_loaded.begin(), is_loaded.end(), true));
-    if (count == 0 || count == pattern.size) return std::nullopt;
+// Columns are whole: what is coupled with one that is loaded is loaded.
+LoadedPart columns_of(const LoadedPart& all, const std::vector<char>& is_loaded) {
     LoadedPart part;
-    std::vector<Index> number(pattern.size, -1);
-    part.unknowns.reserve(count);
-    for (Index j = 0; j < pattern.size; ++j) {
+    std::vector<Index> number(all.pattern.size, -1);
+    for (Index j = 0; j < all.pattern.size; ++j) {
         if (!is_loaded[j]) continue;
         number[j] = static_cast<Index>(part.unknowns.size());
         part.unknowns.push_back(j);
     }
-    part.pattern.size = count;
+    part.pattern.size = static_cast<Index>(part.unknowns.size());
+    part.pattern.column_starts.reserve(part.unknowns.size() + 1);
     part.pattern.column_starts.push_back(0);
-    std::size_t most = 0;
-    for (const Index j : part.unknowns) most += pattern.column_starts[j + 1] - pattern.column_starts[j];
-    part.pattern.rows.resize(most);
-    part.values.resize(most);
-    Index to = 0;
     for (const Index j : part.unknowns) {
-        for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
-            const Index row = number[pattern.rows[k]];
-            part.pattern.rows[to] = row;  // without a branch, which would be as good as random
-            part.values[to] = values[k];
-            to += row >= 0;
-        }
-        part.pattern.column_starts.push_back(to);
+        const Index first = all.pattern.column_starts[j], end = all.pattern.column_starts[j + 1];
+        for (Index k = first; k < end; ++k) part.pattern.rows.push_back(number[all.pattern.rows[k]]);
+        part.values.insert(part.values.end(), all.values.begin() + first, all.values.begin() + end);
+        part.pattern.column_starts.push_back(static_cast<Index>(part.pattern.rows.size()));
     }
-    part.pattern.rows.resize(to);
-    part.values.resize(to);
     return part;
+}
+
+}  // namespace
+
+LoadedPart loaded_part(const SparsePattern& pattern, std::span<const double> values, const VectorXd& forces) {
+    LoadedPart all = without_zeros(pattern, values);
+    if (!all_finite(all.values)) check_finite(values);
+    const std::vector<char> is_loaded = loaded(all.pattern, forces);
+    const auto count = std::count(is_loaded.begin(), is_loaded.end(), true);
+    if (count > 0 && count < pattern.size) return columns_of(all, is_loaded);
+    all.unknowns.resize(pattern.size);
+    std::iota(all.unknowns.begin(), all.unknowns.end(), 0);
+    return all;
 }
 
 }  // namespace magshell

@@ -35,6 +35,20 @@ class FoldSix {
         }
     }
 
+    /// The same, side by side: how far each turns about the edge, with its own nodes 0, 1, 2 and 3, 4, 5 or 6, 7, 8. Where the
+    /// right one is a face; their sum is the gradient.
+    void gradients(Pack3 left[6], Pack3 right[6]) const {
+        const Pack3 l = fold_.left.by_point(), r = -fold_.right.by_point();
+        for (int a = 0; a < 3; ++a) {
+            left[a] = (Pack(wing(a)) - Pack(tangent(a)) * fold_.left.foot) * l;
+            right[a] = (Pack(wing(a)) - Pack(tangent(a)) * fold_.right.foot) * r;
+        }
+        for (int a = 3; a < 6; ++a) {
+            left[a] = Pack(wing(a)) * l;
+            right[a] = Pack(wing(a)) * r;
+        }
+    }
+
     /// Adds moment d2theta, as lower blocks of the nine nodes at lower_index.
     void add_curvature(const Pack& moment, Pack33 h[45]) const {
         const FoldCurvature c(fold_);

@@ -1,0 +1,169 @@
+// The Hessian at rest with rotations of edges that count from where the edge was, as how far the sheet's normal turns there.
+//
+// Between two faces a side measures w (theta_left + theta_right) +- phi, with theta_left and theta_right how far the faces
+// turn about the edge, phi what counts from their mean, and w = 1/2. With psi = phi + (theta_right - theta_left) / 2 that is
+// theta_left + psi on one side and theta_right - psi on the other: what a face measures is its own.
+#include "magshell/term/bending_six_term.h"
+#include "magshell/term/side_nodes.h"
+
+namespace magshell {
+
+void BendingSixTerm::count_rotations_from_rest(bool from_rest) {
+    from_rest_ = from_rest;
+    if (!from_rest) side_turns_ = {};
+}
+
+void BendingSixTerm::prepare_assembly(const double* q, const Controls&) {
+    if (!from_rest_) return;
+    side_turns_.resize(sheet_.folds.size());
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_fold);
+            for (int g = 0; g < 2; ++g) {
+                Pack3 sides[2][6];
+                folds_at(first, last, g, q).gradients(sides[0], sides[1]);
+                for (int lane = 0; lane < last - first; ++lane)
+                    for (int side = 0; side < 2; ++side)
+                        for (int a = 0; a < 6; ++a) {
+                            double* to = side_turns_[first + lane][g].by_node[side].data() + 3 * a;
+                            to[0] = sides[side][a].x[lane];
+                            to[1] = sides[side][a].y[lane];
+                            to[2] = sides[side][a].z[lane];
+                        }
+            }
+        }
+    });
+}
+
+/// visit(rotation among all unknowns, node, its share of theta_right - theta_left over two).
+template <class Visit>
+void BendingSixTerm::each_half_turn(const Visit& visit) const {
+    for (std::size_t h = 0; h < sheet_.folds.size(); ++h) {
+        const FoldSixStencil& fold = sheet_.folds[h];
+        if (!fold.right_is_face) continue;
+        const FaceSideSix& left = sheet_.sides[fold.left.face][fold.left.corner];
+        for (int g = 0; g < 2; ++g)
+            for (int a = 0; a < 9; ++a) {
+                const auto slope = [&](bool on_left) {
+                    return Eigen::Map<const Vec3>(side_turns_[h][g].of(on_left).data() +
+                                                  3 * place_on_side(a));
+                };
+                Vec3 by_node = Vec3::Zero();
+                if (a < 6) by_node -= 0.5 * slope(true);
+                if (a < 3 || a >= 6) by_node += 0.5 * slope(false);
+                visit(first_scalar_ + left.rotation[g], fold.nodes[a], by_node);
+            }
+    }
+}
+
+void BendingSixTerm::rotations_from_sides(VectorXd& motion) const {
+    each_half_turn([&](Index rotation, Index node, const Vec3& by_node) {
+        motion[rotation] -= by_node.dot(motion.segment<3>(3 * node));
+    });
+}
+
+void BendingSixTerm::forces_from_rest(VectorXd& forces) const {
+    each_half_turn([&](Index rotation, Index node, const Vec3& by_node) {
+        forces.segment<3>(3 * node) -= forces[rotation] * by_node;
+    });
+}
+
+void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatrix& out) const {
+    Pack3 x[6];
+    SixNodeRows rows;
+    loop_.gather(pack, q, x);
+    BendingSix(x).rows(elements_[pack], rows);
+    // The only nodes beyond a face are directions that hold its edges.
+    Pack3 held[3][2] = {};
+    Pack sign[3] = {};
+    std::array<bool, 3> any_held{};
+    for (int lane = 0; lane < Pack::width; ++lane)
+        for (int i = 0; i < 3; ++i) {
+            const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
+            sign[i].set(lane, side.sign);
+            if (side.fold < 0) continue;
+            const bool is_held = !sheet_.folds[side.fold].right_is_face;
+            any_held[i] |= is_held;
+            const SideNodes& at = side.on_left ? left_side : right_side;
+            const std::array<int, 6> own = face_order(i);
+            for (int g = 0; g < 2; ++g) {
+                const int point = side.point(g);
+                const double* by_node = is_held ? folds_[side.fold][point].gradient.data()
+                                                : side_turns_[side.fold][point].of(side.on_left).data();
+                for (int k = 0; k < 6; ++k) {
+                    const double* part = by_node + 3 * place_on_side(at.own[k]);
+                    Pack3& row = rows.at[3 * i + g][own[k]];
+                    row.x.set(lane, row.x[lane] + part[0]);
+                    row.y.set(lane, row.y[lane] + part[1]);
+                    row.z.set(lane, row.z[lane] + part[2]);
+                }
+                if (is_held) set_lane(held[i][g], lane, by_node + 3 * at.beyond);
+            }
+        }
+    const Symmetric9 stiffness = history_.scaled(stiffness_[pack]);
+    const SixNodeRows stiff = rows.times(stiffness);
+    Pack33 h[21];
+    rows.blocks(stiff, h);
+    loop_.scatter(pack, h, out);
+    Pack3 beside[6][6];
+    for (int a = 0; a < 6; ++a)
+        for (int k = 0; k < 6; ++k) beside[a][k] = sign[a / 2] * stiff.at[3 * (a / 2) + a % 2][k];
+    for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+        const Index f = loop_.element(pack, lane);
+        const std::array<Index, 6>& nodes = sheet_.own_nodes[f];
+        Index length[6];
+        for (int k = 0; k < 6; ++k) length[k] = out.column_length(nodes[k]);
+        for (int a = 0; a < 6; ++a)
+            if (sheet_.stencils[f].rotations[a] >= 0)
+                for (int k = 0; k < 6; ++k)
+                    out.add_rotation_row(face_slots_[f].rotation_nodes[a][k], length[k], beside[a][k], lane);
+        add_rotations(pack, lane, sign, stiffness, out);
+    }
+    if (any_held[0] || any_held[1] || any_held[2]) add_held(pack, held, sign, stiffness, stiff, out);
+}
+
+/// What directions that hold edges feel of the nodes and rotations of their faces, and of each other.
+void BendingSixTerm::add_held(Index pack, const Pack3 (&held)[3][2], const Pack sign[3],
+                              const Symmetric9& stiffness, const SixNodeRows& stiff,
+                              SystemMatrix& out) const {
+    for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+        const Index f = loop_.element(pack, lane);
+        const std::array<Index, 15>& nodes = sheet_.stencils[f].nodes;
+        const auto is_held = [&](int i) {
+            const Index fold = sheet_.sides[f][i].fold;
+            return fold >= 0 && !sheet_.folds[fold].right_is_face;
+        };
+        const auto add = [&](int row, int column, const Pack33& block) {
+            const SystemMatrix::Slot slot = face_slots_[f].nodes[lower_index(row - 1, column)];
+            if (slot == same_node) out.add_block_and_transpose(nodes[row], block, lane);
+            if (slot >= 0)
+                out.add_block(slot, out.column_length(nodes[slot & 1 ? row : column]), block, lane);
+        };
+        for (int i = 0; i < 3; ++i) {
+            if (!is_held(i)) continue;
+            const int row = 6 + 3 * i;
+            for (int k = 0; k < 6; ++k)
+                add(row, k,
+                    outer(held[i][0], stiff.at[3 * i][k]) + outer(held[i][1], stiff.at[3 * i + 1][k]));
+            for (int j = 0; j < 3; ++j) {
+                Pack3 felt[2];  // by what edge j measures
+                for (int g = 0; g < 2; ++g)
+                    felt[g] = stiffness(3 * i, 3 * j + g) * held[i][0] +
+                              stiffness(3 * i + 1, 3 * j + g) * held[i][1];
+                if (is_held(j) && j <= i) {
+                    const Pack33 block = outer(felt[0], held[j][0]) + outer(felt[1], held[j][1]);
+                    if (j == i)
+                        out.add_diagonal_block(nodes[row], block, lane);
+                    else
+                        add(row, 6 + 3 * j, block);
+                }
+                for (int g = 0; g < 2; ++g)
+                    if (sheet_.stencils[f].rotations[2 * j + g] >= 0)
+                        out.add_rotation_row(face_slots_[f].rotation_nodes[2 * j + g][row],
+                                             out.column_length(nodes[row]), sign[j] * felt[g], lane);
+            }
+        }
+    }
+}
+
+}  // namespace magshell
