@@ -35,6 +35,13 @@ class Coupled {
     std::vector<Index> above_;
 };
 
+template <Index count>
+bool all_zero(const double* values) {
+    bool any = false;
+    for (Index k = 0; k < count; ++k) any |= values[k] != 0.0;
+    return !any;
+}
+
 // The diagonal, and what else is not zero. Most is: counted first, what is kept needs little fresh memory.
 LoadedPart without_zeros(const SparsePattern& pattern, std::span<const double> values) {
     Index count = 0;
@@ -52,11 +59,20 @@ LoadedPart without_zeros(const SparsePattern& pattern, std::span<const double> v
         Index k = pattern.column_starts[j];
         rows[to] = j;
         kept[to++] = values[k];
-        for (++k; k < pattern.column_starts[j + 1]; ++k) {
+        const auto keep = [&] {
             rows[to] = pattern.rows[k];  // without a branch, which would be as good as random
             kept[to] = values[k];
             to += values[k] != 0.0;
+        };
+        const Index end = pattern.column_starts[j + 1];
+        constexpr Index several = 8;  // zeros often stand together
+        for (++k; k + several <= end;) {
+            if (all_zero<several>(values.data() + k))
+                k += several;
+            else
+                for (const Index last = k + several; k < last; ++k) keep();
         }
+        for (; k < end; ++k) keep();
         all.pattern.column_starts.push_back(to);
     }
     all.pattern.rows.resize(to);

@@ -35,12 +35,31 @@ class RotationsFromRest {
 
 // Refined once with a residual of more digits: where stiffnesses differ by 1e6, the order of elimination would decide what is
 // left of the soft ones' digits.
-VectorXd refined(const Factor& factor, const LoadedPart& part, const VectorXd& forces) {
+VectorXd refined(const Factor& factor, const std::vector<double>& values, const VectorXd& forces) {
     VectorXd solution = forces;
     factor.solve(solution);
-    VectorXd rest = residual(part.pattern, part.values.data(), solution, forces);
+    VectorXd rest = residual(*factor.pattern(), values.data(), solution, forces);
     factor.solve(rest);
     return solution + rest;
+}
+
+LoadedPart part_of_model(Model& model, const VectorXd& free_forces) {
+    LargeVector<double> values;
+    model.reduce_matrix(values);
+    model.reduction().add_curvature(model.residual().gradient, values);
+    return loaded_part(*model.reduction().pattern(), values, free_forces);
+}
+
+std::unique_ptr<Factor> analysed(const Model& model, const std::vector<Index>& unknowns,
+                                 SparsePattern pattern) {
+    FactorOptions options;
+    if (pattern.size <= few) {
+        options.ordering = Ordering::amd;
+    } else {
+        const std::vector<Vec3> points = model.free_points();
+        for (const Index unknown : unknowns) options.points.push_back(points[unknown]);
+    }
+    return analyze(std::make_shared<const SparsePattern>(std::move(pattern)), options);
 }
 
 }  // namespace
@@ -51,35 +70,22 @@ SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls
     model.evaluate(q, controls);
     model.assemble(q, controls, false);
     model.require_symmetric();
-    LargeVector<double> values;
-    model.reduce_matrix(values);
-    const Reduction& reduction = model.reduction();
-    reduction.add_curvature(model.residual().gradient, values);
     const VectorXd forces = at_rest.value_or(model.residual().gradient) - gradient;
-    const VectorXd free_forces = reduction.vector(counted.forces(forces));
-
-    LoadedPart part = loaded_part(*reduction.pattern(), values, free_forces);
-    const Index count = part.pattern.size;
-    FactorOptions options;
-    if (count <= few) {
-        options.ordering = Ordering::amd;
-    } else {
-        const std::vector<Vec3> points = model.free_points();
-        for (const Index unknown : part.unknowns) options.points.push_back(points[unknown]);
-    }
-    const auto pattern = std::make_shared<const SparsePattern>(part.pattern);
-    const std::unique_ptr<Factor> factor = analyze(pattern, options);
+    const VectorXd free_forces = model.reduction().vector(counted.forces(forces));
+    LoadedPart part = part_of_model(model, free_forces);
+    const std::unique_ptr<Factor> factor = analysed(model, part.unknowns, std::move(part.pattern));
     std::copy(part.values.begin(), part.values.end(), factor->values().begin());
+    const Index count = factor->size();
     SmallDeflection found{.motion = {}, .report = factor->factorize(), .unknowns = count};
     if (!found.report.succeeded || found.report.negative_pivots || found.report.perturbed_pivots)
         return found;
 
     VectorXd loads(count);
     for (Index k = 0; k < count; ++k) loads[k] = free_forces[part.unknowns[k]];
-    const VectorXd solution = refined(*factor, part, loads);
+    const VectorXd solution = refined(*factor, part.values, loads);
     VectorXd free_motion = VectorXd::Zero(free_forces.size());
     for (Index k = 0; k < count; ++k) free_motion[part.unknowns[k]] = solution[k];
-    found.motion = counted.motion(reduction.expand(free_motion));
+    found.motion = counted.motion(model.reduction().expand(free_motion));
     return found;
 }
 

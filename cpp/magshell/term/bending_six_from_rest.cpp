@@ -20,22 +20,17 @@ void BendingSixTerm::prepare_assembly(const double* q, const Controls&) {
         for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, chunk.last_fold);
             for (int g = 0; g < 2; ++g) {
-                Pack3 sides[2][6];
-                folds_at(first, last, g, q).gradients(sides[0], sides[1]);
+                const std::array<FoldSix::Side, 2> sides = folds_at(first, last, g, q).sides();
                 for (int lane = 0; lane < last - first; ++lane)
                     for (int side = 0; side < 2; ++side)
-                        for (int a = 0; a < 6; ++a) {
-                            double* to = side_turns_[first + lane][g].by_node[side].data() + 3 * a;
-                            to[0] = sides[side][a].x[lane];
-                            to[1] = sides[side][a].y[lane];
-                            to[2] = sides[side][a].z[lane];
-                        }
+                        side_turns_[first + lane][g][side] = {lane_of(sides[side].along, lane),
+                                                              sides[side].foot[lane]};
             }
         }
     });
 }
 
-/// visit(rotation among all unknowns, node, its share of theta_right - theta_left over two).
+/// visit(rotation among all unknowns, node, its share of (theta_right - theta_left) / 2).
 template <class Visit>
 void BendingSixTerm::each_half_turn(const Visit& visit) const {
     for (std::size_t h = 0; h < sheet_.folds.size(); ++h) {
@@ -43,15 +38,12 @@ void BendingSixTerm::each_half_turn(const Visit& visit) const {
         if (!fold.right_is_face) continue;
         const FaceSideSix& left = sheet_.sides[fold.left.face][fold.left.corner];
         for (int g = 0; g < 2; ++g)
-            for (int a = 0; a < 9; ++a) {
-                const auto slope = [&](bool on_left) {
-                    return Eigen::Map<const Vec3>(side_turns_[h][g].of(on_left).data() +
-                                                  3 * place_on_side(a));
-                };
-                Vec3 by_node = Vec3::Zero();
-                if (a < 6) by_node -= 0.5 * slope(true);
-                if (a < 3 || a >= 6) by_node += 0.5 * slope(false);
-                visit(first_scalar_ + left.rotation[g], fold.nodes[a], by_node);
+            for (const bool on_left : {true, false}) {
+                const SideTurn& turn = side_turns_[h][g][on_left ? 0 : 1];
+                const Vec3 half = (on_left ? -0.5 : 0.5) * turn.along;
+                for (int place = 0; place < 6; ++place)
+                    visit(first_scalar_ + left.rotation[g], fold.nodes[node_on_side(place, on_left)],
+                          FoldSix::share(g, place, turn.foot) * half);
             }
     }
 }
@@ -88,16 +80,17 @@ void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatri
             const std::array<int, 6> own = face_order(i);
             for (int g = 0; g < 2; ++g) {
                 const int point = side.point(g);
-                const double* by_node = is_held ? folds_[side.fold][point].gradient.data()
-                                                : side_turns_[side.fold][point].of(side.on_left).data();
+                const std::array<double, 27>& by_node = folds_[side.fold][point].gradient;
+                const SideTurn& turn = side_turns_[side.fold][point][side.on_left ? 0 : 1];
+                const auto part = [&](int a) -> Vec3 {
+                    if (is_held) return Vec3(by_node.data() + 3 * a);
+                    return FoldSix::share(point, place_on_side(a), turn.foot) * turn.along;
+                };
                 for (int k = 0; k < 6; ++k) {
-                    const double* part = by_node + 3 * place_on_side(at.own[k]);
                     Pack3& row = rows.at[3 * i + g][own[k]];
-                    row.x.set(lane, row.x[lane] + part[0]);
-                    row.y.set(lane, row.y[lane] + part[1]);
-                    row.z.set(lane, row.z[lane] + part[2]);
+                    set_lane(row, lane, lane_of(row, lane) + part(at.own[k]));
                 }
-                if (is_held) set_lane(held[i][g], lane, by_node + 3 * at.beyond);
+                if (is_held) set_lane(held[i][g], lane, part(at.beyond));
             }
         }
     const Symmetric9 stiffness = history_.scaled(stiffness_[pack]);

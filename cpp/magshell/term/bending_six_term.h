@@ -60,12 +60,12 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
         double rate;                      // of theta, along the last step that was asked for
     };
     using FoldStates = std::array<FoldState, 2>;
-    // How far both sides of it turn, each by its six nodes in the order of FoldSix::gradients.
-    struct SideTurns {
-        std::array<std::array<double, 18>, 2> by_node;
-
-        const std::array<double, 18>& of(bool left) const { return by_node[left ? 0 : 1]; }
+    // How a side of it turns about the edge: see FoldSix::sides.
+    struct SideTurn {
+        Vec3 along;
+        double foot;
     };
+    using SideTurns = std::array<std::array<SideTurn, 2>, 2>;  // at [point][on its right]
     struct FaceSlots {
         PairSlots<15> nodes;
         std::array<std::array<Index, 15>, 6> rotation_nodes;
@@ -127,7 +127,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     std::vector<FoldStates> folds_;
     std::vector<double> state_;  // the nodes at which all of this holds
     bool from_rest_ = false;
-    std::vector<std::array<SideTurns, 2>> side_turns_;  // of each fold, where rotations count from rest
+    std::vector<SideTurns> side_turns_;  // of each fold, where rotations count from rest
 };
 
 }  // namespace magshell

@@ -23,4 +23,9 @@ constexpr int place_on_side(int a) {
     return a < 6 ? a : a - 3;
 }
 
+/// The fold's node at a place of its left side, or its right one.
+constexpr int node_on_side(int place, bool on_left) {
+    return on_left || place < 3 ? place : place + 3;
+}
+
 }  // namespace magshell
