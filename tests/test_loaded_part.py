@@ -38,6 +38,17 @@ def test_of_a_matrix() -> None:
     assert (rows.tolist(), values.tolist()) == ([0, 1, 1], [0.0, 1.0, 0.0])  # a diagonal stays
 
 
+def test_single_zeros_between_nodes_stay() -> None:
+    """Unknowns 0, 1 and 2, 3 have the same rows below, and are ordered as one if they keep them; 4 is coupled with nothing."""
+    starts, rows = [0, 5, 9, 11, 12, 13], [0, 1, 2, 3, 4, 1, 2, 3, 4, 2, 3, 3, 4]
+    values = [9.0, 0, 1, 0, 0, 9, 0, 0, 0, 9, 0, 9, 9]
+    unknowns, starts, rows, kept = _core.loaded_part(5, starts, rows, values, [1, 1, 1, 1, 1])
+    assert unknowns.tolist() == [0, 1, 2, 3, 4]
+    assert starts.tolist() == [0, 4, 7, 9, 10, 11]
+    assert rows.tolist() == [0, 1, 2, 3, 1, 2, 3, 2, 3, 3, 4]
+    assert kept.tolist() == [9, 0, 1, 0, 9, 0, 0, 9, 0, 9, 9]
+
+
 def test_of_a_matrix_that_is_none() -> None:
     with pytest.raises(ValueError, match=r"values\[9\] is nan"):
         _core.loaded_part(5, STARTS, ROWS, [*VALUES[:9], np.nan], [0, 1, 0, 0, 0])

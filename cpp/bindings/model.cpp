@@ -283,9 +283,6 @@ void register_model(py::module_& module) {
             py::arg("q"), py::call_guard<py::gil_scoped_release>(),
             "How nodes of links and rigid parts move, at a state: evaluations begin with it.")
         .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true)
-        .def_property_readonly(
-            "last_gradient", [](Model& model) { return model.residual().gradient; },
-            "(n,), at the state that was evaluated last, as by hessian().")
         .def(
             "small_deflection",
             [](Model& model, const VectorXd& q, const Controls& controls, const VectorXd& gradient,

@@ -477,11 +477,6 @@ class Model:
         """
         du (n,) of K du = at_rest - gradient, all (n,): K is the Hessian at the rest shape q under these controls, and so is at_rest the gradient unless it is given.
         """
-    @property
-    def last_gradient(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
-        """
-        (n,), at the state that was evaluated last, as by hessian().
-        """
     def linearize(self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
         """
         How nodes of links and rigid parts move, at a state: evaluations begin with it.

@@ -1,6 +1,8 @@
 #include "magshell/linalg/loaded_part.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
 #include <numeric>
 
 #include "magshell/linalg/pattern_checks.h"
@@ -37,96 +39,168 @@ class Coupled {
 
 template <Index count>
 bool all_zero(const double* values) {
-    bool any = false;
-    for (Index k = 0; k < count; ++k) any |= values[k] != 0.0;
-    return !any;
+    std::uint64_t bits = 0;
+    for (Index k = 0; k < count; ++k) bits |= std::bit_cast<std::uint64_t>(values[k]);
+    return bits << 1 == 0;  // but for signs
 }
 
-// The diagonal, and what else is not zero. Most is: counted first, what is kept needs little fresh memory.
-LoadedPart without_zeros(const SparsePattern& pattern, std::span<const double> values) {
-    Index count = 0;
+// Of each column the rows below the diagonal whose entries are not zero.
+struct Coupling {
+    std::vector<Index> starts, rows;
+
+    std::span<const Index> of(Index column) const {
+        return {rows.data() + starts[column], rows.data() + starts[column + 1]};
+    }
+};
+
+Coupling coupling_of(const SparsePattern& pattern, std::span<const double> values) {
+    Index count = 0;  // most are zero: little fresh memory is needed
     for (const double value : values) count += value != 0.0;
-    LoadedPart all;
-    all.pattern.size = pattern.size;
-    all.pattern.column_starts.reserve(pattern.size + 1);
-    all.pattern.column_starts.push_back(0);
-    all.pattern.rows.resize(count + pattern.size + 1);  // what is passed over is written behind the last
-    all.values.resize(count + pattern.size + 1);
-    Index* const rows = all.pattern.rows.data();
-    double* const kept = all.values.data();
+    Coupling coupling{{0}, std::vector<Index>(count + 1)};  // what is passed over is written behind the last
+    coupling.starts.reserve(pattern.size + 1);
     Index to = 0;
     for (Index j = 0; j < pattern.size; ++j) {
-        Index k = pattern.column_starts[j];
-        rows[to] = j;
-        kept[to++] = values[k];
-        const auto keep = [&] {
-            rows[to] = pattern.rows[k];  // without a branch, which would be as good as random
-            kept[to] = values[k];
-            to += values[k] != 0.0;
-        };
-        const Index end = pattern.column_starts[j + 1];
         constexpr Index several = 8;  // zeros often stand together
-        for (++k; k + several <= end;) {
-            if (all_zero<several>(values.data() + k))
+        Index k = pattern.column_starts[j] + 1;
+        const Index end = pattern.column_starts[j + 1];
+        while (k < end) {
+            if (k + several <= end && all_zero<several>(values.data() + k)) {
                 k += several;
-            else
-                for (const Index last = k + several; k < last; ++k) keep();
+                continue;
+            }
+            for (const Index last = std::min(k + several, end); k < last; ++k) {
+                coupling.rows[to] = pattern.rows[k];  // without a branch, which would be as good as random
+                to += values[k] != 0.0;
+            }
         }
-        for (; k < end; ++k) keep();
-        all.pattern.column_starts.push_back(to);
+        coupling.starts.push_back(to);
     }
-    all.pattern.rows.resize(to);
-    all.values.resize(to);
-    return all;
+    return coupling;
 }
 
-// Whether each unknown is coupled with a force.
-std::vector<char> loaded(const SparsePattern& pattern, const VectorXd& forces) {
-    Coupled coupled(pattern.size);
-    for (Index j = 0; j < pattern.size; ++j) {
+// Whether each unknown is coupled with a force; all are where there is none.
+std::vector<char> loaded(const Coupling& coupling, const VectorXd& forces) {
+    const Index size = static_cast<Index>(forces.size());
+    Coupled coupled(size);
+    for (Index j = 0; j < size; ++j) {
         Index first = coupled.first(j);
-        for (Index k = pattern.column_starts[j] + 1; k < pattern.column_starts[j + 1]; ++k)
-            if (!coupled.is_known(first, pattern.rows[k])) first = coupled.join(first, pattern.rows[k]);
+        for (const Index row : coupling.of(j))
+            if (!coupled.is_known(first, row)) first = coupled.join(first, row);
     }
-    std::vector<char> is_loaded(pattern.size, false);
-    for (Index j = 0; j < pattern.size; ++j)
-        if (forces[j] != 0.0) is_loaded[coupled.first(j)] = true;
-    for (Index j = 0; j < pattern.size; ++j) is_loaded[j] = is_loaded[coupled.first(j)];
+    std::vector<char> is_loaded(size, false);
+    bool any = false;
+    for (Index j = 0; j < size; ++j) {
+        if (forces[j] == 0.0) continue;
+        is_loaded[coupled.first(j)] = true;
+        any = true;
+    }
+    for (Index j = 0; j < size; ++j) is_loaded[j] = !any || is_loaded[coupled.first(j)];
     return is_loaded;
 }
 
-// Columns are whole: what is coupled with one that is loaded is loaded.
-LoadedPart columns_of(const LoadedPart& all, const std::vector<char>& is_loaded) {
-    LoadedPart part;
-    std::vector<Index> number(all.pattern.size, -1);
-    for (Index j = 0; j < all.pattern.size; ++j) {
-        if (!is_loaded[j]) continue;
-        number[j] = static_cast<Index>(part.unknowns.size());
-        part.unknowns.push_back(j);
+// Unknowns that follow each other and have the same rows below, as those of a node; each knows the first of its own.
+std::vector<Index> nodes_of(const SparsePattern& pattern) {
+    std::vector<Index> node(pattern.size);
+    for (Index j = 0; j < pattern.size; ++j) {
+        node[j] = j;
+        if (j == 0) continue;
+        const auto rows = pattern.rows.begin(), before = rows + pattern.column_starts[j - 1] + 1,
+                   own = rows + pattern.column_starts[j], end = rows + pattern.column_starts[j + 1];
+        if (own - before == end - own && std::equal(own, end, before)) node[j] = node[j - 1];
     }
-    part.pattern.size = static_cast<Index>(part.unknowns.size());
-    part.pattern.column_starts.reserve(part.unknowns.size() + 1);
-    part.pattern.column_starts.push_back(0);
-    for (const Index j : part.unknowns) {
-        const Index first = all.pattern.column_starts[j], end = all.pattern.column_starts[j + 1];
-        for (Index k = first; k < end; ++k) part.pattern.rows.push_back(number[all.pattern.rows[k]]);
-        part.values.insert(part.values.end(), all.values.begin() + first, all.values.begin() + end);
-        part.pattern.column_starts.push_back(static_cast<Index>(part.pattern.rows.size()));
-    }
-    return part;
+    return node;
 }
+
+// The columns and rows of some unknowns.
+class Selection {
+  public:
+    Selection(const SparsePattern& pattern, const double* values, const Coupling& coupling,
+              const std::vector<char>& is_chosen)
+        : from_(pattern),
+          values_(values),
+          coupling_(coupling),
+          is_chosen_(is_chosen),
+          node_(nodes_of(pattern)),
+          coupled_(pattern.size, -1),
+          number_(pattern.size) {
+        for (Index j = 0; j < pattern.size; ++j) {
+            number_[j] = static_cast<Index>(part_.unknowns.size());
+            if (is_chosen[j]) part_.unknowns.push_back(j);
+        }
+        part_.pattern.size = static_cast<Index>(part_.unknowns.size());
+        part_.pattern.column_starts.reserve(part_.unknowns.size() + 1);
+        part_.pattern.column_starts.push_back(0);
+        std::size_t most = 0;
+        for (const Index j : part_.unknowns) most += pattern.column_starts[j + 1] - pattern.column_starts[j];
+        part_.pattern.rows.reserve(most);
+        part_.values.reserve(most);
+        for (Index first = 0, end = 0; first < pattern.size; first = end) {
+            while (end < pattern.size && node_[end] == first) ++end;
+            add_node(first, end);
+        }
+    }
+    LoadedPart&& take() { return std::move(part_); }
+
+  private:
+    // A node's columns: within the node all rows, of those below the same for each column.
+    void add_node(Index first, Index end) {
+        columns_.clear();
+        for (Index column = first; column < end; ++column)
+            if (is_chosen_[column]) columns_.push_back(column);
+        if (columns_.empty()) return;
+        const Index count = choose_below(end);
+        for (const Index column : columns_) {
+            const Index own = from_.column_starts[column];
+            for (Index row = column; row < end; ++row) {
+                if (!is_chosen_[row]) continue;
+                part_.pattern.rows.push_back(number_[row]);
+                part_.values.push_back(values_[own + row - column]);
+            }
+            part_.pattern.rows.insert(part_.pattern.rows.end(), below_.begin(), below_.begin() + count);
+            const double* const values = values_ + own + end - column;
+            for (Index k = 0; k < count; ++k) part_.values.push_back(values[places_[k]]);
+            part_.pattern.column_starts.push_back(static_cast<Index>(part_.pattern.rows.size()));
+        }
+    }
+
+    // The rows below a node that belong to nodes coupled with it, and how many they are.
+    Index choose_below(Index end) {
+        const Index node = node_[end - 1];
+        for (const Index column : columns_)
+            for (const Index row : coupling_.of(column)) coupled_[node_[row]] = node;
+        const Index below = from_.column_starts[end - 1] + 1, count = from_.column_starts[end] - below;
+        const Index* const rows = from_.rows.data() + below;
+        if (static_cast<Index>(places_.size()) <= count) {
+            places_.resize(count + 1);
+            below_.resize(count + 1);
+        }
+        Index to = 0;
+        for (Index k = 0; k < count; ++k) {
+            const Index row = rows[k];
+            places_[to] = k;
+            below_[to] = number_[row];
+            to += (coupled_[node_[row]] == node) & is_chosen_[row];
+        }
+        return to;
+    }
+
+    const SparsePattern& from_;
+    const double* const values_;
+    const Coupling& coupling_;
+    const std::vector<char>& is_chosen_;
+    const std::vector<Index> node_;
+    std::vector<Index> coupled_;           // of each node: the last that it is coupled with
+    std::vector<Index> number_, columns_;  // of the node: those of its columns that are chosen
+    std::vector<Index> places_, below_;    // rows below: where in each column, and their new numbers
+    LoadedPart part_;
+};
 
 }  // namespace
 
 LoadedPart loaded_part(const SparsePattern& pattern, std::span<const double> values, const VectorXd& forces) {
-    LoadedPart all = without_zeros(pattern, values);
-    if (!all_finite(all.values)) check_finite(values);
-    const std::vector<char> is_loaded = loaded(all.pattern, forces);
-    const auto count = std::count(is_loaded.begin(), is_loaded.end(), true);
-    if (count > 0 && count < pattern.size) return columns_of(all, is_loaded);
-    all.unknowns.resize(pattern.size);
-    std::iota(all.unknowns.begin(), all.unknowns.end(), 0);
-    return all;
+    check_finite(values);
+    const Coupling coupling = coupling_of(pattern, values);
+    return Selection(pattern, values.data(), coupling, loaded(coupling, forces)).take();
 }
 
 }  // namespace magshell

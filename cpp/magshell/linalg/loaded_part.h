@@ -8,7 +8,8 @@
 
 namespace magshell {
 
-/// A symmetric matrix of some of the unknowns of another one, without the entries that are zero off its diagonal.
+/// A symmetric matrix of some of the unknowns of another one, without pairs of nodes between which all is zero. Single zeros
+/// stay: unknowns that have the same pattern, as those of a node, are ordered as one.
 struct LoadedPart {
     std::vector<Index> unknowns;  // ascending
     SparsePattern pattern;

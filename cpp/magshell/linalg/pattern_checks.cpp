@@ -76,14 +76,11 @@ void check_points(const SparsePattern& pattern, const std::vector<Vec3>& points)
         if (!points[j].allFinite()) throw InvalidInput("points[" + text(j) + "] is not finite");
 }
 
-bool all_finite(std::span<const double> values) {
-    bool all = true;  // without a branch, so that the usual case is one vectorized pass
-    for (const double value : values) all &= std::abs(value) <= std::numeric_limits<double>::max();
-    return all;
-}
-
 void check_finite(std::span<const double> values) {
-    if (all_finite(values)) return;
+    bool all_finite = true;  // without a branch, so that the usual case is one vectorized pass
+    for (std::size_t k = 0; k < values.size(); ++k)
+        all_finite &= std::abs(values[k]) <= std::numeric_limits<double>::max();
+    if (all_finite) return;
     for (std::size_t k = 0; k < values.size(); ++k) {
         if (std::isfinite(values[k])) continue;
         throw InvalidInput("values[" + std::to_string(k) + "] is " + std::to_string(values[k]) +

@@ -13,8 +13,6 @@ void check_pattern(const SparsePattern& pattern);
 /// Throws InvalidInput unless there are no points, or a finite one for each unknown.
 void check_points(const SparsePattern& pattern, const std::vector<Vec3>& points);
 
-bool all_finite(std::span<const double> values);
-
 /// Throws InvalidInput naming the first value that is not finite.
 void check_finite(std::span<const double> values);
 
