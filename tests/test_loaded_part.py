@@ -39,7 +39,7 @@ def test_of_a_matrix() -> None:
 
 
 def test_single_zeros_between_nodes_stay() -> None:
-    """Unknowns 0, 1 and 2, 3 have the same rows below, and are ordered as one if they keep them; 4 is coupled with nothing."""
+    """Unknowns 0, 1 and 2, 3 have the same rows below, and are ordered as one if they keep them; 4 is by itself."""
     starts, rows = [0, 5, 9, 11, 12, 13], [0, 1, 2, 3, 4, 1, 2, 3, 4, 2, 3, 3, 4]
     values = [9.0, 0, 1, 0, 0, 9, 0, 0, 0, 9, 0, 9, 9]
     unknowns, starts, rows, kept = _core.loaded_part(5, starts, rows, values, [1, 1, 1, 1, 1])
