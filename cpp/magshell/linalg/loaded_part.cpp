@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 
 #include "magshell/linalg/pattern_checks.h"
@@ -55,7 +57,12 @@ struct Coupling {
 
 Coupling coupling_of(const SparsePattern& pattern, std::span<const double> values) {
     Index count = 0;  // most are zero: little fresh memory is needed
-    for (const double value : values) count += value != 0.0;
+    bool all_finite = true;
+    for (const double value : values) {
+        count += value != 0.0;
+        all_finite &= std::abs(value) <= std::numeric_limits<double>::max();
+    }
+    if (!all_finite) check_finite(values);
     Coupling coupling{{0}, std::vector<Index>(count + 1)};  // what is passed over is written behind the last
     coupling.starts.reserve(pattern.size + 1);
     Index to = 0;
@@ -98,12 +105,12 @@ std::vector<char> loaded(const Coupling& coupling, const VectorXd& forces) {
     return is_loaded;
 }
 
-// Unknowns that follow each other and have the same rows below, as those of a node; each knows the first of its own.
-std::vector<Index> nodes_of(const SparsePattern& pattern) {
+// Chosen unknowns that follow each other and have the same rows below, as those of a node; each knows the first of its own.
+std::vector<Index> nodes_of(const SparsePattern& pattern, const std::vector<char>& is_chosen) {
     std::vector<Index> node(pattern.size);
     for (Index j = 0; j < pattern.size; ++j) {
         node[j] = j;
-        if (j == 0) continue;
+        if (j == 0 || !is_chosen[j] || !is_chosen[j - 1]) continue;
         const auto rows = pattern.rows.begin(), before = rows + pattern.column_starts[j - 1] + 1,
                    own = rows + pattern.column_starts[j], end = rows + pattern.column_starts[j + 1];
         if (own - before == end - own && std::equal(own, end, before)) node[j] = node[j - 1];
@@ -119,13 +126,13 @@ class Selection {
         : from_(pattern),
           values_(values),
           coupling_(coupling),
-          is_chosen_(is_chosen),
-          node_(nodes_of(pattern)),
+          node_(nodes_of(pattern, is_chosen)),
           coupled_(pattern.size, -1),
-          number_(pattern.size) {
+          number_(pattern.size, -1) {
         for (Index j = 0; j < pattern.size; ++j) {
+            if (!is_chosen[j]) continue;
             number_[j] = static_cast<Index>(part_.unknowns.size());
-            if (is_chosen[j]) part_.unknowns.push_back(j);
+            part_.unknowns.push_back(j);
         }
         part_.pattern.size = static_cast<Index>(part_.unknowns.size());
         part_.pattern.column_starts.reserve(part_.unknowns.size() + 1);
@@ -142,20 +149,14 @@ class Selection {
     LoadedPart&& take() { return std::move(part_); }
 
   private:
-    // A node's columns: within the node all rows, of those below the same for each column.
+    // Its columns: within the node all rows, of those below the same for each column.
     void add_node(Index first, Index end) {
-        columns_.clear();
-        for (Index column = first; column < end; ++column)
-            if (is_chosen_[column]) columns_.push_back(column);
-        if (columns_.empty()) return;
-        const Index count = choose_below(end);
-        for (const Index column : columns_) {
+        if (number_[first] < 0) return;
+        const Index count = choose_below(first, end);
+        for (Index column = first; column < end; ++column) {
             const Index own = from_.column_starts[column];
-            for (Index row = column; row < end; ++row) {
-                if (!is_chosen_[row]) continue;
-                part_.pattern.rows.push_back(number_[row]);
-                part_.values.push_back(values_[own + row - column]);
-            }
+            for (Index row = column; row < end; ++row) part_.pattern.rows.push_back(number_[row]);
+            part_.values.insert(part_.values.end(), values_ + own, values_ + own + end - column);
             part_.pattern.rows.insert(part_.pattern.rows.end(), below_.begin(), below_.begin() + count);
             const double* const values = values_ + own + end - column;
             for (Index k = 0; k < count; ++k) part_.values.push_back(values[places_[k]]);
@@ -164,9 +165,8 @@ class Selection {
     }
 
     // The rows below a node that belong to nodes coupled with it, and how many they are.
-    Index choose_below(Index end) {
-        const Index node = node_[end - 1];
-        for (const Index column : columns_)
+    Index choose_below(Index node, Index end) {
+        for (Index column = node; column < end; ++column)
             for (const Index row : coupling_.of(column)) coupled_[node_[row]] = node;
         const Index below = from_.column_starts[end - 1] + 1, count = from_.column_starts[end] - below;
         const Index* const rows = from_.rows.data() + below;
@@ -179,7 +179,7 @@ class Selection {
             const Index row = rows[k];
             places_[to] = k;
             below_[to] = number_[row];
-            to += (coupled_[node_[row]] == node) & is_chosen_[row];
+            to += (coupled_[node_[row]] == node) & (number_[row] >= 0);
         }
         return to;
     }
@@ -187,18 +187,16 @@ class Selection {
     const SparsePattern& from_;
     const double* const values_;
     const Coupling& coupling_;
-    const std::vector<char>& is_chosen_;
     const std::vector<Index> node_;
-    std::vector<Index> coupled_;           // of each node: the last that it is coupled with
-    std::vector<Index> number_, columns_;  // of the node: those of its columns that are chosen
-    std::vector<Index> places_, below_;    // rows below: where in each column, and their new numbers
+    std::vector<Index> coupled_;         // of each node: the last that it is coupled with
+    std::vector<Index> number_;          // or -1
+    std::vector<Index> places_, below_;  // rows below: where in each column, and their new numbers
     LoadedPart part_;
 };
 
 }  // namespace
 
 LoadedPart loaded_part(const SparsePattern& pattern, std::span<const double> values, const VectorXd& forces) {
-    check_finite(values);
     const Coupling coupling = coupling_of(pattern, values);
     return Selection(pattern, values.data(), coupling, loaded(coupling, forces)).take();
 }

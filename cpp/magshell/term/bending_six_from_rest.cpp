@@ -55,6 +55,7 @@ void BendingSixTerm::rotations_from_sides(VectorXd& motion) const {
 }
 
 void BendingSixTerm::forces_from_rest(VectorXd& forces) const {
+    if (forces.tail(forces.size() - first_scalar_).isZero(0.0)) return;
     each_half_turn([&](Index rotation, Index node, const Vec3& by_node) {
         forces.segment<3>(3 * node) -= forces[rotation] * by_node;
     });
