@@ -285,16 +285,16 @@ void register_model(py::module_& module) {
         .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true)
         .def(
             "small_deflection",
-            [](Model& model, const VectorXd& q, const Controls& controls, const VectorXd& gradient,
+            [](Model& model, const VectorXd& q, const Controls& unloaded, const Controls& controls,
                const std::optional<VectorXd>& at_rest) {
                 const std::lock_guard lock(model.in_use());
-                return small_deflection(model, q, controls, gradient, at_rest);
+                return small_deflection(model, q, unloaded, controls, at_rest);
             },
-            py::arg("q"), py::arg("controls"), py::arg("gradient"), py::arg("at_rest") = py::none(),
+            py::arg("q"), py::arg("unloaded"), py::arg("controls"), py::arg("at_rest") = py::none(),
             py::call_guard<py::gil_scoped_release>(),
-            "du (n,) of K du = at_rest - gradient, all (n,): K is the Hessian at the rest shape q under "
-            "these "
-            "controls, and so is at_rest the gradient unless it is given.");
+            "The motion from the rest shape q, of all unknowns, to first order in the controls. at_rest "
+            "(n,): the "
+            "gradient there, unless it is that without controls.");
 }
 
 }  // namespace magshell::bindings

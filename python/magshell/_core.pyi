@@ -470,12 +470,12 @@ class Model:
     def small_deflection(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        unloaded: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        gradient: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         at_rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None,
     ) -> SmallDeflection:
         """
-        du (n,) of K du = at_rest - gradient, all (n,): K is the Hessian at the rest shape q under these controls, and so is at_rest the gradient unless it is given.
+        The motion from the rest shape q, of all unknowns, to first order in the controls. at_rest (n,): the gradient there, unless it is that without controls.
         """
     def linearize(self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
         """

@@ -62,16 +62,40 @@ std::unique_ptr<Factor> analysed(const Model& model, const std::vector<Index>& u
     return analyze(std::make_shared<const SparsePattern>(std::move(pattern)), options);
 }
 
-}  // namespace
+// What supports and motors move.
+VectorXd prescribed(const Model& model, const VectorXd& q, const Controls& unloaded,
+                    const Controls& controls) {
+    const Reduction& reduction = model.reduction();
+    return reduction.progress(controls) * reduction.prescribed_rate(unloaded) +
+           reduction.prescribed_increment(q, unloaded);
+}
 
-SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls& controls,
-                                 const VectorXd& gradient, const std::optional<VectorXd>& at_rest) {
-    const RotationsFromRest counted(model);
-    model.evaluate(q, controls);
+// At the last evaluated state.
+VectorXd stiffness_times(const VectorXd& motion, Model& model, const VectorXd& q, const Controls& controls) {
     model.assemble(q, controls, false);
     model.require_symmetric();
-    const VectorXd forces = at_rest.value_or(model.residual().gradient) - gradient;
-    const VectorXd free_forces = model.reduction().vector(counted.forces(forces));
+    VectorXd forces(motion.size());
+    model.matrix().multiply(motion.data(), forces.data());
+    if (const SystemMatrix* touching = model.contact_matrix())
+        touching->add_product(motion.data(), forces.data());
+    return forces;
+}
+
+}  // namespace
+
+SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls& unloaded,
+                                 const Controls& controls, const std::optional<VectorXd>& at_rest) {
+    const VectorXd moved = prescribed(model, q, unloaded, controls);
+    model.evaluate(q, controls);
+    const VectorXd loaded = model.residual().gradient;
+    model.evaluate(q, unloaded);
+    VectorXd forces = at_rest.value_or(model.residual().gradient) - loaded;
+    if (!moved.isZero(0.0)) forces -= stiffness_times(moved, model, q, unloaded);
+
+    const RotationsFromRest counted(model);
+    model.assemble(q, unloaded, false);
+    model.require_symmetric();
+    const VectorXd free_forces = model.reduction().vector(counted.forces(std::move(forces)));
     LoadedPart part = part_of_model(model, free_forces);
     const std::unique_ptr<Factor> factor = analysed(model, part.unknowns, std::move(part.pattern));
     std::copy(part.values.begin(), part.values.end(), factor->values().begin());
@@ -85,7 +109,7 @@ SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls
     const VectorXd solution = refined(*factor, part.values, loads);
     VectorXd free_motion = VectorXd::Zero(free_forces.size());
     for (Index k = 0; k < count; ++k) free_motion[part.unknowns[k]] = solution[k];
-    found.motion = counted.motion(model.reduction().expand(free_motion));
+    found.motion = moved + counted.motion(model.reduction().expand(free_motion));
     return found;
 }
 

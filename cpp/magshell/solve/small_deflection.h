@@ -13,10 +13,11 @@ struct SmallDeflection {
     Index unknowns = 0;   // of the matrix that was factorized
 };
 
-/// K du = at_rest - gradient, all of all unknowns: K is the Hessian at the rest shape q under these controls, and so is
-/// at_rest the gradient there unless it is given. What nothing but zeros couples with a force stays at rest, and need not be
-/// held. Throws InvalidInput where K is not symmetric.
-SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls& controls,
-                                 const VectorXd& gradient, const std::optional<VectorXd>& at_rest = {});
+/// dm + du with K du = g(unloaded) - g(controls) - K dm, all of all unknowns: K is the Hessian, g the gradient at the rest
+/// shape q, K unloaded, and dm what supports and motors move. at_rest, where it is given, takes the place of g(unloaded).
+/// What nothing but zeros couples with a force stays at rest, and need not be held. Throws InvalidInput where K is not
+/// symmetric.
+SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls& unloaded,
+                                 const Controls& controls, const std::optional<VectorXd>& at_rest = {});
 
 }  // namespace magshell

@@ -102,18 +102,18 @@ class RestStiffness:
         at_rest: g(0) by `forces_at_rest`; by default with all that joints do, which is no load then.
         """
         model, layout = self._model, inputs.scene._control_layout
+        if self._whole is None:
+            found = model.small_deflection(self.rest, self._unloaded, inputs.controls, at_rest)
+            if not len(motion := found.motion):
+                _refuse_indefinite(found.report, found.unknowns)
+            return motion
         moved = model.prescribed_rate(self._unloaded) * layout.of(inputs.controls, "scene", "motion_factor")
         moved = moved + model.driven_increment(self.rest, self._unloaded)
-        loaded = model.gradient(self.rest, inputs.controls)
+        forces = model.gradient(self.rest, self._unloaded) if at_rest is None else at_rest
+        forces = forces - model.gradient(self.rest, inputs.controls)
         if moved.any():
-            loaded += symmetric(*model.hessian(self.rest, self._unloaded, reduced=False)) @ moved
-        if self._whole is not None:
-            if at_rest is None:
-                at_rest = model.gradient(self.rest, self._unloaded)
-            return moved + model.expand(self.solve(model.reduce(at_rest - loaded)))
-        found = model.small_deflection(self.rest, self._unloaded, loaded, at_rest)
-        _refuse_indefinite(found.report, found.unknowns)
-        return moved + found.motion
+            forces -= symmetric(*model.hessian(self.rest, self._unloaded, reduced=False)) @ moved
+        return moved + model.expand(self.solve(model.reduce(forces)))
 
 
 def pulling_joints(inputs: Inputs) -> dict[Any, Any]:
