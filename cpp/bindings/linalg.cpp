@@ -124,21 +124,20 @@ class SharedFactor {
     mutable std::shared_mutex mutex_;
 };
 
-std::optional<py::tuple> loaded(Index size, const IndexArray& column_starts, const IndexArray& rows,
-                                const Array& values, const VectorXd& forces) {
+py::tuple loaded(Index size, const IndexArray& column_starts, const IndexArray& rows, const Array& values,
+                 const VectorXd& forces) {
     const SparsePattern pattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")};
     check_pattern(pattern);
     if (values.ndim() != 1 || values.size() != rows.size() || forces.size() != size)
         throw InvalidInput("values must be as many as rows, and forces as many as unknowns");
-    std::optional<LoadedPart> part;
+    LoadedPart part;
     {
         const py::gil_scoped_release release;
         part = loaded_part(pattern, {values.data(), static_cast<std::size_t>(values.size())}, forces);
     }
-    if (!part) return std::nullopt;
-    return py::make_tuple(given_away(std::move(part->unknowns)),
-                          given_away(std::move(part->pattern.column_starts)),
-                          given_away(std::move(part->pattern.rows)), given_away(std::move(part->values)));
+    return py::make_tuple(given_away(std::move(part.unknowns)),
+                          given_away(std::move(part.pattern.column_starts)),
+                          given_away(std::move(part.pattern.rows)), given_away(std::move(part.values)));
 }
 
 std::string describe(const FactorReport& report) {
@@ -200,8 +199,8 @@ void register_linalg(py::module_& module) {
                py::arg("values"), py::arg("forces"),
                "Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its "
                "unknowns, column_starts, "
-               "rows and values. Nothing but zeros couples it with the rest. None where it is all of them, "
-               "or no force acts.");
+               "rows and values, without zeros off its diagonal. Nothing couples it with the rest. All of "
+               "the matrix where no force acts.");
 
     module.def("factor_backends", [] {
         std::vector<std::string> built;

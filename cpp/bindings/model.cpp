@@ -1,6 +1,7 @@
 // The model of a scene to Python: checked arrays in, numbers out. Scene in the package builds it.
 #include "magshell/scene/model.h"
 
+#include <optional>
 #include <string>
 
 #include "bindings/arrays.h"
@@ -9,6 +10,7 @@
 #include "bindings/scene_input.h"
 #include "bindings/strains.h"
 #include "magshell/core/errors.h"
+#include "magshell/solve/small_deflection.h"
 
 namespace magshell::bindings {
 namespace {
@@ -106,6 +108,12 @@ py::tuple largest_at(const Model& model, const VectorXd& q, const VectorXd& thic
 }  // namespace
 
 void register_model(py::module_& module) {
+    py::class_<SmallDeflection>(module, "SmallDeflection", "How a scene at rest gives way to small forces.")
+        .def_readonly("motion", &SmallDeflection::motion,
+                      "(n,) of all unknowns; empty where the stiffness is not positive definite")
+        .def_readonly("report", &SmallDeflection::report, "of the factorization")
+        .def_readonly("unknowns", &SmallDeflection::unknowns, "of the matrix that was factorized");
+
     py::class_<Model>(module, "Model")
         .def(py::init(&make_model))
         .def_property_readonly(
@@ -275,9 +283,18 @@ void register_model(py::module_& module) {
             py::arg("q"), py::call_guard<py::gil_scoped_release>(),
             "How nodes of links and rigid parts move, at a state: evaluations begin with it.")
         .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true)
-        .def_property_readonly(
-            "last_gradient", [](Model& model) { return model.residual().gradient; },
-            "(n,), at the state that was evaluated last, as by hessian().");
+        .def(
+            "small_deflection",
+            [](Model& model, const VectorXd& q, const Controls& unloaded, const Controls& controls,
+               const std::optional<VectorXd>& at_rest) {
+                const std::lock_guard lock(model.in_use());
+                return small_deflection(model, q, unloaded, controls, at_rest);
+            },
+            py::arg("q"), py::arg("unloaded"), py::arg("controls"), py::arg("at_rest") = py::none(),
+            py::call_guard<py::gil_scoped_release>(),
+            "The motion from the rest shape q, of all unknowns, to first order in the controls. at_rest "
+            "(n,): the "
+            "gradient there, unless it is that without controls.");
 }
 
 }  // namespace magshell::bindings

@@ -36,6 +36,7 @@ __all__: list[str] = [
     "PlacedField",
     "PythonField",
     "SampledField",
+    "SmallDeflection",
     "StaticsOptions",
     "StaticsResult",
     "SurfaceTension",
@@ -369,6 +370,26 @@ class FaceEnergy:
 class SurfaceTension(FaceEnergy):
     def __init__(self) -> None: ...
 
+class SmallDeflection:
+    """
+    How a scene at rest gives way to small forces.
+    """
+    @property
+    def motion(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (n,) of all unknowns; empty where the stiffness is not positive definite
+        """
+    @property
+    def report(self) -> FactorReport:
+        """
+        of the factorization
+        """
+    @property
+    def unknowns(self) -> int:
+        """
+        of the matrix that was factorized
+        """
+
 class Model:
     def __init__(self, **kwargs: typing.Any) -> None: ...
     def assemble(
@@ -446,10 +467,15 @@ class Model:
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
     ) -> tuple[typing.Any, ...]: ...
-    @property
-    def last_gradient(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    def small_deflection(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        unloaded: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        at_rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None,
+    ) -> SmallDeflection:
         """
-        (n,), at the state that was evaluated last, as by hessian().
+        The motion from the rest shape q, of all unknowns, to first order in the controls. at_rest (n,): the gradient there, unless it is that without controls.
         """
     def linearize(self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
         """
@@ -930,9 +956,9 @@ def loaded_part(
     rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
     values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> tuple[typing.Any, ...] | None:
+) -> tuple[typing.Any, ...]:
     """
-    Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its unknowns, column_starts, rows and values. Nothing but zeros couples it with the rest. None where it is all of them, or no force acts.
+    Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its unknowns, column_starts, rows and values, without zeros off its diagonal. Nothing couples it with the rest. All of the matrix where no force acts.
     """
 
 def factor_backends() -> list[str]: ...

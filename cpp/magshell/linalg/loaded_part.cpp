@@ -1,6 +1,10 @@
 #include "magshell/linalg/loaded_part.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <numeric>
 
 #include "magshell/linalg/pattern_checks.h"
@@ -35,58 +39,166 @@ class Coupled {
     std::vector<Index> above_;
 };
 
-std::vector<char> loaded(const SparsePattern& pattern, std::span<const double> values,
-                         const VectorXd& forces) {
-    Coupled coupled(pattern.size);
-    for (Index j = 0; j < pattern.size; ++j) {
-        Index first = coupled.first(j);
-        for (Index k = pattern.column_starts[j] + 1; k < pattern.column_starts[j + 1]; ++k)
-            // Both at once: either by itself is as good as random, and most of what is coupled is known to be.
-            if ((values[k] != 0.0) & !coupled.is_known(first, pattern.rows[k]))
-                first = coupled.join(first, pattern.rows[k]);
+template <Index count>
+bool all_zero(const double* values) {
+    std::uint64_t bits = 0;
+    for (Index k = 0; k < count; ++k) bits |= std::bit_cast<std::uint64_t>(values[k]);
+    return bits << 1 == 0;  // but for signs
+}
+
+// Of each column the rows below the diagonal whose entries are not zero.
+struct Coupling {
+    std::vector<Index> starts, rows;
+
+    std::span<const Index> of(Index column) const {
+        return {rows.data() + starts[column], rows.data() + starts[column + 1]};
     }
-    std::vector<char> is_loaded(pattern.size, false);
-    for (Index j = 0; j < pattern.size; ++j)
-        if (forces[j] != 0.0) is_loaded[coupled.first(j)] = true;
-    for (Index j = 0; j < pattern.size; ++j) is_loaded[j] = is_loaded[coupled.first(j)];
+};
+
+Coupling coupling_of(const SparsePattern& pattern, std::span<const double> values) {
+    Index count = 0;  // most are zero: little fresh memory is needed
+    bool all_finite = true;
+    for (const double value : values) {
+        count += value != 0.0;
+        all_finite &= std::abs(value) <= std::numeric_limits<double>::max();
+    }
+    if (!all_finite) check_finite(values);
+    Coupling coupling{{0}, std::vector<Index>(count + 1)};  // what is passed over is written behind the last
+    coupling.starts.reserve(pattern.size + 1);
+    Index to = 0;
+    for (Index j = 0; j < pattern.size; ++j) {
+        constexpr Index several = 8;  // zeros often stand together
+        Index k = pattern.column_starts[j] + 1;
+        const Index end = pattern.column_starts[j + 1];
+        while (k < end) {
+            if (k + several <= end && all_zero<several>(values.data() + k)) {
+                k += several;
+                continue;
+            }
+            for (const Index last = std::min(k + several, end); k < last; ++k) {
+                coupling.rows[to] = pattern.rows[k];  // without a branch, which would be as good as random
+                to += values[k] != 0.0;
+            }
+        }
+        coupling.starts.push_back(to);
+    }
+    return coupling;
+}
+
+// Whether each unknown is coupled with a force; all are where there is none.
+std::vector<char> loaded(const Coupling& coupling, const VectorXd& forces) {
+    const Index size = static_cast<Index>(forces.size());
+    Coupled coupled(size);
+    for (Index j = 0; j < size; ++j) {
+        Index first = coupled.first(j);
+        for (const Index row : coupling.of(j))
+            if (!coupled.is_known(first, row)) first = coupled.join(first, row);
+    }
+    std::vector<char> is_loaded(size, false);
+    bool any = false;
+    for (Index j = 0; j < size; ++j) {
+        if (forces[j] == 0.0) continue;
+        is_loaded[coupled.first(j)] = true;
+        any = true;
+    }
+    for (Index j = 0; j < size; ++j) is_loaded[j] = !any || is_loaded[coupled.first(j)];
     return is_loaded;
 }
 
+// Chosen unknowns that follow each other and have the same rows below, as those of a node; each knows the first of its own.
+std::vector<Index> nodes_of(const SparsePattern& pattern, const std::vector<char>& is_chosen) {
+    std::vector<Index> node(pattern.size);
+    for (Index j = 0; j < pattern.size; ++j) {
+        node[j] = j;
+        if (j == 0 || !is_chosen[j] || !is_chosen[j - 1]) continue;
+        const auto rows = pattern.rows.begin(), before = rows + pattern.column_starts[j - 1] + 1,
+                   own = rows + pattern.column_starts[j], end = rows + pattern.column_starts[j + 1];
+        if (own - before == end - own && std::equal(own, end, before)) node[j] = node[j - 1];
+    }
+    return node;
+}
+
+// The columns and rows of some unknowns.
+class Selection {
+  public:
+    Selection(const SparsePattern& pattern, const double* values, const Coupling& coupling,
+              const std::vector<char>& is_chosen)
+        : from_(pattern),
+          values_(values),
+          coupling_(coupling),
+          node_(nodes_of(pattern, is_chosen)),
+          coupled_(pattern.size, -1),
+          number_(pattern.size, -1) {
+        for (Index j = 0; j < pattern.size; ++j) {
+            if (!is_chosen[j]) continue;
+            number_[j] = static_cast<Index>(part_.unknowns.size());
+            part_.unknowns.push_back(j);
+        }
+        part_.pattern.size = static_cast<Index>(part_.unknowns.size());
+        part_.pattern.column_starts.reserve(part_.unknowns.size() + 1);
+        part_.pattern.column_starts.push_back(0);
+        std::size_t most = 0;
+        for (const Index j : part_.unknowns) most += pattern.column_starts[j + 1] - pattern.column_starts[j];
+        part_.pattern.rows.reserve(most);
+        part_.values.reserve(most);
+        for (Index first = 0, end = 0; first < pattern.size; first = end) {
+            while (end < pattern.size && node_[end] == first) ++end;
+            add_node(first, end);
+        }
+    }
+    LoadedPart&& take() { return std::move(part_); }
+
+  private:
+    // Its columns: within the node all rows, of those below the same for each column.
+    void add_node(Index first, Index end) {
+        if (number_[first] < 0) return;
+        const Index count = choose_below(first, end);
+        for (Index column = first; column < end; ++column) {
+            const Index own = from_.column_starts[column];
+            for (Index row = column; row < end; ++row) part_.pattern.rows.push_back(number_[row]);
+            part_.values.insert(part_.values.end(), values_ + own, values_ + own + end - column);
+            part_.pattern.rows.insert(part_.pattern.rows.end(), below_.begin(), below_.begin() + count);
+            const double* const values = values_ + own + end - column;
+            for (Index k = 0; k < count; ++k) part_.values.push_back(values[places_[k]]);
+            part_.pattern.column_starts.push_back(static_cast<Index>(part_.pattern.rows.size()));
+        }
+    }
+
+    // The rows below a node that belong to nodes coupled with it, and how many they are.
+    Index choose_below(Index node, Index end) {
+        for (Index column = node; column < end; ++column)
+            for (const Index row : coupling_.of(column)) coupled_[node_[row]] = node;
+        const Index below = from_.column_starts[end - 1] + 1, count = from_.column_starts[end] - below;
+        const Index* const rows = from_.rows.data() + below;
+        if (static_cast<Index>(places_.size()) <= count) {
+            places_.resize(count + 1);
+            below_.resize(count + 1);
+        }
+        Index to = 0;
+        for (Index k = 0; k < count; ++k) {
+            const Index row = rows[k];
+            places_[to] = k;
+            below_[to] = number_[row];
+            to += (coupled_[node_[row]] == node) & (number_[row] >= 0);
+        }
+        return to;
+    }
+
+    const SparsePattern& from_;
+    const double* const values_;
+    const Coupling& coupling_;
+    const std::vector<Index> node_;
+    std::vector<Index> coupled_;         // of each node: the last that it is coupled with
+    std::vector<Index> number_;          // or -1
+    std::vector<Index> places_, below_;  // rows below: where in each column, and their new numbers
+    LoadedPart part_;
+};
+
 }  // namespace
 
-std::optional<LoadedPart> loaded_part(const SparsePattern& pattern, std::span<const double> values,
-                                      const VectorXd& forces) {
-    check_finite(values);
-    const std::vector<char> is_loaded = loaded(pattern, values, forces);
-    const Index count = static_cast<Index>(std::count(is_loaded.begin(), is_loaded.end(), true));
-    if (count == 0 || count == pattern.size) return std::nullopt;
-    LoadedPart part;
-    std::vector<Index> number(pattern.size, -1);
-    part.unknowns.reserve(count);
-    for (Index j = 0; j < pattern.size; ++j) {
-        if (!is_loaded[j]) continue;
-        number[j] = static_cast<Index>(part.unknowns.size());
-        part.unknowns.push_back(j);
-    }
-    part.pattern.size = count;
-    part.pattern.column_starts.push_back(0);
-    std::size_t most = 0;
-    for (const Index j : part.unknowns) most += pattern.column_starts[j + 1] - pattern.column_starts[j];
-    part.pattern.rows.resize(most);
-    part.values.resize(most);
-    Index to = 0;
-    for (const Index j : part.unknowns) {
-        for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
-            const Index row = number[pattern.rows[k]];
-            part.pattern.rows[to] = row;  // without a branch, which would be as good as random
-            part.values[to] = values[k];
-            to += row >= 0;
-        }
-        part.pattern.column_starts.push_back(to);
-    }
-    part.pattern.rows.resize(to);
-    part.values.resize(to);
-    return part;
+LoadedPart loaded_part(const SparsePattern& pattern, std::span<const double> values, const VectorXd& forces) {
+    const Coupling coupling = coupling_of(pattern, values);
+    return Selection(pattern, values.data(), coupling, loaded(coupling, forces)).take();
 }
 
 }  // namespace magshell

@@ -35,6 +35,20 @@ class FoldSix {
         }
     }
 
+    /// The same, side by side, where the right one is a face: a side turns about the edge by along . sum_a share_a x_a, with
+    /// its own nodes 0, 1, 2 and 3, 4, 5 or 6, 7, 8. The sum of both is the gradient.
+    struct Side {
+        Pack3 along;
+        Pack foot;
+    };
+    std::array<Side, 2> sides() const {
+        return {{{fold_.left.by_point(), fold_.left.foot}, {-fold_.right.by_point(), fold_.right.foot}}};
+    }
+    /// place: of a side's six nodes.
+    static double share(int point, int place, double foot) {
+        return wings_[point][place] - (place < 3 ? foot * tangents_[point][place] : 0.0);
+    }
+
     /// Adds moment d2theta, as lower blocks of the nine nodes at lower_index.
     void add_curvature(const Pack& moment, Pack33 h[45]) const {
         const FoldCurvature c(fold_);

@@ -3,23 +3,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "magshell/term/side_nodes.h"
+
 namespace magshell {
-namespace {
-
-// A fold's first six and last three nodes as a face beside it numbers its own six and what is beyond: [on its left][...].
-struct SideNodes {
-    std::array<int, 6>
-        own;     // of the fold, for the face's nodes i + 1, i + 2, middle(i), i, middle(i + 1), middle(i + 2)
-    int beyond;  // the first of three
-};
-constexpr SideNodes left_side = {{0, 1, 2, 3, 4, 5}, 6}, right_side = {{1, 0, 2, 6, 8, 7}, 3};
-
-constexpr std::array<int, 6> face_order(int i) {
-    using six_nodes::middle;
-    return {(i + 1) % 3, (i + 2) % 3, middle(i), i, middle((i + 1) % 3), middle((i + 2) % 3)};
-}
-
-}  // namespace
 
 BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
                                const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
@@ -251,6 +237,10 @@ void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
 void BendingSixTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                               SystemMatrix& out) const {
     const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
+    if (from_rest_) {
+        ElementLoop<6>::over_packs(chunk, [&](Index pack) { assemble_from_rest(pack, q, out); });
+        return;
+    }
     ElementLoop<6>::over_packs(chunk, [&](Index pack) { assemble_faces(pack, q, stress, out); });
     for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width)
         assemble_folds(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
@@ -327,13 +317,20 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
                 if (stencil.nodes[k] >= 0)
                     out.add_rotation_row(slots.rotation_nodes[a][k], out.column_length(stencil.nodes[k]),
                                          beside[a][k], lane);
-            for (int b = 0; b <= a; ++b)
-                if (stencil.rotations[b] >= 0)
-                    out.add(slots.rotations[lower_index(a, b)],
-                            sign[a / 2][lane] * sign[b / 2][lane] *
-                                stiffness(3 * (a / 2) + a % 2, 3 * (b / 2) + b % 2)[lane]);
         }
+        add_rotations(pack, lane, sign, stiffness, out);
     }
+}
+
+/// What the rotations of a face feel of each other.
+void BendingSixTerm::add_rotations(Index pack, int lane, const Pack sign[3], const Symmetric9& stiffness,
+                                   SystemMatrix& out) const {
+    const std::array<Index, 21>& slots = face_slots_[loop_.element(pack, lane)].rotations;
+    for (int a = 0; a < 6; ++a)
+        for (int b = 0; b <= a; ++b)
+            if (const Index slot = slots[lower_index(a, b)]; slot >= 0)
+                out.add(slot, sign[a / 2][lane] * sign[b / 2][lane] *
+                                  stiffness(3 * (a / 2) + a % 2, 3 * (b / 2) + b % 2)[lane]);
 }
 
 void BendingSixTerm::assemble_folds(Index first, Index last, const double* q, const Strains& stress,

@@ -29,6 +29,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const Controls&) const override;
     void evaluate(const double* q, const Controls&, Residual& out) override;
+    void prepare_assembly(const double* q, const Controls&) override;
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
@@ -36,6 +37,9 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
+    void count_rotations_from_rest(bool from_rest) override;
+    void rotations_from_sides(VectorXd& motion) const override;
+    void forces_from_rest(VectorXd& forces) const override;
     std::size_t bytes() const override;
 
     /// d at a state that is only looked at.
@@ -56,6 +60,12 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
         double rate;                      // of theta, along the last step that was asked for
     };
     using FoldStates = std::array<FoldState, 2>;
+    // How a side of it turns about the edge: see FoldSix::sides.
+    struct SideTurn {
+        Vec3 along;
+        double foot;
+    };
+    using SideTurns = std::array<std::array<SideTurn, 2>, 2>;  // at [point][on its right]
     struct FaceSlots {
         PairSlots<15> nodes;
         std::array<std::array<Index, 15>, 6> rotation_nodes;
@@ -89,6 +99,13 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void store_rates(const double* p);
     double moment(const FoldSixStencil& fold, int point, const Strains& stress) const;
     void assemble_faces(Index pack, const double* q, const Strains& stress, SystemMatrix& out) const;
+    void assemble_from_rest(Index pack, const double* q, SystemMatrix& out) const;
+    void add_held(Index pack, const Pack3 (&held)[3][2], const Pack sign[3], const Symmetric9& stiffness,
+                  const SixNodeRows& stiff, SystemMatrix& out) const;
+    void add_rotations(Index pack, int lane, const Pack sign[3], const Symmetric9& stiffness,
+                       SystemMatrix& out) const;
+    template <class Visit>
+    void each_half_turn(const Visit& visit) const;
     void assemble_folds(Index first, Index last, const double* q, const Strains& stress,
                         SystemMatrix& out) const;
 
@@ -109,6 +126,8 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     std::vector<Symmetric9> stiffness_;
     std::vector<FoldStates> folds_;
     std::vector<double> state_;  // the nodes at which all of this holds
+    bool from_rest_ = false;
+    std::vector<SideTurns> side_turns_;  // of each fold, where rotations count from rest
 };
 
 }  // namespace magshell

@@ -28,6 +28,15 @@ class ElasticTerm : public Term {
     /// Adds s . dd/dk at the last evaluated state for every value k from which the strains are measured.
     virtual void strains_vjp(const Strains& /*stresses*/, Gradient& /*out*/) const {}
 
+    /// An edge rotation counts from the mean of the faces on both sides, which it couples by that. To first order it may count
+    /// from where the edge was: then a face's energy is of its own nodes and rotations alone, and the Hessian has fewer
+    /// entries. From now on, or no longer, the Hessian is that: of the rest shape, evaluated last, without stress.
+    virtual void count_rotations_from_rest(bool /*from_rest*/) {}
+    /// While it is: of a small motion of all unknowns, its rotations as they count otherwise; and forces on such ones as those
+    /// on what counts from rest.
+    virtual void rotations_from_sides(VectorXd& /*motion*/) const {}
+    virtual void forces_from_rest(VectorXd& /*forces*/) const {}
+
   protected:
     StrainHistory history_;
 };

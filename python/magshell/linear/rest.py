@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -23,12 +24,7 @@ class _Factorized:
     ):
         self._values = values
         self._factor = _analysed(size, starts, rows, points)
-        report = self._factor.factorize(values)
-        if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
-            raise ValueError(
-                f"the stiffness at rest is not positive definite ({report.negative_pivots} negative and "
-                f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: hold the sheet by supports"
-            )
+        _refuse_indefinite(self._factor.factorize(values), size)
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """Refined once with a residual of more digits: where stiffnesses differ by 1e6, the order of elimination would
@@ -37,13 +33,21 @@ class _Factorized:
         return solution + self._factor.solve(self._factor.residual(self._values, solution, forces))
 
 
+def _refuse_indefinite(report: _core.FactorReport, size: int) -> None:
+    if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
+        raise ValueError(
+            f"the stiffness at rest is not positive definite ({report.negative_pivots} negative and "
+            f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: hold the sheet by supports"
+        )
+
+
 def _analysed(size: int, starts: np.ndarray, rows: np.ndarray, points: np.ndarray) -> _core.Factor:
     return _core.analyze(size, starts, rows, points=points, ordering="amd" if size <= _SMALL else "best")
 
 
 class RestStiffness:
-    """The Hessian K at the rest shape without controls. Works on the free unknowns, (n,). What is solved with is factorized
-    once: the whole K, or what a load is coupled with.
+    """The Hessian K at the rest shape without controls. Works on the free unknowns, (n,). The whole of it is assembled and
+    factorized once, if it is asked for.
 
     Raises ValueError where actuators are springs of their own, which are no part of K, and as `refuse_what_acts`; once
     something is factorized, where that is not positive definite: the scene is not held, or not stable at rest.
@@ -57,60 +61,59 @@ class RestStiffness:
                 "acts: ms.equilibrium, ms.follow and ms.vibration_modes have it"
             )
         self._model = scene._model
+        self._unloaded = scene._control_layout.zeros()
         self.rest: np.ndarray = self._model.rest_state()
         refuse_what_acts(inputs)
-        *self._pattern, self._values = self._model.hessian(self.rest, scene._control_layout.zeros())
-        self._at_rest = self._model.last_gradient
         self._whole: _Factorized | None = None
+
+    @functools.cached_property
+    def _triangle(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+        """Size, starts, rows and values of the lower one."""
+        return self._model.hessian(self.rest, self._unloaded)
 
     @property
     def matrix(self) -> scipy.sparse.csc_array:
         """K, (n, n)."""
-        return self.with_values(self._values)
+        return symmetric(*self._triangle)
 
     def with_values(self, values: np.ndarray) -> scipy.sparse.csc_array:
         """The symmetric matrix (n, n) whose lower triangle has K's pattern and these values."""
-        return symmetric(*self._pattern, values)
+        return symmetric(*self._triangle[:3], values)
 
     def negative_directions(self, change: np.ndarray) -> int:
         """How many negative eigenvalues K plus a change of its values has, by another factorization."""
-        factor = _analysed(*self._pattern, self._model.free_points)
-        return factor.factorize(self._values + change).negative_pivots
+        *pattern, values = self._triangle
+        return _analysed(*pattern, self._model.free_points).factorize(values + change).negative_pivots
 
     def factorize(self) -> None:
         """The whole K, whatever a load is coupled with."""
         if self._whole is None:
-            self._whole = _Factorized(*self._pattern, self._values, self._model.free_points)
+            self._whole = _Factorized(*self._triangle, self._model.free_points)
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """u (n,) of K u = forces (n,)."""
         self.factorize()
         return self._whole.solve(forces)
 
-    def _answer(self, forces: np.ndarray) -> np.ndarray:
-        """The same, where not even the rest of K need be regular if nothing couples it with a force: it stays at rest."""
-        part = _core.loaded_part(*self._pattern, self._values, forces) if self._whole is None else None
-        if part is None:
-            return self.solve(forces)
-        unknowns, starts, rows, values = part
-        points = self._model.free_points[unknowns]
-        answer = np.zeros_like(forces)
-        answer[unknowns] = _Factorized(len(unknowns), starts, rows, values, points).solve(forces[unknowns])
-        return answer
-
     def response(self, inputs: Inputs, at_rest: np.ndarray | None = None) -> np.ndarray:
-        """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports and motors move.
+        """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports and motors move. Where
+        the whole K is not factorized, only what is coupled with a load is, and the rest of K need not be regular.
 
         at_rest: g(0) by `forces_at_rest`; by default with all that joints do, which is no load then.
         """
         model, layout = self._model, inputs.scene._control_layout
-        unloaded = layout.zeros()
-        moved = model.prescribed_rate(unloaded) * layout.of(inputs.controls, "scene", "motion_factor")
-        moved = moved + model.driven_increment(self.rest, unloaded)
-        forces = (self._at_rest if at_rest is None else at_rest) - model.gradient(self.rest, inputs.controls)
+        if self._whole is None:
+            found = model.small_deflection(self.rest, self._unloaded, inputs.controls, at_rest)
+            if not len(motion := found.motion):
+                _refuse_indefinite(found.report, found.unknowns)
+            return motion
+        moved = model.prescribed_rate(self._unloaded) * layout.of(inputs.controls, "scene", "motion_factor")
+        moved = moved + model.driven_increment(self.rest, self._unloaded)
+        forces = model.gradient(self.rest, self._unloaded) if at_rest is None else at_rest
+        forces = forces - model.gradient(self.rest, inputs.controls)
         if moved.any():
-            forces -= symmetric(*model.hessian(self.rest, unloaded, reduced=False)) @ moved
-        return moved + model.expand(self._answer(model.reduce(forces)))
+            forces -= symmetric(*model.hessian(self.rest, self._unloaded, reduced=False)) @ moved
+        return moved + model.expand(self.solve(model.reduce(forces)))
 
 
 def pulling_joints(inputs: Inputs) -> dict[Any, Any]:
