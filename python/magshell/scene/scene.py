@@ -14,6 +14,7 @@ from .. import _core
 from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity
 from .._machine.entry import grouped
+from .._machine.offered import Drawn
 from ..bodies.actuator import Actuator
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
@@ -58,13 +59,12 @@ _SUPPORTS = (Pin, Clamp, SymmetryPlane)
 _ACTUATORS = "Muscle, Cavity, Cells and Tendon objects"
 
 
-class Scene:
+class Scene(Drawn):
     """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
     needs and, up to 256 MB, the memory of its last factorization.
 
     bodies: a Shell or a Solid, or several, which feel each other through ties and contacts only, Rigid parts and
-        Skeletons. Positions and
-        faces of a result are those of one body after another, and `result[body]` has those of one.
+        Skeletons. Positions and faces of a result are those of one body after another, `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks.tensors import stacked
+from .._machine.offered import Kept
 from ..bodies.bodies import BODIES
 from ..bodies.of_body import result_of
 from ..bodies.strains import Strains
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
-class Equilibria(Sequence[Equilibrium]):
+class Equilibria(Kept, Sequence[Equilibrium]):
     """A scene at rest in each of k load cases, or in k ways in one; a sequence of Equilibrium.
 
     positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
