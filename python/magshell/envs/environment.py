@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     import gymnasium
 
     from .._checks.kinds import EnvActuator
-    from ..plotting.view import View
 
 if not TYPE_CHECKING:
     gymnasium = require_gymnasium("envs.Environment")
