@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._checks.checked_list import listed
 from .._checks.tensors import stacked
 from .._machine.offered import Kept
 from ..bodies.bodies import BODIES
@@ -33,7 +34,7 @@ class Equilibria(Kept, Sequence[Equilibrium]):
     """
 
     def __init__(self, cases: Iterable[Equilibrium]):
-        self._cases = tuple(cases)
+        self._cases = tuple(listed("cases", cases, lambda given: isinstance(given, Equilibrium)))
         for case in self._cases:
             if not isinstance(case, Equilibrium):
                 raise ValueError(f"cases must hold Equilibrium objects, got {type(case).__name__}")
