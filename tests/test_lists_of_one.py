@@ -105,3 +105,55 @@ def test_a_wrong_keyword_of_an_optimizer() -> None:
     for make in (ms.optim.LBFGS, ms.optim.MMA, ms.optim.GCMMA):
         with pytest.raises(TypeError, match=r"MMA\(\)|LBFGS\(\) has no keyword 'lr'; it has"):
             make([x], lr=1.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: ms.Clamp(MESH.vertices_at(x=0.0)),
+            r"Clamp edges were given as vertices: .* mesh.edges_between",
+        ),
+        (
+            lambda: ms.EdgeLoad(MESH.vertices_where(lambda x: x[:, 0] > 0.09), (0, 0, 1)),
+            "EdgeLoad edges were",
+        ),
+        (lambda: ms.Pin(MESH.edges_at(x=0.0)), "Pin vertices were given as edges: .* mesh.vertices_at"),
+        (lambda: ms.PointLoad(MESH.faces_where(lambda x: x[:, 0] > 0.09), (0, 0, 1)), "given as faces"),
+        (
+            lambda: ms.AreaLoad((0, 0, 1), faces=MESH.vertices_at(x=0.0)[:2]),
+            "AreaLoad faces were given as vert",
+        ),
+        (lambda: ms.Pressure(1.0, faces=BOX.tetrahedra_at(x=0.0)), "Pressure faces were given as tetrahedra"),
+    ],
+)
+def test_vertices_are_not_taken_for_edges(make, message) -> None:
+    """Their numbers are edges too, of other places: it held and loaded those, without a word."""
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+BOX = ms.meshes.box((1, 1, 1), cells=(1, 1, 1))
+
+
+def test_selections_are_arrays_otherwise() -> None:
+    import pickle
+
+    vertices, edges = MESH.vertices_at(x=0.0), MESH.edges_at(x=0.0)
+    plain = np.array(vertices)
+    assert repr(vertices) == repr(plain) and vertices.tolist() == plain.tolist()
+    for made in (
+        vertices + 1,
+        vertices == 1,
+        np.isin(np.arange(9), vertices),
+        MESH.edges[edges],
+        2 * vertices,
+    ):
+        assert type(made) is np.ndarray
+    assert ms.Pin(np.setdiff1d(vertices, vertices[:1])).vertices.tolist() == plain[1:].tolist()
+    assert ms.Clamp(MESH.edges_between(vertices)).edges.tolist() == edges.tolist()
+    assert ms.Clamp(np.array(vertices)).edges.tolist() == plain.tolist()  # a plain array may be anything
+    again = pickle.loads(pickle.dumps(vertices))
+    assert again.tolist() == plain.tolist() and isinstance(again, np.ndarray)
+    with pytest.raises(ValueError, match=r"field must hold fields of magshell .* ms.MagpylibField.*, got int"):
+        ms.Scene(SHEET, supports=CLAMP, field=3)

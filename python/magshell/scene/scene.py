@@ -26,7 +26,7 @@ from ..bodies.skeleton import Skeleton
 from ..bodies.skeleton_input import skeleton_inputs
 from ..bodies.solid import Solid
 from ..bodies.ties import Tie
-from ..fields.field import AppliedField, UniformField
+from ..fields.field import FIELDS, AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.constraints import free_rigid_motions, gather
@@ -123,7 +123,7 @@ class Scene(Drawn):
             if any(each is other for other in self.actuators[:k]):
                 raise ValueError(f"actuators must differ, but actuator {k} is there twice")
         self.fields: tuple[AppliedField, ...] = (
-            () if field is None else checked_list("field", field, (AppliedField,))
+            () if field is None else checked_list("field", field, (AppliedField,), FIELDS)
         )
         self.obstacles: tuple[Any, ...] = obstacles_of(self._obstacle_contacts)
         if water is not None and not isinstance(water, Water):
