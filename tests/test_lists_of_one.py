@@ -155,5 +155,7 @@ def test_selections_are_arrays_otherwise() -> None:
     assert ms.Clamp(np.array(vertices)).edges.tolist() == plain.tolist()  # a plain array may be anything
     again = pickle.loads(pickle.dumps(vertices))
     assert again.tolist() == plain.tolist() and isinstance(again, np.ndarray)
-    with pytest.raises(ValueError, match=r"field must hold fields of magshell .* ms.MagpylibField.*, got int"):
+    with pytest.raises(
+        ValueError, match=r"field must hold fields of magshell .* ms.MagpylibField.*, got int"
+    ):
         ms.Scene(SHEET, supports=CLAMP, field=3)
