@@ -120,7 +120,7 @@ def test_buckling_is_where_the_path_branches(case) -> None:
     assert branch.kind == "bifurcation"
     found = ms.linear_buckling(scene, about, **towards)
     assert found.factors[0] == pytest.approx(branch.parameter, rel=2e-3)
-    assert 0.05 < found.factors[0] < 0.95
+    assert 0.05 < found.factors[0] < 0.95 and "of the way to the new controls" in repr(found)
     along = np.vdot(found.modes[0], branch.mode)
     assert abs(along) == pytest.approx(np.linalg.norm(found.modes[0]) * np.linalg.norm(branch.mode), rel=1e-3)
 

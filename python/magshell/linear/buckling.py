@@ -37,7 +37,7 @@ class Buckling:
     factors: (k,), ascending: what to multiply the controls by so that the sheet buckles in mode k; about an equilibrium,
         what share of the way from its controls to those given.
     modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
-    edge_rotations: (k, n_e), rad, that go with them.
+    edge_rotations: (k, n_e), rad, that go with them. equilibrium: that one, or None.
     """
 
     scene: Scene
@@ -46,10 +46,12 @@ class Buckling:
     edge_rotations: np.ndarray = field(repr=False)
     factorizations: int
     wall_time: float
+    equilibrium: Equilibrium | None = field(repr=False, default=None)
 
     def __repr__(self) -> str:
         factors = ", ".join(f"{factor:.6g}" for factor in self.factors)
-        return f"Buckling: at {factors} times the controls; {self.wall_time:.3g} s"
+        of = "times the controls" if self.equilibrium is None else "of the way to the new controls"
+        return f"Buckling: at {factors} {of}; {self.wall_time:.3g} s"
 
 
 @solve_entry
@@ -150,6 +152,7 @@ def linear_buckling(
         edge_rotations=edge_rotations,
         factorizations=2,
         wall_time=time.perf_counter() - began,
+        equilibrium=equilibrium,
     )
 
 

@@ -52,6 +52,7 @@ def save(path: str | Path, result: Equilibrium | Equilibria | Trajectory) -> Non
     if type(result) not in _KINDS.values():
         points = ": save its points, ms.Equilibria(path.equilibrium(k) for k in ...)"
         why = points if type(result).__name__ == "Path" else ""
+        why = ": several are ms.Equilibria([...])" if isinstance(result, list | tuple) else why
         raise ValueError(
             f"result must be an Equilibrium, Equilibria or a Trajectory, got {type(result).__name__}{why}"
         )
