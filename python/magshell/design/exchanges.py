@@ -23,15 +23,19 @@ class Exchanges:
     The objective is taken to be quadratic in each face, with one curvature for all: the mean of what the trials showed.
     """
 
-    def __init__(self, search, known: dict[str, Any] | None = None):
+    def __init__(self, search: Any, known: dict[str, Any] | None = None):
         self._search = search
         if known is not None:
             vars(self).update(known)
             return
-        self.trial, self.over = 0, False
+        self.trial: int = 0
+        self.over: bool = False
+        self.value: float
+        self.gradient: np.ndarray
         self.value, self.gradient = search.sample()
-        self.lowest, self.best = self.value, search.kept()
-        self.resting = np.zeros(len(search.faces.held), dtype=int)  # until which trial
+        self.lowest: float = self.value
+        self.best: tuple[Any, ...] = search.kept()
+        self.resting: np.ndarray = np.zeros(len(search.faces.held), dtype=int)  # until which trial
         self.curvature: float | None = None
 
     def state(self) -> dict[str, Any]:

@@ -17,9 +17,9 @@ class PrintableCheckpoint:
     """Where it is, if anywhere, and for what: the ink, the number of faces and the options that must be the same."""
 
     def __init__(self, path: str | Path | None, ink: Ink, n_faces: int, options: dict[str, Any]):
-        self.path = None if path is None else Path(path)
+        self.path: Path | None = None if path is None else Path(path)
         ink_has = {name: getattr(ink, name) for name in ("strength", "directions", "levels", "frames")}
-        self._configuration = kept({"n_faces": n_faces, **ink_has, **options})
+        self._configuration: dict[str, Any] = kept({"n_faces": n_faces, **ink_has, **options})
 
     def save(self, **parts: Any) -> None:
         if self.path is not None:

@@ -6,6 +6,7 @@ import copy
 import time
 from collections.abc import Callable
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -36,12 +37,12 @@ class PrintableSearch:
 
     def __init__(
         self,
-        objective: Callable,
+        objective: Callable[..., Any],
         faces: PrintedFaces,
-        stateful: list,
+        stateful: list[Any],
         checkpoint: PrintableCheckpoint,
         callback: Callable[[PrintableStage], bool | None] | None,
-        bar,
+        bar: Any,
         *,
         max_iterations: int,
         weights: list[float],
@@ -49,16 +50,20 @@ class PrintableSearch:
         stage_iterations: int,
         tolerance: float,
     ):
-        self.objective, self.faces, self.stateful = objective, faces, stateful
-        self._checkpoint, self._callback, self.bar = checkpoint, callback, bar
+        self.objective: Callable[..., Any] = objective
+        self.faces: PrintedFaces = faces
+        self.stateful: list[Any] = stateful
+        self.bar: Any = bar
+        self._checkpoint, self._callback = checkpoint, callback
         self._max_iterations, self._weights, self._blocks = max_iterations, weights, blocks
         self._stage_iterations, self._tolerance = stage_iterations, tolerance
-        self.offering = offering(objective, stateful)
+        self.offering: list[Any] = offering(objective, stateful)
         self.history: list[PrintableStage] = []
-        self.evaluations, self.began = 0, time.perf_counter()
+        self.evaluations: int = 0
+        self.began: float = time.perf_counter()
         self.at_once: float | None = None  # of the free design, rounded
-        self.rounded: tuple = ()
-        self.scale = 0.0  # of the pull, in units of the objective
+        self.rounded: tuple[Any, ...] = ()
+        self.scale: float = 0.0  # of the pull, in units of the objective
         self._compared = False  # with the design that was rounded at once
         self._exchanges: Exchanges | None = None  # while they go on
         self._told = 0  # stages of which the callback knows
@@ -178,7 +183,7 @@ class PrintableSearch:
         self._told = len(history)
         self.bar.update(len(history) + (0 if exchanges is None else exchanges.trial))
 
-    def _check(self, was: float, largest: float, fresh: tuple) -> None:
+    def _check(self, was: float, largest: float, fresh: tuple[Any, ...]) -> None:
         """Raises ValueError where the objective says something else of the design now; it is as before then."""
         try:
             now = self.value()
@@ -218,11 +223,11 @@ class PrintableSearch:
     def _seconds(self) -> float:
         return time.perf_counter() - self.began
 
-    def kept(self) -> tuple:
+    def kept(self) -> tuple[Any, ...]:
         """A design and the states that objects have at it: the way back to it need not be the way there."""
         return self.faces.kept(), [copy.deepcopy(each.state_dict()) for each in self.stateful]
 
-    def back_to(self, kept: tuple) -> None:
+    def back_to(self, kept: tuple[Any, ...]) -> None:
         self.faces.restore(kept[0])
         for each, state in zip(self.stateful, kept[1], strict=True):
             each.load_state_dict(copy.deepcopy(state))
@@ -286,7 +291,7 @@ class PrintableSearch:
             f"objective {value:.6g}, {stage.held} of {len(self.faces.held)} faces rounded"
         )
 
-    def evaluate(self, magnetization):
+    def evaluate(self, magnetization: Any) -> Any:
         """The objective as a tensor."""
         self.evaluations += 1
         answer = Answer.of(self.objective(magnetization))

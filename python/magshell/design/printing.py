@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import numpy as np
-
 from .._checks.arrays import count
 from .._checks.quantity import quantity
 from .._checks.scalars import not_negative

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy
 
@@ -59,10 +61,12 @@ class Stiffness:
     where: in words, for errors: ValueError, once something is factorized that is not positive definite.
     """
 
-    def __init__(self, model, state: np.ndarray, controls: np.ndarray, where: str):
-        self._model, self.state, self.controls, self._where = model, state, controls, where
+    def __init__(self, model: Any, state: np.ndarray, controls: np.ndarray, where: str):
+        self._model, self._where = model, where
+        self.state: np.ndarray = state
+        self.controls: np.ndarray = controls
         *self._pattern, self._values = model.hessian(state, controls)
-        self.gradient = model.last_gradient
+        self.gradient: np.ndarray = model.last_gradient
         columns, stiffnesses = model.low_rank()
         self._beside = (columns, stiffnesses) if np.any(stiffnesses) else ()
         self._whole: _Factorized | None = None
