@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .._checks.tensors import wants_gradient
-from ..scene.inputs import Inputs
+from ..scene.inputs import Inputs, plain_inputs
 from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
 from .stiffness import Stiffness
@@ -49,6 +49,30 @@ def inputs_about(
             )
     inputs = idle_inputs(scene, {}, applied_flux_density, **factors)
     return inputs.with_values(equilibrium._values)
+
+
+def asked_inputs(
+    function: str,
+    scene: Scene,
+    equilibrium: Equilibrium | None,
+    remanent_magnetization: Any,
+    applied_flux_density: Any,
+    values: dict[Any, Any] | None,
+    **factors: Any,
+) -> Inputs:
+    """Of a linear question, at rest or about an equilibrium. Raises ValueError on what does not fit."""
+    if equilibrium is None:
+        return plain_inputs(scene, remanent_magnetization, applied_flux_density, values, **factors)
+    inputs = inputs_about(
+        scene,
+        equilibrium,
+        remanent_magnetization=remanent_magnetization,
+        applied_flux_density=applied_flux_density,
+        values=values,
+        **factors,
+    )
+    refuse_what_cannot_be(function, equilibrium, inputs)
+    return inputs
 
 
 def set_state(equilibrium: Equilibrium) -> None:

@@ -12,10 +12,10 @@ import scipy
 from .._checks.arrays import count
 from .._machine.entry import solve_entry
 from ..errors import NotConverged
-from ..scene.inputs import Inputs, plain_inputs
+from ..scene.inputs import Inputs
 from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
-from .about import StiffnessAbout, inputs_about, refuse_what_cannot_be
+from .about import StiffnessAbout, asked_inputs
 from .mode_shapes import mode_shapes
 from .rest import RestStiffness, pulling_joints, refuse_springs
 from .stiffness import Stiffness
@@ -104,25 +104,19 @@ def linear_buckling(
     0.021
     """
     modes = count("modes", modes)
-    factors = {
-        "load_factor": load_factor,
-        "gravity_factor": gravity_factor,
-        "field_factor": field_factor,
-        "motion_factor": motion_factor,
-    }
-    if equilibrium is None:
-        inputs = plain_inputs(scene, remanent_magnetization, applied_flux_density, values, **factors)
-    else:
-        inputs = inputs_about(
-            scene,
-            equilibrium,
-            remanent_magnetization=remanent_magnetization,
-            applied_flux_density=applied_flux_density,
-            values=values,
-            **factors,
-        )
-        refuse_what_cannot_be("linear_buckling", equilibrium, inputs)
-        refuse_springs(inputs)
+    inputs = asked_inputs(
+        "linear_buckling",
+        scene,
+        equilibrium,
+        remanent_magnetization,
+        applied_flux_density,
+        values,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    refuse_springs(inputs)
     if scene._body_contacts:
         raise ValueError(
             "the scene has contact of bodies, which holds in one direction only, so that no linear mode buckles: ms.follow "

@@ -11,10 +11,9 @@ import numpy as np
 from .._checks.tensors import detached, like
 from .._machine.entry import solve_entry
 from .._machine.offered import Drawn
-from ..scene.inputs import plain_inputs
 from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
-from .about import StiffnessAbout, inputs_about, refuse_what_cannot_be
+from .about import StiffnessAbout, asked_inputs
 from .rest import RestStiffness, forces_at_rest
 
 if TYPE_CHECKING:
@@ -93,31 +92,25 @@ def linear_response(
     >>> round(float(tip), 3)  # p L^3 / (3 E I) = 0.04
     0.04
     """
-    factors = {
-        "load_factor": load_factor,
-        "gravity_factor": gravity_factor,
-        "field_factor": field_factor,
-        "motion_factor": motion_factor,
-    }
     began = time.perf_counter()
-    if equilibrium is None:
-        inputs = plain_inputs(scene, remanent_magnetization, applied_flux_density, values, **factors)
-        at_rest = forces_at_rest(inputs)
-        given = inputs.given
-        with inputs.in_core():
+    inputs = asked_inputs(
+        "linear_response",
+        scene,
+        equilibrium,
+        remanent_magnetization,
+        applied_flux_density,
+        values,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    given = inputs.given if equilibrium is None else [*inputs.given, equilibrium.positions]
+    at_rest = forces_at_rest(inputs) if equilibrium is None else None
+    with inputs.in_core():
+        if equilibrium is None:
             change = RestStiffness(inputs).response(inputs, at_rest)
-    else:
-        inputs = inputs_about(
-            scene,
-            equilibrium,
-            remanent_magnetization=remanent_magnetization,
-            applied_flux_density=applied_flux_density,
-            values=values,
-            **factors,
-        )
-        refuse_what_cannot_be("linear_response", equilibrium, inputs)
-        given = [*inputs.given, equilibrium.positions]
-        with inputs.in_core():
+        else:
             change = StiffnessAbout(equilibrium).response(inputs)
     model = scene._model
     return LinearResponse(
