@@ -7,7 +7,7 @@ from actuated import SOFT, box_sheet, energy_by_torch, hollow_block
 from scipy.spatial.transform import Rotation
 
 import magshell as ms
-from magshell.linear.rest import symmetric
+from magshell.linear.stiffness import symmetric
 
 
 def loose(body, *actuators) -> ms.Scene:

@@ -119,3 +119,12 @@ def test_a_failing_case_is_named_and_the_others_kept(scene):
 def test_cases_that_do_not_fit(scene, inputs, words):
     with pytest.raises(ValueError, match=words):
         ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0), **inputs)
+
+
+def test_bad_input_of_one_case_is_told_with_its_number() -> None:
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(4, 1))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    fields = [(0, 0, 1e-3), (0, 0, np.nan), (0, 0, 2e-3)]
+    with pytest.raises(ValueError, match=r"load case 1 of 3: applied_flux_density \[T\] must be finite"):
+        ms.equilibrium(scene, remanent_magnetization=(1e4, 0, 0), applied_flux_density=fields)

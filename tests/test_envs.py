@@ -171,6 +171,34 @@ def test_frames_have_one_shape_and_differ(monkeypatch):
     assert environment().render() is None
 
 
+def test_frames_take_a_view_and_a_style():
+    mesh = ms.meshes.rectangle(0.02, 0.005, cells=(4, 1))
+    magnetic = {"mass_density": 1e3, "remanent_magnetization": (4e4, 0, 0)}
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, **magnetic)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    bare = ms.Style(backend="matplotlib", arrows=False, show_field=False, mesh_lines=True)
+    frames = []
+    for look in (
+        {"style": ms.Style(backend="matplotlib")},
+        {"style": bare},
+        {"style": bare, "view": ms.View(90, -90)},
+    ):
+        one = environment(
+            scene=scene,
+            actuators=[ms.envs.Actuator(scene, "applied_flux_density", lower=[-1e-3] * 3, upper=[1e-3] * 3)],
+            observation=lambda now: now.positions[-1],
+            reward=lambda now: 0.0,
+            render_mode="rgb_array",
+            render_width=400,
+            **look,
+        )
+        one.reset(seed=0)
+        frames.append(one.render())
+        one.close()
+    for one, other in ((frames[0], frames[1]), (frames[1], frames[2])):
+        assert one.shape != other.shape or (one != other).any()
+
+
 def test_a_step_does_not_build_the_scene_anew(monkeypatch):
     one = robots.soft_arm()
     one.reset(seed=0)
@@ -223,6 +251,9 @@ def test_a_motion_that_fails_ends_the_episode():
         ({"simulate": {"dampin": 3}}, "must not hold 'dampin', but damping"),
         ({"actuators": np.array(3.0)}, "actuators must hold Actuator"),
         ({"render_mode": "human"}, "render_mode must be"),
+        ({"view": "below"}, "view must be .elevation, azimuth."),
+        ({"style": "dark"}, "style must be an ms.Style"),
+        ({"style": ms.Style(contacts=True)}, "do not show contacts"),
         ({"time_step": 0.0}, r"time_step \[s\] must be positive"),
         ({"steps_per_action": 0}, "steps_per_action must be an integer"),
         ({"scene": pendulum()[0]}, "neither the scene nor one of its objects"),

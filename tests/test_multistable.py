@@ -171,3 +171,27 @@ def test_bad_input(options, message):
     scene = beam((4, 1))
     with pytest.raises(ValueError, match=message):
         ms.equilibria(scene, **{**field(scene), **options})
+
+
+def test_a_start_that_looks_like_a_saddle_finds_it():
+    """A strip pushed far has its S far from both wells, where deflation from them does not come."""
+    mesh = ms.meshes.rectangle(0.04, 0.005, cells=(24, 3))
+    sheet = ms.Shell(mesh, thickness=0.4e-3, young_modulus=1e6, poisson_ratio=0.45)
+    ends = [
+        ms.Clamp(mesh.edges_at(x=0.0)),
+        ms.Clamp(mesh.edges_at(x=0.04), displacement=(-1.5e-3, 0, 0)),
+    ]
+    u = mesh.rest_positions[:, 0] / 0.04
+    guess = mesh.rest_positions - np.outer(u, (1.5e-3, 0, 0))
+    guess[:, 2] = 3e-3 * np.sin(2 * np.pi * u) * np.sin(np.pi * u)
+    found = ms.equilibria(
+        ms.Scene(sheet, supports=ends), start=guess, unstable=True, attempts=16, progress=False
+    )
+    kinds = [each.unstable_directions for each in found]
+    assert kinds[:2] == [0, 0] and 1 in kinds  # down both sides of it are the wells
+    saddle = found[kinds.index(1)]
+    assert saddle.energy > 1.5 * found[0].energy
+    middle = mesh.vertices_at(x=0.02)
+    assert abs(saddle.positions[middle, 2]).max() < 1e-5 < abs(found[0].positions[middle, 2]).min()
+    alone = ms.equilibria(ms.Scene(sheet, supports=ends), start=guess, attempts=4, progress=False)
+    assert all(each.stable for each in alone)

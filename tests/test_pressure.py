@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from solid_faces import Faces
 
 import magshell as ms
-from magshell.linear.rest import symmetric
+from magshell.linear.stiffness import symmetric
 from magshell.mesh.face_shapes import sides
 
 SOFT = ms.StVenantKirchhoff(young_modulus=1e5, poisson_ratio=0.3)

@@ -45,7 +45,7 @@ class Ink:
         frames: Numbers | None = None,
     ):
         self.strength: float = positive("strength", "A/m", detached(strength))
-        rays = quantity("directions", "1", detached(directions), ("k", 3))
+        rays = quantity("directions", "1", np.atleast_2d(detached(directions)), ("k", 3))
         lengths = np.linalg.norm(rays, axis=1, keepdims=True)
         if len(rays) == 0:
             raise ValueError("directions must hold at least one")
@@ -152,7 +152,7 @@ class Ink:
 
 
 def _checked_levels(levels) -> tuple[float, ...]:
-    given = quantity("levels", "1", detached(levels), ("n",))
+    given = quantity("levels", "1", np.atleast_1d(detached(levels)), ("n",))
     if not (len(given) and given.min() >= 0 and 0 < given.max() <= 1):
         raise ValueError(
             f"levels must be shares of the strength from 0 to 1, one of them positive, got {given.tolist()}"

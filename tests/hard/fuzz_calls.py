@@ -238,8 +238,8 @@ def _solves(s: Sample) -> Iterator[Call]:
         {**magnetic, **options, "max_points": 3, "locate_critical": True, "solver": quick, "progress": False},
         cost=2,
     )
-    yield Call("linear_response", ms.linear_response, magnetic)
-    yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "modes": 1}, cost=2)
+    yield Call("linear_response", ms.linear_response, {**magnetic, "equilibrium": None})
+    yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "equilibrium": None, "modes": 1}, cost=2)
     modes = {"scene": s.scene, "equilibrium": s.rest, "count": 2, "mass": "consistent"}
     yield Call("vibration_modes", ms.vibration_modes, modes, cost=2)
     viscous = {"damping": 1e-3, "stiffness_damping": 1e-4, "maxwell_modulus": 0.1, "maxwell_time": 1e-2}
@@ -378,7 +378,15 @@ def _files(s: Sample) -> Iterator[Call]:
     yield Call(
         "write_page",
         ms.write_page,
-        {"what": s.mesh, "path": s.folder / "out.html", **states, **look, "color": None, "size_limit": 1e7},
+        {
+            "what": s.mesh,
+            "path": s.folder / "out.html",
+            **states,
+            **look,
+            "obstacles": (),
+            "color": None,
+            "size_limit": 1e7,
+        },
         cost=10,
     )
     yield Call(

@@ -97,6 +97,9 @@ def _objectives(s: Sample) -> Iterator[Call]:
             "exchanges": 1,
             "tolerance": 1e-3,
             "stateful": (),
+            "callback": None,
+            "checkpoint": None,
+            "resume": False,
             "progress": False,
         },
     )

@@ -1,9 +1,21 @@
-"""Lists of objects that scenes are made of."""
+"""Lists of objects, where one object will do as well."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
+
+
+def listed(name: str, given: Any, is_one: Callable[[Any], bool]) -> list[Any]:
+    """Of one object or several, by whether a thing is one; None is none. Raises ValueError where it is neither."""
+    if given is None:
+        return []
+    if is_one(given):
+        return [given]
+    try:
+        return list(given)
+    except TypeError:
+        raise ValueError(f"{name} must be one or a list of them, got {given!r:.60}") from None
 
 
 def checked_list(

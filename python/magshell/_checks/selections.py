@@ -9,8 +9,50 @@ import numpy as np
 from .quantity import array_of
 
 
+class Indices(np.ndarray):
+    """Indices that know what they count: vertices taken for edges would be other places without an error. Parts of them
+    know it too; what is computed from them is a plain array.
+
+    kind: "vertices", "edges", "faces" or "tetrahedra".
+    """
+
+    kind: str | None
+
+    def __new__(cls, values: Any, kind: str | None = None) -> Indices:
+        made = np.asarray(values).view(cls)
+        made.kind = kind
+        return made
+
+    def __array_finalize__(self, made_from: Any) -> None:
+        self.kind = getattr(made_from, "kind", None)
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **options):
+        def plain(values):
+            return values.view(np.ndarray) if isinstance(values, Indices) else values
+
+        if "out" in options:
+            options["out"] = tuple(map(plain, options["out"]))
+        return getattr(ufunc, method)(*map(plain, inputs), **options)
+
+    def __repr__(self) -> str:
+        return repr(self.view(np.ndarray))
+
+
+def _check_kind(name: str, values: Any) -> None:
+    """Raises ValueError where indices count other things than those that the last word of their name says."""
+    wanted, given = name.split()[-1], getattr(values, "kind", None)
+    kinds = ("vertices", "edges", "faces", "tetrahedra")
+    numbers = isinstance(values, Indices) and values.dtype != bool
+    if numbers and given in kinds and wanted in kinds and given != wanted:
+        between = ", or all between vertices: mesh.edges_between(...)" if wanted == "edges" else ""
+        raise ValueError(
+            f"{name} were given as {given}: select {wanted}, as by mesh.{wanted}_at(...){between}"
+        )
+
+
 def selection(name: str, values: Any) -> np.ndarray:
     """Indices, or a mask, as they were given: (k,), k > 0. `indices` checks them once their mesh is known."""
+    _check_kind(name, values)
     array = np.atleast_1d(array_of(name, values, "be integer indices of shape (k,)"))
     if array.size == 0:
         raise ValueError(f"{name} are empty: there is nothing to apply this to")

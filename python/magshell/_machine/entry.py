@@ -19,7 +19,10 @@ def grouped(**groups: type[Any]) -> Callable[[F], F]:
     A keyword that it does not have is told with the group that has it, or with those that are most like it."""
 
     def decorated(function: F) -> F:
-        known = tuple(inspect.signature(function).parameters)
+        parameters = inspect.signature(function).parameters
+        if any(each.kind is each.VAR_KEYWORD for each in parameters.values()):
+            return function  # it tells of wrong ones itself
+        known = tuple(parameters)
         name = function.__qualname__.removesuffix(".__init__")
 
         @functools.wraps(function)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._checks.checked_list import listed
 from .._checks.quantity import quantity
 from .._checks.tensors import require_torch
 from ._arguments import tensor
@@ -155,7 +156,7 @@ class Chain(Curve):
     length: float
 
     def __init__(self, pieces: Sequence[Curve]):
-        self._pieces = list(pieces)
+        self._pieces = listed("pieces", pieces, lambda given: isinstance(given, Curve))
         if not self._pieces or not all(isinstance(piece, Curve) for piece in self._pieces):
             raise ValueError("pieces must be curves of ms.control, at least one")
         lengths = np.array([piece.length for piece in self._pieces])

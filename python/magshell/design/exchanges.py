@@ -14,46 +14,61 @@ _MEMORY = 0.8  # of the mean curvature, at each trial
 _SAME = 1e-12  # in squares of the strength
 
 
-def exchange(search: Any, count: int) -> float:
-    """Changes the face that promises most, `count` times, also where the objective rises for a while (a tabu search), and
-    leaves the faces at the lowest design seen. Returns its objective.
+class Exchanges:
+    """Changes the face that promises most, one at a time, also where the objective rises for a while (a tabu search).
 
     search: has the faces, sample(): (objective, gradient (n_f, 3) by shares of the strength in world axes) of them, kept()
-    and back_to() for all that belongs to a design, and a bar.
+    and back_to() for all that belongs to a design, and a bar. known: `state()` of an earlier one, to go on from.
 
     The objective is taken to be quadratic in each face, with one curvature for all: the mean of what the trials showed.
     """
-    faces = search.faces
-    value, gradient = search.sample()
-    lowest, best = value, search.kept()
-    resting = np.zeros(len(faces.held), dtype=int)  # until which trial
-    rest = min(_RESTS, len(resting) // 4)
-    curvature = None
-    try:
-        for trial in range(count):
-            predicted, amounts, squares = _moves(faces, gradient, curvature or 0.0)
-            predicted[resting > trial] = np.inf
-            face, choice = divmod(int(predicted.argmin()), predicted.shape[1])
-            if not np.isfinite(predicted[face, choice]):
-                break
-            slope = predicted[face, choice] - 0.5 * (curvature or 0.0) * squares[face, choice]
-            before, amount = faces.kept(), amounts[face, choice]
-            faces.put(np.array([face]), np.array([choice // _levels(faces)]), amount)
-            try:
-                found, gradient = search.sample()
-            except DesignRejected:
-                faces.restore(before)
-                resting[face] = count
-            else:
-                shown = max(2.0 * (found - value - slope) / squares[face, choice], 0.0)
-                curvature = shown if curvature is None else _MEMORY * curvature + (1 - _MEMORY) * shown
-                resting[face], value = trial + 1 + rest, found
-                if value < lowest:
-                    lowest, best = value, search.kept()
-            search.bar.update()
-    finally:
-        search.back_to(best)
-    return lowest
+
+    def __init__(self, search: Any, known: dict[str, Any] | None = None):
+        self._search = search
+        if known is not None:
+            vars(self).update(known)
+            return
+        self.trial: int = 0
+        self.over: bool = False
+        self.value: float
+        self.gradient: np.ndarray
+        self.value, self.gradient = search.sample()
+        self.lowest: float = self.value
+        self.best: tuple[Any, ...] = search.kept()
+        self.resting: np.ndarray = np.zeros(len(search.faces.held), dtype=int)  # until which trial
+        self.curvature: float | None = None
+
+    def state(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if not name.startswith("_")}
+
+    def try_one(self) -> None:
+        """The next trial; `over` once there is nothing left to change."""
+        search, faces, curvature = self._search, self._search.faces, self.curvature
+        predicted, amounts, squares = _moves(faces, self.gradient, curvature or 0.0)
+        predicted[self.resting > self.trial] = np.inf
+        face, choice = divmod(int(predicted.argmin()), predicted.shape[1])
+        if not np.isfinite(predicted[face, choice]):
+            self.over = True
+            return
+        slope = predicted[face, choice] - 0.5 * (curvature or 0.0) * squares[face, choice]
+        before, amount = faces.kept(), amounts[face, choice]
+        faces.put(np.array([face]), np.array([choice // _levels(faces)]), amount)
+        try:
+            found, gradient = search.sample()
+        except DesignRejected:
+            faces.restore(before)
+            self.resting[face] = np.iinfo(int).max
+        except BaseException:
+            faces.restore(before)
+            raise
+        else:
+            shown = max(2.0 * (found - self.value - slope) / squares[face, choice], 0.0)
+            self.curvature = shown if curvature is None else _MEMORY * curvature + (1 - _MEMORY) * shown
+            self.resting[face] = self.trial + 1 + min(_RESTS, len(self.resting) // 4)
+            self.value, self.gradient = found, gradient
+            if found < self.lowest:
+                self.lowest, self.best = found, search.kept()
+        self.trial += 1
 
 
 def _levels(faces: PrintedFaces) -> int:

@@ -6,15 +6,18 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
+from .._checks.checked_list import listed
+
 
 def checked_stateful(stateful: Sequence[Any]) -> list[Any]:
+    stateful = listed("stateful", stateful, lambda given: hasattr(given, "state_dict"))
     for each in stateful:
         for method in ("state_dict", "load_state_dict"):
             if not callable(getattr(each, method, None)):
                 raise ValueError(
                     f"every object in `stateful` needs {method}(), and {type(each).__name__} has none"
                 )
-    return list(stateful)
+    return stateful
 
 
 def offering(objective: Callable[..., Any], stateful: Sequence[Any]) -> list[Any]:

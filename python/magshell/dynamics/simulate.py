@@ -18,6 +18,7 @@ from ..bodies.caps import warn_of_caps
 from ..bodies.shell import Shell
 from ..bodies.strains import StrainHistory, warn_if_large
 from ..errors import Interrupted, NotConverged
+from ..fields.inside import told_inside
 from ..methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler, Integrator
 from ..methods.keep import Keep, kept
 from ..methods.solvers import MixedNewton, Newton
@@ -199,7 +200,7 @@ def simulate(
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(
             f"step {found.steps_done} of {steps}, at {result.end.time:.6g} s, failed even in parts of 1/64: "
-            f"{found.reason}. Take shorter steps. The motion until there is in `error.last_good`.",
+            f"{found.reason}. {_advice(result)} The motion until there is in `error.last_good`.",
             result,
         )
     bending = result.energies.get("bending", np.zeros(len(result)))
@@ -209,6 +210,13 @@ def simulate(
     warn_of_caps(scene, positions, inputs.values.whole, bending[most], where)
     _warn(result)
     return result
+
+
+def _advice(result: Trajectory) -> str:
+    """What would help after a step that failed."""
+    fields = map(result._values_at(len(result) - 1).current, result.scene.fields)
+    positions = np.asarray(detached(result.positions[-1]), dtype=np.float64)
+    return told_inside(fields, positions, result.scene.mesh.edge_lengths) or "Take shorter steps."
 
 
 def _with_strains(result: Trajectory) -> Trajectory:

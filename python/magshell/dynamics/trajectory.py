@@ -12,6 +12,7 @@ from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.tensors import detached, plain_arrays
 from .._machine.files import replace_file
+from .._machine.offered import Filmed
 from ..bodies.actuator import Actuator
 from ..bodies.of_body import result_of
 from ..bodies.shell import Shell
@@ -110,7 +111,7 @@ _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains
 
 
 @dataclass(frozen=True, repr=False)
-class Trajectory:
+class Trajectory(Filmed):
     """A motion. With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;

@@ -12,11 +12,15 @@ from .._checks.arrays import count, named_values
 from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity, real_numbers
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from .._machine.keywords import FLUX_DENSITY, nearest_first
 from ..dynamics.simulate import simulate as simulate_motion
 from ..errors import NotConverged
 from ..plotting.limits import checked_width
+from ..plotting.style import Style, style_of
+from ..plotting.view import View, view_of
 from ..scene.scene import Scene
+from ..states.state import states_of
 from .actuator import Actuator
 from .frames import Camera
 from .library import require_gymnasium
@@ -26,7 +30,6 @@ if TYPE_CHECKING:
     import gymnasium
 
     from .._checks.kinds import EnvActuator
-    from ..plotting.view import View
 
 if not TYPE_CHECKING:
     gymnasium = require_gymnasium("envs.Environment")
@@ -50,7 +53,8 @@ class Environment(gymnasium.Env):
     failure_reward: where a step of the motion fails, the episode ends with this reward, at the last good state, and
         info["failure"] says why. None: ms.NotConverged comes through.
     simulate: {name: value}, further arguments of ms.simulate: integrator, damping, solver, ...
-    render_mode: "rgb_array" or None; render_width: pixels; view: as in ms.plot.
+    render_mode: "rgb_array" or None; render_width: pixels; view, style: as in ms.plot, but without
+        contacts.
 
     The scene is built once; actions go on with the motion from its last state with the same bits as one long motion. The
     same seed and actions give the same bits. To run many in processes, hand gymnasium.vector.AsyncVectorEnv functions
@@ -79,6 +83,7 @@ class Environment(gymnasium.Env):
     actuators: tuple[Any, ...]
     scene: Scene
 
+    @grouped(view=View, style=Style)
     def __init__(
         self,
         scene: Scene,
@@ -96,6 +101,7 @@ class Environment(gymnasium.Env):
         render_mode: str | None = None,
         render_width: int = 480,
         view: View | Sequence[float] | str | None = None,
+        style: Style | None = None,
     ):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
@@ -133,6 +139,13 @@ class Environment(gymnasium.Env):
                 )
                 raise ValueError(f"simulate must not hold {name!r}, {why}")
         self.render_mode, self._width, self._view = render_mode, checked_width(render_width), view
+        view_of(states_of(scene), view)  # raises, before there is anything to see
+        self._style = style_of(style)
+        if self._style.contacts:
+            raise ValueError(
+                "frames of an environment do not show contacts, whose forces it does not know beforehand: leave them out of "
+                "its style; ms.plot and ms.animate show those of a motion"
+            )
         self.metadata: dict[str, list[str] | int] = {
             "render_modes": ["rgb_array"],
             "render_fps": max(1, round(min(1e9, 1.0 / (self.time_step * self.steps_per_action)))),
@@ -188,7 +201,9 @@ class Environment(gymnasium.Env):
             raise RuntimeError("reset must be called before there is anything to render")
         if self._camera is None:
             fields = [each.upper for each in self.actuators if each.name == FLUX_DENSITY]
-            self._camera = Camera(self._now, self._width, self._view, fields[0] if fields else None)
+            self._camera = Camera(
+                self._now, self._width, self._view, self._style, fields[0] if fields else None
+            )
         return self._camera.frame(self._now)
 
     def close(self) -> None:

@@ -12,6 +12,7 @@ from ..plotting import backend as backends
 from ..plotting.frames import Reel, Scenery
 from ..plotting.limits import checked_width
 from ..plotting.panels import Options, size_of
+from ..plotting.style import Style
 from ..plotting.surfaces import on_surfaces
 from ..plotting.view import view_of
 from ..states.state import State, states_of
@@ -32,6 +33,7 @@ class Camera:
         first: Snapshot,
         width: int,
         view: View | Sequence[float] | str | None,
+        style: Style,
         strongest: np.ndarray | None = None,
     ):
         """strongest: (3,) T, the uniform field that its arrow is scaled by."""
@@ -47,10 +49,10 @@ class Camera:
             for axis in np.eye(3)
             for sign in (-1, 1)
         ]
-        options = Options(60, True, False, False)
+        options = Options.of(style)
         self._scenery = Scenery([state, *room], None, view_of([state], view), length_unit(size), options)
         drawing = self._scenery.drawing(state, None, state.title)
-        self._reel = Reel(drawing, checked_width(width), backends.choose(None))
+        self._reel = Reel(drawing, checked_width(width), backends.choose(style.backend))
         self._reel.__enter__()
 
     def frame(self, snapshot: Snapshot) -> np.ndarray:

@@ -87,6 +87,11 @@ class MagpylibField(AppliedField):
         self.names: list[str] = [type(source).__name__ for source in listed]
         self._core = core.PythonField(FluxSampler(flux_density, RELATIVE_STEP * self.length_scale))
 
+    def _in_magnets(self, points: np.ndarray) -> np.ndarray:
+        magpylib = _import_magpylib()
+        sources = self._made_from["sources"]
+        return magpylib.getJ(sources, points, sumup=True, squeeze=False).reshape(-1, 3).any(axis=1)
+
     def __repr__(self) -> str:
         return f"MagpylibField({', '.join(self.names)}, length_scale={self.length_scale:g} m)"
 

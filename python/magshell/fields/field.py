@@ -40,6 +40,7 @@ def residual_to_remanent(residual_flux_density: Numbers) -> Any:
     return float(remanent) if remanent.ndim == 0 else remanent
 
 
+FIELDS = "fields of magshell (of magpylib's sources, ms.MagpylibField)"
 _MOST_SAMPLES = 10**9  # 24 GB
 
 
@@ -67,6 +68,10 @@ class AppliedField(Owner):
     def flux_density(self, points: Numbers) -> np.ndarray:
         """B [T], (..., 3), at points [m], (..., 3); NaN where the field has no value."""
         return self._samples(points, order=0)[0]
+
+    def _in_magnets(self, points: np.ndarray) -> np.ndarray:
+        """(n,) whether points (n, 3) m are inside of a magnet of this field, as far as it has any."""
+        return np.zeros(len(points), dtype=bool)
 
     def gradient(self, points: Numbers) -> np.ndarray:
         """dB_i/dx_j [T/m], (..., 3, 3) as [..., i, j], at points [m], (..., 3); NaN as above."""

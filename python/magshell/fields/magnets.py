@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 
 from .. import _core as core
 from .._checks.quantity import quantity
@@ -45,6 +46,14 @@ class Magnet(AppliedField):
                 f"{', '.join(self._replaceable)}"
             )
         return type(self)(**{**self._made_from, **values})
+
+    def _in_magnets(self, points: np.ndarray) -> np.ndarray:
+        own = (
+            scipy.spatial.transform.Rotation.from_rotvec(np.array(self.rotation))
+            .inv()
+            .apply(points - self.center)
+        )
+        return self._holds(own)
 
     def _described(self, size: str) -> str:
         parts = [size, f"M_r ({_listed(self.remanent_magnetization)}) A/m"]
@@ -88,6 +97,9 @@ class CuboidMagnet(Magnet):
         self.dimensions: np.ndarray = all_positive("dimensions", "m", dimensions, (3,))
         super().__init__(remanent_magnetization, center, rotation)
 
+    def _holds(self, points: np.ndarray) -> np.ndarray:
+        return (np.abs(points) < 0.5 * self.dimensions).all(axis=1)
+
     def __repr__(self) -> str:
         return self._described(f"{' x '.join(f'{edge:g}' for edge in self.dimensions)} m")
 
@@ -127,6 +139,10 @@ class CylinderMagnet(Magnet):
         self.radius: float = positive("radius", "m", radius)
         self.height: float = positive("height", "m", height)
         super().__init__(remanent_magnetization, center, rotation)
+
+    def _holds(self, points: np.ndarray) -> np.ndarray:
+        within = np.linalg.norm(points[:, :2], axis=1) < self.radius
+        return within & (np.abs(points[:, 2]) < 0.5 * self.height)
 
     def __repr__(self) -> str:
         return self._described(f"radius {self.radius:g} m, height {self.height:g} m")

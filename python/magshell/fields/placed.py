@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 
 from .. import _core as core
 from .._checks.quantity import quantity
@@ -71,6 +72,10 @@ class PlacedField(AppliedField):
                 f"{', '.join(self._replaceable)}"
             )
         return PlacedField(self.field.replaced(**values) if values else self.field, **place)
+
+    def _in_magnets(self, points: np.ndarray) -> np.ndarray:
+        turn = scipy.spatial.transform.Rotation.from_rotvec(np.array(self.rotation)).inv()
+        return self.field._in_magnets(turn.apply(points - self.center))
 
     def __repr__(self) -> str:
         parts = [repr(self.field)]

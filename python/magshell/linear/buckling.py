@@ -12,10 +12,13 @@ import scipy
 from .._checks.arrays import count
 from .._machine.entry import solve_entry
 from ..errors import NotConverged
-from ..scene.inputs import Inputs, plain_inputs
+from ..scene.inputs import Inputs
 from ..scene.scene import Scene
+from ..statics.equilibrium import Equilibrium
+from .about import StiffnessAbout, asked_inputs
 from .mode_shapes import mode_shapes
-from .rest import RestStiffness, pulling_joints
+from .rest import RestStiffness, pulling_joints, refuse_springs
+from .stiffness import Stiffness
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
@@ -31,9 +34,10 @@ _LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, l
 class Buckling:
     """The lowest buckling modes of a scene.
 
-    factors: (k,), ascending: what to multiply the controls by so that the sheet buckles in mode k.
+    factors: (k,), ascending: what to multiply the controls by so that the sheet buckles in mode k; about an equilibrium,
+        what share of the way from its controls to those given.
     modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
-    edge_rotations: (k, n_e), rad, that go with them.
+    edge_rotations: (k, n_e), rad, that go with them. equilibrium: that one, or None.
     """
 
     scene: Scene
@@ -42,15 +46,18 @@ class Buckling:
     edge_rotations: np.ndarray = field(repr=False)
     factorizations: int
     wall_time: float
+    equilibrium: Equilibrium | None = field(repr=False, default=None)
 
     def __repr__(self) -> str:
         factors = ", ".join(f"{factor:.6g}" for factor in self.factors)
-        return f"Buckling: at {factors} times the controls; {self.wall_time:.3g} s"
+        of = "times the controls" if self.equilibrium is None else "of the way to the new controls"
+        return f"Buckling: at {factors} {of}; {self.wall_time:.3g} s"
 
 
 @solve_entry
 def linear_buckling(
     scene: Scene,
+    equilibrium: Equilibrium | None = None,
     *,
     remanent_magnetization: Numbers | None = None,
     applied_flux_density: Numbers | None = None,
@@ -72,14 +79,19 @@ def linear_buckling(
     A shallow arch that softens on its way needs ms.follow. Controls and values as in ms.equilibrium; a field's own
     stiffness counts.
 
+    equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. K is then that of the equilibrium, u
+        the response to controls that go from its own to those given here (`ms.linear_response`), and the factors are
+        shares of that way: the parameter of ms.follow(..., start=). Magnetization and values are its own.
+
     modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
         the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
     Joints that pull at rest, or have motors, are refused, as they are no controls. Bodies in contact are refused: a contact
     bears in one direction only, so that a mode and its opposite have different factors, and none of them is linear;
-    ms.follow passes where contacts open and close.
+    ms.follow passes where contacts open and close. So are actuators that are springs of their own.
 
-    Raises ValueError on bad input, in a scene with contact of bodies, where the supports leave the sheet a motion without
+    Raises ValueError on bad input, about an equilibrium that is not stable, with its own controls, or one that requires a
+    gradient, as there is none here; in a scene with contact of bodies, where the supports leave the sheet a motion without
     stiffness, where the controls do nothing, and where the sheet does not buckle under them (a column that is pulled);
     Interrupted.
 
@@ -92,8 +104,10 @@ def linear_buckling(
     0.021
     """
     modes = count("modes", modes)
-    inputs = plain_inputs(
+    inputs = asked_inputs(
+        "linear_buckling",
         scene,
+        equilibrium,
         remanent_magnetization,
         applied_flux_density,
         values,
@@ -102,13 +116,14 @@ def linear_buckling(
         field_factor=field_factor,
         motion_factor=motion_factor,
     )
+    refuse_springs(inputs)
     if scene._body_contacts:
         raise ValueError(
             "the scene has contact of bodies, which holds in one direction only, so that no linear mode buckles: ms.follow "
             "follows it as it opens and closes, or leave it out"
         )
     driven = [joint for joint in map(inputs.values.current, scene.joints) if joint.driven]
-    if acting := [*pulling_joints(inputs), *driven]:
+    if equilibrium is None and (acting := [*pulling_joints(inputs), *driven]):
         raise ValueError(
             f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow has it"
         )
@@ -117,7 +132,7 @@ def linear_buckling(
     if modes >= model.free_size:
         raise ValueError(f"modes must be below the {model.free_size} unknowns of the scene, got {modes}")
     with inputs.in_core():
-        stiffness = RestStiffness(inputs)
+        stiffness = RestStiffness(inputs) if equilibrium is None else StiffnessAbout(equilibrium)
         stiffness.factorize()
         response = stiffness.response(inputs)
         displacement = float(np.abs(model.points(response)).max())
@@ -131,6 +146,7 @@ def linear_buckling(
         edge_rotations=edge_rotations,
         factorizations=2,
         wall_time=time.perf_counter() - began,
+        equilibrium=equilibrium,
     )
 
 
@@ -142,9 +158,9 @@ def _size(scene: Scene) -> float:
 
 
 def _stiffness_change(
-    scene: Scene, stiffness: RestStiffness, response: np.ndarray, displacement: float, inputs: Inputs
+    scene: Scene, stiffness: Stiffness, response: np.ndarray, displacement: float, inputs: Inputs
 ) -> np.ndarray:
-    """The values of dK, in the pattern of K, for the controls as they are."""
+    """The values of dK, in the pattern of K, as the controls go from those of K to the inputs'."""
     # Where nothing moves before buckling, K is linear in the controls and any step is exact.
     edges = scene.mesh.edge_lengths
     length = float(edges.mean()) if len(edges) else _size(scene)
@@ -152,7 +168,8 @@ def _stiffness_change(
     step = _PRE_LOAD * length / displacement if moves else 1.0
 
     def values(t: float) -> np.ndarray:
-        return scene._model.hessian(stiffness.rest + t * response, t * inputs.controls)[3]
+        controls = (1.0 - t) * stiffness.controls + t * inputs.controls
+        return scene._model.hessian(stiffness.state + t * response, controls)[3]
 
     change = (values(step) - values(-step)) / (2.0 * step)
     if not change.any():
@@ -166,7 +183,7 @@ def _stiffness_change(
 
 
 def _lowest(
-    stiffness: RestStiffness, change: np.ndarray, count: int, reach: float, displacement: float
+    stiffness: Stiffness, change: np.ndarray, count: int, reach: float, displacement: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positive factors (k,), ascending, and their modes (n, k), k <= count. It moves by `reach` at most."""
     # -dK v = (1/lambda) K v, with K positive definite: the smallest positive lambda are the largest

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._checks.tensors import like
+from .._checks.tensors import detached, like
 from .._machine.entry import solve_entry
-from ..scene.inputs import plain_inputs
+from .._machine.offered import Drawn
 from ..scene.scene import Scene
+from ..statics.equilibrium import Equilibrium
+from .about import StiffnessAbout, asked_inputs
 from .rest import RestStiffness, forces_at_rest
 
 if TYPE_CHECKING:
@@ -19,11 +21,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class LinearResponse:
+class LinearResponse(Drawn):
     """What linear theory says of a scene: the deflection in proportion to the controls. Not an equilibrium.
 
-    displacements: (n_v, 3) m, from the rest shape; edge_rotations: (n_e,) rad, zero where an edge has none.
-    factorizations: one.
+    displacements: (n_v, 3) m, from the rest shape, or from the equilibrium that was given; edge_rotations: (n_e,) rad, zero
+        where an edge has none.
+    equilibrium: that one, or None. factorizations: one.
     """
 
     scene: Scene
@@ -31,14 +34,15 @@ class LinearResponse:
     edge_rotations: Any
     factorizations: int
     wall_time: float
+    equilibrium: Equilibrium | None = None
 
     @property
     def positions(self) -> Computed:
         """(n_v, 3) m. They mean something as long as the displacements are small."""
-        rest = self.scene.mesh.rest_positions
-        if isinstance(self.displacements, np.ndarray):
-            return rest + self.displacements
-        return self.displacements + self.displacements.new_tensor(np.array(rest))
+        from_, of = self.scene.mesh.rest_positions, self.displacements
+        if self.equilibrium is not None:
+            from_ = detached(self.equilibrium.positions)
+        return from_ + of if isinstance(of, np.ndarray) else of + of.new_tensor(np.array(from_))
 
     def __repr__(self) -> str:
         moved = float(np.linalg.norm(np.asarray(self.displacements), axis=1).max(initial=0.0))
@@ -48,6 +52,7 @@ class LinearResponse:
 @solve_entry
 def linear_response(
     scene: Scene,
+    equilibrium: Equilibrium | None = None,
     *,
     remanent_magnetization: Numbers | None = None,
     applied_flux_density: Numbers | None = None,
@@ -63,10 +68,17 @@ def linear_response(
     the stiffness they add; supports that move do so at the rate they start with. Torques, springs, servos and limits that
     pull in joints at rest are loads too, and motors move. Controls and values as in ms.equilibrium.
 
+    equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. The deflection is then that from there
+        as the controls go from its own to those given here, to first order: the tangent of ms.follow(..., start=) at its
+        start. The stiffness is that of the equilibrium, with what loads, fields and actuators add to it; magnetization and
+        values are its own. Contacts stay as they are.
+
     What no stiffness couples with a load stays at rest, and costs nothing: of a flat sheet in a coordinate plane, bending
     where it is loaded across, stretching where it is loaded in its plane.
 
-    Raises ValueError on bad input, and where the supports leave a motion without stiffness to what is loaded; Interrupted.
+    Raises ValueError on bad input, about an equilibrium that is not stable, with its own controls, under a pressure without
+    a potential, or one that requires a gradient, as there is none here; and where the supports leave a motion without
+    stiffness to what is loaded; Interrupted.
 
     remanent_magnetization, applied_flux_density, load_factor, gravity_factor, field_factor, motion_factor: as in
     `equilibrium`.
@@ -80,8 +92,11 @@ def linear_response(
     >>> round(float(tip), 3)  # p L^3 / (3 E I) = 0.04
     0.04
     """
-    inputs = plain_inputs(
+    began = time.perf_counter()
+    inputs = asked_inputs(
+        "linear_response",
         scene,
+        equilibrium,
         remanent_magnetization,
         applied_flux_density,
         values,
@@ -90,15 +105,19 @@ def linear_response(
         field_factor=field_factor,
         motion_factor=motion_factor,
     )
-    began = time.perf_counter()
-    model = scene._model
-    at_rest = forces_at_rest(inputs)
+    given = inputs.given if equilibrium is None else [*inputs.given, equilibrium.positions]
+    at_rest = forces_at_rest(inputs) if equilibrium is None else None
     with inputs.in_core():
-        change = RestStiffness(inputs).response(inputs, at_rest)
+        if equilibrium is None:
+            change = RestStiffness(inputs).response(inputs, at_rest)
+        else:
+            change = StiffnessAbout(equilibrium).response(inputs)
+    model = scene._model
     return LinearResponse(
         scene=scene,
-        displacements=like(model.positions(change), *inputs.given),
-        edge_rotations=like(model.edge_rotations(change), *inputs.given),
+        displacements=like(model.positions(change), *given),
+        edge_rotations=like(model.edge_rotations(change), *given),
         factorizations=1,
         wall_time=time.perf_counter() - began,
+        equilibrium=equilibrium,
     )

@@ -18,9 +18,11 @@ from ..scene.inputs import Inputs
 from ..scene.replacements import requested
 from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
+from .about import idle_inputs, inputs_about, set_state
 from .inertia import consistent_masses, in_places
 from .mode_shapes import mode_shapes
-from .rest import refuse_what_acts, symmetric
+from .rest import refuse_what_acts
+from .stiffness import symmetric
 
 _ROUND_OFF_SHARE = (
     64.0 * np.finfo(float).eps
@@ -123,6 +125,7 @@ def vibration_modes(
             refuse_what_acts(inputs)
             stiffness = model.hessian(model.rest_state(), scene._control_layout.zeros())
         else:
+            set_state(equilibrium)
             stiffness = model.hessian(equilibrium._state, equilibrium._controls)
         beside = model.low_rank()
         inertia = None
@@ -290,38 +293,11 @@ def _root_of(inertia, masses: np.ndarray) -> tuple[Any, ...]:
 
 def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict[Any, Any] | None) -> Inputs:
     """Magnetization and values of the equilibrium; the scene's own, without a field, at rest."""
+    if equilibrium is not None:
+        return inputs_about(scene, equilibrium, values=values)
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
-    uniform = np.zeros(3) if scene.has_uniform_field else None
-    if equilibrium is None:
-        return Inputs(
-            scene, None, uniform, replaced=_idle(scene, requested(scene, None, values, moving=True))
-        )
-    if values is not None:
-        raise ValueError(
-            "values are those of the equilibrium: give them to ms.equilibrium, or give no equilibrium"
-        )
-    if not isinstance(equilibrium, Equilibrium):
-        raise ValueError(f"equilibrium must be an Equilibrium, got {type(equilibrium).__name__}")
-    if equilibrium.scene is not scene:
-        raise ValueError("the equilibrium is of another scene")
-    inputs = Inputs(scene, None, uniform, replaced=_idle(scene, {}))
-    inputs.values = equilibrium._values
-    return inputs
-
-
-def _idle(scene: Scene, replaced: dict[Any, Any]) -> dict[Any, Any]:
-    """With a magnetization of zero for the sheets and skins that are given none, as no field acts on it."""
-    if not scene.fields:
-        return replaced
-    nothing = {"remanent_magnetization": np.zeros(3)}
-    return {
-        **replaced,
-        **{
-            sheet: {**nothing, **replaced.get(sheet, {})}
-            for sheet in (*scene._bodies.sheets, *scene._bodies.skins)
-        },
-    }
+    return idle_inputs(scene, requested(scene, None, values, moving=True))
 
 
 def _slow_square(body: Shell | Solid) -> float:

@@ -6,10 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
+from .._machine.offered import Drawn
 from .selection import MeshSelection
 
 
-class MeshBase(MeshSelection):
+class MeshBase(Drawn, MeshSelection):
     """Counts and lengths that follow from rest_positions, edges, faces and components."""
 
     @property

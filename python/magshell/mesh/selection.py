@@ -14,12 +14,15 @@ import numpy as np
 from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.scalars import not_negative
+from .._checks.selections import Indices
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
 
 
 RELATIVE_TOLERANCE = 1e-6  # of the mesh's size: far above round-off, far below any edge
+
+_PLURAL = {"vertex": "vertices", "edge": "edges", "face": "faces", "tetrahedron": "tetrahedra"}
 
 
 class MeshSelection:
@@ -44,7 +47,7 @@ class MeshSelection:
         found = np.flatnonzero(self._matches(wanted, tolerance))
         if len(found) == 0:
             raise ValueError(self._nothing_at("vertex", wanted, tolerance))
-        return found
+        return Indices(found, "vertices")
 
     def edges_at(
         self,
@@ -110,7 +113,7 @@ class MeshSelection:
         found = np.flatnonzero(chosen[self.edges].all(axis=1))
         if len(found) == 0:
             raise ValueError(f"no edge joins two of the {len(indices)} vertices given")
-        return found
+        return Indices(found, "edges")
 
     def _coordinates(self, x, y, z, tolerance) -> tuple[dict[int, float], float]:
         wanted = {
@@ -139,7 +142,7 @@ class MeshSelection:
             )
         if len(found) == 0:
             raise ValueError(self._nothing_at(kind, wanted, tolerance))
-        return found
+        return Indices(found, _PLURAL[kind])
 
     def _nothing_at(self, kind: str, wanted: dict[int, float], tolerance: float) -> str:
         axes, values = list(wanted), list(wanted.values())
@@ -167,4 +170,4 @@ def _where(kind: str, predicate: Callable[..., Any], points: np.ndarray, indices
         low, high = points.min(axis=0), points.max(axis=0)
         spans = ", ".join(f"{name} {low[i]:.6g} to {high[i]:.6g}" for i, name in enumerate("xyz"))
         raise ValueError(f"the predicate holds for no {kind}; they span {spans} m")
-    return indices[mask]
+    return Indices(indices[mask], _PLURAL[kind.split()[-1]])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._checks.arrays import count, index_array
+from .._checks.selections import Indices
 from .mesh_base import MeshBase
 from .selection import _where
 
@@ -33,7 +34,7 @@ class TetSelection(MeshBase):
         found = np.flatnonzero(self._matches(wanted, tolerance)[self.corners].any(axis=1))
         if len(found) == 0:
             raise ValueError(self._nothing_at("tetrahedron", wanted, tolerance))
-        return found
+        return Indices(found, "tetrahedra")
 
     def tetrahedra_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Tetrahedra where predicate((n_t, 3) barycenters [m]) -> (n_t,) bool holds."""
@@ -48,18 +49,18 @@ class TetSelection(MeshBase):
         >>> len(halves.tetrahedra_in("right"))
         6
         """
-        return np.flatnonzero(self._in_parts(part))
+        return Indices(np.flatnonzero(self._in_parts(part)), "tetrahedra")
 
     def vertices_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
         """Vertices of the tetrahedra of a part; those on its border belong to both sides."""
-        return np.unique(self.tetrahedra[self._in_parts(part)]).astype(np.int64)
+        return Indices(np.unique(self.tetrahedra[self._in_parts(part)]).astype(np.int64), "vertices")
 
     def faces_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
         """Faces of the surface whose tetrahedron belongs to a part. ValueError where none does."""
         found = np.flatnonzero(self._in_parts(part)[self.face_tetrahedra])
         if len(found) == 0:
             raise ValueError(f"part {part!r} lies inside: none of its tetrahedra is on the surface")
-        return found
+        return Indices(found, "faces")
 
     def _in_parts(self, part) -> np.ndarray:
         wanted = [part] if isinstance(part, str) or not isinstance(part, Iterable) else list(part)

@@ -12,6 +12,15 @@ if TYPE_CHECKING:
     from .._checks.kinds import Numbers
 
 
+def is_polyline(points) -> bool:
+    """Whether it is one of them, (n, 2), and not a list of them."""
+    try:
+        shape = np.shape(points)
+    except ValueError:  # lists of other lengths
+        return False
+    return len(shape) == 2 and shape[1] == 2
+
+
 def checked_polyline(name: str, points: Numbers, least: int) -> np.ndarray:
     """(n, 2) finite points, n >= least, no two in a row alike."""
     array = quantity(name, "m", points, ("n", 2))

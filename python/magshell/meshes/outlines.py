@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._checks.checked_list import listed
 from .._checks.scalars import positive
 from .._machine.entry import grouped
 from ..mesh.triangle_mesh import TriangleMesh
@@ -18,6 +19,7 @@ from ._polygon import (
     contains,
     crossings,
     distance_to,
+    is_polyline,
     meeting_point,
     segments,
     sides,
@@ -40,9 +42,9 @@ def outline(
 
     Args:
         outer: (n, 2), m, the corners in either direction, the first one not repeated.
-        holes: polygons alike, inside the outer one and apart from each other.
+        holes: polygons alike, inside the outer one and apart from each other; one, or a list.
         slits: polylines (n, 2), m, cut through the sheet: both sides get vertices of their own. Slits may
-            cross and may end on the boundary; an end inside the sheet stays joined.
+            cross and may end on the boundary; an end inside the sheet stays joined. One, or a list.
         size: the longest edge to aim for, m. Short sides of the polygons make the mesh finer around them.
         order: 1 for three nodes a face; 2 for a SixNodeMesh, whose `elements` the same triangles are.
 
@@ -58,6 +60,7 @@ def outline(
     check_order(order)
     size = positive("size", "m", size)
     outer = checked_polygon("outer", outer)
+    holes, slits = listed("holes", holes, is_polyline), listed("slits", slits, is_polyline)
     holes = [checked_polygon(f"hole {k}", hole) for k, hole in enumerate(holes)]
     slits = [checked_polyline(f"slit {k}", slit, 2) for k, slit in enumerate(slits)]
     _check_holes(outer, holes)

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import torch
 
+from .._checks.checked_list import listed
+from .._checks.tensors import is_tensor
 from . import box as boxes
 from .box import Box
 from .iterate import Iterate, Restoring, as_array, as_tensor
@@ -42,7 +44,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         self.max_shortenings = max_shortenings
         self._run: dict[Any, Any] = {}
         Iterate.__init__(self)
-        torch.optim.Optimizer.__init__(self, params, defaults)
+        torch.optim.Optimizer.__init__(self, listed("params", params, is_tensor), defaults)
 
     def step(self, closure: Callable[..., Any]) -> float:
         """Moves the parameters by one step, within their box, and returns the objective there.

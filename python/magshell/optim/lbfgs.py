@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._machine.entry import grouped
 from ..errors import DesignRejected
 from .base import BoxOptimizer
 from .box import Box
@@ -56,6 +57,7 @@ class LBFGS(BoxOptimizer):
 
     _copied = (*BoxOptimizer._copied, "memory", "first_step", "max_evaluations")
 
+    @grouped()
     def __init__(
         self,
         params: Iterable[Any],

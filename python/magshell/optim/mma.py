@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks.scalars import positive
+from .._machine.entry import grouped
 from ..errors import DesignRejected
 from .approximation import Asymptotes, Surroundings
 from .base import BoxOptimizer, require_range
@@ -50,6 +51,7 @@ class MMA(BoxOptimizer):
 
     _copied = (*BoxOptimizer._copied, "penalty")
 
+    @grouped()
     def __init__(
         self,
         params: Iterable[Any],

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._checks.quantity import quantity
 from .._machine.entry import grouped
+from .._machine.offered import offered
 from .._machine.progress import SolveBar
 from ..states.state import State, states_of, with_times
 from ..states.units import length_unit
@@ -33,6 +34,7 @@ SLOWEST, FASTEST = 0.01, 1000.0  # frames a second that the formats can hold
 PALETTE_FRAMES = 12  # that a GIF's colours are chosen from
 
 
+@offered
 @grouped(color=Color, view=View, style=Style)
 def animate(
     what: Shown,

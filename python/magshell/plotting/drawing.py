@@ -10,6 +10,7 @@ import numpy as np
 
 from .._checks.arrays import index_array
 from .._machine.entry import grouped
+from .._machine.offered import offered
 from ..mesh.crossings import AFFORDABLE_FACES
 from ..states.state import State, states_of
 from ..states.units import length_unit
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 MOST_STATES = 9  # of a path, unless asked for more
 
 
+@offered
 @grouped(color=Color, view=View, style=Style)
 def plot(
     what: Shown,
@@ -67,7 +69,8 @@ def plot(
         "auto": magnetization if it varies, else displacement.
         An ms.Color has a text for the colour bar, its ends and its scale.
     titles: one a state; that a sheet passes through itself is added, where there are at most 20,000 faces to look at.
-    overlay: all states in one panel; fade: with the earlier ones paler, as a strobe light shows a motion.
+    overlay: all states in one panel, each with its title beside it; one that finds no room, as of many states in a small
+        picture, is left out. fade: with the earlier ones paler, as a strobe light shows a motion.
     columns: of panels, by default what fits best.
     view: (elevation, azimuth) in degrees of the eye, as in matplotlib, "top", "front" (both with x to the right) or "side";
         by default what suits the sheet. An ms.View says also what the window holds.

@@ -24,13 +24,16 @@ from .colors import Scalar, scalar_of
 from .drawing import checked_titles
 from .limits import arrow_count
 from .panels import outline, size_of
+from .placed import Placed
 from .playing import SAMPLES, same_faces, speed_of, spread
+from .solids import Solid
 from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
 from .view import View, view_of
 
 if TYPE_CHECKING:
     from .._checks.kinds import Fielded, FilePath, Numbers, Shown
+    from ..obstacles.obstacle import Obstacle
 
 
 @grouped(color=Color, view=View, style=Style)
@@ -43,6 +46,7 @@ def write_page(
     remanent_magnetization: Numbers | None = None,
     applied_flux_density: Numbers | None = None,
     field: Fielded | None = None,
+    obstacles: Obstacle | Sequence[Obstacle] | None = None,
     color: Any = None,
     titles: str | Sequence[str] | None = None,
     view: View | Sequence[float] | str | None = None,
@@ -55,9 +59,10 @@ def write_page(
 
     Drag to turn, scroll or pinch to zoom, shift-drag to move. Several states, as of a path or a motion, get a slider
     and play; a motion starts by itself. The reader chooses the colours: magnetization, displacement, and what `color`
-    (a name or arrays, as in `plot`) adds.
+    (a name or arrays, as in `plot`) adds. Obstacles, magnets and wires of fields, magpylib's too, and free rigid parts are
+    where they are in each state.
 
-    what: as in `plot`, but all states on one mesh. titles: one a state. title: of the page.
+    what, obstacles: as in `plot`, but all states on one mesh. titles: one a state. title: of the page.
     times: s, one a state, where positions (n, n_v, 3) of a mesh are given.
     speed: seconds of the motion that one second of playing shows, which the reader can change; by default as in
         `animate`. States without times are shown ten a second.
@@ -96,6 +101,7 @@ def write_page(
         remanent_magnetization=remanent_magnetization,
         applied_flux_density=applied_flux_density,
         field=field,
+        obstacles=obstacles,
     )
     same_faces(states, "a page")
     size_limit = positive("size_limit", "bytes", size_limit)
@@ -107,14 +113,17 @@ def write_page(
     states = on_surfaces(states)
     mesh = states[0].mesh
     titles = checked_titles(titles, states)
+    placed = Placed(states, size)
     if not style.show_field:
         states = [replace(state, flux_density=None, fields=()) for state in states]
     fields = _sources(states, size)
     numbers = 3 * mesh.n_vertices + 6 * count + sum(len(s.values[0]) for s in scalars if not _is_constant(s))
+    numbers += 20 * max(map(len, placed.places))  # where what is around is
     numbers += max((6 * len(field.starts) for field in fields[0] if field is not None), default=0)
     dtype, kept = _that_fit(len(states), numbers, size_limit)
+    seen = view_of(states, view)
     data = {
-        "view": [view_of(states, view).elevation, view_of(states, view).azimuth],
+        "view": [seen.elevation, seen.azimuth],
         "size": size,
         "unit": unit._asdict(),
         "palette": {"sheet": colors.SHEET, "field": colors.FIELD},
@@ -123,7 +132,9 @@ def write_page(
         "edges": _packed(mesh.edges, "<u4"),
         "rest": _packed(mesh.rest_positions, "<f4"),
         "scalars": [_scalar(s, kept, dtype) for s in scalars],
-        "states": _states(states, kept, titles, fields, count, dtype),
+        "states": _states(states, kept, titles, fields, count, dtype, placed),
+        "around": [_surface(each) for each in placed.surfaces],
+        "window": _window(placed.window(states, seen)),
         "recorded": len(states),
         "shown": {"rest": style.rest, "edges": style.mesh_lines},
         "speed": None if states[0].time is None else speed,
@@ -184,7 +195,7 @@ def _sources(states: list[State], size: float) -> tuple[list[glyphs.Glyphs | Non
 
 
 def _states(
-    states: list[State], kept: list[int], titles: list[str], fields, count: int, dtype: str
+    states: list[State], kept: list[int], titles: list[str], fields, count: int, dtype: str, placed: Placed
 ) -> list[dict[Any, Any]]:
     strongest, (around, full_length) = glyphs.largest(states), fields
     magnitude = max(
@@ -206,8 +217,30 @@ def _states(
         if field is not None:
             one["field"] = _arrows(field, dtype)
             one["fieldLabel"] = f"field, full length at {with_unit(full_length, 'T')}"
+        if placed.places[k]:
+            one["around"] = [
+                {"surface": number} | ({} if moved is None else {"place": _packed(moved, "<f4")})
+                for number, moved in placed.places[k]
+            ]
         packed.append(one)
     return packed
+
+
+def _surface(solid: Solid) -> dict[str, Any]:
+    return {
+        "positions": _packed(solid.positions, "<f4"),
+        "faces": _packed(solid.faces, "<u4"),
+        "color": np.asarray(solid.colors[0]).tolist(),
+        "opacity": solid.opacity,
+        "smooth": solid.smooth,
+    }
+
+
+def _window(found: tuple[np.ndarray, np.ndarray, float] | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    middle, half, farthest = found
+    return {"middle": middle.tolist(), "half": half.tolist(), "farthest": farthest}
 
 
 def _arrows(chosen: glyphs.Glyphs, dtype: str) -> dict[Any, Any]:

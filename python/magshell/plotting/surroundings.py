@@ -16,10 +16,10 @@ LARGE = 2.0  # extents of the bodies, beyond which an obstacle is not shown whol
 ROOM = 0.15  # extents of the bodies: how far around them it is shown then
 
 
-def obstacle_solids(states: list[State], size: float) -> list[Solid]:
+def obstacle_solids(states: list[State], size: float, middle: np.ndarray | None = None) -> list[Solid]:
     """Obstacles and magnets of states that lie over each other: one at rest once, a moving one where it is in each state.
 
-    size: of the drawing, m.
+    size: of the drawing, m. middle: (3,) m, the place that a plane's square is nearest to; by default that of each state.
     """
     shown = {}
     for state in states:
@@ -27,8 +27,8 @@ def obstacle_solids(states: list[State], size: float) -> list[Solid]:
         for obstacle in state.obstacles:
             key = (id(obstacle), None if obstacle.motion is None else time)
             if key not in shown:
-                middle = state.positions.mean(axis=0)
-                vertices, faces = obstacle.surface(time, extent=REACH * size, around=middle)
+                near = state.positions.mean(axis=0) if middle is None else middle
+                vertices, faces = obstacle.surface(time, extent=REACH * size, around=near)
                 surface = sheet(vertices, faces, colors.rgb(colors.OBSTACLE))
                 shown[key] = replace(surface, opacity=OPACITY, around=True)
     for state in states:

@@ -14,6 +14,7 @@ from .. import _core
 from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity
 from .._machine.entry import grouped
+from .._machine.offered import Drawn
 from ..bodies.actuator import Actuator
 from ..bodies.bodies import Bodies
 from ..bodies.caps import Caps
@@ -25,7 +26,7 @@ from ..bodies.skeleton import Skeleton
 from ..bodies.skeleton_input import skeleton_inputs
 from ..bodies.solid import Solid
 from ..bodies.ties import Tie
-from ..fields.field import AppliedField, UniformField
+from ..fields.field import FIELDS, AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.constraints import free_rigid_motions, gather
@@ -58,13 +59,12 @@ _SUPPORTS = (Pin, Clamp, SymmetryPlane)
 _ACTUATORS = "Muscle, Cavity, Cells and Tendon objects"
 
 
-class Scene:
+class Scene(Drawn):
     """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
     needs and, up to 256 MB, the memory of its last factorization.
 
     bodies: a Shell or a Solid, or several, which feel each other through ties and contacts only, Rigid parts and
-        Skeletons. Positions and
-        faces of a result are those of one body after another, and `result[body]` has those of one.
+        Skeletons. Positions and faces of a result are those of one body after another, `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.
@@ -123,7 +123,7 @@ class Scene:
             if any(each is other for other in self.actuators[:k]):
                 raise ValueError(f"actuators must differ, but actuator {k} is there twice")
         self.fields: tuple[AppliedField, ...] = (
-            () if field is None else checked_list("field", field, (AppliedField,))
+            () if field is None else checked_list("field", field, (AppliedField,), FIELDS)
         )
         self.obstacles: tuple[Any, ...] = obstacles_of(self._obstacle_contacts)
         if water is not None and not isinstance(water, Water):

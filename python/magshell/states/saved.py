@@ -11,6 +11,7 @@ import numpy as np
 
 from .._core import __version__
 from .._machine.files import replace_file
+from .._machine.offered import offered
 from ..dynamics.trajectory import Trajectory
 from ..scene.scene import Scene
 from ..starts.plain import from_plain, to_plain
@@ -24,6 +25,7 @@ _KINDS = {each.__name__: each for each in (Equilibrium, Equilibria, Trajectory)}
 _CONTENTS = "contents"
 
 
+@offered
 def save(path: str | Path, result: Equilibrium | Equilibria | Trajectory) -> None:
     """Writes a result into one file, an .npz of arrays and of JSON text, from which `load` makes it again.
 
@@ -50,6 +52,7 @@ def save(path: str | Path, result: Equilibrium | Equilibria | Trajectory) -> Non
     if type(result) not in _KINDS.values():
         points = ": save its points, ms.Equilibria(path.equilibrium(k) for k in ...)"
         why = points if type(result).__name__ == "Path" else ""
+        why = ": several are ms.Equilibria([...])" if isinstance(result, list | tuple) else why
         raise ValueError(
             f"result must be an Equilibrium, Equilibria or a Trajectory, got {type(result).__name__}{why}"
         )

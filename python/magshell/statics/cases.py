@@ -67,6 +67,8 @@ def find_all(scene: Scene, cases: list[dict[Any, Any]], starts: Sequence[Any], s
             found.append(find(scene, arguments, start, _part_of(search, k, len(cases))).equilibrium)
         except (NotConverged, Interrupted) as error:
             raise of_case(error, k, len(cases), Equilibria([*found, error.last_good])) from error
+        except ValueError as error:
+            raise ValueError(f"load case {k} of {len(cases)}: {error}") from error
     return Equilibria(found)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..bodies.caps import describe_faces
+from ..fields.inside import told_inside
 from ..surroundings.constraints import free_rigid_motions
 
 if TYPE_CHECKING:
@@ -41,6 +42,10 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
         sentences += _attempts(found, at_rest and not whole, scene._bodies.size)
         told, near = _places(inputs, found)
         sentences += told
+        positions = scene._model.positions(failed.state)
+        fields = map(inputs.values.current, scene.fields)
+        if inside := told_inside(fields, positions, scene.mesh.edge_lengths):
+            return " ".join([*sentences, inside, kept])
     return " ".join([*sentences, _advice(inputs, found, at_rest, near), kept])
 
 

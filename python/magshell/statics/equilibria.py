@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._checks.checked_list import listed
 from .._checks.tensors import stacked
+from .._machine.offered import Kept
 from ..bodies.bodies import BODIES
 from ..bodies.of_body import result_of
 from ..bodies.strains import Strains
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
-class Equilibria(Sequence[Equilibrium]):
+class Equilibria(Kept, Sequence[Equilibrium]):
     """A scene at rest in each of k load cases, or in k ways in one; a sequence of Equilibrium.
 
     positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
@@ -32,7 +34,7 @@ class Equilibria(Sequence[Equilibrium]):
     """
 
     def __init__(self, cases: Iterable[Equilibrium]):
-        self._cases = tuple(cases)
+        self._cases = tuple(listed("cases", cases, lambda given: isinstance(given, Equilibrium)))
         for case in self._cases:
             if not isinstance(case, Equilibrium):
                 raise ValueError(f"cases must hold Equilibrium objects, got {type(case).__name__}")

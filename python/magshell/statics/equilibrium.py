@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks.tensors import detached, plain_arrays
+from .._machine.offered import Kept
 from ..bodies.of_body import result_of
 from ..bodies.solid_result import told_strains
 from ..bodies.strains import Largest, Strains, strains_of
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Equilibrium:
+class Equilibrium(Kept):
     """A scene at rest. With several bodies, rows are those of one after another; `equilibrium[body]` has those of one.
 
     positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.

@@ -75,9 +75,10 @@ def equilibria(
 
     Controls, values and at_rest as in ms.equilibrium, for one load case.
 
-    start: an equilibrium, Equilibria, positions (n_v, 3) m, or a list of these: where to look as well.
+    start: an equilibrium, Equilibria, positions (n_v, 3) m, or a list of these: where to look as well, for saddles too if
+        they are asked for.
     unstable: hand back saddles too; `unstable_directions` tells them. Their energy over that of a well beside them is
-        what a snap has to be given at least.
+        what a snap has to be given at least. Deep wells have theirs far away: a `start` that looks like one finds it.
     attempts: how many searches are made after the first. One takes from ten to, far from everything, thousands of
         factorizations; `solver` limits it.
     same_within: m, the largest distance between two equilibria that count as one, vertex by vertex; 1e-4 of the scene's
@@ -122,7 +123,7 @@ def equilibria(
             starting_point(scene, each, inputs)  # raises before any work
         hunt = _Hunt(scene, numbers_only(design), search, tolerance, count("seed", seed, least=0))
         try:
-            hunt.run(starts, attempts)
+            hunt.run(starts, attempts, unstable)
             return Equilibria([_again(inputs, each, search) for each in hunt.sorted(unstable)])
         except Interrupted as error:
             kept = Equilibria(hunt.sorted(unstable)) if hunt.known else error.last_good
@@ -146,10 +147,14 @@ class _Hunt:
         self._tolerance = _SAME * self._size if tolerance is None else tolerance
         self._share, self._failed = 0.0, 0
 
-    def run(self, starts: list[Any], attempts: int) -> None:
-        found = [self._find(start) for start in starts or [None]]
-        for each in found:
-            self._add(each)
+    def run(self, starts: list[Any], attempts: int, unstable: bool) -> None:
+        for start in starts or [None]:
+            self._add(self._find(start))
+        for start in starts if unstable else []:
+            try:
+                self._add(self._find(start, require_stable=False))  # a saddle that looks like this
+            except NotConverged:
+                self._failed += 1
         ways = [(each, self._ways_from(each)) for each in self.known]
         made = 0
         while made < attempts:
@@ -166,8 +171,8 @@ class _Hunt:
     def sorted(self, unstable: bool) -> list[Equilibrium]:
         return sorted((each for each in self.known if unstable or each.stable), key=lambda each: each.energy)
 
-    def _find(self, start) -> Equilibrium:
-        search = replace(self._search, progress=self._progress())
+    def _find(self, start, require_stable: bool = True) -> Equilibrium:
+        search = replace(self._search, progress=self._progress(), require_stable=require_stable)
         return find(self._scene, self._design, start, search).equilibrium
 
     def _ways_from(self, known: Equilibrium) -> Iterator[Equilibrium | None]:

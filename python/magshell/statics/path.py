@@ -14,6 +14,7 @@ from .._checks.arrays import count, number
 from .._checks.scalars import positive
 from .._machine.entry import grouped, solve_entry
 from .._machine.log import log
+from .._machine.offered import Filmed
 from .._machine.progress import SolveBar
 from ..bodies.caps import warn_of_caps
 from ..bodies.of_body import result_of
@@ -51,7 +52,7 @@ class CriticalPoint:
 
 
 @dataclass(frozen=True, repr=False)
-class Path:
+class Path(Filmed):
     """A path of equilibria, stable and unstable. `path[body]` has those of one body.
 
     parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.
