@@ -54,7 +54,7 @@ Index total(const std::vector<Index>& weights) {
 class Elimination {
   public:
     explicit Elimination(const NodeGraph& graph)
-        : lists_(graph.neighbours.begin(), graph.neighbours.end()),
+        : lists_(graph.neighbours),
           begin_(graph.starts.begin(), graph.starts.end() - 1),
           elements_(graph.size(), 0),
           variables_(graph.size(), 0),

@@ -40,8 +40,7 @@ void place_entries(const SparsePattern& pattern, AssemblyPlan& plan) {
     // Sorted by front: for now, with the position of an entry's column for its place, and that of its row beside it. What
     // is looked up by an unknown is all over the memory, so it is done here, in the pattern's order.
     plan.entries.resize(pattern.rows.size());
-    LargeVector<Index> row_of(pattern.rows.size());
-    std::vector<Index> next(plan.fronts.size() + 1, 0), local_row(pattern.size);
+    std::vector<Index> row_of(pattern.rows.size()), next(plan.fronts.size() + 1, 0), local_row(pattern.size);
     const auto each_entry = [&](auto&& visit) {
         for (Index j = 0; j < pattern.size; ++j) {
             const Eliminated own = eliminated[j];

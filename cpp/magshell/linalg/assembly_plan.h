@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "magshell/core/large_memory.h"
 #include "magshell/linalg/assembly_tree.h"
 
 namespace magshell {
@@ -49,7 +48,7 @@ struct AssemblyPlan {
     std::vector<Index> rows;        // below the pivots of each front, from shape.rows on
     std::vector<Index> places;      // of those rows in the parent: among its pivots, or among its rows below
     std::vector<Index> targets;     // of those rows in the vector of the subtree, or for top fronts of all
-    LargeVector<PlacedEntry> entries;
+    std::vector<PlacedEntry> entries;
     std::vector<Transfer> transfers;
     std::vector<Subtree> subtrees;          // independent of the number of threads
     std::vector<Index> top;                 // the fronts above them, in order

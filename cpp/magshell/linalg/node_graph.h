@@ -4,14 +4,12 @@
 #include <span>
 #include <vector>
 
-#include "magshell/core/large_memory.h"
 #include "magshell/linalg/quotient_graph.h"
 
 namespace magshell {
 
 struct NodeGraph {
-    std::vector<Index> starts;
-    LargeVector<Index> neighbours;  // both triangles, without the diagonal
+    std::vector<Index> starts, neighbours;  // both triangles, without the diagonal
     std::vector<Index> weights;     // unknowns of each node
     std::vector<Vec3> points;       // of each node; empty where they are not known
 
