@@ -10,8 +10,8 @@ namespace magshell {
 
 struct NodeGraph {
     std::vector<Index> starts, neighbours;  // both triangles, without the diagonal
-    std::vector<Index> weights;     // unknowns of each node
-    std::vector<Vec3> points;       // of each node; empty where they are not known
+    std::vector<Index> weights;             // unknowns of each node
+    std::vector<Vec3> points;               // of each node; empty where they are not known
 
     Index size() const { return static_cast<Index>(weights.size()); }
     std::span<const Index> around(Index node) const {
