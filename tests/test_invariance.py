@@ -229,6 +229,21 @@ def test_any_number_of_threads_gives_the_same_bits(bending, thread_counts, rng):
     assert len(seen) == 1
 
 
+def test_any_number_of_threads_gives_the_same_bits_on_a_large_sheet(thread_counts, rng):
+    """One thread goes from part to neighbouring part, several take colour after colour of a stretch of them."""
+    mesh = ms.meshes.rectangle(0.1, 0.1, cells=(110, 110), irregular=0.2)  # more parts than a stretch holds
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    problem = Problem(scene, Controls(applied_flux_density=FLUX_DENSITY, field_factor=1.0), MAGNETIZATION)
+    q = problem.model.state(*random_state(problem, rng))
+    seen = set()
+    for count in thread_counts:
+        ms.set_num_threads(count)
+        parts = problem.gradient(q), problem.model.hessian(q, problem.controls)[3]
+        seen.add(tuple(part.tobytes() for part in parts))
+    assert len(seen) == 1
+
+
 # Symmetry, welds, moving supports
 
 

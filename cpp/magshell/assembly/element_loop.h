@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <utility>
 
 #include "magshell/assembly/element_blocks.h"
 #include "magshell/assembly/schedule.h"
@@ -29,19 +28,10 @@ class ElementLoop {
     int lanes_in(Index pack) const { return std::min(Pack::width, elements_ - pack * Pack::width); }
     Index element(Index pack, int lane) const { return element_of(pack, lane, elements_); }
 
-    // Whole vectors are put together in registers: lanes written one by one would have to wait in memory for each other.
     void gather(Index pack, const double* q, Pack3 x[N]) const {
         const std::array<Index, N>* at[Pack::width];
         for (int lane = 0; lane < Pack::width; ++lane) at[lane] = &(*nodes_)[element(pack, lane)];
-        for (int k = 0; k < N; ++k) {
-            const double* from[Pack::width];
-            for (int lane = 0; lane < Pack::width; ++lane) from[lane] = q + 3 * (*at[lane])[k];
-            const auto component = [&]<std::size_t... lane>(int c, std::index_sequence<lane...>) {
-                return Pack(Pack::Lanes{from[lane][c]...});
-            };
-            constexpr std::make_index_sequence<Pack::width> lanes;
-            x[k] = {component(0, lanes), component(1, lanes), component(2, lanes)};
-        }
+        for (int k = 0; k < N; ++k) x[k] = vectors_of([&](int lane) { return q + 3 * (*at[lane])[k]; });
     }
 
     void scatter(Index pack, const Pack3 g[N], Residual& out) const {
@@ -111,7 +101,7 @@ class ElementLoop {
     Index elements_;
     const std::vector<std::array<Index, N>>* nodes_;
     const ChunkLoop& chunks_;
-    std::vector<PairSlots<N>> slots_;
+    LargeVector<PairSlots<N>> slots_;
     // Per pack and pair of nodes: the lanes, a bit each, whose block has its rows at the node with the lower number.
     std::vector<std::array<std::uint8_t, N*(N - 1) / 2>> turned_;
 };

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "magshell/assembly/lanes.h"
@@ -13,20 +12,21 @@ namespace magshell {
 
 /// Folds [first, last), at most a pack of them. Lanes past the last fold repeat it.
 inline Fold folds_at(const Sheet& sheet, Index first, Index last, const double* q) {
-    Pack3 x[4];
-    Pack right_is_point;
-    for (int lane = 0; lane < Pack::width; ++lane) {
-        const FoldStencil& fold = sheet.folds[std::min(first + lane, last - 1)];
-        for (int k = 0; k < 4; ++k) set_lane(x[k], lane, q + 3 * fold.nodes[k]);
-        right_is_point.set(lane, fold.right_is_point ? 1.0 : 0.0);
-    }
-    return Fold(x[0], x[1], x[2], x[3], right_is_point);
+    const FoldStencil* at[Pack::width];
+    for (int lane = 0; lane < Pack::width; ++lane) at[lane] = &sheet.folds[std::min(first + lane, last - 1)];
+    const auto place = [&](int k) {
+        return vectors_of([&](int lane) { return q + 3 * at[lane]->nodes[k]; });
+    };
+    const auto right_is_point = [&](int lane) { return at[lane]->right_is_point ? 1.0 : 0.0; };
+    return Fold(place(0), place(1), place(2), place(3), pack_of(right_is_point));
 }
 
 /// theta - theta~ in (-pi, pi]: a sheet rolled into a closed surface may have its rest angle on the other
 /// side of pi.
 inline double turn_from(const FoldStencil& fold, double angle) {
-    return std::remainder(angle - fold.rest_angle, 2.0 * std::numbers::pi);
+    constexpr double pi = std::numbers::pi;
+    const double turn = angle - fold.rest_angle;  // of two numbers in [-pi, pi]
+    return turn > pi ? turn - 2.0 * pi : turn < -pi ? turn + 2.0 * pi : turn;
 }
 
 /// delta of one edge of a face: turn_of(fold) is theta - theta~, or any number a fold that is linear in it.

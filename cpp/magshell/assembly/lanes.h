@@ -1,6 +1,7 @@
 // Filling packs from per-element data and emptying them again: lane l of pack k is element k * width + l.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "magshell/assembly/residual.h"
@@ -18,6 +19,24 @@ constexpr Index packs_for(Index elements) {
 inline Index element_of(Index pack, int lane, Index elements) {
     const Index element = pack * Pack::width + lane;
     return element < elements ? element : elements - 1;
+}
+
+/// number(lane) in each lane, put together in registers: lanes written one by one would have to wait in memory for each
+/// other.
+template <class Number>
+inline Pack pack_of(const Number& number) {
+    return [&]<std::size_t... lane>(std::index_sequence<lane...>) {
+        return Pack(Pack::Lanes{static_cast<double>(number(static_cast<int>(lane)))...});
+    }(std::make_index_sequence<Pack::width>());
+}
+
+/// The vector that begins at from(lane), in each lane.
+template <class From>
+inline Pack3 vectors_of(const From& from) {
+    const double* at[Pack::width];
+    for (int lane = 0; lane < Pack::width; ++lane) at[lane] = from(lane);
+    const auto component = [&](int c) { return pack_of([&](int lane) { return at[lane][c]; }); };
+    return {component(0), component(1), component(2)};
 }
 
 inline void set_lane(Pack3& pack, int lane, const double* from) {
@@ -49,13 +68,6 @@ inline Eigen::Vector<double, N> lane_of(const Pack v[N], int lane) {
 
 inline Vec3 lane_of(const Pack3& v, int lane) {
     return {v.x[lane], v.y[lane], v.z[lane]};
-}
-
-/// The nodes of an element, as three-vectors of packs.
-template <int N>
-inline void gather_nodes(const double* q, const std::array<Index, N> (&nodes)[Pack::width], Pack3 x[N]) {
-    for (int k = 0; k < N; ++k)
-        for (int lane = 0; lane < Pack::width; ++lane) set_lane(x[k], lane, q + 3 * nodes[lane][k]);
 }
 
 inline void scatter_node(Residual& out, Index node, const Pack3& force, int lane) {
@@ -99,8 +111,8 @@ inline void scatter_blocks(SystemMatrix& matrix, const Nodes& nodes, const PairS
     }
 }
 
-template <class T>
-std::size_t bytes_of(const std::vector<T>& values) {
+template <class T, class Allocator>
+std::size_t bytes_of(const std::vector<T, Allocator>& values) {
     return values.capacity() * sizeof(T);
 }
 

@@ -20,11 +20,83 @@ Index part_length(const Body& of) {
     return length / Pack::width * Pack::width;
 }
 
+// Which chunks share nodes.
+class Neighbours {
+  public:
+    Neighbours(Index nodes, const std::vector<const Body*>& bodies, const std::vector<Chunk>& chunks)
+        : chunks_at_(nodes), nodes_in_(chunks.size()) {
+        for (const Chunk& chunk : chunks)
+            for (Index element = chunk.first; element < chunk.last; ++element)
+                for (const Index node : bodies[chunk.body]->nodes_of(element))
+                    if (node >= 0 && (chunks_at_[node].empty() || chunks_at_[node].back() != chunk.number)) {
+                        chunks_at_[node].push_back(chunk.number);
+                        nodes_in_[chunk.number].push_back(node);
+                    }
+    }
+
+    /// Of each chunk, the first that no chunk beside it had before.
+    std::vector<Index> colours() const {
+        std::vector<Index> colour_of(nodes_in_.size(), -1);
+        Index count = 0;
+        for (std::size_t p = 0; p < nodes_in_.size(); ++p) {
+            std::vector<bool> taken(count + 1, false);
+            each_beside(p, [&](Index other) {
+                if (colour_of[other] >= 0) taken[colour_of[other]] = true;
+            });
+            colour_of[p] = static_cast<Index>(std::find(taken.begin(), taken.end(), false) - taken.begin());
+            count = std::max(count, colour_of[p] + 1);
+        }
+        return colour_of;
+    }
+
+    /// The chunks by number, but each after those beside it of earlier colours.
+    std::vector<Index> order(const std::vector<Index>& colour_of) const {
+        std::vector<Index> order;
+        std::vector<bool> taken(nodes_in_.size(), false);
+        const auto take = [&](const auto& self, Index p) -> void {  // as deep as there are colours
+            if (taken[p]) return;
+            taken[p] = true;
+            each_beside(p, [&](Index other) {
+                if (colour_of[other] < colour_of[p]) self(self, other);
+            });
+            order.push_back(p);
+        };
+        for (Index p = 0; p < static_cast<Index>(nodes_in_.size()); ++p) take(take, p);
+        return order;
+    }
+
+  private:
+    template <class Visit>
+    void each_beside(std::size_t p, const Visit& visit) const {
+        for (const Index node : nodes_in_[p])
+            for (const Index other : chunks_at_[node]) visit(other);
+    }
+
+    std::vector<std::vector<Index>> chunks_at_, nodes_in_;
+};
+
+// Stretches of an order, each colour after colour. A stretch holds enough chunks of a colour for several threads.
+std::vector<std::vector<Index>> rounds(const std::vector<Index>& order, const std::vector<Index>& colour_of) {
+    constexpr std::size_t stretch = 32;
+    std::vector<std::vector<Index>> rounds;
+    for (std::size_t first = 0; first < order.size(); first += stretch) {
+        std::vector<std::vector<Index>> of_colours;
+        for (std::size_t k = first; k < std::min(first + stretch, order.size()); ++k) {
+            const std::size_t colour = colour_of[order[k]];
+            if (colour >= of_colours.size()) of_colours.resize(colour + 1);
+            of_colours[colour].push_back(order[k]);
+        }
+        for (std::vector<Index>& chunks : of_colours)
+            if (!chunks.empty()) rounds.push_back(std::move(chunks));
+    }
+    return rounds;
+}
+
 }  // namespace
 
 Schedule::Schedule(Index nodes, const std::vector<const Body*>& bodies) : loops_(bodies.size()) {
     for (Index body = 0; body < static_cast<Index>(bodies.size()); ++body) cut(*bodies[body], body);
-    colour(nodes, bodies);
+    set_order(nodes, bodies);
 }
 
 void Schedule::cut(const Body& of, Index body) {
@@ -40,48 +112,43 @@ void Schedule::cut(const Body& of, Index body) {
     }
 }
 
-void Schedule::colour(Index nodes, const std::vector<const Body*>& bodies) {
-    const Index count = static_cast<Index>(all_.chunks_.size());
-    std::vector<std::vector<Index>> chunks_at(nodes), nodes_in(count);
-    for (const Chunk& chunk : all_.chunks_)
-        for (Index element = chunk.first; element < chunk.last; ++element)
-            for (const Index node : bodies[chunk.body]->nodes_of(element))
-                if (node >= 0 && (chunks_at[node].empty() || chunks_at[node].back() != chunk.number)) {
-                    chunks_at[node].push_back(chunk.number);
-                    nodes_in[chunk.number].push_back(node);
-                }
-    std::vector<Index> colour_of(count, -1);
-    std::vector<std::vector<Index>>& colours = all_.colours_;
-    for (Index p = 0; p < count; ++p) {
-        std::vector<bool> taken(colours.size() + 1, false);
-        for (const Index node : nodes_in[p])
-            for (const Index other : chunks_at[node])
-                if (colour_of[other] >= 0) taken[colour_of[other]] = true;
-        colour_of[p] = static_cast<Index>(std::find(taken.begin(), taken.end(), false) - taken.begin());
-        if (colour_of[p] == static_cast<Index>(colours.size())) colours.emplace_back();
-        colours[colour_of[p]].push_back(p);
-    }
+void Schedule::set_order(Index nodes, const std::vector<const Body*>& bodies) {
+    const Neighbours neighbours(nodes, bodies, all_.chunks_);
+    const std::vector<Index> colour_of = neighbours.colours();
+    all_.order_ = neighbours.order(colour_of);
+    all_.rounds_ = rounds(all_.order_, colour_of);
     for (ChunkLoop& loop : loops_) {
-        loop.colours_.resize(colours.size());
-        for (Index k = 0; k < static_cast<Index>(loop.chunks_.size()); ++k)
-            loop.colours_[colour_of[loop.chunks_[k].number]].push_back(k);
-        std::erase_if(loop.colours_, [](const std::vector<Index>& chunks) { return chunks.empty(); });
+        if (loop.chunks_.empty()) continue;
+        const Index first = loop.chunks_.front().number, last = loop.chunks_.back().number;
+        const auto own = [&](const std::vector<Index>& of_all) {
+            std::vector<Index> of_body;
+            for (const Index p : of_all)
+                if (first <= p && p <= last) of_body.push_back(p - first);
+            return of_body;
+        };
+        loop.order_ = own(all_.order_);
+        for (const std::vector<Index>& round : all_.rounds_)
+            if (std::vector<Index> of_body = own(round); !of_body.empty())
+                loop.rounds_.push_back(std::move(of_body));
     }
 }
 
 std::vector<Chunk> Schedule::in_order() const {
     std::vector<Chunk> order;
-    for (const std::vector<Index>& chunks : all_.colours_)
-        for (const Index p : chunks) order.push_back(all_.chunks_[p]);
+    for (const Index p : all_.order_) order.push_back(all_.chunks_[p]);
     return order;
 }
 
 std::size_t Schedule::bytes() const {
-    return 2 * all_.chunks_.size() * (sizeof(Chunk) + sizeof(Index));
+    return 2 * all_.chunks_.size() * (sizeof(Chunk) + 2 * sizeof(Index));
 }
 
 void ChunkLoop::scatter(const std::function<void(const Chunk&)>& body) const {
-    for (const std::vector<Index>& chunks : colours_)
+    if (num_threads() == 1) {
+        for (const Index p : order_) body(chunks_[p]);
+        return;
+    }
+    for (const std::vector<Index>& chunks : rounds_)
         parallel_for(static_cast<int>(chunks.size()), [&](int k) { body(chunks_[chunks[k]]); });
 }
 

@@ -35,9 +35,9 @@ class SystemMatrix {
     const std::vector<Index>& rows() const { return rows_; }
     const LargeVector<double>& values() const { return values_; }
     LargeVector<double>& values() { return values_; }
-    /// Clears the three columns of a node, or the column of a rotation.
-    void clear_node(Index node) { clear(3 * node, 3 * node + 3); }
-    void clear_rotation(Index rotation) { clear(3 * nodes_ + rotation, 3 * nodes_ + rotation + 1); }
+    void clear_columns(Index first, Index last) {
+        std::fill(values_.data() + column_starts_[first], values_.data() + column_starts_[last], 0.0);
+    }
     std::size_t bytes() const;
 
     /// The slot of the block with rows at node i and columns at node j, two nodes that are coupled.
@@ -145,10 +145,6 @@ class SystemMatrix {
 
   private:
     Index find(Index column, Index row) const;
-    void clear(Index first_column, Index last_column) {
-        std::fill(values_.data() + column_starts_[first_column], values_.data() + column_starts_[last_column],
-                  0.0);
-    }
 
     Index nodes_ = 0, rotations_ = 0;
     std::vector<Index> column_starts_, rows_;

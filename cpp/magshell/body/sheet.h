@@ -7,6 +7,7 @@
 #include "magshell/body/body.h"
 #include "magshell/body/stencil.h"
 #include "magshell/body/surface.h"
+#include "magshell/core/large_memory.h"
 
 namespace magshell {
 
@@ -63,12 +64,12 @@ class Sheet : public Surface, public Body {
     Index n_rotations() const { return static_cast<Index>(edge_of_rotation.size()); }
 
     std::vector<std::array<Index, 3>> edges;  // per face, the caller's edges, opposite the corners
-    std::vector<FoldStencil> folds;
-    std::vector<std::array<FaceSide, 3>> sides;  // per face
+    LargeVector<FoldStencil> folds;
+    LargeVector<std::array<FaceSide, 3>> sides;  // per face
     Index first_rotation = 0;
     std::vector<Index> edge_of_rotation;  // scalar, less the first -> caller's edge
     std::vector<Index> rotation_of_edge;  // caller's edge -> scalar, or -1
-    std::vector<Stencil> stencils;        // per face: corners, the nodes beyond its edges, its rotations
+    LargeVector<Stencil> stencils;        // per face: corners, the nodes beyond its edges, its rotations
 
   private:
     Index add_fold(const Nodes& at, const std::array<Index, 4>& nodes, bool right_is_point);

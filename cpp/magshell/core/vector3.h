@@ -57,8 +57,16 @@ struct Pack33 {
         for (int k = 0; k < 9; ++k) at[k] -= b.at[k];
         return *this;
     }
-    friend Pack33 operator+(Pack33 a, const Pack33& b) { return a += b; }
-    friend Pack33 operator-(Pack33 a, const Pack33& b) { return a -= b; }
+    friend Pack33 operator+(const Pack33& a, const Pack33& b) {
+        Pack33 sum;
+        for (int k = 0; k < 9; ++k) sum.at[k] = a.at[k] + b.at[k];
+        return sum;
+    }
+    friend Pack33 operator-(const Pack33& a, const Pack33& b) {
+        Pack33 difference;
+        for (int k = 0; k < 9; ++k) difference.at[k] = a.at[k] - b.at[k];
+        return difference;
+    }
     friend Pack33 operator*(const Pack& s, const Pack33& a) {
         Pack33 scaled;
         for (int k = 0; k < 9; ++k) scaled.at[k] = s * a.at[k];

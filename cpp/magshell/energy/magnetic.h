@@ -87,13 +87,17 @@ struct Magnetic {
         const Pack33 kc1 = multiply(k, c1);
         const Pack33 h11 = -multiply(c2, multiply(k, c2)), h22 = -multiply(c1, kc1);
         const Pack33 h12 = multiply(c2, kc1) - scale * cross_matrix(tangential(flux));
-        const Pack33 h21 = transpose(h12);
-        h[lower_index(1, 1)] = h11;
-        h[lower_index(2, 1)] = h21;
-        h[lower_index(2, 2)] = h22;
-        h[lower_index(1, 0)] = -(h11 + h12);
-        h[lower_index(2, 0)] = -(h21 + h22);
-        h[lower_index(0, 0)] = h11 + h12 + h21 + h22;
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 3; ++column) {
+                const int k = 3 * row + column, transposed = 3 * column + row;
+                const Pack b11 = h11.at[k], b12 = h12.at[k], b21 = h12.at[transposed], b22 = h22.at[k];
+                h[lower_index(1, 1)].at[k] = b11;
+                h[lower_index(2, 1)].at[k] = b21;
+                h[lower_index(2, 2)].at[k] = b22;
+                h[lower_index(1, 0)].at[k] = -(b11 + b12);
+                h[lower_index(2, 0)].at[k] = -(b21 + b22);
+                h[lower_index(0, 0)].at[k] = b11 + b12 + b21 + b22;
+            }
     }
 
     /// Adds what a field that varies in space brings: d2(M . B(x_b)) with one or two derivatives on x_b.

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "magshell/linalg/cuts.h"
+#include "magshell/linalg/separator_refinement.h"
 
 namespace magshell {
 namespace {
@@ -114,6 +115,40 @@ bool worth_trying(Index separator, std::size_t nodes) {
     return std::pow(static_cast<double>(separator), 3) > as_long * static_cast<double>(nodes);
 }
 
+bool lighter(const Way& a, const Way& b) {
+    return a.cut.weight < b.cut.weight;
+}
+
+bool cheaper(const Way& a, const Way& b) {
+    return a.cut.cost < b.cut.cost;
+}
+
+// Puts the nodes, all of them on the left, on the sides of a cut along state.coordinate, and returns its lighter border.
+std::vector<Index> separate(const NodeGraph& graph, const std::vector<Index>& nodes, const Cut& cut,
+                            CutState& state) {
+    for (const Index node : nodes)
+        if (!(state.coordinate[node] < cut.at)) state.side[node] = Side::right;
+    const Side thinned = cut.left_border ? Side::left : Side::right;
+    std::vector<Index> separator;
+    for (const Index node : nodes) {
+        if (state.side[node] != thinned) continue;
+        const std::span<const Index> around = graph.around(node);
+        if (std::any_of(around.begin(), around.end(),
+                        [&](Index beside) { return state.side[beside] == other(thinned); }))
+            separator.push_back(node);
+    }
+    for (const Index node : separator) state.side[node] = Side::between;
+    return separator;
+}
+
+// Of what separates the sides, as of a cut.
+double cost_of(const NodeGraph& graph, const std::vector<Index>& nodes, const CutState& state) {
+    double weight[4] = {0.0, 0.0, 0.0, 0.0};
+    for (const Index node : nodes) weight[static_cast<int>(state.side[node])] += graph.weights[node];
+    const double sides = weight[0] + weight[1];
+    return cost_of_cut(weight[2], std::abs(weight[0] - 0.5 * sides) / sides);
+}
+
 }  // namespace
 
 CutState::CutState(const NodeGraph& graph)
@@ -144,37 +179,46 @@ std::vector<Index> bisect(const NodeGraph& graph, const std::vector<Index>& node
             ways.push_back({median_cut(graph, nodes, state, along, reach), direction});
         }
     }
-    const auto lighter = [](const Way& a, const Way& b) { return a.cut.weight < b.cut.weight; };
-    Way best = *std::min_element(ways.begin(), ways.end(), lighter);
-    if (best.cut.weight == std::numeric_limits<Index>::max()) return {};
+    const auto is_none = [](const Way& way) { return way.cut.weight == std::numeric_limits<Index>::max(); };
+    std::erase_if(ways, is_none);
+    if (ways.empty()) return {};
     const auto set_coordinates = [&](const Vec3& direction) {
         const bool by_level = direction.isZero(0.0);
         for (const Index node : nodes)
             state.coordinate[node] = by_level ? level(node) : direction.dot(graph.points[node]);
     };
-    if (worth_trying(best.cut.weight, nodes.size())) {
-        best.cut.cost = std::numeric_limits<double>::max();
-        for (const Way& way : ways) {
+    if (const auto first = std::min_element(ways.begin(), ways.end(), lighter);
+        worth_trying(first->cut.weight, nodes.size())) {
+        for (Way& way : ways) {
             set_coordinates(way.direction);
-            const Cut cut = lightest_cut(graph, nodes, state);
-            if (cut.cost < best.cut.cost) best = {cut, way.direction};
+            way.cut = lightest_cut(graph, nodes, state);
         }
+        std::stable_sort(ways.begin(), ways.end(), cheaper);
+        std::erase_if(ways, is_none);
+    } else {
+        ways = {*first};
     }
-
-    set_coordinates(best.direction);
-    for (const Index node : nodes)
-        if (!(state.coordinate[node] < best.cut.at)) state.side[node] = Side::right;
-    const Side thinned = best.cut.left_border ? Side::left : Side::right;
-    std::vector<Index> separator;
-    for (const Index node : nodes) {
-        if (state.side[node] != thinned) continue;
-        const std::span<const Index> around = graph.around(node);
-        if (std::any_of(around.begin(), around.end(),
-                        [&](Index beside) { return state.side[beside] == other(thinned); }))
-            separator.push_back(node);
+    // Those that look best before they are refined are smoother, and so are the parts that they leave.
+    constexpr double so_much_less = 0.9;
+    std::vector<Side> best_sides;
+    std::vector<Index> best_separator;
+    double least = std::numeric_limits<double>::max();
+    for (const Way& way : ways) {
+        set_coordinates(way.direction);
+        std::vector<Index> separator = separate(graph, nodes, way.cut, state);
+        refine_separator(graph, nodes, separator, state);
+        if (ways.size() == 1) return separator;
+        const double cost = cost_of(graph, nodes, state);
+        if (best_sides.empty() || cost < so_much_less * least) {
+            least = cost;
+            best_separator = std::move(separator);
+            best_sides.clear();
+            for (const Index node : nodes) best_sides.push_back(state.side[node]);
+        }
+        for (const Index node : nodes) state.side[node] = Side::left;
     }
-    for (const Index node : separator) state.side[node] = Side::between;
-    return separator;
+    for (std::size_t k = 0; k < best_sides.size(); ++k) state.side[nodes[k]] = best_sides[k];
+    return best_separator;
 }
 
 }  // namespace magshell

@@ -30,10 +30,10 @@ struct CutState {
     std::vector<char> has_moved;               // out of a separator
 };
 
-/// Cuts `nodes`, all of them Side::left before, into sides of about the same number, and puts the lighter
-/// border of the two between them: returns it. The cut is that with the lightest border among planes across
-/// the directions in which the nodes extend, and the ways from a node at an end, near the middle of each. Where no cut
-/// can be, all stay on the left.
+/// Cuts `nodes`, all of them Side::left before, into sides of about the same number, and puts between them what separates
+/// them: returns it. Tried are planes across the directions in which the nodes extend, and the ways from a node at an end,
+/// near the middle of each: the lighter border of the two sides of the best, or where cuts matter of each of the best,
+/// is refined, and the lightest of those taken. Where no cut can be, all stay on the left.
 std::vector<Index> bisect(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state);
 
 }  // namespace magshell

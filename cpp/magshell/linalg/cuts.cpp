@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "magshell/linalg/bisection.h"
 
@@ -11,23 +12,23 @@ namespace magshell {
 // neighbour to the right, and on the right side's the other way round: all borders' weights are sums of differences.
 Cut lightest_cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state) {
     constexpr double farthest = 0.2;  // of the whole weight, from the middle
-    constexpr double uneven = 8.0;    // times the square of that makes a border so much heavier
     const Index count = static_cast<Index>(nodes.size());
-    std::vector<Index> sorted = nodes;
-    std::sort(sorted.begin(), sorted.end(), [&](Index a, Index b) {
-        return std::pair(state.coordinate[a], a) < std::pair(state.coordinate[b], b);
-    });
+    std::vector<std::pair<double, Index>>
+        sorted;  // coordinates beside their nodes, which are all over the memory
+    sorted.reserve(nodes.size());
+    for (const Index node : nodes) sorted.emplace_back(state.coordinate[node], node);
+    std::sort(sorted.begin(), sorted.end());
     // A node's place is that of the first that has its coordinate.
     std::vector<Index>& place = state.place;
     double whole = 0.0;
     for (Index k = 0; k < count; ++k) {
-        const Index node = sorted[k];
-        const bool alike = k > 0 && state.coordinate[sorted[k - 1]] == state.coordinate[node];
-        place[node] = alike ? place[sorted[k - 1]] : k;
+        const auto [coordinate, node] = sorted[k];
+        const bool alike = k > 0 && sorted[k - 1].first == coordinate;
+        place[node] = alike ? place[sorted[k - 1].second] : k;
         whole += graph.weights[node];
     }
     std::vector<Index> left(count + 1, 0), right(count + 1, 0);  // how the borders change from cut to cut
-    for (const Index node : sorted) {
+    for (const auto& [coordinate, node] : sorted) {
         Index first = place[node], last = first;
         for (const Index beside : graph.around(node)) {
             if (state.side[beside] == Side::settled) continue;
@@ -47,16 +48,14 @@ Cut lightest_cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutSta
         borders[0] += left[k];
         borders[1] += right[k];
         const double off = std::abs(below / whole - 0.5);
-        below += graph.weights[sorted[k]];
-        if (k == 0 || place[sorted[k]] != k) continue;
+        below += graph.weights[sorted[k].second];
+        if (k == 0 || place[sorted[k].second] != k) continue;
         const Index weight = std::min(borders[0], borders[1]);
         // Beyond the limit the more even cut counts alone.
-        const double cost = off > farthest ? (1.0 + off) * 2.0 * whole : weight * (1.0 + uneven * off * off);
+        const double cost = off > farthest ? (1.0 + off) * 2.0 * whole : cost_of_cut(weight, off);
         if (cost >= cut.cost) continue;
-        cut = {.weight = weight,
-               .cost = cost,
-               .left_border = borders[0] <= borders[1],
-               .at = state.coordinate[sorted[k]]};
+        cut = {
+            .weight = weight, .cost = cost, .left_border = borders[0] <= borders[1], .at = sorted[k].first};
     }
     return cut;
 }

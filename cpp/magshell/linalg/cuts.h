@@ -18,6 +18,12 @@ struct Cut {
     double at = 0.0;
 };
 
+/// What a separator costs that leaves one side so much more than half of the whole.
+inline double cost_of_cut(double weight, double off) {
+    constexpr double uneven = 8.0;  // times the square of that makes it so much heavier
+    return weight * (1.0 + uneven * off * off);
+}
+
 /// The cut along state.coordinate with the lightest border, of those that leave neither side much more than half; the more
 /// one does, the lighter the border has to be.
 Cut lightest_cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state);

@@ -5,7 +5,6 @@
 #include "magshell/core/parallel.h"
 #include "magshell/linalg/bisection.h"
 #include "magshell/linalg/minimum_degree.h"
-#include "magshell/linalg/separator_refinement.h"
 
 namespace magshell {
 namespace {
@@ -23,7 +22,6 @@ struct Halves {
 Halves cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state) {
     Halves halves;
     halves.separator = bisect(graph, nodes, state);
-    refine_separator(graph, nodes, halves.separator, state);
     for (const Index node : nodes) {
         if (state.side[node] == Side::between) continue;
         (state.side[node] == Side::left ? halves.left : halves.right).push_back(node);

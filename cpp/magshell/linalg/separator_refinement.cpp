@@ -8,6 +8,7 @@ namespace magshell {
 namespace {
 
 constexpr double largest_share = 0.6;  // of a side
+constexpr double alike_enough = 0.52;  // the larger side's share of both
 constexpr int most_passes = 3;
 constexpr int most_moves_in_vain = 200;  // nor more than the separator has nodes
 
@@ -31,8 +32,12 @@ class Refinement {
     }
 
   private:
-    // Less is better: the separator's weight, then how unlike the sides are.
-    std::pair<Index, Index> cost() const { return {weight_[2], std::max(weight_[0], weight_[1])}; }
+    // Less is better: the separator's weight, then how unlike the sides are. Sides that are alike enough become no more
+    // so: a separator gets steps from it, along which later cuts take longer.
+    std::pair<Index, Index> cost() const {
+        const Index larger = std::max(weight_[0], weight_[1]);
+        return {weight_[2], larger > alike_enough * (weight_[0] + weight_[1]) ? larger : 0};
+    }
 
     struct Move {
         Index gain, node;

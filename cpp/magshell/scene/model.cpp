@@ -244,10 +244,9 @@ std::string Model::not_finite(const VectorXd& q, const Controls& controls) {
 
 void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, bool cautious) {
     const auto clear = [&](std::size_t chunk) {
-        for (const Index node : first_nodes_[chunk]) matrix_.clear_node(node);
-        for (const Index rotation : first_rotations_[chunk]) matrix_.clear_rotation(rotation);
+        for (const auto& [first, last] : first_columns_[chunk]) matrix_.clear_columns(first, last);
     };
-    clear(first_nodes_.size() - 1);
+    clear(first_columns_.size() - 1);
     // All terms of a chunk before the next chunk: its share of the matrix is cleared and filled in the cache.
     for (BorderTerm* term : borders_) term->take_extrapolated(extrapolated_stress, cautious);
     for (const std::unique_ptr<Term>& term : terms_) {
@@ -300,23 +299,36 @@ void Model::reduce_matrix(Factor& factor) {
 
 void Model::share_out_columns() {
     const std::vector<Chunk> chunks = schedule_.in_order();
-    std::vector<bool> node_taken(nodes().n_nodes(), false), rotation_taken(nodes().scalars, false);
-    first_nodes_.resize(chunks.size() + 1);
-    first_rotations_.resize(chunks.size() + 1);
-    const auto take = [](std::vector<bool>& taken, Index number, std::vector<Index>& list) {
-        if (number < 0 || taken[number]) return;
-        taken[number] = true;
-        list.push_back(number);
-    };
-    for (const Chunk& chunk : chunks)
-        for (Index element = chunk.first; element < chunk.last; ++element) {
-            const Body& body = *bodies_.all()[chunk.body];
-            for (const Index node : body.nodes_of(element))
-                take(node_taken, node, first_nodes_[chunk.number]);
-            for (const Index r : body.scalars_of(element))
-                take(rotation_taken, r, first_rotations_[chunk.number]);
+    std::vector<bool> taken(matrix_.size(), false);
+    first_columns_.resize(chunks.size() + 1);
+    std::vector<Index> columns;
+    const auto take = [&](Index first, Index count) {
+        for (Index column = first; column < first + count; ++column) {
+            if (!taken[column]) columns.push_back(column);
+            taken[column] = true;
         }
-    for (Index node = 0; node < nodes().n_nodes(); ++node) take(node_taken, node, first_nodes_.back());
+    };
+    const auto hand_over = [&](std::vector<std::array<Index, 2>>& runs) {
+        std::sort(columns.begin(), columns.end());
+        for (const Index column : columns)
+            if (!runs.empty() && runs.back()[1] == column)
+                ++runs.back()[1];
+            else
+                runs.push_back({column, column + 1});
+        columns.clear();
+    };
+    for (const Chunk& chunk : chunks) {
+        const Body& body = *bodies_.all()[chunk.body];
+        for (Index element = chunk.first; element < chunk.last; ++element) {
+            for (const Index node : body.nodes_of(element))
+                if (node >= 0) take(3 * node, 3);
+            for (const Index r : body.scalars_of(element))
+                if (r >= 0) take(3 * matrix_.nodes() + r, 1);
+        }
+        hand_over(first_columns_[chunk.number]);
+    }
+    take(0, 3 * matrix_.nodes());
+    hand_over(first_columns_.back());
 }
 
 double Model::largest_share(const VectorXd& q, const VectorXd& p) const {

@@ -234,7 +234,7 @@ class Model {
     std::unique_ptr<ContactLayer> layer_;  // nullptr: no bodies touch each other
     std::int64_t coupled_ = 0;             // the version of it that the reduced pattern has; 0: it has none
     // By chunk: the nodes and rotations whose columns it is the first to add to, and so clears. Last: nobody's.
-    std::vector<std::vector<Index>> first_nodes_, first_rotations_;
+    std::vector<std::vector<std::array<Index, 2>>> first_columns_;  // from, to
     Values values_;
     Varying varying_;
     VectorXd standing_;      // the values, before any varied

@@ -47,26 +47,24 @@ struct Wing {
     Pack3 by_point() const { return (Pack(1.0) / height) * normal; }
 };
 
-/// d2α of one wing in its own variables (r, e); the (e, r) block is the transpose of `point_edge`.
-struct WingCurvature {
-    Pack33 point_point, point_edge, edge_edge;
-
-    explicit WingCurvature(const Wing& w) {
-        const Pack inverse_h = Pack(1.0) / w.height;
-        const Pack inverse_e = Pack(1.0) / w.edge_length;
-        const Pack33 turn = symmetric_outer(w.normal, w.away);
-        const Pack33 slide = outer(w.edge_direction, w.normal);
-        const Pack a = inverse_h * inverse_h, b = w.foot * a, c = inverse_e * inverse_h;
-        const Pack d = w.foot * b + Pack(0.5) * inverse_e * inverse_e, f = w.foot * c;
-        for (int row = 0; row < 3; ++row)
-            for (int column = 0; column < 3; ++column) {
-                const int k = 3 * row + column, transposed = 3 * column + row;
-                point_point.at[k] = -a * turn.at[k];
-                point_edge.at[k] = b * turn.at[k] - c * slide.at[k];
-                edge_edge.at[k] = f * (slide.at[k] + slide.at[transposed]) - d * turn.at[k];
-            }
-    }
-};
+/// factor d2α of one wing in its own variables (r, e); the (e, r) block is the transpose of `point_edge`. Of the two wings of
+/// a fold the (e, e) blocks are added up.
+inline void add_wing_curvature(const Wing& w, const Pack& factor, Pack33& point_point, Pack33& point_edge,
+                               Pack33& edge_edge) {
+    const Pack inverse_h = Pack(1.0) / w.height;
+    const Pack inverse_e = Pack(1.0) / w.edge_length;
+    const Pack33 turn = symmetric_outer(w.normal, w.away);
+    const Pack33 slide = outer(w.edge_direction, w.normal);
+    const Pack a = factor * inverse_h * inverse_h, b = w.foot * a, c = factor * inverse_e * inverse_h;
+    const Pack d = w.foot * b + Pack(0.5) * factor * inverse_e * inverse_e, f = w.foot * c;
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) {
+            const int k = 3 * row + column, transposed = 3 * column + row;
+            point_point.at[k] = -a * turn.at[k];
+            point_edge.at[k] = b * turn.at[k] - c * slide.at[k];
+            edge_edge.at[k] += f * (slide.at[k] + slide.at[transposed]) - d * turn.at[k];
+        }
+}
 
 /// A fold about the edge x0-x1 between the wings of x2 (left) and x3 (right).
 struct Fold {
@@ -95,26 +93,28 @@ struct Fold {
     }
 };
 
-/// d2theta as 3x3 blocks of the nodes 0..3, the lower triangle at row (row + 1) / 2 + column. The last but
+/// moment d2theta as 3x3 blocks of the nodes 0..3, the lower triangle at row (row + 1) / 2 + column. The last but
 /// one, (3, 2), is zero.
 struct FoldCurvature {
     enum Block { B00, B10, B11, B20, B21, B22, B30, B31, B32, B33, count };
     Pack33 block[count];
 
-    explicit FoldCurvature(const Fold& fold) {
-        const WingCurvature l(fold.left), r(fold.right);
+    explicit FoldCurvature(const Fold& fold, const Pack& moment) {
         const Pack p = fold.right_is_point;
         // x1 enters by e, x2 by r_left, x3 by r_right, and x0 by minus their sum (r_right only where x3 is a point).
-        block[B11] = l.edge_edge - r.edge_edge;
-        block[B21] = l.point_edge;
-        block[B31] = -r.point_edge;
-        block[B22] = l.point_point;
-        block[B33] = -r.point_point;
-        block[B32] = {};
-        block[B20] = -(block[B21] + block[B22]);
-        block[B30] = -(block[B31] + p * block[B33]);
-        block[B10] = -transpose(block[B11] + block[B21] + p * block[B31]);
-        block[B00] = -(block[B10] + block[B20] + p * block[B30]);
+        block[B11] = block[B32] = {};
+        add_wing_curvature(fold.left, moment, block[B22], block[B21], block[B11]);
+        add_wing_curvature(fold.right, -moment, block[B33], block[B31], block[B11]);
+        // Number by number: whole blocks would be copied.
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 3; ++column) {
+                const int k = 3 * row + column, transposed = 3 * column + row;
+                block[B20].at[k] = -(block[B21].at[k] + block[B22].at[k]);
+                block[B30].at[k] = -(block[B31].at[k] + p * block[B33].at[k]);
+                block[B10].at[transposed] = -(block[B11].at[k] + block[B21].at[k] + p * block[B31].at[k]);
+            }
+        for (int k = 0; k < 9; ++k)
+            block[B00].at[k] = -(block[B10].at[k] + block[B20].at[k] + p * block[B30].at[k]);
     }
 };
 

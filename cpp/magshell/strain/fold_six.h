@@ -51,11 +51,10 @@ class FoldSix {
 
     /// Adds moment d2theta, as lower blocks of the nine nodes at lower_index.
     void add_curvature(const Pack& moment, Pack33 h[45]) const {
-        const FoldCurvature c(fold_);
-        const auto times = [&](const Pack33& block) { return moment * block; };
-        const Pack33 tt = times(c.block[FoldCurvature::B11]), lt = times(c.block[FoldCurvature::B21]),
-                     rt = times(c.block[FoldCurvature::B31]), ll = times(c.block[FoldCurvature::B22]),
-                     rr = times(c.block[FoldCurvature::B33]);
+        const FoldCurvature c(fold_, moment);
+        const Pack33 &tt = c.block[FoldCurvature::B11], &lt = c.block[FoldCurvature::B21],
+                     &rt = c.block[FoldCurvature::B31], &ll = c.block[FoldCurvature::B22],
+                     &rr = c.block[FoldCurvature::B33];
         // Of the edge's nodes, which enter by t, and by u on both sides alike.
         const Pack33 both_t = lt + right_is_face_ * rt, both = ll + right_is_face_ * rr,
                      t_both = transpose(both_t);

@@ -5,6 +5,19 @@
 #include "magshell/assembly/folds.h"
 
 namespace magshell {
+namespace {
+
+// Asks for entries of an array that a loop comes to soon, if there are so many.
+template <class Array>
+void fetch(const Array& array, Index first, Index count) {
+    const Index last = std::min(first + count, static_cast<Index>(array.size()));
+    if (first >= last) return;
+    const char *at = reinterpret_cast<const char*>(&array[first]),
+               *end = reinterpret_cast<const char*>(&array[last - 1] + 1);
+    for (; at < end; at += 64) __builtin_prefetch(at);
+}
+
+}  // namespace
 
 BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
                          const Nodes& nodes, const SystemMatrix& matrix, Registry& registry)
@@ -18,7 +31,11 @@ BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks
       growth_(sheet.owner, sheet.faces, growth, registry),
       curvature_scale_(registry.values.add(sheet.owner, "curvature_scale", "1", sheet.n_edges(), 1)),
       stiffness_(face_packs()),
-      folds_(sheet.folds.size()) {
+      turns_(sheet.folds.size()),
+      rates_(sheet.folds.size()),
+      gradients_(sheet.folds.size()) {
+    face_slots_.reserve(sheet.n_faces());
+    fold_slots_.reserve(sheet.folds.size());
     for (const Stencil& s : sheet.stencils) {
         FaceSlots& slots = face_slots_.emplace_back();
         slots.nodes = pair_slots<6>(matrix, s.nodes);
@@ -132,12 +149,12 @@ void BendingTerm::store_folds(const double* q) {
             Pack3 g[4];
             fold.gradient(g);
             for (int lane = 0; lane < last - first; ++lane) {
-                FoldState& state = folds_[first + lane];
-                state.turn = turn_from(sheet_.folds[first + lane], angle[lane]);
+                turns_[first + lane] = turn_from(sheet_.folds[first + lane], angle[lane]);
+                double* const gradient = gradients_[first + lane].data();
                 for (int k = 0; k < 4; ++k) {
-                    state.gradient[3 * k] = g[k].x[lane];
-                    state.gradient[3 * k + 1] = g[k].y[lane];
-                    state.gradient[3 * k + 2] = g[k].z[lane];
+                    gradient[3 * k] = g[k].x[lane];
+                    gradient[3 * k + 1] = g[k].y[lane];
+                    gradient[3 * k + 2] = g[k].z[lane];
                 }
             }
         }
@@ -145,17 +162,17 @@ void BendingTerm::store_folds(const double* q) {
 }
 
 /// delta of a pack of faces from a number a fold and the rotations in q; linear, so it serves rates as well.
-void BendingTerm::measure(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const {
-    const auto turn_of = [&](Index fold) { return folds_[fold].*turn; };
+void BendingTerm::measure(Index pack, const double* q, const std::vector<double>& turns,
+                          Pack delta[3]) const {
+    const auto turn_of = [&](Index fold) { return turns[fold]; };
     const double* rotation = q + first_scalar_;
-    for (int lane = 0; lane < Pack::width; ++lane) {
-        const std::array<FaceSide, 3>& sides = sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
-        for (int i = 0; i < 3; ++i) delta[i].set(lane, bending_strain(sides[i], turn_of, rotation));
-    }
+    const SidesOfPack sides = sides_of(pack);
+    for (int i = 0; i < 3; ++i)
+        delta[i] = pack_of([&](int lane) { return bending_strain((*sides[lane])[i], turn_of, rotation); });
 }
 
 double BendingTerm::energy(const double* q, const Controls&) const {
-    std::vector<double> turns(folds_.size());
+    std::vector<double> turns(sheet_.folds.size());
     chunks_.each([&](const Chunk& chunk) {
         for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, chunk.last_fold);
@@ -201,12 +218,15 @@ double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const
 
 void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
     // Faces that share a rotation share an edge and so a node: chunks of one colour meet at no rotation either.
+    constexpr Index ahead = 24;  // folds
     chunks_.scatter([&](const Chunk& chunk) {
         for (Index h = chunk.first_fold; h < chunk.last_fold; ++h) {
+            fetch(sheet_.folds, h + ahead, 1);
+            fetch(gradients_, h + ahead, 1);
             const double m = moment(sheet_.folds[h], stresses);
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)
-                    out.add(3 * sheet_.folds[h].nodes[k] + c, m * folds_[h].gradient[3 * k + c]);
+                    out.add(3 * sheet_.folds[h].nodes[k] + c, m * gradients_[h][3 * k + c]);
         }
         for (Index f = chunk.first; f < chunk.last; ++f)
             for (int i = 0; i < 3; ++i) {
@@ -226,23 +246,31 @@ void BendingTerm::assemble(const Chunk& chunk, const double* q, const Controls&,
 }
 
 void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
+    const Index next = Pack::width * (pack + 1);
+    fetch(face_slots_, next, Pack::width);
+    fetch(sheet_.sides, next, Pack::width);
+    fetch(sheet_.stencils, next, Pack::width);
+    fetch(stiffness_, pack + 1, 1);
     BendingFace face;
-    for (int lane = 0; lane < Pack::width; ++lane) {
-        const std::array<FaceSide, 3>& sides = sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
-        for (int i = 0; i < 3; ++i) {
-            const FaceSide& side = sides[i];
-            face.sign[i].set(lane, side.sign);
-            static constexpr double nothing[12] = {};
-            const double* g = side.fold < 0 ? nothing : folds_[side.fold].gradient;
-            // On its right face, a fold's first two nodes are swapped and so are its last two.
-            const int swap = side.on_left ? 0 : 3;
-            const Vec3 from[4] = {side.weight * Vec3(g + swap), side.weight * Vec3(g + 3 - swap),
-                                  side.weight * Vec3(g + 6 + swap), side.weight * Vec3(g + 9 - swap)};
-            set_lane(face.corner[i][(i + 1) % 3], lane, from[0]);
-            set_lane(face.corner[i][(i + 2) % 3], lane, from[1]);
-            set_lane(face.corner[i][i], lane, from[2]);
-            set_lane(face.beyond[i], lane, from[3]);
+    const SidesOfPack sides = sides_of(pack);
+    for (int i = 0; i < 3; ++i) {
+        static constexpr std::array<double, 12> nothing = {};
+        // On its right face, a fold's first two nodes are swapped and so are its last two.
+        const double* gradient[Pack::width];
+        int swap[Pack::width];
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const FaceSide& side = (*sides[lane])[i];
+            gradient[lane] = (side.fold < 0 ? nothing : gradients_[side.fold]).data();
+            swap[lane] = side.on_left ? 0 : 3;
         }
+        face.sign[i] = pack_of([&](int lane) { return (*sides[lane])[i].sign; });
+        const Pack weight = pack_of([&](int lane) { return (*sides[lane])[i].weight; });
+        face.corner[i][(i + 1) % 3] =
+            weight * vectors_of([&](int lane) { return gradient[lane] + swap[lane]; });
+        face.corner[i][(i + 2) % 3] =
+            weight * vectors_of([&](int lane) { return gradient[lane] + 3 - swap[lane]; });
+        face.corner[i][i] = weight * vectors_of([&](int lane) { return gradient[lane] + 6 + swap[lane]; });
+        face.beyond[i] = weight * vectors_of([&](int lane) { return gradient[lane] + 9 - swap[lane]; });
     }
     Pack33 blocks[21];
     Pack3 stiff_corner[3][3], rows[3][6];
@@ -274,10 +302,9 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
 
 void BendingTerm::assemble_folds(Index first, Index last, const double* q, const Strains& stress,
                                  SystemMatrix& out) const {
-    FoldCurvature curvature(folds_at(sheet_, first, last, q));
-    Pack moments(0.0);
-    for (Index h = first; h < last; ++h) moments.set(h - first, moment(sheet_.folds[h], stress));
-    for (Pack33& block : curvature.block) block = moments * block;
+    const Pack moments =
+        pack_of([&](int lane) { return moment(sheet_.folds[std::min(first + lane, last - 1)], stress); });
+    const FoldCurvature curvature(folds_at(sheet_, first, last, q), moments);
     for (Index h = first; h < last; ++h)
         scatter_blocks<4>(out, sheet_.folds[h].nodes, fold_slots_[h], curvature.block, h - first);
 }
@@ -285,10 +312,10 @@ void BendingTerm::assemble_folds(Index first, Index last, const double* q, const
 void BendingTerm::store_rates(const double* p) {
     chunks_.each([&](const Chunk& chunk) {
         for (Index h = chunk.first_fold; h < chunk.last_fold; ++h) {
-            folds_[h].rate = 0.0;
+            rates_[h] = 0.0;
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)
-                    folds_[h].rate += folds_[h].gradient[3 * k + c] * p[3 * sheet_.folds[h].nodes[k] + c];
+                    rates_[h] += gradients_[h][3 * k + c] * p[3 * sheet_.folds[h].nodes[k] + c];
         }
     });
 }
@@ -347,7 +374,8 @@ void BendingTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
 
 std::size_t BendingTerm::bytes() const {
     return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + growth_.bytes() +
-           bytes_of(stiffness_) + bytes_of(turned_) + bytes_of_stresses() + bytes_of(folds_);
+           bytes_of(stiffness_) + bytes_of(turned_) + bytes_of_stresses() + bytes_of(turns_) +
+           bytes_of(rates_) + bytes_of(gradients_);
 }
 
 }  // namespace magshell

@@ -45,33 +45,33 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
 
   private:
     friend class StrainScaffold<BendingTerm>;
-    // A fold at the last evaluated state.
-    struct FoldState {
-        double turn;          // theta - theta~
-        double gradient[12];  // by its four nodes
-        double rate;          // of theta, along the last extrapolated step
-        double unused[2];     // two cache lines in all
-    };
     struct FaceSlots {
         PairSlots<6> nodes;
         std::array<Index, 18> rotation_nodes;  // rotation i against node k, at 6 i + k
         std::array<Index, 6> rotations;        // rotations (i, j) at lower_index(i, j)
     };
 
+    using SidesOfPack = std::array<const std::array<FaceSide, 3>*, Pack::width>;
+    SidesOfPack sides_of(Index pack) const {
+        SidesOfPack sides;
+        for (int lane = 0; lane < Pack::width; ++lane)
+            sides[lane] = &sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
+        return sides;
+    }
     Index face_packs() const { return packs_for(sheet_.n_faces()); }
     template <class Body>
     void each_pack(const Body& body) const {
         chunks_.each([&](const Chunk& chunk) { FaceLoop::over_packs(chunk, body); });
     }
-    void measure(Index pack, const double* q, const double FoldState::* turn, Pack delta[3]) const;
+    void measure(Index pack, const double* q, const std::vector<double>& turns, Pack delta[3]) const;
     void begin_strains(const double* q) { store_folds(q); }
     void begin_rates(const double* p) { store_rates(p); }
     void strain(Index pack, const double* q, Pack d[3]) const {
-        measure(pack, q, &FoldState::turn, d);
+        measure(pack, q, turns_, d);
         if (turned_.empty()) return;
         for (int i = 0; i < 3; ++i) d[i] -= turned_[pack][i];
     }
-    void rate(Index pack, const double* p, Pack d[3]) const { measure(pack, p, &FoldState::rate, d); }
+    void rate(Index pack, const double* p, Pack d[3]) const { measure(pack, p, rates_, d); }
     const Symmetric3& stiffness(Index pack) const { return stiffness_[pack]; }
     /// Of each fold at rest, how its angle goes with its nodes along a normal of both of its sides.
     std::vector<std::array<double, 4>> slopes_at_rest() const;
@@ -97,12 +97,15 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     SheetMaterials materials_;
     SheetGrowth growth_;
     Slot curvature_scale_;
-    std::vector<FaceSlots> face_slots_;
-    std::vector<PairSlots<4>> fold_slots_;
+    LargeVector<FaceSlots> face_slots_;
+    LargeVector<PairSlots<4>> fold_slots_;
     VectorXd curvature_scales_;  // one an edge, [Chen22] k_cur
-    std::vector<Symmetric3> stiffness_;
+    LargeVector<Symmetric3> stiffness_;
     std::vector<std::array<Pack, 3>> turned_;  // grown_turns, where anything grows
-    std::vector<FoldState> folds_;
+    // Of each fold at the last evaluated state: theta - theta~, its gradient by the four nodes, and the rate of theta along
+    // the last extrapolated step.
+    std::vector<double> turns_, rates_;
+    LargeVector<std::array<double, 12>> gradients_;
 };
 
 }  // namespace magshell

@@ -113,8 +113,8 @@ void CoupleTerm::finish_assembly(const double* q, const Controls& controls, Syst
         const Pack moment(-controls[factor_.first] * couple.couple);
         Pack33 h[45] = {};
         if (couple.point < 0) {
-            const FoldCurvature curvature(flat_fold(x));
-            for (std::size_t b = 0; b < std::size(curvature.block); ++b) h[b] = moment * curvature.block[b];
+            const FoldCurvature curvature(flat_fold(x), moment);
+            std::copy(std::begin(curvature.block), std::end(curvature.block), h);
         } else {
             curved_fold(x, couple.point).add_curvature(moment, h);
         }

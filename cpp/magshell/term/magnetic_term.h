@@ -41,7 +41,7 @@ class MagneticTerm final : public Term {
     const FeltField field_;
     Slot magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
-    std::vector<Magnetic::Element> elements_;
+    LargeVector<Magnetic::Element> elements_;
     std::vector<Magnetic::Field> fields_;  // sampled for the assembly at hand; empty in a uniform field
     bool normal_magnetization_ = false;
 };

@@ -58,7 +58,7 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     const Index nodes_;
     SheetMaterials materials_;
     SheetGrowth growth_;
-    std::vector<Membrane::Element> elements_;
+    LargeVector<Membrane::Element> elements_;
     std::vector<double> state_;  // the nodes at which stress_ holds
 };
 

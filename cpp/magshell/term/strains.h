@@ -15,7 +15,7 @@ namespace magshell {
 /// `width` numbers an element, three of a sheet's, in the layout of packs: strain i of pack p at width p + i, one
 /// lane an element.
 struct Strains {
-    std::vector<Pack> packs;
+    LargeVector<Pack> packs;
     Index elements = 0;
     int width = 3;
 
