@@ -160,12 +160,13 @@ bool Newton::negligible(const VectorXd& step) const {
            negligible_move * model_.length_scale();
 }
 
-NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls, bool roughly) {
-    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {true, roughly});
+NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls, bool roughly, const LastStep& last) {
+    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {true, roughly, &last});
 }
 
-NewtonReport Newton::solve_roughly(VectorXd& q, const Controls& controls) {
-    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {false, true});
+NewtonReport Newton::solve_roughly(VectorXd& q, const Controls& controls, bool roughly,
+                                   const LastStep& last) {
+    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {false, roughly, &last});
 }
 
 // With friction held, the stage is a minimization, which damped steps do not leave. Normal forces follow,
@@ -265,11 +266,17 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
     double last_step = 0.0, step_before = 0.0, last_residual = std::numeric_limits<double>::infinity();
     double moved = std::numeric_limits<double>::infinity();  // since the last factorization
     Index first_negative_pivots = 0;
+    LastStep last;
     const auto fail = [&](std::string reason) {
         report.reason = std::move(reason);
         return report;
     };
     if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
+    if (mixed && care.last && care.last->step.size() > 0) {
+        evaluate(care.last->from, controls, anchor);
+        model_.extrapolate(care.last->step);
+        extrapolated = true;
+    }
     evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
         report.touched |= model_.touches();
@@ -293,6 +300,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
                     step_before &&
             report.factor.negative_pivots <= first_negative_pivots) {
             report.converged = report.rough = true;
+            report.last = std::move(last);
             return report;
         }
         if (report.iterations == max_iterations)
@@ -338,6 +346,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             step = solved();
         }
         const VectorXd from = model_.has_body_contact() && in_place ? q : VectorXd();
+        if (care.roughly) last.from = q;
         double share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
         if (from.size() > 0) {
@@ -370,6 +379,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             return fail("the steps of the iteration do not get shorter");
         if (mixed) model_.extrapolate(step);
         extrapolated = true;
+        if (care.roughly) last.step = step;
         step_before = last_step;
         last_step = length;
         moved += length;

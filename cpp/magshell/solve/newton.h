@@ -26,6 +26,11 @@ struct NewtonOptions {
     int max_iterations = 20;
 };
 
+/// The last of the mixed steps to a state, by which its stresses are known where they have not come to rest.
+struct LastStep {
+    VectorXd from, step;  // empty: at rest, its strains tell them
+};
+
 /// What happened in one solve at fixed controls.
 struct NewtonReport {
     bool converged = false;
@@ -33,6 +38,7 @@ struct NewtonReport {
     double residual = 0.0;
     FactorReport factor;    // of the last matrix factorized
     bool rough = false;     // whether it was ended where little was left
+    LastStep last;          // then
     bool in_place = false;  // whether that may stand for the solution's own, nothing having moved since
     bool touched = false;   // whether bodies touched, or were in each other's way, at any of its iterations
     std::string blocked;    // what was in the way of the last step of which little could be taken, in words
@@ -73,9 +79,10 @@ class Newton {
     /// As solve(), and given up as soon as the matrix has unstable directions that it had not at the beginning and steps
     /// do not get much shorter, or as steps get longer. roughly: ends where what is left is little beside what the first step
     /// moved.
-    NewtonReport solve_wary(VectorXd& q, const Controls& controls, bool roughly = false);
+    NewtonReport solve_wary(VectorXd& q, const Controls& controls, bool roughly = false,
+                            const LastStep& last = {});
     /// As solve(), or only to where what is left is little beside what the first step moved.
-    NewtonReport solve_roughly(VectorXd& q, const Controls& controls);
+    NewtonReport solve_roughly(VectorXd& q, const Controls& controls, bool roughly, const LastStep& last);
     NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
     /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity), in rounds
     /// of held normal forces: slower, and sure of foot where contacts open and close, stick and slip.
@@ -143,6 +150,7 @@ class Newton {
     /// How an iteration is watched.
     struct Care {
         bool wary = false, roughly = false;
+        const LastStep* last = nullptr;  // to where it begins
     };
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                          bool mixed, Care care);

@@ -88,6 +88,7 @@ class Statics {
                 was_stable_ = report.factor.negative_pivots == 0;
                 accept(trial, controls, target, report.residual);
                 rough_ = report.rough;
+                last_ = std::move(report.last);
                 factor = report.in_place ? report.factor : FactorReport();
                 steps.succeeded(step, report);
                 continue;
@@ -104,6 +105,7 @@ class Statics {
                 return false;
             }
             rough_ = false;
+            last_ = {};
             steps.again_with(longest_step);
         }
         return factor.succeeded ? judge(factor) : check_stability();
@@ -112,8 +114,9 @@ class Statics {
     // States on the way need not be exact.
     NewtonReport step_to(VectorXd& q, const Controls& controls, bool on_the_way) {
         const bool roughly = on_the_way && goes_roughly();
-        if (wary_) return newton_.solve_wary(q, controls, roughly);
-        return roughly ? newton_.solve_roughly(q, controls) : newton_.solve(q, controls);
+        if (wary_) return newton_.solve_wary(q, controls, roughly, last_);
+        return goes_roughly() ? newton_.solve_roughly(q, controls, roughly, last_)
+                              : newton_.solve(q, controls);
     }
 
     bool goes_roughly() const { return options_.start_at_rest && !newton_.model().has_body_contact(); }
@@ -235,6 +238,7 @@ class Statics {
     const bool wary_;         // load steps are given up at once where they leave the stable states
     bool was_stable_ = true;  // where the last load step ended
     bool rough_ = false;      // whether it ended before it was exact
+    LastStep last_;           // of that
 };
 
 }  // namespace
