@@ -160,13 +160,12 @@ bool Newton::negligible(const VectorXd& step) const {
            negligible_move * model_.length_scale();
 }
 
-NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls, bool roughly, const LastStep& last) {
-    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {true, roughly, &last});
+NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls, const LoadStep& load) {
+    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, load, true);
 }
 
-NewtonReport Newton::solve_roughly(VectorXd& q, const Controls& controls, bool roughly,
-                                   const LastStep& last) {
-    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {false, roughly, &last});
+NewtonReport Newton::solve_load(VectorXd& q, const Controls& controls, const LoadStep& load) {
+    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, load);
 }
 
 // With friction held, the stage is a minimization, which damped steps do not leave. Normal forces follow,
@@ -259,7 +258,7 @@ double Newton::obstacles_change(const VectorXd& step) const {
 }
 
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
-                             bool mixed, Care care) {
+                             bool mixed, const LoadStep& load, bool wary) {
     NewtonReport report;
     VectorXd move = model_.reduction().prescribed_increment(q, controls);
     bool extrapolated = false;
@@ -272,9 +271,9 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         return report;
     };
     if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
-    if (mixed && care.last && care.last->step.size() > 0) {
-        evaluate(care.last->from, controls, anchor);
-        model_.extrapolate(care.last->step);
+    if (mixed && load.last && load.last->step.size() > 0) {
+        evaluate(load.last->from, controls, anchor);
+        model_.extrapolate(load.last->step);
         extrapolated = true;
     }
     evaluate(q, controls, anchor);
@@ -294,7 +293,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             return report;
         }
         // Steps that shrink by squares say what is left. Beside the thickness it must be small: it stretches the sheet.
-        if (care.roughly && in_place && report.iterations > 1 && last_step <= settling * step_before &&
+        if (load.roughly && in_place && report.iterations > 1 && last_step <= settling * step_before &&
             last_step * last_step * last_step <=
                 std::min(little_left * report.first_length, 0.1 * model_.length_scale()) * step_before *
                     step_before &&
@@ -331,7 +330,13 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
                         : std::numeric_limits<double>::infinity();
             return true;
         };
-        const bool kept = report.iterations > 0 && factor_serves(contraction, report.residual, last_step);
+        const bool begun = report.iterations == 0 && load.factor && in_place;
+        if (begun) {
+            report.factor = *load.factor;
+            first_negative_pivots = report.factor.negative_pivots;
+        }
+        const bool kept =
+            begun || (report.iterations > 0 && factor_serves(contraction, report.residual, last_step));
         if (!kept && !renew()) return report;
         // Loads at rest leave a remainder of few nodes, which takes few vectors: no digit is given away.
         const VectorXd force = -gradient(q, anchor) - pull.col(0);
@@ -346,7 +351,10 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             step = solved();
         }
         const VectorXd from = model_.has_body_contact() && in_place ? q : VectorXd();
-        if (care.roughly) last.from = q;
+        if (load.roughly) last.from = q;
+        const bool bends = load.bend && report.iterations == 0 && in_place;
+        if (bends) report.tangent = step;
+        if (const VectorXd more = bends ? load.bend(step) : VectorXd(); more.size() > 0) step += more;
         double share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
         if (from.size() > 0) {
@@ -368,7 +376,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         move = left_of(move, share, q, controls);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (report.iterations == 0) report.first_length = length;
-        if (care.wary && report.iterations > 0 &&
+        if (wary && report.iterations > 0 &&
             length > std::max(settling * last_step, 1e-3 * model_.extent()) &&
             (report.factor.negative_pivots > first_negative_pivots ||
              (report.iterations > 1 ? length > last_step
@@ -377,9 +385,9 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())
             return fail("the steps of the iteration do not get shorter");
-        if (mixed) model_.extrapolate(step);
+        if (mixed) model_.extrapolate(bends ? report.tangent : step);
         extrapolated = true;
-        if (care.roughly) last.step = step;
+        if (load.roughly) last.step = step;
         step_before = last_step;
         last_step = length;
         moved += length;
