@@ -28,6 +28,7 @@ constexpr double round_off = 1e-6;   // of the extent: no energy tells such a st
 struct Kind {
     double gain = 0.0;    // [J] a factorization
     bool slower = false;  // than the one before
+    bool known = false;   // whether one has been tried
     int pause = 0, next_pause = 1;
 
     void gained(double more) {
@@ -128,6 +129,7 @@ class Downhill : private Relaxing {
                 return true;
             }
             if (found) stride_.gained(gain());
+            stride_.known = true;
             if (!found || slide_is_better())
                 stride_.rest();
             else
@@ -138,7 +140,7 @@ class Downhill : private Relaxing {
         if (!slide()) return !strides_first && strides(found) && found;
         slide_.gained(gain());
         stretched_ = true;
-        if (slide_is_better()) return true;
+        if (stride_.known && slide_is_better()) return true;
         stride_.pause = 0;
         slide_.rest();
         return true;

@@ -23,6 +23,8 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
     return scale > 0.0 ? length / scale : length > 0.0 ? 1.0 : 0.0;
 }
 
+// Of the extent: a step after which an iteration may end, and one under the floor of round-off.
+constexpr double settled_step = 1e-3, last_under_floor = 1e-5;
 // An iteration that will converge does so from its sixth step on with steps that shrink; that of a sheet, with few
 // unstable directions. A solid that a first step has stretched too far has as many as its mesh has modes across it, and
 // none after the next one.
@@ -284,10 +286,12 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent())
             return fail("the iteration diverged");
         const bool in_place = move.isZero(0.0);
-        const bool settled = report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent();
+        const bool settled =
+            report.residual <= options_.tolerance && last_step <= settled_step * model_.extent();
         // Under the floor, small forces that move a thin sheet far are lost in larger ones: a step tells them.
         if (in_place && settled &&
-            (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
+            ((report.iterations > 0 && last_step <= last_under_floor * model_.extent()) ||
+             relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
             report.in_place = moved <= negligible_move * model_.length_scale();
             return report;
