@@ -262,11 +262,12 @@ double Newton::obstacles_change(const VectorXd& step) const {
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
                              bool mixed, const LoadStep& load, bool wary) {
     NewtonReport report;
+    if (load.factor) report.factor = *load.factor;
+    Index first_negative_pivots = report.factor.negative_pivots;
     VectorXd move = model_.reduction().prescribed_increment(q, controls);
     bool extrapolated = false;
     double last_step = 0.0, step_before = 0.0, last_residual = std::numeric_limits<double>::infinity();
     double moved = std::numeric_limits<double>::infinity();  // since the last factorization
-    Index first_negative_pivots = 0;
     LastStep last;
     const auto fail = [&](std::string reason) {
         report.reason = std::move(reason);
@@ -334,13 +335,8 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
                         : std::numeric_limits<double>::infinity();
             return true;
         };
-        const bool begun = report.iterations == 0 && load.factor && in_place;
-        if (begun) {
-            report.factor = *load.factor;
-            first_negative_pivots = report.factor.negative_pivots;
-        }
-        const bool kept =
-            begun || (report.iterations > 0 && factor_serves(contraction, report.residual, last_step));
+        const bool kept = report.iterations == 0 ? load.factor && in_place
+                                                 : factor_serves(contraction, report.residual, last_step);
         if (!kept && !renew()) return report;
         // Loads at rest leave a remainder of few nodes, which takes few vectors: no digit is given away.
         const VectorXd force = -gradient(q, anchor) - pull.col(0);

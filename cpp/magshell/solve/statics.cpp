@@ -123,13 +123,19 @@ class Statics {
     // States on the way need not be exact.
     NewtonReport step_to(VectorXd& q, const Controls& controls, double step, bool on_the_way) {
         if (!goes_roughly()) return newton_.solve(q, controls);
-        LoadStep load{on_the_way, &last_};
+        LoadStep load{on_the_way, keeps_stresses() ? &last_ : nullptr};
         if (!wary_) return newton_.solve_load(q, controls, load);
         load.bend = [&](const VectorXd& tangent) { return predictor_.bend(result_.state, tangent, step); };
         return newton_.solve_wary(q, controls, load);
     }
 
     bool goes_roughly() const { return options_.start_at_rest && !newton_.model().has_body_contact(); }
+
+    // A liquid begins with the pressure of a volume that it is not to have, and a solid with stretched elements.
+    bool keeps_stresses() const {
+        const Model& model = newton_.model();
+        return model.bodies().solids().empty() && model.low_rank().empty();
+    }
 
     bool go_elsewhere() {
         constexpr int times_longer = 3;  // than Newton's way to an equilibrium that is near
