@@ -83,7 +83,9 @@ def test_a_flat_strip_far_beyond_where_it_buckles(ratio):
     push = ms.Clamp(mesh.edges_at(x=0.1), displacement=(-0.01, 0, 0))
     found = ms.equilibrium(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0)), push]))
     assert found.stable and found.factorizations <= 280
-    assert np.ptp(found.positions[:, 2]) == pytest.approx(HEIGHT, rel=1e-2)
+    assert np.ptp(found.positions[:, 2]) == pytest.approx(
+        0.0194924, rel=1e-2
+    )  # of an inextensible arch (Euler's elastica)
 
 
 def test_a_strip_buckles_to_the_side_that_its_load_pushes():

@@ -85,13 +85,17 @@ def _all() -> Iterator[tuple[str, Callable]]:
     for angle in (30, 60, 90, 120, 150, 170):
         for beta in (2.0, 5.0, 10.0, 20.0, 35.0, 50.0, 100.0):
             for cells in ((10, 1), (40, 4)):
-                yield f"C1/{angle}/{cells[0]}x{cells[1]}/{beta:g}", lambda a=angle, b=beta, c=cells: _solved(
-                    *oblique_field(a, b, c)
+                yield (
+                    f"C1/{angle}/{cells[0]}x{cells[1]}/{beta:g}",
+                    lambda a=angle, b=beta, c=cells: _solved(*oblique_field(a, b, c)),
                 )
     for cells in (8, 12, 16, 24):
         for force in (250.0, 1000.0, 2000.0, 4000.0, -250.0, -1000.0, -2000.0, -4000.0):
             side = "pulled" if force > 0 else "pushed"
-            yield f"A8 {side}/{cells}x{cells}/{force:g}", lambda n=cells, f=force: _solved(semi_cylinder(n, f))
+            yield (
+                f"A8 {side}/{cells}x{cells}/{force:g}",
+                lambda n=cells, f=force: _solved(semi_cylinder(n, f)),
+            )
     for cells in (8, 12, 16):
         for force in (300.0, 600.0, 1500.0, 3000.0):
             yield f"A6/{cells}x{cells}/{force:g}", lambda n=cells, f=force: _solved(_pinched(n, f))
@@ -113,8 +117,9 @@ def _all() -> Iterator[tuple[str, Callable]]:
         )
     for beta in (0.5, 2.0, 5.0):
         for angle in (45, 90):
-            yield f"easy/C1-{angle}, 60x6, beta {beta:g}", lambda a=angle, b=beta: _solved(
-                *oblique_field(a, b, (60, 6))
+            yield (
+                f"easy/C1-{angle}, 60x6, beta {beta:g}",
+                lambda a=angle, b=beta: _solved(*oblique_field(a, b, (60, 6))),
             )
     for each in all_cases():
         yield f"hard {each.family}/{each.name}", lambda c=each: bool(c.run().right)
@@ -188,7 +193,9 @@ def _print_families(found: dict, earlier: dict) -> None:
         families.setdefault(name.split("/")[0], []).append(name)
         if not name.startswith(("hard", "easy")):
             families.setdefault("/".join(name.split("/")[:2]), []).append(name)
-    print(f"\n{'family':34s} {'cases':>5s} {'sum':>7s} {'most':>5s}   before: sum  most   ends higher, lower, change")
+    print(
+        f"\n{'family':34s} {'cases':>5s} {'sum':>7s} {'most':>5s}   before: sum  most   ends higher, lower, change"
+    )
     for family, names in families.items():
         counts = [_count(found[name]) for name in names]
         text = f"{family:34s} {len(names):5d} {sum(counts):7d} {max(counts):5d}"
@@ -196,7 +203,8 @@ def _print_families(found: dict, earlier: dict) -> None:
         if known:
             old = [_count(earlier[name]) for name in known]
             ends = [_ends(found[name], earlier[name]) for name in known]
-            text += f"   {sum(old):11d} {max(old):5d}   {sum(e[0] for e in ends):3d} {sum(e[1] for e in ends):3d} {sum(e[2] for e in ends):+.3g}"
+            higher, lower, change = (sum(column) for column in zip(*ends, strict=True))
+            text += f"   {sum(old):11d} {max(old):5d}   {higher:3d} {lower:3d} {change:+.3g}"
         wrong = [name for name in names if found[name]["right"] is not True]
         print(text + (f"   NOT RIGHT: {wrong}" if wrong else ""))
 
