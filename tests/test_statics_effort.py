@@ -16,9 +16,9 @@ from magshell.bench.statics import oblique_field, semi_cylinder
     ),  # 30 at 150 degrees is the issue's goal, for any beta; the other bounds were set after seeing 22 to 28, 59, 8 and 9
     [
         *((150, beta, 30) for beta in (2.0, 5.0, 10.0, 20.0, 35.0, 50.0, 100.0)),
-        (170, 5.0, 55),
-        (170, 20.0, 55),
-        (170, 100.0, 75),
+        (170, 5.0, 35),
+        (170, 20.0, 50),
+        (170, 100.0, 55),
         (120, 20.0, 30),
         (90, 20.0, 28),
         (90, 100.0, 30),
@@ -41,11 +41,14 @@ def test_a_field_from_behind(angle, beta, most):
 
 @pytest.mark.parametrize(
     ("cells", "force", "most", "energy"),
-    [  # 60 is the issue's goal, which the fourth misses: it took 88
+    [  # 60 is the issue's goal, which -2000 N on 16x16 misses: it took 88
         (8, 2000.0, 60, -1268.857),
+        (12, 2000.0, 60, -1252.801),
         (16, 2000.0, 60, -1239.048),
         (8, -2000.0, 60, 69.50908),
-        (16, -2000.0, 100, -74.71199),
+        (16, -1000.0, 60, 193.9938),
+        (16, -2000.0, 80, -74.71199),
+        (24, -1000.0, 60, 201.2298),
         (24, 2000.0, 18, -1204.423),
     ],
 )
@@ -56,6 +59,33 @@ def test_a_semi_cylinder_pulled_and_pushed(cells, force, most, energy):
     assert found.stable and found.progress == 1.0
     assert found.energy <= energy + 1e-5 * abs(energy)
     assert found.factorizations <= most
+
+
+@pytest.mark.parametrize(("ratio", "most"), [(1e-6, 100), (1e-5, 60), (1e-4, 60), (1e-3, 60), (1e-2, 60)])
+def test_a_thin_strip_rolled_up(ratio, most):
+    """What a load step leaves rough would stiffen the next one: thousandfold, where the strip is thin (343 and 131 then)."""
+    length, angle, stiffness = 0.1, 1.8 * np.pi, 1e6 * (ratio * 0.1) ** 3 / 12.0
+    mesh = ms.meshes.rectangle(length, 0.1 * length, cells=(40, 2))
+    sheet = ms.Shell(mesh, thickness=ratio * length, young_modulus=1e6, poisson_ratio=0.0)
+    couple = ms.EdgeCouple(mesh.edges_at(x=length), -angle * stiffness / length)
+    found = ms.equilibrium(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[couple]))
+    assert found.stable and found.factorizations <= most
+    end = found.positions[np.isclose(mesh.rest_positions[:, 0], length)].mean(axis=0)[[0, 2]]
+    circle = length * np.array([np.sin(angle), 1.0 - np.cos(angle)]) / angle
+    np.testing.assert_allclose(end, circle, atol=1e-3 * length)
+
+
+@pytest.mark.parametrize("ratio", [1e-2, 1e-3])
+def test_a_flat_strip_far_beyond_where_it_buckles(ratio):
+    """It falls along a hundred directions at once, of which strides follow the fastest (345 and 605 factorizations)."""
+    mesh = ms.meshes.rectangle(0.1, 0.01, cells=(40, 2))
+    sheet = ms.Shell(mesh, thickness=0.1 * ratio, young_modulus=1e6, poisson_ratio=0.0)
+    push = ms.Clamp(mesh.edges_at(x=0.1), displacement=(-0.01, 0, 0))
+    found = ms.equilibrium(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0)), push]))
+    assert found.stable and found.factorizations <= 280
+    assert np.ptp(found.positions[:, 2]) == pytest.approx(
+        0.0194924, rel=1e-2
+    )  # of an inextensible arch (Euler's elastica)
 
 
 def test_a_strip_buckles_to_the_side_that_its_load_pushes():

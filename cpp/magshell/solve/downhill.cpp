@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "magshell/solve/descent.h"
 #include "magshell/solve/relaxing.h"
@@ -9,16 +11,37 @@
 namespace magshell {
 namespace {
 
-constexpr int iterations_a_stride = 10, steps_a_slide = 20;
+constexpr int iterations_a_stride = 6, steps_a_slide = 20;
 constexpr double above_instability = 1.1;         // the rate, over the most negative eigenvalue's size
 constexpr double longest = 0.3, shortest = 1e-3;  // of the extent: the radius of strides
 constexpr double has_settled = 1e-2;              // of its longest iteration: a stride's last one
-constexpr int tries = 2,
-              more_tries = 5;        // strides, ever shorter, before a slide; where strides have done better
-constexpr int longest_pause = 8;     // steps in which no stride is tried
+// Strides, ever shorter, before a slide: at first, where strides have done better, and where slides have.
+constexpr int tries = 2, more_tries = 5, fewer_tries = 1;
+constexpr Index several = 4;                              // directions in which a state falls
+constexpr int longest_pause = 16;                         // steps in which one of both is not tried
+constexpr double below_failure = 0.75, forgetting = 1.2;  // of how long strides may be
 constexpr double much_better = 4.0;  // than strides slides must be to be preferred to them
 constexpr double near = 0.05;        // of the extent: a Newton step so long may be the last
 constexpr double round_off = 1e-6;   // of the extent: no energy tells such a step
+
+/// Strides or slides: what the last one gained, and in how many steps one is tried next though the others gain more.
+struct Kind {
+    double gain = 0.0;    // [J] a factorization
+    bool slower = false;  // than the one before
+    bool known = false;   // whether one has been tried
+    int pause = 0, next_pause = 1;
+
+    void gained(double more) {
+        slower = more < gain;
+        gain = more;
+    }
+
+    bool is_due() { return pause == 0 || --pause < 0; }
+    void rest() {
+        pause = next_pause;
+        next_pause = std::min(4 * next_pause, longest_pause);
+    }
+};
 
 class Downhill : private Relaxing {
   public:
@@ -32,7 +55,7 @@ class Downhill : private Relaxing {
   private:
     // From the Hessian at q: done, or the rate of the next step, 0 where the last factorization will do.
     bool look() {
-        const FactorReport factor = newton_.factorize_at(q_, controls_);
+        const FactorReport factor = factor_ = newton_.factorize_at(q_, controls_);
         const double residual = newton_.relative_residual(q_, {});
         at_rest_ = residual <= newton_.options().tolerance;
         falls_ = false;
@@ -67,19 +90,20 @@ class Downhill : private Relaxing {
     }
 
     bool finish(double expected) {
-        return ends_by([&](VectorXd& trial) { return newton_.solve_wary(trial, controls_); },
-                       [&](const NewtonReport& report, const VectorXd& trial) {
-                           const bool there = expected <= round_off * model_.extent() &&
-                                              length(trial - q_) <= 3.0 * expected;
-                           return report.factor.negative_pivots == 0 &&
-                                  (there || lowers(model_.energy(trial, controls_)));
-                       });
+        return ends_by(
+            [&](VectorXd& trial) { return newton_.solve_wary(trial, controls_, {.factor = &factor_}); },
+            [&](const NewtonReport& report, const VectorXd& trial) {
+                const bool there =
+                    expected <= round_off * model_.extent() && length(trial - q_) <= 3.0 * expected;
+                return report.factor.negative_pivots == 0 &&
+                       (there || lowers(model_.energy(trial, controls_)));
+            });
     }
 
     bool step() {
         const bool definite = rate_ == 0.0;
         const double before = energy_, first_rate = rate_;
-        const int factorizations = newton_.factorizations() - 1;
+        int factorizations = newton_.factorizations() - 1;
         const auto gain = [&] { return (before - energy_) / (newton_.factorizations() - factorizations); };
         if (falls_ && at_rest_) push();
         newton_.evaluate(q_, controls_, {});
@@ -90,28 +114,41 @@ class Downhill : private Relaxing {
             newton_.evaluate(q_, controls_, {});
             if (!factorize_definite()) return false;
         }
+        // Where a state falls along many directions at once, strides follow the fastest of them only. Elsewhere they leave a
+        // saddle ever faster.
+        const bool doubtful = stride_.slower || (factor_.succeeded && factor_.negative_pivots >= several);
+        const bool strides_first = stride_.is_due() && !(doubtful && slide_.is_due());
         bool found = false;
-        if (!strides(found)) return false;
-        if (found) {
-            stride_gain_ = gain();
-            if (much_better * stride_gain_ < slide_gain_)
-                rest_from_strides();
+        if (strides_first) {
+            const double radius = radius_;
+            if (!strides(found)) return false;
+            if (found && std::exchange(stretched_, false)) {
+                radius_ = std::max(radius_, radius);
+                failed_ = std::numeric_limits<double>::infinity();
+                slide_.pause = std::max(slide_.pause, 1);
+                return true;
+            }
+            if (found) stride_.gained(gain());
+            stride_.known = true;
+            if (!found || slide_is_better())
+                stride_.rest();
             else
-                next_pause_ = 1;
-            return true;
+                stride_.next_pause = 1;
+            if (found) return true;
+            factorizations = newton_.factorizations() - 1;
         }
-        if (!slide()) return false;
-        slide_gain_ = gain();
-        if (slide_gain_ < much_better * stride_gain_) pause_ = 0;
+        if (!slide()) return !strides_first && strides(found) && found;
+        slide_.gained(gain());
+        stretched_ = true;
+        if (stride_.known && slide_is_better()) return true;
+        stride_.pause = 0;
+        slide_.rest();
         return true;
     }
 
-    void push() { energy_ = std::min(energy_, leave_saddle(mode_)); }
+    bool slide_is_better() const { return slide_.gain > much_better * stride_.gain; }
 
-    void rest_from_strides() {
-        pause_ = next_pause_;
-        next_pause_ = std::min(2 * next_pause_, longest_pause);
-    }
+    void push() { energy_ = std::min(energy_, leave_saddle(mode_)); }
 
     VectorXd newton_step() const { return newton_.solve_with_factor(-newton_.gradient(q_, {})); }
 
@@ -144,13 +181,10 @@ class Downhill : private Relaxing {
 
     // Ever shorter ones, until one is found; false where no rate leads on.
     bool strides(bool& found) {
-        if (pause_ > 0) {
-            --pause_;
-            return true;
-        }
         const double radius = radius_;
-        const bool proven = slide_gain_ > 0.0 && stride_gain_ >= slide_gain_;
-        for (int k = 0; k < (proven ? more_tries : tries); ++k) {
+        const bool proven = slide_.gain > 0.0 && stride_.gain >= slide_.gain;
+        const int most = proven ? more_tries : slide_is_better() ? fewer_tries : tries;
+        for (int k = 0; k < most; ++k) {
             VectorXd p = newton_step();
             if (length(p) > 1.5 * radius_) {
                 if (!shorten(p)) return false;
@@ -158,14 +192,16 @@ class Downhill : private Relaxing {
             }
             const double whole = length(p);
             if (stride(p)) {
-                radius_ = std::min(std::max(2.0 * radius_, 4.0 * last_move_), longest * model_.extent());
+                failed_ *= forgetting;
+                radius_ = std::min({std::max(2.0 * radius_, 4.0 * last_move_), below_failure * failed_,
+                                    longest * model_.extent()});
                 found = true;
                 return true;
             }
+            failed_ = std::max(std::min(failed_, whole), shortest * model_.extent());
             radius_ = std::max(0.25 * std::min(whole, radius_), shortest * model_.extent());
             if (!shorten(p)) return false;
         }
-        rest_from_strides();
         radius_ = std::min(4.0 * radius_, radius);
         return true;
     }
@@ -222,12 +258,14 @@ class Downhill : private Relaxing {
         }
     }
 
+    double failed_ = std::numeric_limits<double>::infinity();  // [m] as long as strides have failed
     double radius_, near_;  // [m] of strides, and of Newton's steps that may be the last
+    FactorReport factor_;   // at q
     Mode mode_;             // the most unstable one, where the energy falls along it
     bool falls_ = false, at_rest_ = false;
+    bool stretched_ = false;  // by a slide, which strides undo before they lead anywhere
     int looks_ = 0, next_end_ = 2;
-    int pause_ = 0, next_pause_ = 1;
-    double stride_gain_ = 0.0, slide_gain_ = 0.0;  // [J] a factorization, of the last ones
+    Kind stride_, slide_;
 };
 
 }  // namespace

@@ -23,6 +23,8 @@ double relative(const VectorXd& part, const VectorXd& magnitude, const VectorXd&
     return scale > 0.0 ? length / scale : length > 0.0 ? 1.0 : 0.0;
 }
 
+// Of the extent: a step after which an iteration may end, and one under the floor of round-off.
+constexpr double settled_step = 1e-3, last_under_floor = 1e-5;
 // An iteration that will converge does so from its sixth step on with steps that shrink; that of a sheet, with few
 // unstable directions. A solid that a first step has stretched too far has as many as its mesh has modes across it, and
 // none after the next one.
@@ -160,12 +162,12 @@ bool Newton::negligible(const VectorXd& step) const {
            negligible_move * model_.length_scale();
 }
 
-NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls, bool roughly) {
-    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {true, roughly});
+NewtonReport Newton::solve_wary(VectorXd& q, const Controls& controls, const LoadStep& load) {
+    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, load, true);
 }
 
-NewtonReport Newton::solve_roughly(VectorXd& q, const Controls& controls) {
-    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, {false, true});
+NewtonReport Newton::solve_load(VectorXd& q, const Controls& controls, const LoadStep& load) {
+    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, load);
 }
 
 // With friction held, the stage is a minimization, which damped steps do not leave. Normal forces follow,
@@ -258,18 +260,25 @@ double Newton::obstacles_change(const VectorXd& step) const {
 }
 
 NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
-                             bool mixed, Care care) {
+                             bool mixed, const LoadStep& load, bool wary) {
     NewtonReport report;
+    if (load.factor) report.factor = *load.factor;
+    Index first_negative_pivots = report.factor.negative_pivots;
     VectorXd move = model_.reduction().prescribed_increment(q, controls);
     bool extrapolated = false;
     double last_step = 0.0, step_before = 0.0, last_residual = std::numeric_limits<double>::infinity();
     double moved = std::numeric_limits<double>::infinity();  // since the last factorization
-    Index first_negative_pivots = 0;
+    LastStep last;
     const auto fail = [&](std::string reason) {
         report.reason = std::move(reason);
         return report;
     };
     if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
+    if (mixed && load.last && load.last->step.size() > 0) {
+        evaluate(load.last->from, controls, anchor);
+        model_.extrapolate(load.last->step);
+        extrapolated = true;
+    }
     evaluate(q, controls, anchor);
     for (;; ++report.iterations, ++iterations_) {
         report.touched |= model_.touches();
@@ -278,21 +287,24 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (!std::isfinite(report.residual) || last_step > 1e3 * model_.extent())
             return fail("the iteration diverged");
         const bool in_place = move.isZero(0.0);
-        const bool settled = report.residual <= options_.tolerance && last_step <= 1e-3 * model_.extent();
+        const bool settled =
+            report.residual <= options_.tolerance && last_step <= settled_step * model_.extent();
         // Under the floor, small forces that move a thin sheet far are lost in larger ones: a step tells them.
         if (in_place && settled &&
-            (report.iterations > 0 || relative_residual(q, anchor, false) <= options_.tolerance)) {
+            ((report.iterations > 0 && last_step <= last_under_floor * model_.extent()) ||
+             relative_residual(q, anchor, false) <= options_.tolerance)) {
             report.converged = true;
             report.in_place = moved <= negligible_move * model_.length_scale();
             return report;
         }
         // Steps that shrink by squares say what is left. Beside the thickness it must be small: it stretches the sheet.
-        if (care.roughly && in_place && report.iterations > 1 && last_step <= settling * step_before &&
+        if (load.roughly && in_place && report.iterations > 1 && last_step <= settling * step_before &&
             last_step * last_step * last_step <=
                 std::min(little_left * report.first_length, 0.1 * model_.length_scale()) * step_before *
                     step_before &&
             report.factor.negative_pivots <= first_negative_pivots) {
             report.converged = report.rough = true;
+            report.last = std::move(last);
             return report;
         }
         if (report.iterations == max_iterations)
@@ -323,7 +335,8 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
                         : std::numeric_limits<double>::infinity();
             return true;
         };
-        const bool kept = report.iterations > 0 && factor_serves(contraction, report.residual, last_step);
+        const bool kept = report.iterations == 0 ? load.factor && in_place
+                                                 : factor_serves(contraction, report.residual, last_step);
         if (!kept && !renew()) return report;
         // Loads at rest leave a remainder of few nodes, which takes few vectors: no digit is given away.
         const VectorXd force = -gradient(q, anchor) - pull.col(0);
@@ -338,6 +351,10 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
             step = solved();
         }
         const VectorXd from = model_.has_body_contact() && in_place ? q : VectorXd();
+        if (load.roughly) last.from = q;
+        const bool bends = load.bend && report.iterations == 0 && in_place;
+        if (bends) report.tangent = step;
+        if (const VectorXd more = bends ? load.bend(step) : VectorXd(); more.size() > 0) step += more;
         double share = advance(q, step, shortest_share, report);
         if (share < 0.0) return report;
         if (from.size() > 0) {
@@ -359,7 +376,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         move = left_of(move, share, q, controls);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (report.iterations == 0) report.first_length = length;
-        if (care.wary && report.iterations > 0 &&
+        if (wary && report.iterations > 0 &&
             length > std::max(settling * last_step, 1e-3 * model_.extent()) &&
             (report.factor.negative_pivots > first_negative_pivots ||
              (report.iterations > 1 ? length > last_step
@@ -368,8 +385,9 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())
             return fail("the steps of the iteration do not get shorter");
-        if (mixed) model_.extrapolate(step);
+        if (mixed) model_.extrapolate(bends ? report.tangent : step);
         extrapolated = true;
+        if (load.roughly) last.step = step;
         step_before = last_step;
         last_step = length;
         moved += length;

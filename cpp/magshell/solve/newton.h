@@ -26,6 +26,19 @@ struct NewtonOptions {
     int max_iterations = 20;
 };
 
+/// The last of the mixed steps to a state, by which its stresses are known where they have not come to rest.
+struct LastStep {
+    VectorXd from, step;  // empty: at rest, its strains tell them
+};
+
+/// How a load step begins, and where it may end.
+struct LoadStep {
+    bool roughly = false;                  // where what is left is little beside what the first step moved
+    const LastStep* last = nullptr;        // to where it begins
+    const FactorReport* factor = nullptr;  // of the last factorization, if that is of where it begins
+    std::function<VectorXd(const VectorXd&)> bend = {};  // what to add to its first step, or an empty vector
+};
+
 /// What happened in one solve at fixed controls.
 struct NewtonReport {
     bool converged = false;
@@ -33,6 +46,8 @@ struct NewtonReport {
     double residual = 0.0;
     FactorReport factor;    // of the last matrix factorized
     bool rough = false;     // whether it was ended where little was left
+    LastStep last;          // then
+    VectorXd tangent;       // the first step, before anything was added to it
     bool in_place = false;  // whether that may stand for the solution's own, nothing having moved since
     bool touched = false;   // whether bodies touched, or were in each other's way, at any of its iterations
     std::string blocked;    // what was in the way of the last step of which little could be taken, in words
@@ -71,11 +86,10 @@ class Newton {
     /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
     NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
     /// As solve(), and given up as soon as the matrix has unstable directions that it had not at the beginning and steps
-    /// do not get much shorter, or as steps get longer. roughly: ends where what is left is little beside what the first step
-    /// moved.
-    NewtonReport solve_wary(VectorXd& q, const Controls& controls, bool roughly = false);
-    /// As solve(), or only to where what is left is little beside what the first step moved.
-    NewtonReport solve_roughly(VectorXd& q, const Controls& controls);
+    /// do not get much shorter, or as steps get longer.
+    NewtonReport solve_wary(VectorXd& q, const Controls& controls, const LoadStep& load);
+    /// As solve(), beginning and ending as a load step.
+    NewtonReport solve_load(VectorXd& q, const Controls& controls, const LoadStep& load);
     NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
     /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity), in rounds
     /// of held normal forces: slower, and sure of foot where contacts open and close, stick and slip.
@@ -140,12 +154,8 @@ class Newton {
     }
 
   private:
-    /// How an iteration is watched.
-    struct Care {
-        bool wary = false, roughly = false;
-    };
     NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
-                         bool mixed, Care care);
+                         bool mixed, const LoadStep& load, bool wary = false);
     /// What is left of a motion that supports and motors prescribe after a share of it.
     VectorXd left_of(const VectorXd& move, double share, const VectorXd& q, const Controls& controls) const;
     /// Of a step, which is a share of a whole one, the part up to which bodies that touch do not push back by more than it

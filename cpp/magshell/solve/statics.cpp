@@ -5,6 +5,7 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/deflation.h"
+#include "magshell/solve/load_predictor.h"
 #include "magshell/solve/load_steps.h"
 #include "magshell/solve/put_in_joints.h"
 #include "magshell/solve/relaxation.h"
@@ -19,7 +20,13 @@ class Statics {
   public:
     Statics(Newton& newton, const Controls& from, const Controls& to, const StaticsOptions& options,
             StaticsResult& result)
-        : newton_(newton), from_(from), to_(to), options_(options), result_(result), wary_(goes_warily()) {}
+        : newton_(newton),
+          from_(from),
+          to_(to),
+          options_(options),
+          result_(result),
+          wary_(goes_warily()),
+          predictor_(newton.model().n_coordinates()) {}
 
     bool run() {
         const bool found = search();
@@ -79,15 +86,17 @@ class Statics {
             const double target = step < left ? result_.progress + step : 1.0;
             const Controls controls = controls_at(target);
             VectorXd trial = result_.state;
-            NewtonReport report = step_to(trial, controls, target < 1.0);
+            NewtonReport report = step_to(trial, controls, target - result_.progress, target < 1.0);
             if (report.converged && strays(report, step)) {
                 report.converged = false;
                 report.reason = "a step ended on another branch, which is not stable";
             }
             if (report.converged) {
                 was_stable_ = report.factor.negative_pivots == 0;
+                predictor_.went(result_.state, report.tangent, target - result_.progress);
                 accept(trial, controls, target, report.residual);
                 rough_ = report.rough;
+                last_ = std::move(report.last);
                 factor = report.in_place ? report.factor : FactorReport();
                 steps.succeeded(step, report);
                 continue;
@@ -104,19 +113,29 @@ class Statics {
                 return false;
             }
             rough_ = false;
+            last_ = {};
+            predictor_.forget();
             steps.again_with(longest_step);
         }
         return factor.succeeded ? judge(factor) : check_stability();
     }
 
     // States on the way need not be exact.
-    NewtonReport step_to(VectorXd& q, const Controls& controls, bool on_the_way) {
-        const bool roughly = on_the_way && goes_roughly();
-        if (wary_) return newton_.solve_wary(q, controls, roughly);
-        return roughly ? newton_.solve_roughly(q, controls) : newton_.solve(q, controls);
+    NewtonReport step_to(VectorXd& q, const Controls& controls, double step, bool on_the_way) {
+        if (!goes_roughly()) return newton_.solve(q, controls);
+        LoadStep load{on_the_way, keeps_stresses() ? &last_ : nullptr};
+        if (!wary_) return newton_.solve_load(q, controls, load);
+        load.bend = [&](const VectorXd& tangent) { return predictor_.bend(result_.state, tangent, step); };
+        return newton_.solve_wary(q, controls, load);
     }
 
     bool goes_roughly() const { return options_.start_at_rest && !newton_.model().has_body_contact(); }
+
+    // A liquid begins with the pressure of a volume that it is not to have, and a solid with stretched elements.
+    bool keeps_stresses() const {
+        const Model& model = newton_.model();
+        return model.bodies().solids().empty() && model.low_rank().empty();
+    }
 
     bool go_elsewhere() {
         constexpr int times_longer = 3;  // than Newton's way to an equilibrium that is near
@@ -220,7 +239,13 @@ class Statics {
         newton_.model().reduction().advance(trial, p);
         newton_.evaluate(trial, result_.controls, {});
         const double after = newton_.relative_residual(trial, {}, false);
-        if (!(after < before)) return;
+        // Under the floor rounding decides which residual is smaller: of so short a step the matrix knows more.
+        constexpr double rounding = 1e-9;  // of the extent
+        const bool tiny = p.head(newton_.model().n_coordinates()).lpNorm<Eigen::Infinity>() <=
+                          rounding * newton_.model().extent();
+        if (!(after < before) &&
+            !(tiny && newton_.relative_residual(trial, {}) <= newton_.options().tolerance))
+            return;
         result_.state = trial;
         result_.turns = newton_.model().turns();
         result_.residual = std::min(result_.residual, after);
@@ -235,6 +260,8 @@ class Statics {
     const bool wary_;         // load steps are given up at once where they leave the stable states
     bool was_stable_ = true;  // where the last load step ended
     bool rough_ = false;      // whether it ended before it was exact
+    LastStep last_;           // of that
+    LoadPredictor predictor_;
 };
 
 }  // namespace
