@@ -56,7 +56,6 @@ def calls(s: Sample) -> Iterator[Call]:
     yield from _scenes(s)
     yield from _fields(s)
     yield from _solves(s)
-    yield from _files(s)
 
 
 def _meshes(s: Sample) -> Iterator[Call]:
@@ -320,88 +319,3 @@ def _here():
     from concurrent.futures import ThreadPoolExecutor
 
     return ThreadPoolExecutor(1)
-
-
-def _files(s: Sample) -> Iterator[Call]:
-    n_v, n_f = s.mesh.n_vertices, s.mesh.n_faces
-    there = s.folder / "mesh.ply"
-    yield Call("read_mesh", ms.read_mesh, {"path": there, "drop_unused": False, "unit": "mm"})
-    yield Call("read_fields", ms.read_fields, {"path": there, "drop_unused": False})
-    fields = {"vertex_fields": {"u": np.zeros(n_v)}, "face_fields": {"m": np.zeros((n_f, 3))}}
-    yield Call(
-        "write_mesh",
-        ms.write_mesh,
-        {"path": s.folder / "out.ply", "mesh": s.mesh, "positions": s.positions, **fields},
-    )
-    states = {"positions": np.stack([s.positions] * 2), "times": (0.0, 1.0)}
-    yield Call(
-        "write_series",
-        ms.write_series,
-        {
-            "path": s.folder / "out.pvd",
-            "what": s.mesh,
-            **states,
-            "velocities": np.zeros((2, n_v, 3)),
-            "vertex_fields": {"u": np.zeros((2, n_v))},
-            "face_fields": {"m": np.zeros((2, n_f, 3))},
-            "progress": False,
-        },
-        cost=3,
-    )
-    painted = ms.Style(backend="matplotlib")
-    look = {
-        "remanent_magnetization": None,
-        "applied_flux_density": None,
-        "view": None,
-    }
-    yield Call("Keep", ms.Keep, {"what": "stages", "memory_budget": 1e6})
-    yield Call("View", ms.View, {"elevation": 20.0, "azimuth": 30.0, "frame": [(0, 0, 0), (1, 1, 1)]})
-    color = {"values": np.zeros(n_f), "label": "u", "range": (0.0, 1.0), "scale": "diverging"}
-    yield Call("Color", lambda **a: ms.plot(s.mesh, color=ms.Color(**a), style=painted), color, cost=30)
-    shown = ("show_field", "rest", "mesh_lines")
-    style = {"arrows": 3, **dict.fromkeys(shown, True), "contacts": False, "backend": "matplotlib"}
-    yield Call("Style", ms.Style, style)
-    yield Call(
-        "plot",
-        ms.plot,
-        {
-            "what": s.mesh,
-            "positions": s.positions,
-            **look,
-            "color": np.zeros(n_f),
-            "width": 400,
-            "columns": 1,
-            "style": painted,
-        },
-        cost=30,
-    )
-    yield Call(
-        "write_page",
-        ms.write_page,
-        {
-            "what": s.mesh,
-            "path": s.folder / "out.html",
-            **states,
-            **look,
-            "obstacles": (),
-            "color": None,
-            "size_limit": 1e7,
-        },
-        cost=10,
-    )
-    yield Call(
-        "animate",
-        ms.animate,
-        {
-            "what": s.mesh,
-            "path": s.folder / "out.gif",
-            **states,
-            **look,
-            "fps": 5.0,
-            "speed": 1.0,
-            "width": 400,
-            "style": painted,
-            "progress": False,
-        },
-        cost=60,
-    )
