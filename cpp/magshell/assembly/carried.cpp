@@ -317,6 +317,7 @@ void Carried::pull_back(const VectorXd& full, VectorXd& reduced) const {
 void Carried::diagonal(const VectorXd& weights, VectorXd& reduced) const {
     for (const Chunk& chunk : chunks_) {
         const Index n = chunk.carrier->coordinates();
+        if (n == 0) continue;  // an empty matrix has no diagonal to point to
         reduced.segment(free_ + chunk.first, n) =
             chunk.twists.product(chunk.carrier->gather(weights)).diagonal().head(n);
     }
