@@ -86,7 +86,7 @@ class State:
 
 @dataclass(frozen=True)
 class Design(State):
-    """The best that was found. history: ms.Record each, whose `terms` hold the mean square miss."""
+    """The best that was found. history: as that of ms.minimize, whose `terms` hold the mean square miss."""
 
     history: list
 

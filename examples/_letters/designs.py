@@ -29,7 +29,7 @@ SCALE_PRICE = (
 class Design:
     """An optimized sheet, in SI units, and how it came about.
 
-    history: ms.Record an iteration; `terms` holds the mismatch. error: rms distance over the letter's height.
+    history: an entry an iteration; `terms` holds the mismatch. error: rms distance over the letter's height.
     squares: sum of squared distances, m2, the objective of [Chen22].
     """
 

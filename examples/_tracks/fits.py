@@ -55,7 +55,7 @@ class Fit:
     positions: np.ndarray
     track: np.ndarray
     replayed: np.ndarray
-    history: list[ms.Record]
+    history: list  # as that of ms.minimize
 
     @property
     def figures(self) -> dict[str, float]:
