@@ -152,8 +152,10 @@ def test_bad_input(function) -> None:
         function(about, about)
     with pytest.raises(ValueError, match="of another scene"):
         function(held(sheet, (-EULER, 0, 0)), about)
-    with pytest.raises(ValueError, match="values: it has that of the equilibrium"):
+    with pytest.raises(ValueError, match="values are those of the equilibrium: give them to"):
         function(scene, about, values={sheet: {"growth": 1.1}})
+    with pytest.raises(ValueError, match="remanent_magnetization is that of the equilibrium: give it to"):
+        function(scene, about, remanent_magnetization=(1e4, 0, 0))
     with pytest.raises(ValueError, match="controls are those of the equilibrium, so that nothing changes"):
         function(scene, about, load_factor=0.5)
     with pytest.raises(ValueError, match="no UniformField"):

@@ -125,6 +125,22 @@ def test_a_wrong_keyword_of_an_optimizer() -> None:
             "AreaLoad faces were given as vert",
         ),
         (lambda: ms.Pressure(1.0, faces=BOX.tetrahedra_at(x=0.0)), "Pressure faces were given as tetrahedra"),
+        (
+            lambda: ms.Pressure(1.0, faces=CURVED.elements_where(lambda x: x[:, 0] > 0.05)),
+            r"Pressure faces were given as elements of six nodes: .* of element k are 4 k to 4 k \+ 3",
+        ),
+        (
+            lambda: ms.Fibres(BOX.vertices_at(x=0.0)[:1], [(1, 0, 0)]),
+            "elements were given as vertices: select tetrahedra, as by mesh.tetrahedra_at",
+        ),
+        (
+            lambda: ms.fibres_along([(0, 0, 0), (1, 1, 1)], BOX, reach=1.0, elements=BOX.faces_at(x=0.0)),
+            "elements were given as faces: select tetrahedra",
+        ),
+        (
+            lambda: ms.Cells(CUBE, [BOX.vertices_at(x=0.0)], stiffness=1.0),
+            "Cells groups were given as vertices: select tetrahedra",
+        ),
     ],
 )
 def test_vertices_are_not_taken_for_edges(make, message) -> None:
@@ -134,6 +150,8 @@ def test_vertices_are_not_taken_for_edges(make, message) -> None:
 
 
 BOX = ms.meshes.box((1, 1, 1), cells=(1, 1, 1))
+CUBE = ms.Solid(BOX, material=ms.NeoHookean(young_modulus=1.0, poisson_ratio=0.0), element="linear")
+CURVED = ms.meshes.rectangle(0.1, 0.02, cells=(6, 2), order=2)
 
 
 def test_selections_are_arrays_otherwise() -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._checks.quantity import quantity
+from ._checks.quantity import one_or_more, quantity
 from ._checks.scalars import positive
 from ._checks.tensors import detached, is_tensor, like, real_tensor, require_torch
 
@@ -22,9 +22,9 @@ class Ink:
     """The magnetizations that can be printed: a few directions, one strength, and any share of it or a few.
 
     strength: A/m, of a face that is magnetized fully.
-    directions: (k, 3), of any length but zero; in world axes at rest, or in those of `frames`.
-    levels: shares of the strength that can be printed, each from 0 to 1: (1,) where every face is magnetized fully,
-        (0, 1) where it may have no magnetization, (0, 0.5, 1) in three steps. None: any share.
+    directions: (k, 3), or (3,) for one, of any length but zero; in world axes at rest, or in those of `frames`.
+    levels: shares of the strength that can be printed, one or several, each from 0 to 1: 1 where every face is magnetized
+        fully, (0, 1) where it may have no magnetization, (0, 0.5, 1) in three steps. None: any share.
     frames: (n_f, 3, 3), for directions that are others on every face: rows are three orthogonal unit vectors, in which
         `directions` are given, see `ms.parametrize.radial_frames` and `ms.parametrize.frames_along`. None: world axes.
 
@@ -45,7 +45,7 @@ class Ink:
         frames: Numbers | None = None,
     ):
         self.strength: float = positive("strength", "A/m", detached(strength))
-        rays = quantity("directions", "1", np.atleast_2d(detached(directions)), ("k", 3))
+        rays = one_or_more("directions", "1", detached(directions), ("k", 3))
         lengths = np.linalg.norm(rays, axis=1, keepdims=True)
         if len(rays) == 0:
             raise ValueError("directions must hold at least one")
@@ -152,7 +152,7 @@ class Ink:
 
 
 def _checked_levels(levels) -> tuple[float, ...]:
-    given = quantity("levels", "1", np.atleast_1d(detached(levels)), ("n",))
+    given = one_or_more("levels", "1", detached(levels), ("n",))
     if not (len(given) and given.min() >= 0 and 0 < given.max() <= 1):
         raise ValueError(
             f"levels must be shares of the strength from 0 to 1, one of them positive, got {given.tolist()}"

@@ -32,6 +32,16 @@ def quantity(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) ->
     return array
 
 
+def one_or_more(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) -> np.ndarray:
+    """A quantity of which there may be several, along the first axis of the shape; one alone needs no such axis.
+
+    >>> one_or_more("directions", "1", [0, 0, 1], ("k", 3)).shape
+    (1, 3)
+    """
+    array = real_numbers(label(name, unit), values)
+    return quantity(name, unit, array[None] if fits(array.shape, shape[1:]) else array, shape)
+
+
 def label(name: str, unit: str) -> str:
     """What messages call a quantity; unit "" for a number without one."""
     return f"{name} [{unit}]" if unit else name

@@ -8,12 +8,18 @@ import numpy as np
 
 from .quantity import array_of
 
+KINDS = ("vertices", "edges", "faces", "elements of six nodes", "tetrahedra")
+_OTHERWISE = {
+    ("vertices", "edges"): ", or all between vertices: mesh.edges_between(...)",
+    ("elements of six nodes", "faces"): "; those of element k are 4 k to 4 k + 3",
+}
+
 
 class Indices(np.ndarray):
     """Indices that know what they count: vertices taken for edges would be other places without an error. Parts of them
     know it too; what is computed from them is a plain array.
 
-    kind: "vertices", "edges", "faces" or "tetrahedra".
+    kind: one of KINDS.
     """
 
     kind: str | None
@@ -38,21 +44,23 @@ class Indices(np.ndarray):
         return repr(self.view(np.ndarray))
 
 
-def _check_kind(name: str, values: Any) -> None:
-    """Raises ValueError where indices count other things than those that the last word of their name says."""
-    wanted, given = name.split()[-1], getattr(values, "kind", None)
-    kinds = ("vertices", "edges", "faces", "tetrahedra")
+def _check_kind(name: str, values: Any, wanted: str) -> None:
+    """Raises ValueError where indices count other things than those wanted."""
+    given = getattr(values, "kind", None)
     numbers = isinstance(values, Indices) and values.dtype != bool
-    if numbers and given in kinds and wanted in kinds and given != wanted:
-        between = ", or all between vertices: mesh.edges_between(...)" if wanted == "edges" else ""
+    if numbers and given in KINDS and wanted in KINDS and given != wanted:
+        otherwise = _OTHERWISE.get((given, wanted), "")
         raise ValueError(
-            f"{name} were given as {given}: select {wanted}, as by mesh.{wanted}_at(...){between}"
+            f"{name} were given as {given}: select {wanted}, as by mesh.{wanted}_at(...){otherwise}"
         )
 
 
-def selection(name: str, values: Any) -> np.ndarray:
-    """Indices, or a mask, as they were given: (k,), k > 0. `indices` checks them once their mesh is known."""
-    _check_kind(name, values)
+def selection(name: str, values: Any, of: str | None = None) -> np.ndarray:
+    """Indices, or a mask, as they were given: (k,), k > 0. `indices` checks them once their mesh is known.
+
+    of: what they count, by default what the last word of their name says.
+    """
+    _check_kind(name, values, of or name.split()[-1])
     array = np.atleast_1d(array_of(name, values, "be integer indices of shape (k,)"))
     if array.size == 0:
         raise ValueError(f"{name} are empty: there is nothing to apply this to")

@@ -41,7 +41,7 @@ class Fibres:
     length: float | None = None
 
     def __post_init__(self) -> None:
-        elements = selection("elements", self.elements)
+        elements = selection("elements", self.elements, "tetrahedra")
         count = len(elements) if elements.dtype != bool else int(elements.sum())
         directions = quantity("directions", "", self.directions, (count, 3))
         weights = np.ones(count) if self.weights is None else self.weights
@@ -114,7 +114,7 @@ def fibres_along(
     points = mesh.tetrahedron_barycenters
     chosen = np.arange(len(points))
     if elements is not None:
-        chosen = indices("elements", selection("elements", elements), len(points))
+        chosen = indices("elements", selection("elements", elements, "tetrahedra"), len(points))
     distances, coordinates = _nearest(points[chosen], line, pieces, lengths)
     weights = np.exp(-distances / reach)
     if not (distances <= _sizes(mesh)[chosen]).any():
@@ -180,7 +180,7 @@ def fibres_of(
         return fibres
     chosen = np.arange(n)
     if elements is not None:
-        chosen = indices("elements", selection("elements", elements), n)
+        chosen = indices("elements", selection("elements", elements, "tetrahedra"), n)
     if callable(fibres):
         fibres = fibres(mesh.tetrahedron_barycenters[chosen])
     shape = shape_of("fibres", fibres)

@@ -6,10 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from .._checks.arrays import count
-from .._checks.quantity import quantity
+from .._checks.quantity import one_or_more, quantity
 from .._checks.scalars import not_negative
 from .._checks.tensors import detached, require_torch
 from .._machine.progress import progress_bar
@@ -88,7 +86,7 @@ def minimize_printable(
     if len(start) == 0:
         raise ValueError("remanent_magnetization has no faces")
     ink.check_faces(len(start))
-    weights = quantity("weights", "1", np.atleast_1d(detached(weights)), ("n",)).tolist()
+    weights = one_or_more("weights", "1", detached(weights), ("n",)).tolist()
     if any(weight < 0 for weight in weights):
         raise ValueError(f"weights must not be negative, got {weights}")
     max_iterations, stage_iterations, exchanges = (

@@ -41,11 +41,14 @@ def inputs_about(
         raise ValueError(f"equilibrium must be an Equilibrium, got {type(equilibrium).__name__}")
     if equilibrium.scene is not scene:
         raise ValueError("the equilibrium is of another scene")
-    own = {"values": values, "remanent_magnetization": remanent_magnetization}
-    for name, given in own.items():
+    own = (
+        ("values are those", "them", values),
+        ("remanent_magnetization is that", "it", remanent_magnetization),
+    )
+    for what, it, given in own:
         if given is not None:
             raise ValueError(
-                f"{name}: it has that of the equilibrium: give it to ms.equilibrium, or give no equilibrium"
+                f"{what} of the equilibrium: give {it} to ms.equilibrium, or give no equilibrium"
             )
     inputs = idle_inputs(scene, {}, applied_flux_density, **factors)
     return inputs.with_values(equilibrium._values)

@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 
 RELATIVE_TOLERANCE = 1e-6  # of the mesh's size: far above round-off, far below any edge
 
-_PLURAL = {"vertex": "vertices", "edge": "edges", "face": "faces", "tetrahedron": "tetrahedra"}
+_PLURAL = {
+    "vertex": "vertices",
+    "edge": "edges",
+    "face": "faces",
+    "element": "elements of six nodes",
+    "tetrahedron": "tetrahedra",
+}
 
 
 class MeshSelection:

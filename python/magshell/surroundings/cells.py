@@ -113,7 +113,10 @@ def _groups(groups, n_tetrahedra: int) -> list[np.ndarray]:
     if groups is None:
         return [np.array([k]) for k in range(n_tetrahedra)]
     if isinstance(groups, list | tuple) and groups and all(np.ndim(each) == 1 for each in groups):
-        cells = [indices("Cells groups", selection("Cells groups", each), n_tetrahedra) for each in groups]
+        cells = [
+            indices("Cells groups", selection("Cells groups", each, "tetrahedra"), n_tetrahedra)
+            for each in groups
+        ]
     else:
         array = np.asarray(groups)
         if array.shape != (n_tetrahedra,) or not np.issubdtype(array.dtype, np.integer):
