@@ -379,8 +379,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Anchor
         if (wary && report.iterations > 0 &&
             length > std::max(settling * last_step, 1e-3 * model_.extent()) &&
             (report.factor.negative_pivots > first_negative_pivots ||
-             (report.iterations > 1 ? length > last_step
-                                    : length > growing * std::max(last_step, model_.extent()))))
+             (report.iterations == 1 && length > growing * std::max(last_step, model_.extent()))))
             return fail("the iteration leaves the stable states");
         if (mixed && report.iterations >= settling_iterations && length > shrinking * last_step &&
             length > 1e-3 * model_.extent())
