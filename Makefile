@@ -1,19 +1,22 @@
 # One command each: `make demo` and `make test` install what is missing, build, and run. `make help` lists the rest.
 #
 # Everything lives in .venv; the stamps in it make a second call quick. PYTHON=python3.12 chooses the interpreter of a
-# new .venv.
+# new .venv. Tests run in as many processes as there are processors: PROCESSES=0 runs them one after another.
 PYTHON ?= python3
+PROCESSES ?= auto
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 
 # What the installed package is made from; a newer one means another build, an incremental one.
 sources := CMakeLists.txt pyproject.toml README.md LICENSE \
     $(shell find cpp cmake python/magshell -type f ! -name '*.so' ! -name '*.pyc' 2>/dev/null)
+# A file's tests stay together, as they share what is dear to make; what takes longest comes first (tests/parallel.py).
+PYTEST = $(VENV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 pythons := $(wildcard python tests examples docs)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test docs wheel sanitize lint format stubs clean
+.PHONY: help demo test quick seconds docs wheel sanitize lint format stubs clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -24,7 +27,14 @@ demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pict
 	@echo "The pictures are in $(CURDIR)/out:" && ls out
 
 test: $(VENV)/.with-test  ## every test, the notebooks and examples included
-	$(VENV)/bin/python -m pytest
+	$(PYTEST)
+
+quick: $(VENV)/.with-test  ## the tests that take little time: under two minutes on two processors
+	$(PYTEST) -m "not slow"
+
+seconds: $(VENV)/.with-test  ## measure again which tests take long, for `make quick`: every test
+	$(PYTEST) --junitxml=build/tests.xml
+	$(VENV)/bin/python scripts/test_seconds.py build/tests.xml tests/seconds.txt
 
 docs: $(VENV)/.with-docs  ## the manual, in docs/_build/html; warnings are errors
 	$(VENV)/bin/python -m sphinx -W --keep-going -q -j auto -b html docs docs/_build/html

@@ -1,4 +1,5 @@
-"""What every test runs under: one BLAS thread, two of ours, no display, the same random numbers every time."""
+"""What every test runs under: one BLAS thread, two of ours (one where tests run in several processes), no display, the
+same random numbers every time."""
 
 import os
 import signal
@@ -8,7 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 # Before numpy is imported: its BLAS reads these once.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
-os.environ.setdefault("MAGSHELL_NUM_THREADS", "2")  # which would follow OMP_NUM_THREADS
+# Ours would follow OMP_NUM_THREADS. Results are the same bits with any number (test_invariance.py and others).
+os.environ.setdefault("MAGSHELL_NUM_THREADS", "1" if "PYTEST_XDIST_WORKER" in os.environ else "2")
 os.environ["MPLBACKEND"] = "Agg"
 os.environ["PYVISTA_OFF_SCREEN"] = "true"
 
@@ -18,6 +20,12 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
+from parallel import (  # noqa: E402, F401 - pytest finds hooks by their names
+    pytest_collection_modifyitems,
+    pytest_configure_node,
+    pytest_runtest_protocol,
+    pytest_xdist_auto_num_workers,
+)
 
 
 @pytest.fixture

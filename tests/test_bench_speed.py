@@ -138,6 +138,7 @@ def test_exponents() -> None:
     assert fitted_exponent([10, 10], [1.0, 2.0]) is None and fitted_exponent([1, 2], [1.0, None]) is None
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("long", [True, False])
 def test_a_long_call_is_measured_in_one_round(monkeypatch, long: bool) -> None:
     calls = []
@@ -147,6 +148,7 @@ def test_a_long_call_is_measured_in_one_round(monkeypatch, long: bool) -> None:
     assert measured.wall >= 2e-3 and 0 <= measured.processor < measured.wall
 
 
+@pytest.mark.alone
 def test_share_of_the_processor() -> None:
     ms.set_num_threads(1)
     slept, share = timing.with_share(lambda: time.sleep(0.05))

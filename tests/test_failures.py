@@ -206,6 +206,7 @@ def long_solve_with_a_slow_progress(progress):
     long_solve(slow)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     "solve",
     [long_solve, long_solve_in_a_slow_field, long_solve_with_a_slow_progress],

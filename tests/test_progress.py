@@ -139,6 +139,7 @@ def test_nobody_who_listens_is_told_nothing(capsys):
     assert capsys.readouterr() == ("", "") and not logging.getLogger("magshell").handlers
 
 
+@pytest.mark.alone
 def test_progress_of_one_solve_costs_nothing_to_speak_of(monkeypatch):
     """The bar is not even made before its time."""
     monkeypatch.setattr(bars, "progress_bar", lambda *_, **__: pytest.fail("a bar was made"))

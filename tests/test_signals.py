@@ -104,6 +104,7 @@ def run(script: str) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, "-c", SOLVE + script], capture_output=True, text=True, timeout=120)
 
 
+@pytest.mark.alone
 def test_a_handler_that_returns_runs_soon_and_the_solve_goes_on():
     result = run(RETURNS)
     assert result.returncode == 0, result.stderr

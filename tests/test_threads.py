@@ -255,6 +255,7 @@ def test_more_threads_than_processors_give_the_same_bits():
     printed_by(SHEET + CROWDED, preexec_fn=lambda: os.sched_setaffinity(0, {one}))
 
 
+@pytest.mark.alone
 @LINUX
 @pytest.mark.skipif(SANITIZED, reason="sanitizers make the loops of small sheets long")
 def test_small_sheets_wake_nobody():
