@@ -244,6 +244,10 @@ BAD = [
     ({"integrator": "bdf2"}, "integrator must be"),
     ({"solver": "newton"}, "solver must be"),
     ({"record_every": 0}, "record_every"),
+    (
+        {"steps": 10, "record_every": 11},
+        "record_every must be at most steps = 10, got 11: only the start would be recorded",
+    ),
     ({"keep": "all"}, "keep must be"),
     ({"remanent_magnetization": None}, "remanent_magnetization"),
 ]

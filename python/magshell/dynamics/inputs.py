@@ -72,6 +72,11 @@ class MotionInputs:
     ):
         self.inputs, self.integrator = inputs, integrator
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
+        if self.record_every > self.steps:
+            raise ValueError(
+                f"record_every must be at most steps = {self.steps}, got {self.record_every}: "
+                "only the start would be recorded"
+            )
         check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
         self.keep, self.memory_budget = getattr(_core.Keep, keep.what or "nothing"), int(keep.memory_budget)
         self.given_time_step, self._outside = time_step, None

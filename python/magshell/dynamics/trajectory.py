@@ -12,6 +12,7 @@ from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.tensors import detached, plain_arrays
 from .._machine.files import replace_file
+from .._machine.npz import open_npz
 from .._machine.offered import Filmed
 from ..bodies.actuator import Actuator
 from ..bodies.of_body import result_of
@@ -87,7 +88,7 @@ class MotionState:
     def load(cls, path: str | Path) -> MotionState:
         """Reads what `save` wrote. Raises ValueError if it is something else."""
         try:
-            with np.load(Path(path), allow_pickle=False) as file:
+            with open_npz(Path(path)) as file:
                 time = float(quantity("time", "s", file["time"], ()))
                 origin, time_step, steps = quantity("clock", "SI", file["clock"], (3,)).tolist()
                 remembered = quantity("turns", "SI", file["turns"], ("n",))

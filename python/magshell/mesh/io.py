@@ -15,6 +15,7 @@ from .._checks.quantity import quantity, shape_of
 from .._checks.tensors import detached
 from .._machine.entry import grouped
 from .._machine.files import replacing
+from .file_counts import check_counts
 from .obj import read_obj
 from .ply import read_ply, write_ply
 from .selection import RELATIVE_TOLERANCE
@@ -192,8 +193,7 @@ def _read(path, drop_unused: bool) -> tuple[TriangleMesh | SixNodeMesh, Fields] 
     except ImportError:
         raise
     except Exception as error:  # a reader fed garbage may raise anything
-        reason = str(error) or type(error).__name__
-        raise ValueError(f"cannot read {str(path)!r} as {ending[1:].upper()}: {reason}") from error
+        raise ValueError(f"cannot read {str(path)!r} as {ending[1:].upper()}: {_reason(error)}") from error
     if isinstance(found, TetContent):
         return _solid(path, found, drop_unused)
     points, faces, vertex_fields, face_fields = found
@@ -211,6 +211,14 @@ def _read(path, drop_unused: bool) -> tuple[TriangleMesh | SixNodeMesh, Fields] 
     except ValueError as error:
         raise ValueError(f"{str(path)!r}: {error}") from error
     return mesh, Fields(vertex_fields, face_fields)
+
+
+def _reason(error: Exception) -> str:
+    """Say what a reader stumbled over; many say too little."""
+    text = str(error)
+    if text and not isinstance(error, LookupError | TypeError | AssertionError | AttributeError):
+        return text
+    return f"its contents do not fit together ({type(error).__name__}{': ' + text if text else ''})"
 
 
 def _solid(path: Path, found: TetContent, drop_unused: bool) -> tuple[TetMesh, TetFields]:
@@ -250,6 +258,7 @@ def _meshio(module: str | None = None):
 def _read_with_meshio(
     path: Path,
 ) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[Any, Any]] | TetContent:
+    check_counts(path)
     # meshio.read ends the interpreter on a file it cannot read; the readers of the formats raise
     with np.errstate(over="ignore"):  # its STL reader multiplies whatever stands where the count should
         content = _meshio(_MESHIO_MODULES[path.suffix.lower()]).read(path)

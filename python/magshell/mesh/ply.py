@@ -141,9 +141,9 @@ def _binary_table(element: _Element, data: bytes, offset: int, order: str) -> tu
         if prop.count_type is None:
             columns.append((prop.name, order + prop.type))
         else:
-            length = np.frombuffer(data, order + prop.count_type, 1, position)[0] if element.count else 0
+            length = _list_length(element, prop, data, position, order) if element.count else 0
             columns.append((prop.name + " count", order + prop.count_type))
-            columns.append((prop.name, order + prop.type, (int(length),)))
+            columns.append((prop.name, order + prop.type, (length,)))
         position = offset + np.dtype(columns).itemsize
     row = np.dtype(columns)
     available = (len(data) - offset) // row.itemsize if row.itemsize else 0
@@ -154,6 +154,21 @@ def _binary_table(element: _Element, data: bytes, offset: int, order: str) -> tu
     if available < element.count:
         raise ValueError(f"it ends in the middle: {available} of {element.count} rows of {element.name}")
     return {prop.name: table[prop.name] for prop in element.properties}, offset + row.itemsize * element.count
+
+
+def _list_length(element: _Element, prop: _Property, data: bytes, position: int, order: str) -> int:
+    """How many entries the list of an element's first row has. Raises ValueError where the file has no room for them."""
+    kind = np.dtype(order + str(prop.count_type))
+    room = len(data) - position - kind.itemsize
+    if room < 0:
+        raise ValueError(f"it ends in the middle: 0 of {element.count} rows of {element.name}")
+    length = int(np.frombuffer(data, kind, 1, position)[0])
+    if not 0 <= length * np.dtype(prop.type).itemsize <= room:
+        raise ValueError(
+            f"the list {prop.name} of the first {element.name} says that it has {length:,} entries, but only {room:,} bytes "
+            "follow"
+        )
+    return length
 
 
 def _ascii_table(element: _Element, lines) -> dict[Any, Any]:

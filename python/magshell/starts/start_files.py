@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._machine.files import replace_file
+from .._machine.npz import open_npz
 from .attempt import Outcome
 from .plain import from_plain, to_plain
 from .run_description import described, differences, told_apart
@@ -56,7 +57,7 @@ class StartFiles:
     def _read(self, number: int) -> Outcome:
         path = self._path(number)
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with open_npz(path) as file:
                 known = json.loads(file["contents"].tobytes())
                 run, start = dict(known["run"]), str(known["start"])
                 numbers = {name: float(known[name]) for name in _NUMBERS}

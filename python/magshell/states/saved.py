@@ -11,6 +11,7 @@ import numpy as np
 
 from .._core import __version__
 from .._machine.files import replace_file
+from .._machine.npz import open_npz
 from .._machine.offered import offered
 from ..dynamics.trajectory import Trajectory
 from ..scene.scene import Scene
@@ -95,7 +96,7 @@ def load(path: str | Path, scene: Scene) -> Any:  # which of them, the file tell
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
     with open(path, "rb") as opened:
         try:
-            with np.load(opened, allow_pickle=False) as file:
+            with open_npz(opened) as file:
                 known = json.loads(file[_CONTENTS].tobytes())
                 if known["format"] > _FORMAT:
                     raise _Later
