@@ -227,17 +227,17 @@ def test_a_mesh_from_a_file(tmp_path):
         (ob.slope(np.pi / 6, uphill=(0, 2)), "Plane(normal (0, -0.5, 0.866))"),
         (
             ob.Sphere(0.5, inside=True, center=(0, 0, 1)),
-            "Sphere(radius 0.5 m, the sheet inside, center (0, 0, 1) m)",
+            "Sphere(radius 0.5 m, bodies inside, center (0, 0, 1) m)",
         ),
         (ob.Box((1, 2, 3), rounding=0.1), "Box(1 x 2 x 3 m, edges rounded by 0.1 m)"),
         (
             ob.Capsule(0.2, 0.1, rotation=(0, 0, 1), motion=lambda t: [t, 0, 0]),
             "Capsule(length 0.2 m, radius 0.1 m, rotation (0, 0, 1) rad, moving)",
         ),
-        (ob.Tube(LINE, [0.1, 0.2, 0.1]), "Tube(3 points, radius 0.1 to 0.2 m, open, the sheet inside)"),
+        (ob.Tube(LINE, [0.1, 0.2, 0.1]), "Tube(3 points, radius 0.1 to 0.2 m, open, bodies inside)"),
         (
             ob.Tube(LINE, 0.1, inside=False, closed=True),
-            "Tube(3 points, radius 0.1 m, closed, the sheet outside)",
+            "Tube(3 points, radius 0.1 m, closed, bodies outside)",
         ),
         (ob.bump(0.1, 1.0), "HeightField(97 x 2 heights on 1.5 x 1.5 m, 0 to 0.1 m)"),
         (

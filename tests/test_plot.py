@@ -334,8 +334,8 @@ def test_of_many_states_some_are_drawn(mesh) -> None:
             "'volume_ratio', 'von_mises_stress', 'activation', 'fibre_stretch', "
             "'fibre_tension', 'membrane_force', 'bending_moment' or an array",
         ),
-        ({"color": "magnetization"}, "needs a magnetized sheet"),
-        ({"color": "magnetic_energy"}, "needs a magnetized sheet in a field"),
+        ({"color": "magnetization"}, "needs magnetized faces"),
+        ({"color": "magnetic_energy"}, "needs magnetized faces in a field"),
         ({"color": 7}, "color must be None, a name or an array, got 7"),
         ({"color": np.zeros(7)}, r"a number a face, \(160,\), or a vertex, \(105,\), got \(7,\)"),
         ({"color": np.full(160, np.nan)}, "must be finite"),

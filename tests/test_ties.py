@@ -94,7 +94,7 @@ def test_vibrations_of_a_coated_strip():
 def test_what_holds_one_holds_the_other():
     left, right, tie = halves()
     right_only = [ms.Clamp(right.mesh.edges_at(x=LENGTH), body=right)]
-    with pytest.raises(ValueError, match="leave the sheet free: rotation about"):
+    with pytest.raises(ValueError, match="leave the sheets free: rotation about"):
         ms.Scene(
             [left, right], supports=[*right_only, ms.Pin(left.mesh.vertices_at(x=LENGTH / 2), body=left)]
         )

@@ -22,8 +22,7 @@ def quantity(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) ->
     if not fits(array.shape, shape):
         if shape == ():
             raise ValueError(f"{named} must be a number, got shape {array.shape}")
-        wanted = ", ".join(str(size) for size in shape) + ("," if len(shape) == 1 else "")
-        raise ValueError(f"{named} must have shape ({wanted}), got {array.shape}")
+        raise ValueError(f"{named} must have shape {_shown(shape)}, got {array.shape}")
     if not np.isfinite(array).all():
         index = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
         entry = f"{name}[{', '.join(map(str, index))}]" if index else name
@@ -39,7 +38,15 @@ def one_or_more(name: str, unit: str, values: Any, shape: tuple[int | str, ...])
     (1, 3)
     """
     array = real_numbers(label(name, unit), values)
+    if not (fits(array.shape, shape) or fits(array.shape, shape[1:])):
+        raise ValueError(
+            f"{label(name, unit)} must have shape {_shown(shape[1:])} or {_shown(shape)}, got {array.shape}"
+        )
     return quantity(name, unit, array[None] if fits(array.shape, shape[1:]) else array, shape)
+
+
+def _shown(shape: tuple[int | str, ...]) -> str:
+    return f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
 
 
 def label(name: str, unit: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 FLUX_DENSITY = "applied_flux_density"
@@ -62,16 +63,49 @@ def check_known(function: str, named, known, groups: dict[str, type[Any]]) -> No
                     there = f"{parameter}=ms.{group.__name__}({field}=...)"
                     raise TypeError(f"{function}() has no keyword {name!r}: it is said by {there}")
         there = [each for each in known if each != "self"]
-        raise TypeError(
-            f"{function}() has no keyword {name!r}; it has, most like it first: {nearest_first(name, there)}"
-        )
+        use = f"{use}; it has" if (use := meant(name, there)) else "it has, most like it first"
+        raise TypeError(f"{function}() has no keyword {name!r}; {use}: {nearest_first(name, there)}")
+
+
+# What other programs and textbooks call things, and their names here, of which a function may have one.
+_ELSEWHERE = {
+    "young_modulus": ("E", "Y", "youngs_modulus", "elastic_modulus", "modulus", "stiffness"),
+    "poisson_ratio": ("nu", "poisson", "poissons_ratio"),
+    "mass_density": ("rho", "density"),
+    "thickness": ("h", "t"),
+    "applied_flux_density": (
+        "B",
+        "b",
+        "B0",
+        "B_a",
+        "B_applied",
+        "field",
+        "applied_field",
+        "flux_density",
+        "magnetic_field",
+    ),
+    "remanent_magnetization": ("M", "Mr", "M_r", "magnetization", "magnetisation", "remanence"),
+    "steps and time_step": ("duration", "T", "t_end", "t_max", "tmax", "end_time", "time", "times"),
+    "time_step": ("dt", "timestep", "delta_t", "step_size"),
+    "steps": ("n_steps", "num_steps", "nsteps", "number_of_steps", "n"),
+    "gravity": ("g",),
+    "cells": ("n", "resolution", "divisions"),
+}
+
+
+def meant(name: str, there: Iterable[str]) -> str:
+    """Return "use ..." with the names, of those that are there, that one from elsewhere stands for; empty without one."""
+    for own, others in _ELSEWHERE.items():
+        if name in others and set(own.split(" and ")) <= set(there):
+            return f"use {own}"
+    return ""
 
 
 def nearest_first(name, names) -> str:
     """The names that there are, the one most like `name` in front."""
     from difflib import SequenceMatcher  # for errors alone
 
-    return ", ".join(sorted(names, key=lambda each: -SequenceMatcher(None, str(name), each).ratio()))
+    return ", ".join(sorted(sorted(names), key=lambda each: -SequenceMatcher(None, str(name), each).ratio()))
 
 
 def _fields(scene) -> tuple[Any, ...]:

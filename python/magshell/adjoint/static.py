@@ -42,7 +42,7 @@ class Adjoint:
             raise NoGradient(
                 "no gradient here: the equilibrium is not stable "
                 f"({found.unstable_directions} directions lower its energy, or its Hessian is singular), "
-                "and a sheet would not stay in it. Solve with require_stable=True."
+                "and no body would stay in it. Solve with require_stable=True."
             )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from .._checks.quantity import quantity, real_numbers
+from .._machine.entry import grouped
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
@@ -27,6 +28,12 @@ class SolidMaterial:
 
     # Of each value: unit, what it has to be, and a test of that.
     _ranges: ClassVar[dict[str, tuple[str, str, Callable[..., Any]]]] = {}
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """A keyword that its constructor does not have is told with those that it has."""
+        super().__init_subclass__(**options)
+        if "__init__" in vars(cls):
+            setattr(cls, "__init__", grouped()(cls.__init__))  # noqa: B010 - assigned, it were declared to type checkers
 
     def __init__(self, **values: Any):
         self._given = {name: self._checked(name, value) for name, value in values.items()}

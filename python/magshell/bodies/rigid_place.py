@@ -146,10 +146,11 @@ def _place(
     if len(rest):  # neither much smaller than what it carries, which it turns
         length = max(length, 0.5 * np.sqrt(((rest - center) ** 2).sum(axis=1).mean()))
     if skeleton is not None:
-        length = max(length, 0.5 * skeleton.reach(part, center))
+        length = max(length, 0.5 * skeleton.reach(part, center)) or skeleton.turning_scale(part)
     if not length > 0:
         raise ValueError(
-            "a Link of a point mass needs a joint away from its center: nothing tells how it turns"
+            "a Link of a point mass needs a joint away from its center, or one that does not let it turn (Prismatic, "
+            "Fixed): nothing tells how it turns"
         )
     points = center + length * _POINTS @ axes.T
     return Place(vertices, slice(first, first + 10), points, center, axes, length, np.zeros((0, 3)))

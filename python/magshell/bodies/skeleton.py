@@ -9,7 +9,7 @@ import numpy as np
 
 from .._checks.checked_list import checked_list
 from .joint import Joint
-from .joints import Closure
+from .joints import Closure, Fixed, Prismatic
 from .rigid import Rigid
 
 if TYPE_CHECKING:
@@ -143,6 +143,18 @@ class Skeleton:
         """How far from a point of a link its joints are, m."""
         places = [joint.origin for joint in self.joints if link is joint.child or link is joint.parent]
         return max((float(np.linalg.norm(place - center)) for place in places), default=0.0)
+
+    def turning_scale(self, link: Rigid) -> float:
+        """Return a length, m, for a link that does not turn by itself as one of its joints is a slide or fixed; else 0.
+
+        It only sets how rotations of the link are scaled: that of the skeleton, 0.01 m where all of it is at one place.
+        """
+        own = [joint for joint in self.joints if link is joint.child or link is joint.parent]
+        if not any(isinstance(joint, Prismatic | Fixed) for joint in own):
+            return 0.0
+        centers = [each.center for each in self.links if each.center is not None]
+        places = np.array([*centers, *(joint.origin for joint in self.joints)])
+        return float(np.linalg.norm(np.ptp(places, axis=0))) or 0.01
 
     def held(self, link: Rigid) -> bool:
         """Whether joints lead from a link to the world."""

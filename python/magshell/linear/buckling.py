@@ -173,7 +173,7 @@ def _stiffness_change(
 
     change = (values(step) - values(-step)) / (2.0 * step)
     if not change.any():
-        raise ValueError("the controls neither load the sheet nor change its stiffness: nothing buckles it")
+        raise ValueError("the controls neither load the scene nor change its stiffness: nothing buckles")
     largest = np.abs(change).max()
     if not largest < _LARGEST_CHANGE * abs(stiffness.matrix).max():  # NaN too
         raise ValueError(
@@ -202,8 +202,7 @@ def _lowest(
         available = stiffness.negative_directions(largest * change)
         if available == 0:
             raise ValueError(
-                "the sheet does not buckle under these controls, as far as linear theory reaches; "
-                "under reversed ones it may"
+                "nothing buckles under these controls, as far as linear theory reaches; under reversed ones it may"
             )
         inverses, vectors = scipy.sparse.linalg.eigsh(k=min(count, available), which="LA", **pencil)
     except scipy.sparse.linalg.ArpackError as error:

@@ -44,7 +44,7 @@ def refuse_indefinite(report: _core.FactorReport, size: int, where: str) -> None
     if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
         raise ValueError(
             f"the stiffness {where} is not positive definite ({report.negative_pivots} negative and "
-            f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: hold the sheet by supports"
+            f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: add supports"
         )
 
 

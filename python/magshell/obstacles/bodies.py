@@ -145,4 +145,4 @@ def _sided(shape: core.Obstacle, inside: bool) -> core.Obstacle:
 
 
 def _side(inside: bool) -> str:
-    return ", the sheet inside" if inside else ""
+    return ", bodies inside" if inside else ""

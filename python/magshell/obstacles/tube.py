@@ -83,4 +83,4 @@ class Tube(Obstacle):
         radius = f"{low:g} m" if low == high else f"{low:g} to {high:g} m"
         ends = "closed" if self.closed else "open"
         side = "inside" if self.inside else "outside"
-        return f"{len(self.points)} points, radius {radius}, {ends}, the sheet {side}"
+        return f"{len(self.points)} points, radius {radius}, {ends}, bodies {side}"

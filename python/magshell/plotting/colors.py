@@ -124,7 +124,7 @@ def _automatic(states: list[State]) -> str | None:
 def _magnetization(states: list[State], _: LengthUnit) -> Scalar:
     """The component along the axis all share; else the angle in the plane all share; else the magnitude."""
     if not any(state.is_magnetized for state in states):
-        raise ValueError("color='magnetization' needs a magnetized sheet: give remanent_magnetization [A/m]")
+        raise ValueError("color='magnetization' needs magnetized faces: give remanent_magnetization [A/m]")
     vectors = [
         np.zeros((s.mesh.n_faces, 3)) if s.remanent_magnetization is None else s.remanent_magnetization
         for s in states
@@ -160,7 +160,7 @@ def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
     densities = []
     for state in states:
         if not state.is_magnetized or (state.flux_density is None and not state.has_sources):
-            raise ValueError("color='magnetic_energy' needs a magnetized sheet in a field, in every state")
+            raise ValueError("color='magnetic_energy' needs magnetized faces in a field, in every state")
         densities.append(
             -np.einsum("fi,fi->f", state.magnetization, state.flux_density_at(state.barycenters))
         )

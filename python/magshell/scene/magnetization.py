@@ -45,6 +45,7 @@ def check_on_skins(scene: Scene, given: np.ndarray) -> None:
         if given.any() and scene.bodies and not any(True for _ in _carriers(scene)):
             raise ValueError(
                 "remanent_magnetization was given for all faces, but the scene has no Shell, and no Solid with a skin"
+                + _of_solids(scene)
             )
         return
     bare = np.zeros(scene._bodies.n_magnetized, dtype=bool)
@@ -56,7 +57,15 @@ def check_on_skins(scene: Scene, given: np.ndarray) -> None:
     if idle.any():
         raise ValueError(
             f"remanent_magnetization [A/m] of face {np.argmax(idle)} must be zero: it is of a Solid that has no skin there"
+            + _of_solids(scene)
         )
+
+
+def _of_solids(scene: Scene) -> str:
+    """Say how solids are magnetized throughout, in a message that begins with what has gone wrong."""
+    if any(isinstance(body, Solid) and body.remanent_magnetization is not None for body in scene.bodies):
+        return '. A Solid magnetized throughout takes it as values={solid: {"remanent_magnetization": ...}}'
+    return ". A Solid is magnetized throughout by Solid(..., remanent_magnetization=...)"
 
 
 def of_carriers(scene: Scene, magnetization: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .._checks.quantity import quantity
-from .._machine.keywords import controls_of, nearest_first
+from .._machine.keywords import controls_of, meant, nearest_first
 from ..bodies.shell import Shell
 from ..surroundings.loads import DeadLoad
 from .courses import refuse_functions
@@ -90,6 +90,7 @@ def _check(scene, owner, named) -> None:
             raise ValueError(f"{name} of the scene has no part in this solve: leave it out of values")
         if name not in names:
             what = f"it has {nearest_first(name, names)}" if names else "it has none that can be"
+            what = f"{use}; {what}" if (use := meant(name, names)) else what
             raise ValueError(
                 f"{type(owner).__name__} has no value {name!r} to be replaced in a solve: {what}"
             )

@@ -26,6 +26,7 @@ from ..bodies.skeleton import Skeleton
 from ..bodies.skeleton_input import skeleton_inputs
 from ..bodies.solid import Solid
 from ..bodies.ties import Tie
+from ..bodies.words import called
 from ..fields.field import FIELDS, AppliedField, UniformField
 from ..mesh.triangle_mesh import TriangleMesh
 from ..surroundings.body_contact import BodyContact
@@ -186,9 +187,10 @@ class Scene(Drawn):
                 if bodies.drifts(each)
             ]
         if free:
+            it = "it" if len(bodies.listed) == 1 else "them"
             raise ValueError(
-                f"the supports leave the sheet free: {'; '.join(free)}. Hold it, or say allow_rigid_motions=True if a "
-                "field or gravity does"
+                f"the supports leave {called(bodies.listed)} free: {'; '.join(free)}. Hold {it}, or say "
+                "allow_rigid_motions=True if a field or gravity does"
             )
         n_directions, n_couples = len(constraints.directions), len(edges)
         surfaces, body_contacts = body_contact_inputs(self._body_contacts, bodies)

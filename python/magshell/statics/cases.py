@@ -7,18 +7,29 @@ from dataclasses import replace
 from typing import Any
 
 from .._checks.quantity import shape_of
-from .._machine.keywords import FACTORS
+from .._machine.keywords import FACTORS, FLUX_DENSITY
 from ..errors import DesignRejected, Interrupted, NotConverged
 from ..scene.scene import Scene
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium
 from .search import Search, find
 
-_DIMENSIONS = {"applied_flux_density": 1, **dict.fromkeys(FACTORS, 0)}  # of one case
+_DIMENSIONS = {FLUX_DENSITY: 1, **dict.fromkeys(FACTORS, 0)}  # of one case
+
+
+def _check_shape(name: str, shape: tuple[int, ...]) -> None:
+    """Raises ValueError on a shape that is neither of one load case nor of several."""
+    if name == FLUX_DENSITY and not (len(shape) in (1, 2) and shape[-1] == 3):
+        raise ValueError(f"{name} [T] must have shape (3,), or (k, 3) for k load cases, got {shape}")
+    if name != FLUX_DENSITY and len(shape) > 1:
+        raise ValueError(f"{name} [1] must be a number, or have shape (k,) for k load cases, got {shape}")
 
 
 def split(arguments: dict[Any, Any]) -> list[dict[Any, Any]] | None:
     """The arguments of each case; None where they are those of one. Raises ValueError where the counts differ."""
+    for name, value in arguments.items():
+        if name in _DIMENSIONS and value is not None:
+            _check_shape(name, shape_of(name, value))
     of_cases = {
         name: arguments[name]
         for name, dimensions in _DIMENSIONS.items()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..bodies.caps import describe_faces
+from ..bodies.words import called
 from ..fields.inside import told_inside
 from ..surroundings.constraints import free_rigid_motions
 
@@ -39,7 +40,7 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
     sentences = [f"{head}: {found.reason}."]
     near = np.zeros(0, dtype=int)  # vertices that have to do with it
     if failed.state.size:
-        sentences += _attempts(found, at_rest and not whole, scene._bodies.size)
+        sentences += _attempts(found, at_rest and not whole, scene._bodies)
         told, near = _places(inputs, found)
         sentences += told
         positions = scene._model.positions(failed.state)
@@ -49,7 +50,7 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
     return " ".join([*sentences, _advice(inputs, found, at_rest, near), kept])
 
 
-def _attempts(found, in_steps: bool, size: float) -> list[str]:
+def _attempts(found, in_steps: bool, bodies) -> list[str]:
     told = []
     if in_steps and found.failed.shortest_step < 1.0:
         told.append(f"Load steps were shortened to {found.failed.shortest_step:.2g} of the way.")
@@ -58,9 +59,9 @@ def _attempts(found, in_steps: bool, size: float) -> list[str]:
         told.append("Relaxation found no step to take.")
     else:
         taken, last = ("1 step", "it") if steps == 1 else (f"{steps} steps", "its last one")
-        moved = f"; {last} still moved the sheet by {found.failed.last_move:.2g} m"
+        moved = f"; {last} still moved {called(bodies.listed)} by {found.failed.last_move:.2g} m"
         stood = " and came to a standstill"
-        told.append(f"Relaxation took {taken}{moved if _still_moves(found.failed, size) else stood}.")
+        told.append(f"Relaxation took {taken}{moved if _still_moves(found.failed, bodies.size) else stood}.")
     return told
 
 
@@ -134,7 +135,10 @@ def _free(inputs, found) -> str:
     free = free_rigid_motions(scene._bodies, scene._constraints) if "singular" in found.reason else []
     if not free:
         return ""
-    return f"The supports leave the sheet free ({'; '.join(free)}): hold it, unless a field or gravity does."
+    return (
+        f"The supports leave {called(scene._bodies.listed)} free ({'; '.join(free)}): add supports, unless a field or "
+        "gravity holds there."
+    )
 
 
 def _advice_of_any(inputs, found, at_rest: bool) -> str:

@@ -139,7 +139,7 @@ class WarmStart:
             else:
                 raise EquilibriumJumped(
                     f"the equilibrium jumps at {at:.3g} to {to:.3g} of the way from the last design to this one: "
-                    "the sheet buckles or snaps. Take a shorter step, or go through it with accept_jumps().",
+                    "it buckles or snaps. Take a shorter step, or go through it with accept_jumps().",
                     self.equilibria,
                 )
         return solution

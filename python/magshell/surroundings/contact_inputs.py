@@ -13,6 +13,7 @@ from .._checks.selections import indices
 from .._machine.callers import callers_level
 from ..bodies.rigid import Rigid
 from ..bodies.solid import Solid
+from ..bodies.words import called
 from ..errors import MeshQualityWarning
 from .body_contact import BodyContact, side_of, touches_with_shape
 
@@ -227,9 +228,15 @@ def check_outside(scene: Scene, values: Any, positions: np.ndarray, time: float)
                 worst = inside[np.argmax(depth[inside])]
                 touched = np.unique(vertices[inside][vertices[inside] >= 0])
                 raise ValueError(
-                    f"the sheet starts inside {obstacle!r}: {_list(touched)}, the deepest {depth[worst]:.3g} m deep "
-                    f"at vertex {vertices[worst, 0]}"
+                    f"{_owner(scene, vertices[worst, 0])} starts inside {obstacle!r}: {_list(touched)}, the deepest "
+                    f"{depth[worst]:.3g} m deep at vertex {vertices[worst, 0]}"
                 )
+
+
+def _owner(scene: Scene, vertex: int) -> str:
+    """Name the body that a vertex of the scene belongs to, by number where there are several."""
+    number = next(k for k, span in enumerate(scene._bodies.spans) if vertex < span.vertices.stop)
+    return called([scene.bodies[number]]) if len(scene.bodies) == 1 else f"body {number}"
 
 
 def _list(vertices: np.ndarray) -> str:

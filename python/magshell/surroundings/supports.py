@@ -15,6 +15,7 @@ from ..bodies.bodies import checked_body, on_body
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from ..mesh.six_node_mesh import SixNodeMesh
+from ..mesh.tet_mesh import TetMesh
 from ..mesh.triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -242,7 +243,7 @@ class SymmetryPlane(Support):
         above, below = int(np.argmax(height)), int(np.argmin(height))
         if height[above] > tolerance and height[below] < -tolerance:
             raise ValueError(
-                f"the sheet lies on both sides of {self!r}, vertex {above} on one and vertex {below} on the "
+                f"{_called(mesh)} lies on both sides of {self!r}, vertex {above} on one and vertex {below} on the "
                 "other: model one half"
             )
         return vertices
@@ -264,7 +265,7 @@ class SymmetryPlane(Support):
         lying = np.flatnonzero(np.abs(steepness) < 1e-6)
         if lying.size:
             raise ValueError(
-                f"the sheet lies in {self!r} at edge {edges[lying[0]]}: its image would lie on it"
+                f"{_called(mesh)} lies in {self!r} at edge {edges[lying[0]]}: its image would lie on it"
             )
         outwards = np.sign(steepness)
         return [DirectedEdges(edges, outwards[:, None] * self.normal, None)]
@@ -360,3 +361,10 @@ def continuations(mesh: TriangleMesh, edges: np.ndarray) -> np.ndarray:
 
 def _numbers(vector: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:g}" for value in vector) + ")"
+
+
+def _called(mesh: Any) -> str:
+    """Say what a mesh is of."""
+    if isinstance(mesh, TetMesh):
+        return "the solid"
+    return "the sheet" if isinstance(mesh, TriangleMesh | SixNodeMesh) else "the scene"
