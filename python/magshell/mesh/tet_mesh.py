@@ -318,7 +318,8 @@ class TetMesh(TetSelection):
 
         surface: where curved boundaries are: a signed distance, (n, 3) m -> (n,) m, as those of `ms.shapes`. Nodes on
             edges of the surface move onto it, where both corners lie on it within 1e-3 of the edge; where that would turn
-            a tetrahedron inside out, only as far as it does not. By default they stay halfway.
+            a tetrahedron inside out, only as far as it does not, of which an ms.MeshQualityWarning says how many and how
+            far they stay off it. By default they stay halfway.
         """
         return self if self.order == 2 else quadratic(self, surface)
 

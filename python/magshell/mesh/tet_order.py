@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .off_surface import warn_of_nodes_off
 from .signed_distance import Distance, middles_on_surface
 from .tet_jacobian import jacobians, not_positive, straight_volumes
 
@@ -26,7 +27,9 @@ def quadratic(mesh: TetMesh, surface: Projection | None) -> TetMesh:
     edges, middles = middles_on_surface(mesh, mesh.boundary_edges, surface)
     target = positions.copy()
     target[mesh.n_vertices + edges] = middles
-    return type(mesh)(held_back(positions, target, nodes), nodes, mesh.parts, mesh.part_names)
+    placed = held_back(positions, target, nodes)
+    warn_of_nodes_off(mesh, edges, placed[mesh.n_vertices + edges], surface)
+    return type(mesh)(placed, nodes, mesh.parts, mesh.part_names)
 
 
 def curved(mesh: TetMesh, place: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> TetMesh:
