@@ -39,6 +39,7 @@ from .errors import (
     NoGradient,
     NotConverged,
     ObjectiveFailed,
+    UnitWarning,
 )
 from .fields.adapters import CustomField, MagpylibField
 from .fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
@@ -178,6 +179,7 @@ __all__ = [
     "Trajectory",
     "TriangleMesh",
     "UniformField",
+    "UnitWarning",
     "VibrationModes",
     "View",
     "WarmStart",

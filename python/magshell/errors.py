@@ -29,6 +29,12 @@ class MeshQualityWarning(UserWarning):
     tetrahedra for their mean volume."""
 
 
+class UnitWarning(UserWarning):
+    """A thickness, modulus, density, magnetization or field is by decades beyond any body, as where mm, kPa or mT were
+    given for m, Pa or T. Said once a scene and kind of value; `warnings.filterwarnings("ignore",
+    category=ms.UnitWarning)` for models without units."""
+
+
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C stopped a solve. `last_good` holds the last converged state, as a result of the same kind; None where
     there is nothing before all of it is done, as of linear solves, or where the start was not yet known."""

@@ -30,6 +30,7 @@ NOT_CALLED = {
     "Strains": "a result",
     "LargeStrainWarning": "a warning",
     "MeshQualityWarning": "a warning",
+    "UnitWarning": "a warning",
     "VibrationModes": "a result",
     "Weld": "a result",
     "AppliedField": "abstract",

@@ -18,6 +18,7 @@ from ..methods.clock import Clock, clock_of
 from ..methods.integrators import Integrator
 from ..methods.solvers import Newton
 from ..scene.inputs import Inputs
+from ..scene.plausible import warn_of_field
 from ..statics.equilibrium import Equilibrium
 from ..statics.start import check_faces
 from ..surroundings.contact_inputs import check_outside, poses
@@ -153,6 +154,8 @@ class MotionInputs:
         elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
         knots = self.at_knots(name, unit, value, row)
+        if name == "applied_flux_density":
+            warn_of_field(self.inputs.scene, np.asarray(detached(knots)))
         return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
 
     def at_knots(self, name: str, unit: str, value: Any, row: tuple[int, ...]) -> Any:

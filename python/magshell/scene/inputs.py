@@ -13,6 +13,7 @@ from .._checks.quantity import quantity
 from .._checks.tensors import detached, is_tensor, to_array, wants_gradient
 from ..bodies.shell import magnetization_of
 from .magnetization import check_given_once, check_on_skins, of_all_bodies
+from .plausible import warn_of_field, warn_of_units
 from .replacements import checked, requested
 from .scene import Scene
 from .values import Values
@@ -131,7 +132,9 @@ class Inputs:
         }
         if not arrays and self.magnetization is None:
             return scene._values
-        return Values(scene, arrays, self.magnetization)
+        values = Values(scene, arrays, self.magnetization)
+        warn_of_units(scene, values)
+        return values
 
     def _flux_density(self, given) -> np.ndarray:
         if given is None:
@@ -140,7 +143,9 @@ class Inputs:
             return np.zeros(3)
         if not self.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
-        return quantity("applied_flux_density", "T", given, (3,))
+        flux_density = quantity("applied_flux_density", "T", given, (3,))
+        warn_of_field(self.scene, flux_density)
+        return flux_density
 
     def with_values(self, values: Values) -> Inputs:
         """The same but for the values of the scene."""

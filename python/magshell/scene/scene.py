@@ -34,7 +34,6 @@ from ..surroundings.constraints import free_rigid_motions, gather
 from ..surroundings.contact import Contact
 from ..surroundings.contact_inputs import (
     body_contact_inputs,
-    check_neighbours,
     check_shapes,
     contact_inputs,
     obstacles_of,
@@ -48,6 +47,7 @@ from ..surroundings.supports import Clamp, Pin, SymmetryPlane
 from ..surroundings.water import Water
 from .core_inputs import actuator_inputs, body_inputs, face_inputs, muscle_inputs
 from .couples import couple_directions, couple_edges
+from .first_look import look_at
 from .layout import Layout
 from .values import Values
 
@@ -198,6 +198,7 @@ class Scene(Drawn):
         self._turn, self._solving = threading.RLock(), False
         self._warned_of_caps = False
         self._warned_of_strain = 0.0
+        self._warned_of_units: set[str] = set()
         self._model = _core.Model(
             n_vertices=mesh.n_vertices,
             original=bodies.original if bodies.ties else [],
@@ -227,7 +228,7 @@ class Scene(Drawn):
         # What the core holds now: a solve with other values puts its own there.
         self._values = self._in_core = Values(self)
         self._model.set_values(self._values.numbers)
-        check_neighbours(self, warns=True)
+        look_at(self)
 
     def _held_by_joints(self) -> np.ndarray:
         """The vertices of links that joints hold to the world."""
