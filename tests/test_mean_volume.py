@@ -66,31 +66,63 @@ THICK = {
 }
 
 
+def free(solid):
+    return ms.Scene(solid, allow_rigid_motions=True)
+
+
+SLICES = {
+    "pins on all vertices": lambda mesh: [ms.Pin(np.arange(mesh.n_vertices), "y")],
+    "symmetry planes on both sides": lambda mesh: [
+        ms.SymmetryPlane((0, 1, 0), point=(0, y, 0)) for y in (0.0, 0.01)
+    ],
+}
+
+
+@pytest.mark.parametrize("hold", SLICES.values(), ids=SLICES)
+def test_a_slice_in_plane_strain_may_be_one_cell_thick_where_it_is_held_and_nowhere_else(hold):
+    """Cells along x, y and z; held along y on both of its sides."""
+
+    def told(cells, supports):
+        solid = ms.Solid(ms.meshes.box((0.1, 0.01, 0.04), cells), material=SOFT)
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            ms.Scene(solid, supports=supports(solid.mesh), allow_rigid_motions=True)
+        return [str(each.message) for each in found]
+
+    assert not told((10, 1, 4), hold)
+    assert not told((20, 1, 2), hold)
+    (free_plate,) = told((10, 1, 4), lambda mesh: [])
+    (held_at_one_end,) = told((10, 1, 4), lambda mesh: [ms.Pin(mesh.vertices_at(x=0.0))])
+    (thin_bar,) = told((40, 1, 1), hold)  # one cell through its height, in which it bends
+    assert all("one cell thick" in text for text in (free_plate, held_at_one_end, thin_bar))
+
+
 @pytest.mark.parametrize("name", THIN)
 def test_one_cell_through_a_thickness_is_warned_of(name):
     mesh = THIN[name]()
     with pytest.warns(
         ms.MeshQualityWarning, match=r"a slender region about \[[^\]]*\] m is one cell thick \("
     ) as told:
-        ms.Solid(mesh, material=SOFT)
+        free(ms.Solid(mesh, material=SOFT))
     assert told[0].filename == __file__ and len(told) == 1
     with warnings.catch_warnings():  # not where each point has its own volume
         warnings.simplefilter("error")
-        ms.Solid(mesh, material=SOFT, element="linear")
-        ms.Solid(mesh, material=SOFT, mean_volume=False)
-        ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3))
+        free(ms.Solid(mesh, material=SOFT, element="linear"))
+        free(ms.Solid(mesh, material=SOFT, mean_volume=False))
+        free(ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3)))
 
 
 @pytest.mark.parametrize("name", THICK)
 def test_no_warning_without_reason(name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        ms.Solid(THICK[name](), material=SOFT)
+        free(ms.Solid(THICK[name](), material=SOFT))
 
 
 def test_a_fin_is_named_by_its_place_and_a_solve_does_not_warn_again():
     with pytest.warns(ms.MeshQualityWarning) as told:
         solid = ms.Solid(fin(1), material=SOFT)
+        free(solid)
     place = np.fromstring(str(told[0].message).split("[")[1].split("]")[0], sep=",")
     assert place == pytest.approx((0.75, 0.2, 0.225), abs=0.01)
     with warnings.catch_warnings():

@@ -35,12 +35,17 @@ MOST_JOINED = 0.1
 # thicknesses 432.
 LEAST_SLENDER = 400.0
 FEWEST = 12  # tetrahedra of a region: of fewer none is slender
+_HELD = 1e-6  # [-] below one: the share of a direction that supports hold at all corners of a slice
+_SIDE = 0.9  # [-] cosine between the direction in which a slice is held and normals of its sides
 _FLAT = 1e-6  # of the size of a body: centers this near to a plane lie in it
 
 
-def warn_of_mean_volume(mesh: TetMesh, isochoric: bool) -> None:
-    """mesh: of a solid whose elements have the mean volume."""
-    thin = thin_regions(mesh)
+def warn_of_thin_regions(mesh: TetMesh, held: np.ndarray) -> None:
+    """Warn of slender regions one cell thick, but for slices in plane strain, which are held across their thickness.
+
+    mesh: of a solid whose elements have the mean volume. held: (n_v, 3, 3), onto the directions that supports hold.
+    """
+    thin = [each for each in thin_regions(mesh) if not _is_slice(mesh, each, held)]
     if thin:
         sizes = f"{sum(map(len, thin))} of {mesh.n_tetrahedra} tetrahedra"
         where = np.round(mesh.tetrahedron_barycenters[thin[0]].mean(axis=0), 9).tolist()
@@ -51,6 +56,10 @@ def warn_of_mean_volume(mesh: TetMesh, isochoric: bool) -> None:
             "14 to 18 % too far. Use two cells or more through every thickness (both sides of a symmetry plane count), or "
             "cells with a vertex inside"
         )
+
+
+def warn_of_free_modes(mesh: TetMesh, isochoric: bool) -> None:
+    """Warn of shapes that cost isochoric material nothing. mesh: of a solid whose elements have the mean volume."""
     free = free_modes(mesh) if isochoric else 0
     if free:
         _warn(
@@ -84,6 +93,20 @@ def thin_regions(mesh: TetMesh) -> list[np.ndarray]:
     thin &= np.bincount(region) >= FEWEST
     order = np.flatnonzero(thin)
     return [chosen[region == k] for k in order[np.argsort(-volume[order], kind="stable")]]
+
+
+def _is_slice(mesh: TetMesh, region: np.ndarray, held: np.ndarray) -> bool:
+    """Whether supports hold all corners of a region (k,) along one direction, and it is more than one cell thick across."""
+    corners = mesh.corners[region]
+    values, axes = np.linalg.eigh(held[np.unique(corners)].mean(axis=0))
+    count = int((values > 1.0 - _HELD).sum())
+    if count != 1:
+        return count > 1
+    surface = mesh.surface
+    sides = surface.faces[np.abs(surface.face_normals @ axes[:, -1]) < _SIDE]
+    on_sides = np.zeros(mesh.n_vertices, dtype=bool)
+    on_sides[mesh.surface_vertices[sides]] = True
+    return bool(on_sides[corners].all(axis=1).mean() < 0.5)
 
 
 def free_modes(mesh: TetMesh) -> int:

@@ -13,7 +13,7 @@ from .._machine.entry import grouped
 from ..mesh.tet_integrals import shape_integrals, shape_products
 from ..mesh.tet_mesh import TetMesh
 from .materials import Projective, SolidMaterial
-from .mean_volume import warn_of_mean_volume
+from .mean_volume import warn_of_free_modes
 from .shell import magnetization_of
 from .skin import Skin
 
@@ -38,7 +38,7 @@ class Solid(Owner):
     mean_volume: whether the volumetric part of the energy acts on the mean change of volume of each element, which keeps
         nearly incompressible material from locking; for quadratic elements. By default where Poisson's ratio is above 0.4.
         Use two cells or more through every thickness: with one, a slender bar's two lowest frequencies are 2 and 12 % too
-        low at a Poisson's ratio of 0.45, with two within 1 %. An ms.MeshQualityWarning says where a slender region has one,
+        low at a Poisson's ratio of 0.45, with two within 1 %. An ms.MeshQualityWarning of its scene says where a slender region has one,
         and where tetrahedra are so few that shapes of isochoric material cost no energy.
     skin: Skin, a thin magnetized layer on its surface; as `solid.skin` it has values of its own.
     remanent_magnetization: (3,) or (n_t, 3) A/m, at rest, in world axes, of a solid that is magnetized throughout; zero
@@ -95,7 +95,7 @@ class Solid(Owner):
         self.skin: Skin | None = None if skin is None else skin._on(mesh, self.mesh)
         self.remanent_magnetization: np.ndarray | None = self._magnetization(remanent_magnetization)
         if self.mean_volume:
-            warn_of_mean_volume(self.mesh, material.isochoric)
+            warn_of_free_modes(self.mesh, material.isochoric)
 
     @property
     def _replaceable(self) -> tuple[str, ...]:
