@@ -11,6 +11,8 @@ from model_access import Controls, Problem
 import magshell as ms
 from magshell.surroundings.supports import rotation_matrix
 
+pytestmark = pytest.mark.filterwarnings("ignore::magshell.UnitWarning")  # sheets without stiffness
+
 FIELD = (0.03, -0.05, 0.08)  # T
 MAGNETIZATION = {"tangential": (4e4, 3e4, 0.0), "normal": (0.0, 0.0, 6e4), "mixed": (3e4, -2e4, 5e4)}
 

@@ -176,6 +176,7 @@ def test_a_step_that_fails_is_taken_in_parts(strip):
     assert move.steps_done == 4 and len(move) == 5
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")  # 1e4 T
 def test_what_cannot_be_done_hands_back_the_motion_until_then(strip):
     field = np.zeros((6, 3))
     field[4:, 2] = 1e4

@@ -124,6 +124,7 @@ def edge_traction(mesh, rotation):
     return edges, THICKNESS * (conormals @ rotation @ TANGENTIAL)[:, None] * (rotation @ FLUX_DENSITY)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")  # without stiffness
 @pytest.mark.parametrize("rotation", [np.eye(3), OBLIQUE], ids=["along the axes", "oblique"])
 def test_a_tangential_magnetization_pulls_at_the_boundary_only(rotation, rng):
     mesh = sheet().mesh.transformed(rotation)

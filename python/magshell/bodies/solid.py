@@ -39,7 +39,8 @@ class Solid(Owner):
         nearly incompressible material from locking; for quadratic elements. By default where Poisson's ratio is above 0.4.
         Use two cells or more through every thickness: with one, a slender bar's two lowest frequencies are 2 and 12 % too
         low at a Poisson's ratio of 0.45, with two within 1 %. An ms.MeshQualityWarning says where a slender region has one
-        (as its scene is made, and not of slices in plane strain), and where tetrahedra are so few that shapes of isochoric material cost no energy.
+        (as its scene is made, and not of slices in plane strain), and where tetrahedra are so few that shapes of isochoric
+        material cost no energy.
     skin: Skin, a thin magnetized layer on its surface; as `solid.skin` it has values of its own.
     remanent_magnetization: (3,) or (n_t, 3) A/m, at rest, in world axes, of a solid that is magnetized throughout; zero
         where a solve is to say it.

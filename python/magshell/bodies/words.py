@@ -13,8 +13,9 @@ def called(bodies: Iterable[Any]) -> str:
     """Return "the sheet" for one Shell, "the solids" for several Solids, "the body" or "the bodies" otherwise.
 
     >>> import magshell as ms
-    >>> called([ms.Solid(ms.meshes.box((1.0, 1.0, 1.0), cells=(2, 2, 2)), material=ms.NeoHookean(young_modulus=1e5))])
-    'the solid'
+    >>> sheet = ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)
+    >>> called([sheet]), called([sheet, ms.Rigid(mass=1.0, inertia=1.0, center=(0, 0, 0))])
+    ('the sheet', 'the bodies')
     """
     every = list(bodies)
     kinds = {

@@ -21,7 +21,7 @@ MOST_OF_EXTENT = 3.0  # [-] thickness of a sheet over its extent: from 1 on it i
 LEAST_OF_EXTENT = 1e-8  # [-] a layer of one atom on a metre has 1e-10
 MOST_OF_EDGE = 100.0  # [-] thickness over the median edge
 YOUNG_MODULUS = (0.1, 1e13)  # Pa: the softest gels have 10, diamond 1.2e12
-MASS_DENSITY = (0.1, 1e6)  # kg/m3: aerogel has 1, osmium 2.3e4
+MASS_DENSITY = (1e-7, 1e6)  # kg/m3: aerogel has 1, osmium 2.3e4; 1e-6 stands for none of what a Rigid carries
 MOST_MAGNETIZATION = 1e8  # A/m: iron saturates at 1.7e6
 MOST_FLUX_DENSITY = 30.0  # T: what moves soft robots has 0.1, the strongest magnets of hospitals 12
 
@@ -36,7 +36,7 @@ def warn_of_units(scene: Scene, values: Values) -> None:
             scene, "young_modulus", "Pa", _held(body, "young_modulus"), YOUNG_MODULUS, "kPa? MPa?", whose
         )
         density = _held(body, "mass_density")
-        _warn_of_range(scene, "mass_density", "kg/m3", density, MASS_DENSITY, "g/cm3? t/mm3?", whose)
+        _warn_of_range(scene, "mass_density", "kg/m3", density, MASS_DENSITY, "t/mm3?", whose)
     for label, name in scene._value_layout:
         if name == "remanent_magnetization":
             rows = scene._value_layout.of(values.numbers, label, name)
@@ -81,7 +81,7 @@ def _warn_of_range(
     low, high = float(np.min(rows)), float(np.max(rows))
     if low < limits[0] or high > limits[1]:
         worst = low if low < limits[0] else high
-        text = f"{name} [{unit}]{whose} is {worst:g}, outside of {limits[0]:g} to {limits[1]:g}, where all matter is"
+        text = f"{name} [{unit}]{whose} is {worst:g}, outside of {limits[0]:g} to {limits[1]:g}, far beyond all matter"
         _warn(scene, name, text, hint)
 
 
