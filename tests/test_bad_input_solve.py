@@ -68,7 +68,7 @@ test_solve_is_refused = refused(
         (
             "flux densities of two components",
             lambda: solve_magnetic(applied_flux_density=np.ones((5, 2))),
-            r"applied_flux_density \[T\] must have shape \(3,\), got \(2,\)",
+            r"applied_flux_density \[T\] must have shape \(3,\), or \(k, 3\) for k load cases, got \(5, 2\)",
         ),
         (
             "a field as value",
