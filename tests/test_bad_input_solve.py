@@ -79,7 +79,7 @@ test_solve_is_refused = refused(
         (
             "factors",
             lambda: solve(motion_factor=((1, 2),)),
-            r"motion_factor \[1\] must be a number, got shape \(1, 2\)",
+            r"motion_factor \[1\] must be a number, or have shape \(k,\) for k load cases, got \(1, 2\)",
         ),
         ("factor bool", lambda: solve(load_factor=True), rf"load_factor \[1\] {NOT_NUMBERS}, got True"),
         ("scene", lambda: solve(shell()), "scene must be a Scene, got Shell"),

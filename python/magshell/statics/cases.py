@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from numbers import Number
 from typing import Any
 
 from .._checks.quantity import shape_of
@@ -28,7 +29,7 @@ def _check_shape(name: str, shape: tuple[int, ...]) -> None:
 def split(arguments: dict[Any, Any]) -> list[dict[Any, Any]] | None:
     """The arguments of each case; None where they are those of one. Raises ValueError where the counts differ."""
     for name, value in arguments.items():
-        if name in _DIMENSIONS and value is not None:
+        if name in _DIMENSIONS and (isinstance(value, Number | list | tuple) or hasattr(value, "ndim")):
             _check_shape(name, shape_of(name, value))
     of_cases = {
         name: arguments[name]
