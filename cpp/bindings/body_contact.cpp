@@ -12,7 +12,7 @@ namespace {
 // The pairs of all contacts at q, with these velocities of all unknowns. What there is not, of pairs of fewer vertices, is
 // -1 and zero.
 py::dict touching_pairs(Model& model, const VectorXd& q, const VectorXd& v) {
-    std::vector<BodyContactTerm::Touch> all;
+    std::vector<BodyContactTerm::ActiveContact> all;
     std::vector<FrictionLaw> laws;
     {
         const py::gil_scoped_release unlocked;
@@ -20,8 +20,9 @@ py::dict touching_pairs(Model& model, const VectorXd& q, const VectorXd& v) {
         if (!model.has_body_contact()) throw InvalidInput("the scene has no contact of bodies");
         if (q.size() != model.size() || v.size() != model.size())
             throw InvalidInput("q and v must have a number for each of all unknowns");
-        all = model.body_contact()->touches(q.data());
-        for (const BodyContactTerm::Touch& touch : all) laws.push_back(model.body_contact()->friction(touch));
+        all = model.body_contact()->active_contacts(q.data());
+        for (const BodyContactTerm::ActiveContact& touch : all)
+            laws.push_back(model.body_contact()->friction(touch));
     }
     const py::ssize_t n = static_cast<py::ssize_t>(all.size());
     IndexArray contacts(n), vertices({n, py::ssize_t{4}});
@@ -30,10 +31,10 @@ py::dict touching_pairs(Model& model, const VectorXd& q, const VectorXd& v) {
     Array weights({n, py::ssize_t{4}}), normals({n, py::ssize_t{3}});
     Array friction({n, py::ssize_t{3}}), sliding({n, py::ssize_t{3}});
     for (py::ssize_t k = 0; k < n; ++k) {
-        const BodyContactTerm::Touch& touch = all[k];
+        const BodyContactTerm::ActiveContact& touch = all[k];
         const Proximity& near = touch.at.near();
         const PairVectors gradient = touch.at.gradient();
-        const PairPlaces moving = places_of(touch.near.pair, v.data());
+        const PairPositions moving = positions_of(touch.near.pair, v.data());
         contacts.mutable_at(k) = touch.near.contact;
         swapped.mutable_at(k) = touch.near.swapped;
         distances.mutable_at(k) = near.distance;

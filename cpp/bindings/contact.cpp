@@ -28,7 +28,7 @@ class PairRows {
             throw InvalidInput(std::string(name) + " must have shape (n, 4, 3)");
     }
     py::ssize_t count() const { return array_.shape(0); }
-    PairPlaces operator[](py::ssize_t pair) const {
+    PairPositions operator[](py::ssize_t pair) const {
         const double* p = array_.data(pair, 0, 0);
         return {Vec3(p), Vec3(p + 3), Vec3(p + 6), Vec3(p + 9)};
     }
@@ -92,7 +92,7 @@ py::dict pair_energies_of(const std::string& kind, const Array& places, double a
         energy.mutable_at(k) = at.acts() ? at.energy() : 0.0;
         force.mutable_at(k) = at.acts() ? at.normal_force() : 0.0;
         copy_rows(at.acts() ? at.gradient() : zero, gradient.mutable_data(k, 0, 0));
-        copy_rows(at.acts() ? at.normal_force_by_place() : zero, by_place.mutable_data(k, 0, 0));
+        copy_rows(at.acts() ? at.normal_force_by_position() : zero, by_place.mutable_data(k, 0, 0));
         if (!at.acts()) continue;
         PairBlocks blocks;
         at.hessian(cautious, blocks);
@@ -160,7 +160,7 @@ Array free_shares(const std::string& kind, const Array& from, const Array& to, d
     if (begin.count() != end.count()) throw InvalidInput("there must be as many ways' ends as beginnings");
     Array shares(begin.count());
     for (py::ssize_t k = 0; k < begin.count(); ++k)
-        shares.mutable_at(k) = free_share(which, begin[k], end[k], thickness, keep);
+        shares.mutable_at(k) = collision_free_step(which, begin[k], end[k], thickness, keep);
     return shares;
 }
 
@@ -188,7 +188,7 @@ py::dict frictions(const std::string& kind, const Array& places, double area, do
         Square full(by_velocity.mutable_data(k, 0, 0)), held(secant.mutable_data(k, 0, 0)),
             placed(by_place.mutable_data(k, 0, 0));
         std::array<Mat3, 16> blocks;
-        rub.by_place(blocks);
+        rub.by_position(blocks);
         for (int i = 0; i < 4; ++i)
             for (int j = 0; j < 4; ++j) {
                 full.block<3, 3>(3 * i, 3 * j) = rub.by_velocity(i, j, false);
@@ -197,7 +197,7 @@ py::dict frictions(const std::string& kind, const Array& places, double area, do
             }
         const PairFriction::Gradient by = rub.vjp(along[k]);
         copy_rows(by.by_velocity, along_velocity.mutable_data(k, 0, 0));
-        copy_rows(by.by_place, along_place.mutable_data(k, 0, 0));
+        copy_rows(by.by_position, along_place.mutable_data(k, 0, 0));
         along_normal_force.mutable_at(k) = by.by_normal_force;
         const double numbers[3] = {by.by_law.kinetic, by.by_law.fixed, by.by_law.sticking_speed};
         std::copy_n(numbers, 3, along_law.mutable_data(k, 0));
@@ -310,7 +310,7 @@ void register_contact(py::module_& module) {
             "near_on_the_way",
             [](BroadPhase& self, const Array& positions, const Array& end,
                const std::vector<double>& margins) {
-                return unlocked([&] { return self.near_on_the_way(positions.data(), end.data(), margins); });
+                return unlocked([&] { return self.near_along_path(positions.data(), end.data(), margins); });
             },
             py::arg("positions"), py::arg("end"), py::arg("margins"))
         .def(

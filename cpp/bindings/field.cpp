@@ -10,7 +10,7 @@
 #include "magshell/core/errors.h"
 #include "magshell/field/dipoles.h"
 #include "magshell/field/magnet.h"
-#include "magshell/field/placed_field.h"
+#include "magshell/field/posed_field.h"
 #include "magshell/field/sampled_field.h"
 
 namespace magshell::bindings {
@@ -168,11 +168,11 @@ void register_field(py::module_& module) {
     py::class_<PythonField, AppliedField, std::shared_ptr<PythonField>>(module, "PythonField")
         .def(py::init<py::function>(), py::arg("sampler"));
 
-    py::class_<PlacedField, AppliedField, std::shared_ptr<PlacedField>>(module, "PlacedField")
+    py::class_<PosedField, AppliedField, std::shared_ptr<PosedField>>(module, "PlacedField")
         .def(
             py::init([](std::shared_ptr<AppliedField> field, const Numbers& center, const Numbers& rotation) {
-                return std::make_shared<PlacedField>(std::move(field), Vec3(center.data()),
-                                                     Vec3(rotation.data()));
+                return std::make_shared<PosedField>(std::move(field), Vec3(center.data()),
+                                                    Vec3(rotation.data()));
             }),
             py::arg("field"), py::arg("center"), py::arg("rotation"));
 

@@ -10,9 +10,9 @@
 #include "magshell/core/parallel.h"
 #include "magshell/obstacle/box.h"
 #include "magshell/obstacle/capsule.h"
+#include "magshell/obstacle/complement.h"
 #include "magshell/obstacle/height_field.h"
-#include "magshell/obstacle/inverted.h"
-#include "magshell/obstacle/mesh_body.h"
+#include "magshell/obstacle/mesh_obstacle.h"
 #include "magshell/obstacle/plane.h"
 #include "magshell/obstacle/sphere.h"
 #include "magshell/obstacle/tube.h"
@@ -97,11 +97,11 @@ void register_obstacle(py::module_& module) {
         .def_static(
             "mesh",
             [](const TriangleMesh& mesh, Index resolution) -> Shared {
-                return std::make_shared<MeshBody>(mesh, resolution);
+                return std::make_shared<MeshObstacle>(mesh, resolution);
             },
             py::arg("mesh"), py::arg("resolution"), py::call_guard<py::gil_scoped_release>())
         .def(
-            "inverted", [](const Shared& body) -> Shared { return std::make_shared<Inverted>(body); },
+            "inverted", [](const Shared& body) -> Shared { return std::make_shared<Complement>(body); },
             "The space around the body, as a body.");
 
     module.def("distances", &distances, py::arg("obstacle"), py::arg("points"),

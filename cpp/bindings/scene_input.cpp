@@ -33,7 +33,7 @@ std::vector<ContactInput> contacts_of(const py::list& given) {
     for (const py::handle each : given) {
         ContactInput& contact = contacts.emplace_back();
         contact.obstacles = each["obstacles"].cast<std::vector<Index>>();
-        contact.rubs = each["rubs"].cast<bool>();
+        contact.has_friction = each["rubs"].cast<bool>();
         contact.lagged = each["lagged"].cast<bool>();
         const IndexArray vertices = each["vertices"].cast<IndexArray>();
         const Array weights = each["weights"].cast<Array>();

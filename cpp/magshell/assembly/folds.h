@@ -6,19 +6,19 @@
 
 #include "magshell/assembly/lanes.h"
 #include "magshell/body/sheet.h"
-#include "magshell/strain/fold_angle.h"
+#include "magshell/strain/dihedral_angle.h"
 
 namespace magshell {
 
 /// Folds [first, last), at most a pack of them. Lanes past the last fold repeat it.
-inline Fold folds_at(const Sheet& sheet, Index first, Index last, const double* q) {
+inline DihedralAngle folds_at(const Sheet& sheet, Index first, Index last, const double* q) {
     const FoldStencil* at[Pack::width];
     for (int lane = 0; lane < Pack::width; ++lane) at[lane] = &sheet.folds[std::min(first + lane, last - 1)];
     const auto place = [&](int k) {
         return vectors_of([&](int lane) { return q + 3 * at[lane]->nodes[k]; });
     };
     const auto right_is_point = [&](int lane) { return at[lane]->right_is_point ? 1.0 : 0.0; };
-    return Fold(place(0), place(1), place(2), place(3), pack_of(right_is_point));
+    return DihedralAngle(place(0), place(1), place(2), place(3), pack_of(right_is_point));
 }
 
 /// theta - theta~ in (-pi, pi]: a sheet rolled into a closed surface may have its rest angle on the other

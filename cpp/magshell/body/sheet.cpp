@@ -1,13 +1,13 @@
 #include "magshell/body/sheet.h"
 
-#include "magshell/strain/fold_angle.h"
+#include "magshell/strain/dihedral_angle.h"
 
 namespace magshell {
 
 Index Sheet::add_fold(const Nodes& at, const std::array<Index, 4>& nodes, bool right_is_point) {
     const std::vector<Vec3>& rest = at.rest;
-    const Fold fold(broadcast(rest[nodes[0]]), broadcast(rest[nodes[1]]), broadcast(rest[nodes[2]]),
-                    broadcast(rest[nodes[3]]), Pack(right_is_point ? 1.0 : 0.0));
+    const DihedralAngle fold(broadcast(rest[nodes[0]]), broadcast(rest[nodes[1]]), broadcast(rest[nodes[2]]),
+                             broadcast(rest[nodes[3]]), Pack(right_is_point ? 1.0 : 0.0));
     folds.push_back({nodes, right_is_point, fold.angle()[0], {}, {}});
     return static_cast<Index>(folds.size()) - 1;
 }

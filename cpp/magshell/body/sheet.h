@@ -16,7 +16,7 @@ struct DirectedEdge {
     Index edge, direction;
 };
 
-/// A fold angle between a face and another face or a direction. Node order as in strain/fold_angle.h.
+/// A fold angle between a face and another face or a direction. Node order as in strain/dihedral_angle.h.
 struct FoldStencil {
     std::array<Index, 4> nodes;
     bool right_is_point;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "magshell/mesh/curve_order.h"
-#include "magshell/strain/fold_six.h"
+#include "magshell/mesh/space_filling_order.h"
+#include "magshell/strain/dihedral_angle_six.h"
 
 namespace magshell {
 namespace {
@@ -13,7 +13,7 @@ std::array<double, 2> angles_at_rest(const Nodes& at, const std::array<Index, 9>
     Pack3 x[9];
     for (int a = 0; a < 9; ++a) x[a] = broadcast(nodes[a] < 0 ? Vec3::Zero() : at.rest[nodes[a]]);
     const Pack face(right_is_face ? 1.0 : 0.0);
-    return {FoldSix(x, face, 0).angle()[0], FoldSix(x, face, 1).angle()[0]};
+    return {DihedralAngleSix(x, face, 0).angle()[0], DihedralAngleSix(x, face, 1).angle()[0]};
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ struct SixNodeInput {
     std::vector<Index> vertices;                  // the scene's vertex of each row
 };
 
-/// A fold about an edge, at both its Gauss points. Node order as in strain/fold_six.h; absent nodes are negative.
+/// A fold about an edge, at both its Gauss points. Node order as in strain/dihedral_angle_six.h; absent nodes are negative.
 struct FoldSixStencil {
     std::array<Index, 9> nodes;
     bool right_is_face;

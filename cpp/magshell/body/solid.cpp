@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "magshell/core/errors.h"
-#include "magshell/mesh/curve_order.h"
+#include "magshell/mesh/space_filling_order.h"
 #include "magshell/strain/tetrahedron.h"
 
 namespace magshell {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "magshell/mesh/curve_order.h"
+#include "magshell/mesh/space_filling_order.h"
 
 namespace magshell {
 

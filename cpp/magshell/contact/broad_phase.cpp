@@ -5,7 +5,7 @@
 
 #include "magshell/contact/edge_through_triangle.h"
 #include "magshell/contact/neighbours.h"
-#include "magshell/contact/recount.h"
+#include "magshell/contact/overcount_correction.h"
 #include "magshell/core/parallel.h"
 
 namespace magshell {
@@ -40,11 +40,11 @@ BroadPhase::BroadPhase(std::vector<ContactSurface> surfaces, std::vector<Surface
     for (const ContactSurface& surface : surfaces_) boxes_.emplace_back(surface);
 }
 
-void BroadPhase::fit(const NodeWays& ways) {
+void BroadPhase::fit(const NodePaths& ways) {
     for (FaceBoxes& each : boxes_) each.fit(ways);
 }
 
-BroadPhase::Keys BroadPhase::find(Index contact, const NodeWays& ways, double margin) const {
+BroadPhase::Keys BroadPhase::find(Index contact, const NodePaths& ways, double margin) const {
     const Index of_a = contacts_[contact].a, of_b = contacts_[contact].b;
     const ContactSurface &a = surfaces_[of_a], &b = surfaces_[of_b];
     std::vector<Keys> found;
@@ -119,7 +119,7 @@ NearPair BroadPhase::pair_of(Index contact, Sort sort, Key key) const {
 }
 
 std::vector<NearPair> BroadPhase::near(const double* q, const std::vector<double>& margins) {
-    const NodeWays ways(q);
+    const NodePaths ways(q);
     fit(ways);
     std::vector<NearPair> all;
     for (Index contact = 0; contact < static_cast<Index>(contacts_.size()); ++contact) {
@@ -131,21 +131,21 @@ std::vector<NearPair> BroadPhase::near(const double* q, const std::vector<double
                 const std::size_t end = std::min(of.size(), (part + 1) * block_of_pairs);
                 for (std::size_t k = part * block_of_pairs; k < end; ++k) {
                     NearPair near = pair_of(contact, static_cast<Sort>(sort), of[k]);
-                    if (pair_distance(near.pair.kind, places_of(near.pair, q)) < margins[contact])
+                    if (pair_distance(near.pair.kind, positions_of(near.pair, q)) < margins[contact])
                         parts[part].push_back(near);
                 }
             });
             const std::size_t first = all.size();
             for (const std::vector<NearPair>& part : parts) all.insert(all.end(), part.begin(), part.end());
-            if (sort < 2) add_recounts(first, q, margins[contact], all);
+            if (sort < 2) add_overcount_corrections(first, q, margins[contact], all);
         }
     }
     return all;
 }
 
-std::vector<NearPair> BroadPhase::near_on_the_way(const double* q, const double* end,
+std::vector<NearPair> BroadPhase::near_along_path(const double* q, const double* end,
                                                   const std::vector<double>& margins) {
-    const NodeWays ways(q, end);
+    const NodePaths ways(q, end);
     fit(ways);
     std::vector<NearPair> all;
     for (Index contact = 0; contact < static_cast<Index>(contacts_.size()); ++contact) {
@@ -161,7 +161,7 @@ void BroadPhase::make_room(const std::vector<Vec3>& rest, const std::vector<doub
     nearest_.assign(contacts_.size(), {});
     Rows3 places(rest.size(), 3);
     for (std::size_t k = 0; k < rest.size(); ++k) places.row(k) = rest[k].transpose();
-    const NodeWays ways(places.data());
+    const NodePaths ways(places.data());
     fit(ways);
     Neighbours neighbours(surfaces_, rest);
     for (Index contact = 0; contact < static_cast<Index>(contacts_.size()); ++contact) {
@@ -170,7 +170,7 @@ void BroadPhase::make_room(const std::vector<Vec3>& rest, const std::vector<doub
         for (int sort = 0; sort < 3; ++sort)
             for (Key key : keys.of[sort]) {
                 const NearPair near = pair_of(contact, static_cast<Sort>(sort), key);
-                const double distance = pair_distance(near.pair.kind, places_of(near.pair, places.data()));
+                const double distance = pair_distance(near.pair.kind, positions_of(near.pair, places.data()));
                 if (distance >= near_at_rest[contact] || !neighbours.are(near.pair, distance)) continue;
                 rooms_[contact].of[sort].push_back({key, 0.5 * distance});
                 if (!nearest_[contact] || distance < nearest_[contact]->distance)
@@ -180,7 +180,7 @@ void BroadPhase::make_room(const std::vector<Vec3>& rest, const std::vector<doub
 }
 
 std::vector<NearPair> BroadPhase::crossings(const double* q) {
-    fit(NodeWays(q));
+    fit(NodePaths(q));
     std::vector<NearPair> all;
     for (Index contact = 0; contact < static_cast<Index>(contacts_.size()); ++contact) {
         const Index of_a = contacts_[contact].a, of_b = contacts_[contact].b;

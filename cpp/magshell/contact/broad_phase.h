@@ -37,12 +37,12 @@ class BroadPhase {
     void make_room(const std::vector<Vec3>& rest, const std::vector<double>& near_at_rest);
 
     /// Two neighbours, and how far they are from each other at rest [m].
-    struct Neighboured {
+    struct NeighbourPair {
         double distance;
         NearPair near;
     };
     /// Of a contact, those that are nearest each other of all to which it gave room; empty: to none.
-    const std::optional<Neighboured>& nearest_neighbours(Index contact) const { return nearest_[contact]; }
+    const std::optional<NeighbourPair>& nearest_neighbours(Index contact) const { return nearest_[contact]; }
 
     const std::vector<ContactSurface>& surfaces() const { return surfaces_; }
 
@@ -51,7 +51,7 @@ class BroadPhase {
     std::vector<NearPair> near(const double* q, const std::vector<double>& margins);
     /// The points and triangles, and the edges, that may come nearer than that on straight ways of their nodes from q to
     /// `end`: all that do, and some whose boxes do.
-    std::vector<NearPair> near_on_the_way(const double* q, const double* end,
+    std::vector<NearPair> near_along_path(const double* q, const double* end,
                                           const std::vector<double>& margins);
     /// Pairs of an edge (first) and a triangle (second) that pass through each other with nodes at q, as faces:
     /// contact, first_face, second_face, swapped.
@@ -72,15 +72,15 @@ class BroadPhase {
         std::vector<std::pair<Key, double>> of[3];
     };
 
-    Keys find(Index contact, const NodeWays& ways, double margin) const;
-    void fit(const NodeWays& ways);
+    Keys find(Index contact, const NodePaths& ways, double margin) const;
+    void fit(const NodePaths& ways);
     NearPair pair_of(Index contact, Sort sort, Key key) const;
 
     std::vector<ContactSurface> surfaces_;
     std::vector<SurfacePair> contacts_;
     std::vector<FaceBoxes> boxes_;  // of each surface
     std::vector<Rooms> rooms_;      // of each contact
-    std::vector<std::optional<Neighboured>> nearest_;
+    std::vector<std::optional<NeighbourPair>> nearest_;
 };
 
 }  // namespace magshell

@@ -18,7 +18,7 @@ int first_part(PairKind kind) {
     return kind == PairKind::edge_edge ? 2 : 1;
 }
 
-double largest_coordinate(PairKind kind, const PairPlaces& x) {
+double largest_coordinate(PairKind kind, const PairPositions& x) {
     double largest = 0.0;
     for (int i = 0; i < nodes_of(kind); ++i) largest = std::max(largest, x[i].lpNorm<Eigen::Infinity>());
     return largest;
@@ -26,13 +26,13 @@ double largest_coordinate(PairKind kind, const PairPlaces& x) {
 
 }  // namespace
 
-double free_share(PairKind kind, const PairPlaces& from, const PairPlaces& to, double thickness,
-                  double keep) {
+double collision_free_step(PairKind kind, const PairPositions& from, const PairPositions& to,
+                           double thickness, double keep) {
     const int count = nodes_of(kind), first = first_part(kind);
     const double error = round_off * (largest_coordinate(kind, from) + largest_coordinate(kind, to));
-    PairPlaces way = to;
+    PairPositions way = to;
     for (int i = 0; i < count; ++i) way[i] = to[i] - from[i];
-    PairPlaces x = from;
+    PairPositions x = from;
     double share = 0.0, least = 0.0, enough = 0.0;
     for (int turn = 0; turn < most_turns; ++turn) {
         const Proximity near = proximity(kind, x);

@@ -19,6 +19,7 @@ namespace magshell {
 /// above `thickness` [m] stays above `keep` (in [0, 1)) times what it is at the beginning. 0 where it is none.
 /// 1 only if all of the way is free; never too large, and less than it could be only by a few hundredths of the
 /// gap, or where the gap is no more than round-off.
-double free_share(PairKind kind, const PairPlaces& from, const PairPlaces& to, double thickness, double keep);
+double collision_free_step(PairKind kind, const PairPositions& from, const PairPositions& to,
+                           double thickness, double keep);
 
 }  // namespace magshell

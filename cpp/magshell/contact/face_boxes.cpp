@@ -32,7 +32,7 @@ bool split(const Pair& pair, const std::vector<BoxTree::Node>& of_a, const std::
 
 }  // namespace
 
-Bounds NodeWays::around(std::span<const Index> nodes) const {
+Bounds NodePaths::around(std::span<const Index> nodes) const {
     const auto at = [](const double* all, Index node) { return Eigen::Map<const Vec3>(all + 3 * node); };
     Bounds bounds{at(from, nodes[0]), at(from, nodes[0])};
     const auto include = [&](const Vec3& x) {
@@ -45,7 +45,7 @@ Bounds NodeWays::around(std::span<const Index> nodes) const {
     return bounds;
 }
 
-void FaceBoxes::fit(const NodeWays& ways) {
+void FaceBoxes::fit(const NodePaths& ways) {
     boxes_.resize(surface_->faces.size());
     const Index count = surface_->n_faces(), blocks = (count + block_of_faces - 1) / block_of_faces;
     parallel_for(blocks, [&](int block) {

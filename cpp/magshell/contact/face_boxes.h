@@ -11,12 +11,12 @@
 namespace magshell {
 
 /// Where all nodes are: at `from`, or anywhere on straight ways from there to `to`; three numbers each.
-struct NodeWays {
+struct NodePaths {
     const double* from;
     const double* to;
 
-    explicit NodeWays(const double* at) : from(at), to(at) {}
-    NodeWays(const double* begin, const double* end) : from(begin), to(end) {}
+    explicit NodePaths(const double* at) : from(at), to(at) {}
+    NodePaths(const double* begin, const double* end) : from(begin), to(end) {}
 
     bool still() const { return from == to; }
     /// Around some nodes.
@@ -30,7 +30,7 @@ class FaceBoxes {
 
     /// Puts the boxes around the faces. What is near does not depend on how the tree was made, only the time does: it
     /// is made anew when its boxes have grown to overlap.
-    void fit(const NodeWays& ways);
+    void fit(const NodePaths& ways);
     const std::vector<BoxTree::Node>& nodes() const { return nodes_; }
     const std::vector<Index>& items() const { return items_; }
     const Bounds& box(Index face) const { return boxes_[face]; }

@@ -13,8 +13,8 @@ struct RankTwo {
 
 /// p (d u u^T + u v^T + v u^T); cautious: without its negative direction.
 RankTwo of_free(double push, double distance, const PairWeights& slide, const PairWeights& weights,
-                bool cautious) {
-    if (!cautious) return {push * distance, push, 0.0};
+                bool project_psd) {
+    if (!project_psd) return {push * distance, push, 0.0};
     double squared_u = 0.0, squared_v = 0.0;
     for (int i = 0; i < 4; ++i) {
         squared_u += slide[i] * slide[i];
@@ -35,9 +35,9 @@ void add_outer(const PairVectors& one, const PairVectors& other, double scale, P
 
 }  // namespace
 
-PairEnergy::PairEnergy(const ContactPair& pair, const PairPlaces& x, const BarrierLaw& law)
+PairEnergy::PairEnergy(const ContactPair& pair, const PairPositions& x, const BarrierLaw& law)
     : pair_(pair),
-      share_(pair.share(law)),
+      distance_scale_(pair.distance_scale(law)),
       law_(pair.scaled(law)),
       acts_(proximity_within(pair.kind, x, law_.reach + law_.thickness, near_)),
       edges_(x, acts_ && pair.kind == PairKind::edge_edge ? pair.parallel : 0.0),
@@ -61,7 +61,7 @@ PairVectors PairEnergy::gradient() const {
     return by;
 }
 
-PairVectors PairEnergy::normal_force_by_place() const {
+PairVectors PairEnergy::normal_force_by_position() const {
     PairVectors by;
     for (int i = 0; i < 4; ++i) by[i] = -edges_.factor * curvature_ * near_.weights[i] * near_.normal;
     if (edges_.acts) {
@@ -74,19 +74,19 @@ PairVectors PairEnergy::normal_force_by_place() const {
     return by;
 }
 
-void PairEnergy::hessian(bool cautious, PairBlocks& blocks) const {
+void PairEnergy::hessian(bool project_psd, PairBlocks& blocks) const {
     const Vec3& n = near_.normal;
     const PairWeights& w = near_.weights;
     const double push = -edges_.factor * slope_, d = near_.distance;
-    const double curvature = edges_.factor * (cautious ? std::max(curvature_, 0.0) : curvature_);
+    const double curvature = edges_.factor * (project_psd ? std::max(curvature_, 0.0) : curvature_);
     const int count = nodes_of(pair_.kind);
     RankTwo part[2];
     Mat3 across = Mat3::Zero();
     for (int a = 0; a < 2; ++a) {
         if (a < near_.free)
-            part[a] = of_free(push, d, near_.slide[a], w, cautious);
+            part[a] = of_free(push, d, near_.slide[a], w, project_psd);
         else if (d > 0.0)
-            part[a].v_v = cautious ? std::max(-push / d, 0.0) : -push / d;
+            part[a].v_v = project_psd ? std::max(-push / d, 0.0) : -push / d;
         if (part[a].v_v != 0.0) across += part[a].v_v * near_.along[a] * near_.along[a].transpose();
     }
     Vec3 turning[4];
@@ -101,11 +101,11 @@ void PairEnergy::hessian(bool cautious, PairBlocks& blocks) const {
             const Vec3 row = along * n + w[j] * turning[i], column = w[i] * turning[j];
             blocks[at].noalias() = n * row.transpose() + column * n.transpose() + w[i] * w[j] * across;
         }
-    if (edges_.acts) add_parallel(cautious, blocks);
+    if (edges_.acts) add_parallel(project_psd, blocks);
 }
 
 // With g = dc/dx:  E_b' m' (v_n g^T + g v_n^T) + E_b (m'' g g^T + m' d2c/dx2)
-void PairEnergy::add_parallel(bool cautious, PairBlocks& blocks) const {
+void PairEnergy::add_parallel(bool project_psd, PairBlocks& blocks) const {
     const Vec3 zero = Vec3::Zero();
     PairVectors moved{zero, zero, zero, zero},
         turned{-edges_.by_one, edges_.by_one, -edges_.by_two, edges_.by_two};
@@ -116,7 +116,7 @@ void PairEnergy::add_parallel(bool cautious, PairBlocks& blocks) const {
         squared_turned += turned[i].squaredNorm();
     }
     const double mixed = slope_ * edges_.slope;
-    if (!cautious) {
+    if (!project_psd) {
         add_outer(moved, turned, mixed, blocks);
         add_outer(turned, moved, mixed, blocks);
         add_outer(turned, turned, energy_ * edges_.bend, blocks);
@@ -131,7 +131,7 @@ void PairEnergy::add_parallel(bool cautious, PairBlocks& blocks) const {
         if (bend > 0.0) add_outer(turned, turned, bend, blocks);
     }
     const double scale = energy_ * edges_.slope;
-    const ParallelEdges::Second second = edges_.second(cautious);
+    const ParallelEdges::Second second = edges_.second(project_psd);
     const Mat3 below = second.mixed.transpose();  // two, one
     for (int i = 0, at = 0; i < 4; ++i)
         for (int j = 0; j <= i; ++j, ++at) {
@@ -153,14 +153,14 @@ PairEnergy::ByLaw PairEnergy::vjp(const PairVectors& lambda, double by_normal_fo
              scale * (along * barrier_.slope_by_reach + turning * barrier_.energy_by_reach),
              -scale * (along * barrier_.curvature + turning * barrier_.slope),
              scale * (along * barrier_.slope_by_smoothing + turning * barrier_.energy_by_smoothing)};
-    if (share_ < 1.0) {
+    if (distance_scale_ < 1.0) {
         // Its own numbers are a share of the law's, which is room / (reach + thickness).
         const double both = law_.reach + law_.thickness;
         const double by_share =
             by.reach * law_.reach + by.thickness * law_.thickness + by.smoothing * law_.smoothing;
-        by.reach = share_ * (by.reach - by_share / both);
-        by.thickness = share_ * (by.thickness - by_share / both);
-        by.smoothing *= share_;
+        by.reach = distance_scale_ * (by.reach - by_share / both);
+        by.thickness = distance_scale_ * (by.thickness - by_share / both);
+        by.smoothing *= distance_scale_;
     }
     return by;
 }

@@ -29,13 +29,13 @@ struct ContactPair {
     double room = std::numeric_limits<double>::infinity();
 
     /// The share of a law's reach and thickness that this pair has.
-    double share(const BarrierLaw& law) const {
+    double distance_scale(const BarrierLaw& law) const {
         const double both = law.reach + law.thickness;
         return both > room ? room / both : 1.0;
     }
     /// The law that holds for it.
     BarrierLaw scaled(BarrierLaw law) const {
-        const double s = share(law);
+        const double s = distance_scale(law);
         law.reach *= s;
         law.thickness *= s;
         law.smoothing *= s;
@@ -45,8 +45,8 @@ struct ContactPair {
 };
 
 /// The nodes' vectors, out of all that there are, three numbers each.
-inline PairPlaces places_of(const ContactPair& pair, const double* all) {
-    PairPlaces x;
+inline PairPositions positions_of(const ContactPair& pair, const double* all) {
+    PairPositions x;
     for (int k = 0; k < nodes_of(pair.kind); ++k) x[k] = Eigen::Map<const Vec3>(all + 3 * pair.nodes[k]);
     return x;
 }
@@ -58,7 +58,7 @@ using PairBlocks = std::array<Mat3, 10>;
 
 class PairEnergy {
   public:
-    PairEnergy(const ContactPair& pair, const PairPlaces& x, const BarrierLaw& law);
+    PairEnergy(const ContactPair& pair, const PairPositions& x, const BarrierLaw& law);
 
     /// Whether the parts are near enough. If they are not, there is nothing else to ask for.
     bool acts() const { return acts_; }
@@ -70,10 +70,10 @@ class PairEnergy {
     /// - dN/dd [N/m]
     double normal_stiffness() const { return edges_.factor * curvature_; }
     /// dN/dx [N/m]
-    PairVectors normal_force_by_place() const;
+    PairVectors normal_force_by_position() const;
     PairVectors gradient() const;
     /// Only the blocks of the pair's own nodes.
-    void hessian(bool cautious, PairBlocks& blocks) const;
+    void hessian(bool project_psd, PairBlocks& blocks) const;
 
     /// Of lambda . gradient, and of a function of the normal force with `by_normal_force`.
     struct ByLaw {
@@ -82,10 +82,10 @@ class PairEnergy {
     ByLaw vjp(const PairVectors& lambda, double by_normal_force = 0.0) const;
 
   private:
-    void add_parallel(bool cautious, PairBlocks& blocks) const;
+    void add_parallel(bool project_psd, PairBlocks& blocks) const;
 
     ContactPair pair_;
-    double share_;
+    double distance_scale_;
     BarrierLaw law_;  // its own
     Proximity near_;
     bool acts_;

@@ -9,7 +9,7 @@ Vec3 weighted(const PairWeights& weights, const PairVectors& vectors, int count)
     return sum;
 }
 
-PairVectors spread(const PairWeights& weights, const Vec3& vector) {
+PairVectors distributed(const PairWeights& weights, const Vec3& vector) {
     return {weights[0] * vector, weights[1] * vector, weights[2] * vector, weights[3] * vector};
 }
 
@@ -22,17 +22,17 @@ PairFriction::PairFriction(const PairEnergy& at, const PairVectors& velocities, 
                 law) {}
 
 PairVectors PairFriction::force() const {
-    return spread(at_.near().weights, friction_.force);
+    return distributed(at_.near().weights, friction_.force);
 }
 
 // With dw, dn of contact/proximity.h and dN of the energy.
 template <class Take>
 void PairFriction::each_product(const Take& take) const {
     const Proximity& near = at_.near();
-    take(Product{spread(near.weights, friction_.by_normal_force), at_.normal_force_by_place()});
+    take(Product{distributed(near.weights, friction_.by_normal_force), at_.normal_force_by_position()});
     for (int a = 0; a < 2; ++a) {
-        const PairVectors moved = spread(near.weights, near.along[a]);
-        const PairVectors by_normal = spread(near.weights, friction_.by_normal * near.along[a]);
+        const PairVectors moved = distributed(near.weights, near.along[a]);
+        const PairVectors by_normal = distributed(near.weights, friction_.by_normal * near.along[a]);
         if (a >= near.free) {
             Product turned{by_normal, moved};
             for (Vec3& each : turned.right) each /= near.distance;
@@ -40,7 +40,7 @@ void PairFriction::each_product(const Take& take) const {
             continue;
         }
         // The places slide along, by which weights change: of the force, and of the velocity.
-        const PairVectors tilted = spread(near.slide[a], near.normal);
+        const PairVectors tilted = distributed(near.slide[a], near.normal);
         const Vec3 change = friction_.by_velocity * weighted(near.slide[a], velocities_, at_.count());
         Product slid, turned{by_normal, tilted};
         for (int i = 0; i < 4; ++i) {
@@ -53,7 +53,7 @@ void PairFriction::each_product(const Take& take) const {
     }
 }
 
-void PairFriction::by_place(std::array<Mat3, 16>& blocks) const {
+void PairFriction::by_position(std::array<Mat3, 16>& blocks) const {
     for (Mat3& block : blocks) block.setZero();
     each_product([&](const Product& product) {
         for (int i = 0; i < 4; ++i)
@@ -64,15 +64,15 @@ void PairFriction::by_place(std::array<Mat3, 16>& blocks) const {
 PairFriction::Gradient PairFriction::vjp(const PairVectors& lambda) const {
     const PairWeights& weights = at_.near().weights;
     const Vec3 along = weighted(weights, lambda, at_.count());
-    Gradient by{spread(weights, friction_.by_velocity * along),
-                spread(weights, Vec3::Zero()),
+    Gradient by{distributed(weights, friction_.by_velocity * along),
+                distributed(weights, Vec3::Zero()),
                 along.dot(friction_.by_normal_force),
                 {along.dot(friction_.by_kinetic), along.dot(friction_.by_fixed),
                  along.dot(friction_.by_sticking_speed)}};
     each_product([&](const Product& product) {
         double sum = 0.0;
         for (int i = 0; i < at_.count(); ++i) sum += lambda[i].dot(product.left[i]);
-        for (int j = 0; j < 4; ++j) by.by_place[j] += sum * product.right[j];
+        for (int j = 0; j < 4; ++j) by.by_position[j] += sum * product.right[j];
     });
     return by;
 }

@@ -24,11 +24,11 @@ class PairFriction {
         return w[i] * w[j] * (secant ? friction_.secant : friction_.by_velocity);
     }
     /// Blocks dF_i/dx_j, through N, n and w, with velocities that stay: not symmetric. (i, j) at 4 i + j.
-    void by_place(std::array<Mat3, 16>& blocks) const;
+    void by_position(std::array<Mat3, 16>& blocks) const;
 
     /// Of lambda . F.
     struct Gradient {
-        PairVectors by_velocity, by_place;
+        PairVectors by_velocity, by_position;
         double by_normal_force;  // alone, for PairEnergy::vjp
         FrictionLaw by_law;
     };

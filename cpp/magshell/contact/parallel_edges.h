@@ -21,7 +21,7 @@ struct ParallelEdges {
     double area = 0.0;               // |a x b|
 
     /// below: e, of rest lengths; 0 for none.
-    ParallelEdges(const PairPlaces& x, double below) {
+    ParallelEdges(const PairPositions& x, double below) {
         if (!(below > 0.0)) return;
         one = x[1] - x[0];
         two = x[3] - x[2];
@@ -45,7 +45,7 @@ struct ParallelEdges {
     struct Second {
         Mat3 one, mixed, two;
     };
-    Second second(bool cautious) const {
+    Second second(bool project_psd) const {
         // Within the plane of a and b c is the square of the area A, whose own second derivatives have the
         // eigenvalues 1 and -1; across it they are 2 (|b|^2, - a . b; |a|^2), which is never negative.
         const Mat3 across = 2.0 * normal * normal.transpose();
@@ -56,8 +56,8 @@ struct ParallelEdges {
         Second c{two.squaredNorm() * across + 2.0 * area_by_one * area_by_one.transpose(),
                  -both * across + 2.0 * area_by_one * area_by_two.transpose(),
                  one.squaredNorm() * across + 2.0 * area_by_two * area_by_two.transpose()};
-        c.mixed += (cautious ? 1.0 : 2.0) * area * turned;
-        if (cautious) {
+        c.mixed += (project_psd ? 1.0 : 2.0) * area * turned;
+        if (project_psd) {
             const Mat3 within = area * (Mat3::Identity() - 0.5 * across);
             c.one += within;
             c.two += within;

@@ -20,7 +20,7 @@ struct Closest {
 };
 
 /// A point `p` of one part against the edge from node a to node b of the other; sign of the edge's weights.
-void try_point_edge(const PairPlaces& x, int p, int a, int b, double sign, Closest& best) {
+void try_point_edge(const PairPositions& x, int p, int a, int b, double sign, Closest& best) {
     const Vec3 along = x[b] - x[a], to = x[p] - x[a];
     const double squared_length = along.squaredNorm(), projected = along.dot(to);
     double s = 0.0;
@@ -61,7 +61,7 @@ struct InPlane {
     }
 };
 
-Closest closest_point_triangle(const PairPlaces& x) {
+Closest closest_point_triangle(const PairPositions& x) {
     const InPlane at(x[2] - x[1], x[3] - x[1], x[0] - x[1]);
     if (at.told && at.first > 0.0 && at.second > 0.0 && at.first + at.second < 1.0)
         return {
@@ -73,7 +73,7 @@ Closest closest_point_triangle(const PairPlaces& x) {
     return best;
 }
 
-Closest closest_edge_edge(const PairPlaces& x) {
+Closest closest_edge_edge(const PairPositions& x) {
     const InPlane at(x[1] - x[0], x[2] - x[3], x[2] - x[0]);
     if (at.told && at.first > 0.0 && at.first < 1.0 && at.second > 0.0 && at.second < 1.0)
         return {
@@ -86,7 +86,7 @@ Closest closest_edge_edge(const PairPlaces& x) {
     return best;
 }
 
-Closest closest(PairKind kind, const PairPlaces& x) {
+Closest closest(PairKind kind, const PairPositions& x) {
     if (kind == PairKind::point_triangle) return closest_point_triangle(x);
     if (kind == PairKind::edge_edge) return closest_edge_edge(x);
     Closest best;
@@ -106,7 +106,7 @@ Vec3 across(const Vec3& n) {
     return n.cross(Vec3::Unit(smallest)).normalized();
 }
 
-Proximity completed(PairKind kind, const PairPlaces& x, const Closest& at) {
+Proximity completed(PairKind kind, const PairPositions& x, const Closest& at) {
     Proximity near;
     near.weights = at.weights;
     near.free = at.free;
@@ -148,18 +148,18 @@ Proximity completed(PairKind kind, const PairPlaces& x, const Closest& at) {
 
 }  // namespace
 
-Proximity proximity(PairKind kind, const PairPlaces& x) {
+Proximity proximity(PairKind kind, const PairPositions& x) {
     return completed(kind, x, closest(kind, x));
 }
 
-bool proximity_within(PairKind kind, const PairPlaces& x, double reach, Proximity& near) {
+bool proximity_within(PairKind kind, const PairPositions& x, double reach, Proximity& near) {
     const Closest at = closest(kind, x);
     if (!(at.squared < reach * reach)) return false;
     near = completed(kind, x, at);
     return near.distance < reach;
 }
 
-double pair_distance(PairKind kind, const PairPlaces& x) {
+double pair_distance(PairKind kind, const PairPositions& x) {
     return std::sqrt(closest(kind, x).squared);
 }
 

@@ -36,7 +36,7 @@ constexpr int nodes_of(PairKind kind) {
 }
 
 /// Where the nodes of a pair are [m].
-using PairPlaces = std::array<Vec3, 4>;
+using PairPositions = std::array<Vec3, 4>;
 /// A number for each node.
 using PairWeights = std::array<double, 4>;
 
@@ -50,12 +50,12 @@ struct Proximity {
 };
 
 /// The closest points of a pair. Degenerate triangles and edges, and parallel edges, are as good as others.
-Proximity proximity(PairKind kind, const PairPlaces& x);
+Proximity proximity(PairKind kind, const PairPositions& x);
 
 /// The same where the parts are nearer than `reach` [m]; else false, at less cost.
-bool proximity_within(PairKind kind, const PairPlaces& x, double reach, Proximity& near);
+bool proximity_within(PairKind kind, const PairPositions& x, double reach, Proximity& near);
 
 /// Their distance alone [m].
-double pair_distance(PairKind kind, const PairPlaces& x);
+double pair_distance(PairKind kind, const PairPositions& x);
 
 }  // namespace magshell

@@ -9,7 +9,7 @@
 #pragma once
 
 #include "magshell/energy/six_node_rows.h"
-#include "magshell/strain/from_first.h"
+#include "magshell/strain/relative_to_first_node.h"
 #include "magshell/strain/six_nodes.h"
 
 namespace magshell {
@@ -24,7 +24,7 @@ class BendingSix {
     };
 
     explicit BendingSix(const Pack3 places[6]) {
-        const std::array<Pack3, 6> x = from_first<6>(places);
+        const std::array<Pack3, 6> x = relative_to_first_node<6>(places);
         for (int p = 0; p < points; ++p) {
             Normal& at = at_[p];
             at.a1 = combination(first(p), x.data());
@@ -144,11 +144,11 @@ class BendingSix {
         }
     };
 
-    struct Share {
+    struct NodeFactor {
         int node;
         double factor;
     };
-    static constexpr std::array<Share, 4> bend_of(int i) {
+    static constexpr std::array<NodeFactor, 4> bend_of(int i) {
         return {{{i, 4.0},
                  {six_nodes::middle(i), 4.0},
                  {six_nodes::middle((i + 1) % 3), -4.0},

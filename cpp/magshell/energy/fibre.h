@@ -17,8 +17,8 @@
 #include "magshell/core/pack_functions.h"
 #include "magshell/core/vector3.h"
 #include "magshell/energy/fibre_curve.h"
-#include "magshell/strain/carried_vector.h"
 #include "magshell/strain/deformation.h"
+#include "magshell/strain/pushed_forward_vector.h"
 
 namespace magshell {
 
@@ -57,7 +57,7 @@ struct FibreLaw {
     }
 
     /// f_V - 1 and its slope.
-    FibreCurve::Sample beside_isometric(double rate) const {
+    FibreCurve::Sample excess_over_isometric(double rate) const {
         FibreCurve::Sample sample = force_velocity.at(rate);
         sample.value -= 1.0;
         return sample;
@@ -65,11 +65,12 @@ struct FibreLaw {
 };
 
 /// Where a fibre lies now.
-struct FibrePlace {
+struct DeformedFibre {
     Pack3 y, n;
     Pack length, inverse;  // l, and 1/l, zero where l is
 
-    explicit FibrePlace(const Pack3& carried) : y(carried), length(sqrt(squared_norm(carried))) {
+    explicit DeformedFibre(const Pack3& pushed_forward)
+        : y(pushed_forward), length(sqrt(squared_norm(pushed_forward))) {
         for (int lane = 0; lane < Pack::width; ++lane)
             inverse.set(lane, length[lane] > 0.0 ? 1.0 / length[lane] : 0.0);
         n = inverse * y;

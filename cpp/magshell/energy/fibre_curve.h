@@ -22,7 +22,7 @@ class FibreCurve {
     /// coefficients c_i of the places origin + i spacing, two or more.
     FibreCurve(double origin, double spacing, std::vector<double> coefficients)
         : origin_(origin), spacing_(spacing), c_(std::move(coefficients)), integrals_(size() + 4) {
-        for (int i = -2; i <= size(); ++i) integrals_[i + 3] = integrals_[i + 2] + whole(i);
+        for (int i = -2; i <= size(); ++i) integrals_[i + 3] = integrals_[i + 2] + interval_integral(i);
     }
 
     bool empty() const { return c_.empty(); }
@@ -63,7 +63,7 @@ class FibreCurve {
     }
 
     // Over the whole interval from knot i on, of the spacing.
-    double whole(int i) const {
+    double interval_integral(int i) const {
         return (coefficient(i - 1) + 11.0 * coefficient(i) + 11.0 * coefficient(i + 1) + coefficient(i + 2)) /
                24.0;
     }

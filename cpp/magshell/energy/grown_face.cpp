@@ -50,12 +50,12 @@ GrownTriangle::Work GrownTriangle::work(const std::array<Mat2, 3>& measures, dou
     return work;
 }
 
-Mat2 GrownTriangle::membrane_by_growth(const SheetMaterial& m, const Vec3& r, const Vec3& d) const {
+Mat2 GrownTriangle::membrane_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const {
     return work(face.membrane_measures(), m.young_modulus * m.thickness, m.poisson_ratio, r, d).by_growth;
 }
 
 // R'_i = det G / (A~ l'_i) G^-1 (t~_i (x) t~_i) G^-1, with the turned edges.
-Mat2 GrownTriangle::bending_by_growth(const SheetMaterial& m, const Vec3& r, const Vec3& d) const {
+Mat2 GrownTriangle::bending_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const {
     const double modulus = m.young_modulus * m.thickness * m.thickness * m.thickness / 12.0;
     const Work found = work(face.bending_measures(), modulus, m.poisson_ratio, r, d);
     Mat2 by_growth = found.by_growth + 2.0 * found.total * inverse;
@@ -80,15 +80,16 @@ Vec3 GrownFace::squared_lengths() const {
             triangle_.grown[2].squaredNorm()};
 }
 
-Vec3 GrownFace::turns(const Vec3& rest_angles) const {
-    Vec3 turns;
+Vec3 GrownFace::natural_angle_changes(const Vec3& rest_angles) const {
+    Vec3 natural_angle_changes;
     for (int i = 0; i < 3; ++i) {
         const Eigen::Vector2d &tj = triangle_.grown[(i + 1) % 3], &tk = triangle_.grown[(i + 2) % 3];
         const double length = face().edge_length[i];
         const double share = length / (triangle_.edge[i].norm() * std::sqrt(triangle_.determinant));
-        turns[i] = rest_angles[i] * (share - 1.0) - length / (4.0 * face().area) * tj.dot(curvature_ * tk);
+        natural_angle_changes[i] =
+            rest_angles[i] * (share - 1.0) - length / (4.0 * face().area) * tj.dot(curvature_ * tk);
     }
-    return turns;
+    return natural_angle_changes;
 }
 
 Mat2 GrownFace::lengths_by_growth(const Vec3& by) const {
@@ -97,7 +98,7 @@ Mat2 GrownFace::lengths_by_growth(const Vec3& by) const {
     return sum;
 }
 
-GrownFace::ByNatural GrownFace::turns_by_natural(const Vec3& rest_angles, const Vec3& by) const {
+GrownFace::ByNatural GrownFace::natural_angle_changes_vjp(const Vec3& rest_angles, const Vec3& by) const {
     ByNatural sum{Mat2::Zero(), Mat2::Zero()};
     for (int i = 0; i < 3; ++i) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;

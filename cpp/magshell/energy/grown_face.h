@@ -32,8 +32,8 @@ class GrownTriangle {
           determinant(growth.determinant()),
           face(grown) {}
 
-    Mat2 membrane_by_growth(const SheetMaterial& m, const Vec3& r, const Vec3& d) const;
-    Mat2 bending_by_growth(const SheetMaterial& m, const Vec3& r, const Vec3& d) const;
+    Mat2 membrane_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const;
+    Mat2 bending_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const;
     /// d|t'_i|^2 and, over l'_i, dl'_i.
     Mat2 squared_length_by_growth(int i) const { return 2.0 * symmetric_product(grown[i], edge[i]); }
     Mat2 relative_length_by_growth(int i) const {
@@ -62,7 +62,7 @@ class GrownFace {
     std::array<Vec3, 3> corners() const;
     Vec3 squared_lengths() const;
     /// o_i [rad], over the angles of the rest shape.
-    Vec3 turns(const Vec3& rest_angles) const;
+    Vec3 natural_angle_changes(const Vec3& rest_angles) const;
 
     /// Of by . |t'|^2.
     Mat2 lengths_by_growth(const Vec3& by) const;
@@ -70,7 +70,7 @@ class GrownFace {
         Mat2 growth, curvature;
     };
     /// Of by . o.
-    ByNatural turns_by_natural(const Vec3& rest_angles, const Vec3& by) const;
+    ByNatural natural_angle_changes_vjp(const Vec3& rest_angles, const Vec3& by) const;
 
     /// A derivative in the face's axes as one by a tensor in world axes.
     Mat3 in_world(const Mat2& tensor) const { return axes_ * tensor * axes_.transpose(); }

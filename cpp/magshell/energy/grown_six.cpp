@@ -118,7 +118,7 @@ std::array<Vec3, 3> GrownSix::grown_tangents(const std::array<double, 3>& at) co
     return grown;
 }
 
-Mat2 GrownSix::membrane_by_growth(const SheetMaterial& m, const Vec9& r, const Vec9& d) const {
+Mat2 GrownSix::membrane_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const {
     Mat2 sum = Mat2::Zero();
     for (int p = 0; p < 6; ++p) {
         const Eigen::Matrix<double, 3, 9> rows = membrane_interpolation(six_nodes::inside[p].at);
@@ -130,7 +130,7 @@ Mat2 GrownSix::membrane_by_growth(const SheetMaterial& m, const Vec9& r, const V
 
 // r . C d = r_ . S d_ with the moments r_ = C r and d_ = C d fixed and S the compliance, so that it changes by - r_ . dS d_. At a
 // point S is f w/2 J' (b_p tr(M_r M_d) + b_t tr M_r tr M_d), and moments are M = sum_a s'_a psi_a m_a T'_i, T' = G T~ G / det^2.
-Mat2 GrownSix::bending_by_growth(const SheetMaterial& m, const Vec9& r, const Vec9& d) const {
+Mat2 GrownSix::bending_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const {
     const Mat9 stiffness = face().bending_stiffness(m);
     const Vec9 of_r = stiffness * r, of_d = stiffness * d;
     const double factor = 12.0 / (m.young_modulus * m.thickness * m.thickness * m.thickness);

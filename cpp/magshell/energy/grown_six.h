@@ -42,8 +42,8 @@ class GrownSix {
     std::array<Vec3, 3> grown_tangents(const std::array<double, 3>& at) const;
 
     /// Of r . C d, with C of the face and r, d fixed.
-    Mat2 membrane_by_growth(const SheetMaterial& m, const Vec9& r, const Vec9& d) const;
-    Mat2 bending_by_growth(const SheetMaterial& m, const Vec9& r, const Vec9& d) const;
+    Mat2 membrane_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const;
+    Mat2 bending_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const;
     /// Of by . squared_lengths; of by . f' in a fixed shape, f' as it is; and of by . (f~ rest + bent).
     Mat2 lengths_by_growth(const Vec9& by) const;
     Mat2 inside_by_growth(const Vec9& by, const Vec9& inside) const;

@@ -16,10 +16,24 @@
 #pragma once
 
 #include "magshell/core/pack_functions.h"
-#include "magshell/energy/rest_moduli.h"
 #include "magshell/strain/deformation.h"
 
 namespace magshell {
+
+struct RestModuli {
+    Pack lambda, mu;  // [Pa]
+};
+
+/// Materials whose constants are just these.
+struct LameSolid {
+    static constexpr int constants = 2;
+
+    static RestModuli rest_moduli(const Pack c[]) { return {c[0], c[1]}; }
+    static void rest_moduli_vjp(const Pack[], const RestModuli& by, Pack out[]) {
+        out[0] += by.lambda;
+        out[1] += by.mu;
+    }
+};
 
 /// w, and its derivatives by I1 and J.
 struct InvariantDerivatives {

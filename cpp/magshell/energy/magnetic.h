@@ -62,7 +62,7 @@ struct Magnetic {
     }
 
     /// What a field that varies adds to the gradient of each node: - A~ h (dB/dx)^T M / 3.
-    Pack3 gradient_by_place(const Element& e, const Field& field) const {
+    Pack3 gradient_by_position(const Element& e, const Field& field) const {
         const Pack3 m = magnetization(e);
         const Pack* g = field.gradient.at;
         const Pack3 pull = {g[0] * m.x + g[3] * m.y + g[6] * m.z, g[1] * m.x + g[4] * m.y + g[7] * m.z,
@@ -101,7 +101,7 @@ struct Magnetic {
     }
 
     /// Adds what a field that varies in space brings: d2(M . B(x_b)) with one or two derivatives on x_b.
-    void add_hessian_by_place(const Element& e, const Field& field, Pack33 h[6]) const {
+    void add_hessian_by_position(const Element& e, const Field& field, Pack33 h[6]) const {
         Pack33 by_node[3];  // d(M . dB/dx_j)/dx_node, row = component of the node, column = j
         for (int j = 0; j < 3; ++j) {
             Pack3 d1, d2;

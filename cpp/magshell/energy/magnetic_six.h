@@ -19,7 +19,7 @@ class MagneticSix {
 
     MagneticSix(const Pack3 x[6], int point) : point_(point), frame_(of(x, point)) {}
 
-    static Pack3 place(const Pack3 x[6], int point) {
+    static Pack3 position(const Pack3 x[6], int point) {
         Pack3 at = Pack(shapes_[point][0]) * x[0];
         for (int k = 1; k < 6; ++k) at += Pack(shapes_[point][k]) * x[k];
         return at;
@@ -42,7 +42,7 @@ class MagneticSix {
     }
 
     /// Adds what a field that varies in space brings.
-    void add_gradient_by_place(const Element& e, const Magnetic::Field& field, Pack3 g[6]) const {
+    void add_gradient_by_position(const Element& e, const Magnetic::Field& field, Pack3 g[6]) const {
         const Pack3 pull = -e.volume * multiply(transpose(field.gradient), frame_.magnetization(e));
         for (int k = 0; k < 6; ++k) g[k] += Pack(shapes_[point_][k]) * pull;
     }
@@ -62,7 +62,7 @@ class MagneticSix {
     }
 
     /// Adds what a field that varies in space brings: d2(M . B(x_p)) with one or two derivatives on x_p.
-    void add_hessian_by_place(const Element& e, const Magnetic::Field& field, Pack33 h[21]) const {
+    void add_hessian_by_position(const Element& e, const Magnetic::Field& field, Pack33 h[21]) const {
         Pack33 by_first, by_second;  // d(M . dB/dx_j)/da, row = component of a, column = j
         for (int j = 0; j < 3; ++j) {
             Pack3 d1, d2;

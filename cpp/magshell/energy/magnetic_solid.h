@@ -15,20 +15,20 @@
 
 #include "magshell/core/vector3.h"
 #include "magshell/energy/magnetic.h"
-#include "magshell/strain/carried_vector.h"
 #include "magshell/strain/deformation.h"
+#include "magshell/strain/pushed_forward_vector.h"
 
 namespace magshell {
 
 template <int N>
-struct MagneticSolid : CarriedVector<N> {  // alpha_k [A/m2]
-    using CarriedVector<N>::alpha;
+struct MagneticSolid : PushedForwardVector<N> {  // alpha_k [A/m2]
+    using PushedForwardVector<N>::alpha;
 
     Pack volume;  // V_p [m3]
 
     Pack3 magnetization(const Pack3 x[N]) const { return this->at(x); }
 
-    static Pack3 place(const std::array<double, N>& shapes, const Pack3 x[N]) {
+    static Pack3 position(const std::array<double, N>& shapes, const Pack3 x[N]) {
         Pack3 at = Pack(shapes[0]) * x[0];
         for (int k = 1; k < N; ++k) at += Pack(shapes[k]) * x[k];
         return at;
@@ -42,8 +42,8 @@ struct MagneticSolid : CarriedVector<N> {  // alpha_k [A/m2]
     }
 
     /// Adds what comes with a field that varies in space.
-    void add_gradient_by_place(const std::array<double, N>& shapes, const Pack3 x[N],
-                               const Magnetic::Field& field, Pack3 g[N]) const {
+    void add_gradient_by_position(const std::array<double, N>& shapes, const Pack3 x[N],
+                                  const Magnetic::Field& field, Pack3 g[N]) const {
         const Pack3 pull = -volume * multiply(transpose(field.gradient), magnetization(x));
         for (int k = 0; k < N; ++k) g[k] += Pack(shapes[k]) * pull;
     }

@@ -16,7 +16,7 @@
 
 namespace magshell {
 
-struct SheetMaterial {
+struct ShellMaterial {
     double thickness, young_modulus, poisson_ratio;
 };
 
@@ -46,14 +46,14 @@ struct RestFace {
         }
     }
 
-    Mat3 membrane_stiffness(const SheetMaterial& m) const { return membrane(m).stiffness(m.poisson_ratio); }
-    Mat3 bending_stiffness(const SheetMaterial& m) const { return bending(m).stiffness(m.poisson_ratio); }
+    Mat3 membrane_stiffness(const ShellMaterial& m) const { return membrane(m).stiffness(m.poisson_ratio); }
+    Mat3 bending_stiffness(const ShellMaterial& m) const { return bending(m).stiffness(m.poisson_ratio); }
 
     /// dC/dnu. By the modulus C is linear; by the thickness linear (membrane) or cubic (bending).
-    Mat3 membrane_by_poisson_ratio(const SheetMaterial& m) const {
+    Mat3 membrane_by_poisson_ratio(const ShellMaterial& m) const {
         return membrane(m).by_poisson_ratio(m.poisson_ratio);
     }
-    Mat3 bending_by_poisson_ratio(const SheetMaterial& m) const {
+    Mat3 bending_by_poisson_ratio(const ShellMaterial& m) const {
         return bending(m).by_poisson_ratio(m.poisson_ratio);
     }
 
@@ -99,11 +99,11 @@ struct RestFace {
         }
     };
 
-    PlaneStress membrane(const SheetMaterial& m) const {
+    PlaneStress membrane(const ShellMaterial& m) const {
         return {membrane_measures(), m.young_modulus * area * m.thickness};
     }
 
-    PlaneStress bending(const SheetMaterial& m) const {
+    PlaneStress bending(const ShellMaterial& m) const {
         const double cubed = m.thickness * m.thickness * m.thickness;
         return {bending_measures(), m.young_modulus * area * cubed / 12.0};
     }

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "magshell/energy/six_node_rows.h"
-#include "magshell/strain/from_first.h"
+#include "magshell/strain/relative_to_first_node.h"
 #include "magshell/strain/six_nodes.h"
 
 namespace magshell {
@@ -14,7 +14,7 @@ namespace magshell {
 class MembraneSix {
   public:
     explicit MembraneSix(const Pack3 places[6]) {
-        const std::array<Pack3, 6> x = from_first<6>(places);
+        const std::array<Pack3, 6> x = relative_to_first_node<6>(places);
         for (int i = 0; i < 3; ++i) {
             for (int g = 0; g < 2; ++g) {
                 each_along(i, g, [&](int a, double c) { add(on_edge_[i][g], c, x[a]); });

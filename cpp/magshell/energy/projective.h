@@ -30,7 +30,7 @@ struct Projective : LameSolid {
         out[1] += by.mu;
     }
     /// No Hessian is larger: distances to a set grow no faster than to a point of it.
-    static Pack surrogate(const Pack c[]) { return Pack(2.0) * c[1] + c[0]; }
+    static Pack projective_weight(const Pack c[]) { return Pack(2.0) * c[1] + c[0]; }
 
     Pack33 f;
     Polar polar;

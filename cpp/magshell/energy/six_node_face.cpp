@@ -75,11 +75,11 @@ Mat9 SixNodeFace::membrane(const Stiffness& at_point) const {
     return sum;
 }
 
-Mat9 SixNodeFace::membrane_stiffness(const SheetMaterial& m) const {
+Mat9 SixNodeFace::membrane_stiffness(const ShellMaterial& m) const {
     return membrane([&](const RestFace& face) { return face.membrane_stiffness(m); });
 }
 
-Mat9 SixNodeFace::membrane_by_poisson_ratio(const SheetMaterial& m) const {
+Mat9 SixNodeFace::membrane_by_poisson_ratio(const ShellMaterial& m) const {
     return membrane([&](const RestFace& face) { return face.membrane_by_poisson_ratio(m); });
 }
 
@@ -109,14 +109,14 @@ Mat9 SixNodeFace::compliance(double factor, double by_products, double by_traces
     return sum;
 }
 
-Mat9 SixNodeFace::bending_stiffness(const SheetMaterial& m) const {
+Mat9 SixNodeFace::bending_stiffness(const ShellMaterial& m) const {
     const double cubed = m.thickness * m.thickness * m.thickness;
     return compliance(12.0 / (m.young_modulus * cubed), 1.0 + m.poisson_ratio, -m.poisson_ratio)
         .llt()
         .solve(Mat9::Identity());
 }
 
-Mat9 SixNodeFace::bending_by_poisson_ratio(const SheetMaterial& m) const {
+Mat9 SixNodeFace::bending_by_poisson_ratio(const ShellMaterial& m) const {
     const double cubed = m.thickness * m.thickness * m.thickness;
     const Mat9 stiffness = bending_stiffness(m);
     return -stiffness * compliance(12.0 / (m.young_modulus * cubed), 1.0, -1.0) * stiffness;

@@ -26,10 +26,10 @@ class SixNodeFace {
     /// From its tangents at the points inside.
     SixNodeFace(const std::array<std::array<Vec3, 3>, 6>& tangents, const std::array<double, 9>& scale);
 
-    Mat9 membrane_stiffness(const SheetMaterial& m) const;
-    Mat9 membrane_by_poisson_ratio(const SheetMaterial& m) const;
-    Mat9 bending_stiffness(const SheetMaterial& m) const;
-    Mat9 bending_by_poisson_ratio(const SheetMaterial& m) const;
+    Mat9 membrane_stiffness(const ShellMaterial& m) const;
+    Mat9 membrane_by_poisson_ratio(const ShellMaterial& m) const;
+    Mat9 bending_stiffness(const ShellMaterial& m) const;
+    Mat9 bending_by_poisson_ratio(const ShellMaterial& m) const;
 
     /// At a point inside: the inverse of J, twice the area of the tangent triangle there.
     std::array<double, 6> inverse_jacobian;

@@ -38,7 +38,7 @@ inline VolumeNames names_of(VolumeLaw law) {
 }
 
 /// Whether its first number is a volume that it wants, and the value which that has at rest.
-inline bool wants_volume(VolumeLaw law) {
+inline bool has_target_volume(VolumeLaw law) {
     return law == VolumeLaw::liquid || law == VolumeLaw::cell;
 }
 inline double target_at_rest(VolumeLaw law, double rest) {
@@ -54,7 +54,7 @@ struct VolumeEnergy {
     /// Under a load factor.
     VolumeEnergy(VolumeLaw law, std::array<double, 2> numbers, double rest, double volume, double factor)
         : VolumeEnergy(law, loaded(law, numbers, rest, factor), rest, volume) {
-        if (wants_volume(law)) {
+        if (has_target_volume(law)) {
             slope_by_factor = slope_by[0] * (numbers[0] - target_at_rest(law, rest));
             slope_by[0] *= factor;
             return;
@@ -105,7 +105,7 @@ struct VolumeEnergy {
     static std::array<double, 2> loaded(VolumeLaw law, std::array<double, 2> numbers, double rest,
                                         double factor) {
         const double at_rest = target_at_rest(law, rest);
-        if (wants_volume(law)) numbers[0] = at_rest + factor * (numbers[0] - at_rest);
+        if (has_target_volume(law)) numbers[0] = at_rest + factor * (numbers[0] - at_rest);
         return numbers;
     }
 };

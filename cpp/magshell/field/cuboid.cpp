@@ -41,18 +41,18 @@ LineFunction whole_line(double x, double y) {
 
 /// Adds F_bc = f and what follows from it.
 void add_line(int b, int c, const LineFunction& f, int order, PotentialDerivatives& out) {
-    out.second[place(b, c)] += f.value;
+    out.second[derivative_index(b, c)] += f.value;
     if (order < 3) return;
-    out.third[place(b, b, c)] += f.b;
-    out.third[place(b, c, c)] += f.c;
-    out.third[place(b, b, b)] -= f.c;
-    out.third[place(c, c, c)] -= f.b;
+    out.third[derivative_index(b, b, c)] += f.b;
+    out.third[derivative_index(b, c, c)] += f.c;
+    out.third[derivative_index(b, b, b)] -= f.c;
+    out.third[derivative_index(c, c, c)] -= f.b;
     if (order < 4) return;
-    out.fourth[place(b, b, b, c)] += f.bb;
-    out.fourth[place(b, b, c, c)] += f.bc;
-    out.fourth[place(b, c, c, c)] += f.cc;
-    out.fourth[place(b, b, b, b)] -= f.bc;
-    out.fourth[place(c, c, c, c)] -= f.bc;
+    out.fourth[derivative_index(b, b, b, c)] += f.bb;
+    out.fourth[derivative_index(b, b, c, c)] += f.bc;
+    out.fourth[derivative_index(b, c, c, c)] += f.cc;
+    out.fourth[derivative_index(b, b, b, b)] -= f.bc;
+    out.fourth[derivative_index(c, c, c, c)] -= f.bc;
 }
 
 constexpr std::array<int, 3> next = {1, 2, 0}, after = {2, 0, 1};
@@ -64,11 +64,11 @@ PotentialDerivatives corner(const Vec3& x, const Vec3& side, int order) {
     if (r == 0.0) r = std::numeric_limits<double>::quiet_NaN();
     for (int a = 0; a < 3; ++a) {
         const int b = next[a], c = after[a];
-        out.second[place(a, a)] = -std::atan2(side[a] * x[b] * x[c], std::abs(x[a]) * r);
+        out.second[derivative_index(a, a)] = -std::atan2(side[a] * x[b] * x[c], std::abs(x[a]) * r);
         add_line(b, c, end_of_line(x[b], x[c], x[a], r, side[a]), order, out);
-        if (order >= 4) out.fourth[place(0, 1, 2, a)] = -x[a] / (r * r * r);
+        if (order >= 4) out.fourth[derivative_index(0, 1, 2, a)] = -x[a] / (r * r * r);
     }
-    out.third[place(0, 1, 2)] = 1.0 / r;
+    out.third[derivative_index(0, 1, 2)] = 1.0 / r;
     return out;
 }
 

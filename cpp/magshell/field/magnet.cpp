@@ -25,11 +25,11 @@ Mat3 flux_matrix(const PotentialDerivatives& potential, bool inside) {
 template <class Shape>
 Magnet<Shape>::Magnet(Shape shape, const Vec3& magnetization, const Vec3& center, const Vec3& rotation)
     : shape_(std::move(shape)) {
-    place(magnetization, center, rotation);
+    set_pose(magnetization, center, rotation);
 }
 
 template <class Shape>
-void Magnet<Shape>::place(const Vec3& magnetization, const Vec3& center, const Vec3& rotation) {
+void Magnet<Shape>::set_pose(const Vec3& magnetization, const Vec3& center, const Vec3& rotation) {
     magnetization_ = magnetization;
     center_ = center;
     rotation_ = rotation;
@@ -68,7 +68,7 @@ template <class Shape>
 void Magnet<Shape>::set_values(std::span<const double> values) {
     shape_.set_sizes(values.first(Shape::n_sizes));
     const double* rest = values.data() + Shape::n_sizes;
-    place(Vec3(rest), Vec3(rest + 3), Vec3(rest + 6));
+    set_pose(Vec3(rest), Vec3(rest + 3), Vec3(rest + 6));
 }
 
 // w = u . B + m . (G v), G = dB/dx, with all vectors in the axes of the shape. As the magnet moves, w changes

@@ -40,7 +40,7 @@ class Magnet final : public AppliedField {
     static constexpr int n_values = Shape::n_sizes + 9;
     using Row = Eigen::Matrix<double, n_values, 1>;
 
-    void place(const Vec3& magnetization, const Vec3& center, const Vec3& rotation);
+    void set_pose(const Vec3& magnetization, const Vec3& center, const Vec3& rotation);
     /// Of one point, by sizes, magnetization, center, and turns in the world's axes.
     Row gradient_at(const Vec3& point, const Vec3& u, const Vec3& m, const Vec3& v) const;
 

@@ -9,15 +9,15 @@
 namespace magshell {
 
 /// Where the derivative along these axes stands: those along x first, then y, then z.
-constexpr int place(int i, int j) {
+constexpr int derivative_index(int i, int j) {
     const int p = (i > 0) + (j > 0), c = (i == 2) + (j == 2);
     return p * (p + 1) / 2 + c;
 }
-constexpr int place(int i, int j, int k) {
+constexpr int derivative_index(int i, int j, int k) {
     const int p = (i > 0) + (j > 0) + (k > 0), c = (i == 2) + (j == 2) + (k == 2);
     return p * (p + 1) / 2 + c;
 }
-constexpr int place(int i, int j, int k, int l) {
+constexpr int derivative_index(int i, int j, int k, int l) {
     const int p = (i > 0) + (j > 0) + (k > 0) + (l > 0), c = (i == 2) + (j == 2) + (k == 2) + (l == 2);
     return p * (p + 1) / 2 + c;
 }
@@ -47,9 +47,10 @@ struct PotentialDerivatives {
     void add_slope(double factor, const PotentialDerivatives& other, int axis) {
         for (int i = 0; i < 3; ++i)
             for (int j = i; j < 3; ++j) {
-                second[place(i, j)] += factor * other.third[place(i, j, axis)];
+                second[derivative_index(i, j)] += factor * other.third[derivative_index(i, j, axis)];
                 for (int k = j; k < 3; ++k)
-                    third[place(i, j, k)] += factor * other.fourth[place(i, j, k, axis)];
+                    third[derivative_index(i, j, k)] +=
+                        factor * other.fourth[derivative_index(i, j, k, axis)];
             }
     }
 
@@ -65,8 +66,9 @@ struct PotentialDerivatives {
         Mat3 result;
         for (int i = 0; i < 3; ++i)
             for (int j = i; j < 3; ++j)
-                result(j, i) = result(i, j) = third[place(i, j, 0)] * a[0] + third[place(i, j, 1)] * a[1] +
-                                              third[place(i, j, 2)] * a[2];
+                result(j, i) = result(i, j) = third[derivative_index(i, j, 0)] * a[0] +
+                                              third[derivative_index(i, j, 1)] * a[1] +
+                                              third[derivative_index(i, j, 2)] * a[2];
         return result;
     }
 
@@ -77,9 +79,9 @@ struct PotentialDerivatives {
             for (int j = i; j < 3; ++j) {
                 double sum = 0.0;
                 for (int k = 0; k < 3; ++k) {
-                    sum += fourth[place(i, j, k, k)] * a[k] * b[k];
+                    sum += fourth[derivative_index(i, j, k, k)] * a[k] * b[k];
                     for (int l = k + 1; l < 3; ++l)
-                        sum += fourth[place(i, j, k, l)] * (a[k] * b[l] + a[l] * b[k]);
+                        sum += fourth[derivative_index(i, j, k, l)] * (a[k] * b[l] + a[l] * b[k]);
                 }
                 result(j, i) = result(i, j) = sum;
             }
@@ -100,18 +102,18 @@ inline void add_point_charge(double charge, const Vec3& x, int order, PotentialD
     for (int i = 0; i < 3; ++i)
         for (int j = i; j < 3; ++j) {
             const double ij = i == j;
-            out.second[place(i, j)] += k3 * (3.0 * e[i] * e[j] - ij);
+            out.second[derivative_index(i, j)] += k3 * (3.0 * e[i] * e[j] - ij);
             if (order < 3) continue;
             for (int k = j; k < 3; ++k) {
                 const double jk = j == k, ik = i == k;
-                out.third[place(i, j, k)] +=
+                out.third[derivative_index(i, j, k)] +=
                     k4 * (ij * e[k] + jk * e[i] + ik * e[j] - 5.0 * e[i] * e[j] * e[k]);
                 if (order < 4) continue;
                 for (int l = k; l < 3; ++l) {
                     const double il = i == l, jl = j == l, kl = k == l;
                     const double pairs = ij * e[k] * e[l] + ik * e[j] * e[l] + il * e[j] * e[k] +
                                          jk * e[i] * e[l] + jl * e[i] * e[k] + kl * e[i] * e[j];
-                    out.fourth[place(i, j, k, l)] +=
+                    out.fourth[derivative_index(i, j, k, l)] +=
                         k5 * (ij * kl + ik * jl + il * jk - 5.0 * pairs + 35.0 * e[i] * e[j] * e[k] * e[l]);
                 }
             }

@@ -87,7 +87,7 @@ void SampledField::set_values(std::span<const double> values) {
 
 bool SampledField::Axis::contains(double x) const {
     constexpr double slack = 1e-9;  // of a spacing, beyond the samples' ends
-    const double u = knots_from_origin(x);
+    const double u = grid_coordinate(x);
     return u >= -slack && u <= samples - 1 + slack;  // false for NaN
 }
 
@@ -99,7 +99,7 @@ SampledField::Cell SampledField::cell_of(const Vec3& point) const {
     Cell cell;
     for (int a = 0; a < 3; ++a) {
         const Axis& axis = axes_[a];
-        const double u = axis.knots_from_origin(point[a]);
+        const double u = axis.grid_coordinate(point[a]);
         const double i = std::clamp(std::floor(u), 0.0, std::max(axis.samples - 2.0, 0.0));
         cell.weights[a] = spline_weights(u - i);
         cell.first += static_cast<std::ptrdiff_t>(i) * axis.stride;

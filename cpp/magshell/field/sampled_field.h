@@ -41,7 +41,7 @@ class SampledField final : public AppliedField {
         Index samples;
         std::ptrdiff_t stride;  // between neighbouring coefficients
 
-        double knots_from_origin(double x) const { return (x - origin) * knots_per_metre; }
+        double grid_coordinate(double x) const { return (x - origin) * knots_per_metre; }
         bool contains(double x) const;
     };
 

@@ -65,7 +65,7 @@ void place_entries(const SparsePattern& pattern, AssemblyPlan& plan) {
         const FrontShape& front = plan.fronts[s].shape;
         for (Index k = 0; k < front.below; ++k) local_row[plan.rows[front.rows + k]] = k;
         for (Index k = plan.fronts[s].first_entry; k < plan.fronts[s + 1].first_entry; ++k) {
-            PlacedEntry& entry = plan.entries[k];
+            RoutedEntry& entry = plan.entries[k];
             const Index column = entry.place, row = row_of[k];
             const bool is_pivot = row < front.first + front.pivots;
             const Index in_front = is_pivot ? row - front.first : local_row[row];

@@ -21,7 +21,7 @@ struct Transfer {
 };
 
 /// A matrix entry and its place in its front's panel [doubles].
-struct PlacedEntry {
+struct RoutedEntry {
     Index entry;
     Index place;
 };
@@ -48,7 +48,7 @@ struct AssemblyPlan {
     std::vector<Index> rows;        // below the pivots of each front, from shape.rows on
     std::vector<Index> places;      // of those rows in the parent: among its pivots, or among its rows below
     std::vector<Index> targets;     // of those rows in the vector of the subtree, or for top fronts of all
-    std::vector<PlacedEntry> entries;
+    std::vector<RoutedEntry> entries;
     std::vector<Transfer> transfers;
     std::vector<Subtree> subtrees;          // independent of the number of threads
     std::vector<Index> top;                 // the fronts above them, in order

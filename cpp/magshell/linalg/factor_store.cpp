@@ -23,7 +23,7 @@ std::shared_ptr<Factor> FactorStore::get(const std::shared_ptr<const SparsePatte
     return shelf.spare ? std::exchange(shelf.spare, nullptr) : shelf.analysed->sibling();
 }
 
-void FactorStore::keep(std::shared_ptr<Factor> factor) {
+void FactorStore::store(std::shared_ptr<Factor> factor) {
     constexpr std::size_t large = std::size_t{1} << 28;
     if (!factor || factor.use_count() > 1 || factor->bytes() > large) return;
     Shelf* shelf = shelf_of(factor->pattern());

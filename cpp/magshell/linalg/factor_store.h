@@ -18,7 +18,7 @@ class FactorStore {
     std::shared_ptr<Factor> get(const std::shared_ptr<const SparsePattern>& pattern, const Analyze& analyze);
     /// One that nobody else holds, for the next who asks: fresh memory costs page faults. What is large goes back to the
     /// system.
-    void keep(std::shared_ptr<Factor> factor);
+    void store(std::shared_ptr<Factor> factor);
     /// How often a pattern was analysed.
     int analyses() const { return analyses_; }
 

@@ -91,8 +91,8 @@ std::vector<Index> ordered(const Places& places) {
     return order;
 }
 
-Places places_of(const NodeGraph& graph, const std::vector<Index>& nodes, const std::vector<Index>& piece_of,
-                 std::vector<Index>& number) {
+Places positions_of(const NodeGraph& graph, const std::vector<Index>& nodes,
+                    const std::vector<Index>& piece_of, std::vector<Index>& number) {
     const Index own = piece_of[nodes.front()];
     Places places{nodes, {0}, {}, {}};
     std::vector<Index> beyond;
@@ -124,7 +124,7 @@ Places places_of(const NodeGraph& graph, const std::vector<Index>& nodes, const 
 std::vector<Index> minimum_degree_order(const NodeGraph& graph, const std::vector<Index>& nodes,
                                         const std::vector<Index>& piece_of, std::vector<Index>& number) {
     if (nodes.empty()) return {};
-    const Places places = places_of(graph, nodes, piece_of, number);
+    const Places places = positions_of(graph, nodes, piece_of, number);
     const std::size_t count = places.weights.size();
     if (count <= 4 * bits) return ordered<4>(places);
     if (count <= 6 * bits) return ordered<6>(places);

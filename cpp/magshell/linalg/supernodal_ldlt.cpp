@@ -139,7 +139,7 @@ PivotTally SupernodalLdlt::process(Index s, double* from, double* to) {
 std::size_t SupernodalLdlt::bytes() const {
     return own_bytes() + (work_ ? work_->bytes() : 0) +
            sizeof(Index) * (pattern_->rows.size() + 3 * plan_.rows.size()) +
-           sizeof(PlacedEntry) * plan_.entries.size() + sizeof(Transfer) * plan_.transfers.size();
+           sizeof(RoutedEntry) * plan_.entries.size() + sizeof(Transfer) * plan_.transfers.size();
 }
 
 std::size_t SupernodalLdlt::own_bytes() const {

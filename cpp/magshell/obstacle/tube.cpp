@@ -16,7 +16,7 @@ constexpr int transition =
     3;  // knots after which an open end is straight and round: coefficients reach so far
 
 // Of an open tube the radius settles: its spline goes on through values like the last one.
-void settle(std::vector<Vec4>& coefficients, std::span<const double> radii) {
+void settle_radius(std::vector<Vec4>& coefficients, std::span<const double> radii) {
     std::vector<Vec4> longer(radii.size() + 2 * transition);
     for (std::size_t k = 0; k < longer.size(); ++k) {
         const std::size_t inner =
@@ -46,7 +46,7 @@ Tube::Tube(std::span<const Vec3> points, std::span<const double> radii, bool clo
         values.emplace_back(points[k].x(), points[k].y(), points[k].z(), radii[k]);
     coefficients_ = spline_coefficients(values);
     if (!closed) {
-        settle(coefficients_, radii);
+        settle_radius(coefficients_, radii);
         for (const double radius : {radii.back(), radii.front()}) {
             continue_straight(coefficients_, radius);
             std::reverse(coefficients_.begin(), coefficients_.end());

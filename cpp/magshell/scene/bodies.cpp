@@ -145,7 +145,7 @@ void Bodies::couple_volumes_and_tendons(const SceneInput& input) {
     for (const TendonInput& tendon : input.tendons)
         for (std::size_t k = 0; k + 1 < tendon.points.size(); ++k) {
             std::vector<Index>& nodes = coupled_.emplace_back();
-            for (const RidingPoint& point : {tendon.points[k], tendon.points[k + 1]})
+            for (const EmbeddedPoint& point : {tendon.points[k], tendon.points[k + 1]})
                 add(nodes, point.vertices.begin(), point.vertices.end());
             close(nodes);
         }

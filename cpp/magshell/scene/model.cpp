@@ -9,8 +9,8 @@
 #include "magshell/linalg/low_rank_factor.h"
 #include "magshell/scene/scene_input.h"
 #include "magshell/term/body_contact_term.h"
-#include "magshell/term/border_term.h"
 #include "magshell/term/damper_term.h"
+#include "magshell/term/low_rank_term.h"
 
 namespace magshell {
 namespace {
@@ -88,7 +88,7 @@ Model::Model(const SceneInput& input)
     add_terms(input);
     for (const std::unique_ptr<Term>& term : terms_) {
         if (term->body() >= 0) of_body_[term->body()].push_back(term.get());
-        if (term->refuses_states()) refusing_.push_back(term.get());
+        if (term->has_infeasible_states()) refusing_.push_back(term.get());
     }
     share_out_columns();
 }
@@ -133,7 +133,7 @@ NodeMatrix Model::surrogate() const {
     NodeMatrix sum(nodes().n_nodes(), nodes().scalars);
     // Dampers act on few coordinates, whose stiffness in a step secants learn.
     for (const std::unique_ptr<Term>& term : terms_)
-        if (term.get() != damper_term_ && !term->add_surrogate(sum))
+        if (term.get() != damper_term_ && !term->add_projective_stiffness(sum))
             throw InvalidInput("Projective Dynamics has no constant matrix for the " +
                                std::string(term->name()) + " energy of this scene");
     sum.finish();
@@ -142,7 +142,7 @@ NodeMatrix Model::surrogate() const {
 
 VectorXd Model::touching_stiffness() const {
     VectorXd of_nodes = VectorXd::Zero(nodes().n_nodes());
-    for (const std::unique_ptr<Term>& term : terms_) term->add_touching_stiffness(of_nodes);
+    for (const std::unique_ptr<Term>& term : terms_) term->add_contact_stiffness(of_nodes);
     return of_nodes;
 }
 
@@ -197,7 +197,7 @@ std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
 }
 
 void Model::keep_spare(std::shared_ptr<Factor> factor) {
-    factors_.keep(std::move(factor));
+    factors_.store(std::move(factor));
 }
 
 double Model::energy(const VectorXd& q, const Controls& controls) const {
@@ -248,9 +248,9 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
     };
     clear(first_columns_.size() - 1);
     // All terms of a chunk before the next chunk: its share of the matrix is cleared and filled in the cache.
-    for (BorderTerm* term : borders_) term->take_extrapolated(extrapolated_stress, cautious);
+    for (LowRankTerm* term : borders_) term->take_extrapolated(extrapolated_stress, cautious);
     for (const std::unique_ptr<Term>& term : terms_) {
-        term->be_cautious(cautious);
+        term->set_psd_projection(cautious);
         term->prepare_assembly(q.data(), controls);
     }
     if (const std::int64_t coupled = layer_ && layer_->used() ? layer_->version() : 0; coupled != coupled_) {
@@ -264,7 +264,7 @@ void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapola
     });
     for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
     low_rank_.clear();
-    for (const BorderTerm* term : borders_) term->add_low_rank(controls, low_rank_);
+    for (const LowRankTerm* term : borders_) term->add_low_rank(controls, low_rank_);
     add_remainders(q, controls);
 }
 
@@ -333,17 +333,17 @@ void Model::share_out_columns() {
 
 double Model::largest_share(const VectorXd& q, const VectorXd& p) const {
     double share = 1.0;
-    for (const Term* term : refusing_) share = std::min(share, term->largest_share(q.data(), p.data()));
+    for (const Term* term : refusing_) share = std::min(share, term->max_step_length(q.data(), p.data()));
     return share;
 }
 
 bool Model::touches() const {
-    return body_contact_ && !body_contact_->touching().empty();
+    return body_contact_ && !body_contact_->evaluated_contacts().empty();
 }
 
 std::string Model::refusal(const VectorXd& q) const {
     for (const Term* term : refusing_)
-        if (std::string reason = term->refusal(q.data()); !reason.empty()) return reason;
+        if (std::string reason = term->invalid_state_reason(q.data()); !reason.empty()) return reason;
     return {};
 }
 
@@ -362,7 +362,7 @@ double Model::share_of_step(const VectorXd& q, const VectorXd& p) const {
 
 std::string Model::stuck(const VectorXd& q, const VectorXd& p) const {
     const double share = largest_share(q, p);
-    if (body_contact_ && body_contact_->largest_share(q.data(), p.data()) <= share)
+    if (body_contact_ && body_contact_->max_step_length(q.data(), p.data()) <= share)
         return "bodies cannot follow: " + body_contact_->blocking(q.data(), p.data());
     return "elements cannot follow: " + refusal(q + 1.01 * share * p);
 }
@@ -373,17 +373,18 @@ void Model::extrapolate(const VectorXd& p) {
 
 Model::Turns Model::turns() const {
     Turns turns;
-    for (const std::unique_ptr<Term>& term : terms_) turns.push_back(term->turns());
+    for (const std::unique_ptr<Term>& term : terms_) turns.push_back(term->angle_branches());
     return turns;
 }
 
 void Model::set_turns(const Turns& turns) {
     bool fits = turns.empty() || turns.size() == terms_.size();
     for (std::size_t k = 0; fits && k < turns.size(); ++k)
-        fits = turns[k].size() == terms_[k]->turns().size();
+        fits = turns[k].size() == terms_[k]->angle_branches().size();
     if (!fits) throw InvalidInput("the start remembers a motion of another scene: start from its positions");
     for (std::size_t k = 0; k < terms_.size(); ++k)
-        terms_[k]->set_turns(turns.empty() ? std::vector<double>(terms_[k]->turns().size(), 0.0) : turns[k]);
+        terms_[k]->set_angle_branches(
+            turns.empty() ? std::vector<double>(terms_[k]->angle_branches().size(), 0.0) : turns[k]);
 }
 
 std::size_t Model::bytes() const {

@@ -27,7 +27,7 @@
 namespace magshell {
 
 class BodyContactTerm;
-class BorderTerm;
+class LowRankTerm;
 class DamperTerm;
 class MuscleTerm;
 struct GrowthForm;
@@ -241,7 +241,7 @@ class Model {
     Kinematics kinematics_;  // where the forces were evaluated last
     Remainder remainder_;
     LowRank low_rank_;
-    std::vector<BorderTerm*> borders_;  // those that it is of
+    std::vector<LowRankTerm*> borders_;  // those that it is of
     FactorStore factors_;
     int values_version_ = 0;
     double length_scale_ = 0.0;

@@ -5,7 +5,7 @@
 #include "magshell/core/errors.h"
 #include "magshell/scene/model.h"
 #include "magshell/term/body_contact_term.h"
-#include "magshell/term/border_term.h"
+#include "magshell/term/low_rank_term.h"
 
 namespace magshell {
 
@@ -13,7 +13,8 @@ void Model::add_remainders(const VectorXd& q, const Controls& controls) {
     remainder_.clear();
     unsymmetric_ = false;
     if (!follows_) return;
-    for (const std::unique_ptr<Term>& term : terms_) term->add_remainder(q.data(), controls, remainder_);
+    for (const std::unique_ptr<Term>& term : terms_)
+        term->add_nonsymmetric_tangent(q.data(), controls, remainder_);
     unsymmetric_ = feels_skews(0);
 }
 
@@ -75,7 +76,7 @@ std::vector<PairStiffness> Model::touching_pairs() const {
 }
 
 void Model::add_cancelling_forces_here(bool in_motion, VectorXd& out) const {
-    for (const BorderTerm* term : borders_) term->add_cancelling_here(out);
+    for (const LowRankTerm* term : borders_) term->add_cancelling_here(out);
     if (contact_) contact_->add_cancelling_normal_forces(out);
     if (body_contact_) body_contact_->add_cancelling_normal_forces(out);
     if (!in_motion) return;
@@ -83,7 +84,7 @@ void Model::add_cancelling_forces_here(bool in_motion, VectorXd& out) const {
 }
 
 void Model::hold_forces(bool held) {
-    for (const std::unique_ptr<ForceTerm>& force : forces_) force->hold(held);
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->set_frozen(held);
 }
 
 void Model::assemble_forces(const Controls& controls, bool cautious) {

@@ -35,7 +35,7 @@ VectorXd Model::gradient_rate(const VectorXd& q, const Controls& at, const Contr
     Residual change, constant, dropped;
     for (Residual* each : {&change, &constant, &dropped}) each->reset(size());
     for (const std::unique_ptr<Term>& term : terms_) {
-        if (!term->driven()) continue;
+        if (!term->depends_on_loads()) continue;
         term->evaluate(q.data(), rate, change);
         term->evaluate(q.data(), none, constant);
         term->evaluate(q.data(), at, dropped);  // where it is again

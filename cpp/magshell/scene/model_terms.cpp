@@ -4,8 +4,8 @@
 
 #include "magshell/scene/model.h"
 #include "magshell/scene/scene_input.h"
-#include "magshell/strain/fold_angle.h"
-#include "magshell/strain/fold_six.h"
+#include "magshell/strain/dihedral_angle.h"
+#include "magshell/strain/dihedral_angle_six.h"
 #include "magshell/term/ball_torque_term.h"
 #include "magshell/term/bending_six_term.h"
 #include "magshell/term/bending_term.h"
@@ -38,8 +38,8 @@ CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& m
     const std::array<Index, 3>& c = sheet.corners[f];
     const std::array<Index, 4> nodes = {c[(i + 1) % 3], c[(i + 2) % 3], c[i],
                                         at.direction_node(given.direction)};
-    const Fold fold(broadcast(at.rest[nodes[0]]), broadcast(at.rest[nodes[1]]), broadcast(at.rest[nodes[2]]),
-                    broadcast(at.rest[nodes[3]]), Pack(0.0));
+    const DihedralAngle fold(broadcast(at.rest[nodes[0]]), broadcast(at.rest[nodes[1]]),
+                             broadcast(at.rest[nodes[2]]), broadcast(at.rest[nodes[3]]), Pack(0.0));
     return {{nodes[0], nodes[1], nodes[2], nodes[3], -1, -1, -1, -1, -1},
             -1,
             fold.angle()[0],
@@ -76,8 +76,9 @@ std::array<CoupleTerm::Couple, 2> couples_of(const EdgeCoupleInput& given, const
         lengths[g] = (along[0] * rest[from] + along[1] * rest[to] + along[2] * rest[middle(i)]).norm();
     }
     const auto at_point = [&](int g) {
-        return CoupleTerm::Couple{nodes,     g, FoldSix(x, Pack(0.0), g).angle()[0],   side.rotation[g],
-                                  side.sign, 0, lengths[g] / (lengths[0] + lengths[1])};
+        return CoupleTerm::Couple{
+            nodes,     g, DihedralAngleSix(x, Pack(0.0), g).angle()[0], side.rotation[g],
+            side.sign, 0, lengths[g] / (lengths[0] + lengths[1])};
     };
     return {at_point(0), at_point(1)};
 }
@@ -181,7 +182,7 @@ void Model::add_magnetic_terms(const SceneInput& input) {
 }
 
 void Model::add_volumes(const SceneInput& input) {
-    const auto add = [&](std::unique_ptr<BorderTerm> term) {
+    const auto add = [&](std::unique_ptr<LowRankTerm> term) {
         borders_.push_back(term.get());
         terms_.push_back(std::move(term));
     };
@@ -284,7 +285,7 @@ void Model::add_contacts(const SceneInput& input) {
     terms_.push_back(std::move(contact));
     std::vector<bool> rubs, lagged;
     for (const ContactInput& each : input.contacts) {
-        rubs.push_back(each.rubs);
+        rubs.push_back(each.has_friction);
         lagged.push_back(each.lagged);
     }
     if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
@@ -299,7 +300,7 @@ void Model::add_body_contacts(const SceneInput& input) {
     terms_.push_back(std::move(contact));
     std::vector<bool> rubs, lagged;
     for (const BodyContactInput& each : input.body_contacts) {
-        rubs.push_back(each.rubs);
+        rubs.push_back(each.has_friction);
         lagged.push_back(each.lagged);
     }
     if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())

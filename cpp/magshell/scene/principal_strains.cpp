@@ -82,7 +82,7 @@ void add_sheet(const Model& model, Index body, const VectorXd& q, const VectorXd
                                                                        : membrane.rest_corners(f),
                                           own = bending.grows() ? bending.grown(f).corners()
                                                                 : sheet.rest_corners(f);
-                const Vec3 turned = bending.grown_turns(f);
+                const Vec3 turned = bending.natural_angle_changes(f);
                 for (int k = 0; k < 3; ++k) {
                     set_lane(own_rest[k], lane, own[k]);
                     set_lane(rest[k], lane, corners[k]);

@@ -17,7 +17,7 @@
 #include "magshell/term/face_energy.h"
 #include "magshell/term/muscle_fibres.h"
 #include "magshell/term/pressure_term.h"
-#include "magshell/term/sheet_growth.h"
+#include "magshell/term/shell_growth.h"
 #include "magshell/term/solid_term.h"
 #include "magshell/term/tendon_term.h"
 #include "magshell/term/volume_term.h"

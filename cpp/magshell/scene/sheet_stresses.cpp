@@ -72,7 +72,7 @@ std::vector<FaceStress> sheet_stresses(const Model& model, Index number, const V
         const std::array<Vec3, 3> rest = membrane.rest_corners(f);
         Vec3 x[3];
         for (int k = 0; k < 3; ++k) x[k] = q.segment<3>(3 * membrane.corners()[f][k]);
-        const Vec3 turned = bending.grown_turns(f);
+        const Vec3 turned = bending.natural_angle_changes(f);
         const Vec3 change = squared_lengths(x) - (stretching.grows() ? stretching.grown(f).squared_lengths()
                                                                      : squared_lengths(rest.data()));
         for (int i = 0; i < 3; ++i) {

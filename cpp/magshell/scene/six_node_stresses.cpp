@@ -110,14 +110,14 @@ struct Terms {
 
 std::vector<SixNodeStrain> six_node_strains(const Model& model, Index number, const VectorXd& q) {
     const Terms terms(model, number);
-    const Strains bends = terms.bending.look(q.data());
+    const Strains bends = terms.bending.strains_at(q.data());
     // On a flat face the curvature that the moments see is the same for all materials.
-    const SheetMaterial unit{.thickness = 1.0, .young_modulus = 12.0, .poisson_ratio = 0.0};
+    const ShellMaterial unit{.thickness = 1.0, .young_modulus = 12.0, .poisson_ratio = 0.0};
     std::vector<SixNodeStrain> out(4 * static_cast<std::size_t>(terms.sheet.n_faces()));
     Index last = -1;
     Numbers moments;
-    terms.each(terms.membrane.look(q.data()), [&](Index row, Index f, const Tangents& tangents,
-                                                  const std::array<double, 3>& at, const Mat3& green) {
+    terms.each(terms.membrane.strains_at(q.data()), [&](Index row, Index f, const Tangents& tangents,
+                                                        const std::array<double, 3>& at, const Mat3& green) {
         if (f != last) moments = terms.bending.rest(f).bending_stiffness(unit) * numbers_of(bends, f);
         last = f;
         out[row] = {green, moment_at(terms.bending.rest(f), tangents, at, moments)};
@@ -127,10 +127,10 @@ std::vector<SixNodeStrain> six_node_strains(const Model& model, Index number, co
 
 std::vector<FaceStress> six_node_stresses(const Model& model, Index number, const VectorXd& q) {
     const Terms terms(model, number);
-    const Strains moments = terms.bending.stresses(terms.bending.look(q.data()));
+    const Strains moments = terms.bending.stresses(terms.bending.strains_at(q.data()));
     std::vector<FaceStress> out(4 * static_cast<std::size_t>(terms.sheet.n_faces()));
-    terms.each(terms.membrane.look(q.data()), [&](Index row, Index f, const Tangents& tangents,
-                                                  const std::array<double, 3>& at, const Mat3& green) {
+    terms.each(terms.membrane.strains_at(q.data()), [&](Index row, Index f, const Tangents& tangents,
+                                                        const std::array<double, 3>& at, const Mat3& green) {
         const auto& [thickness, modulus, nu] = terms.membrane.material(f);
         const Mat3 plane = tangents.plane(),
                    moment = moment_at(terms.bending.rest(f), tangents, at, numbers_of(moments, f));

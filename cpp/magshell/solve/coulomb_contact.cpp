@@ -12,8 +12,8 @@ StandingAside::StandingAside(const Model& model) : model_(model) {
 }
 
 void StandingAside::stand(bool aside) const {
-    if (model_.contact()) model_.contact()->stand_aside(aside);
-    if (model_.body_contact()) model_.body_contact()->stand_aside(aside);
+    if (model_.contact()) model_.contact()->set_switched_off(aside);
+    if (model_.body_contact()) model_.body_contact()->set_switched_off(aside);
 }
 
 CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix, const Controls& controls,
@@ -27,9 +27,9 @@ CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix,
     matrix.require_isotropic();
     if (model.body_contact()) model.body_contact()->require_one_coefficient();
     if (!model.contact()) return;
-    for (const ContactTerm::Keeping& keeping : model.contact()->keepings()) {
+    for (const ContactTerm::HardContact& keeping : model.contact()->hard_contacts()) {
         if (!matrix.solves(keeping.node)) continue;
-        obstacles_.push_back({keeping, model.contact()->standing(keeping.obstacle, controls)});
+        obstacles_.push_back({keeping, model.contact()->obstacle_state(keeping.obstacle, controls)});
         pairs_.push_back({{keeping.node, -1, -1, -1}, 1, {1.0, 0.0, 0.0, 0.0}, keeping.friction});
     }
 }
@@ -68,13 +68,13 @@ void CoulombContact::look_at_bodies(const VectorXd& q) {
     for (std::size_t k = 0; k < between_.size(); ++k)
         if (const Pair& pair = pairs_[obstacles_.size() + k]; !pair.force.isZero(0.0))
             pushed[key(between_[k].near)] = pair.force;
-    between_ = model_.body_contact()->hard_pairs(q.data());
-    std::erase_if(between_, [&](const BodyContactTerm::HardPair& each) {
+    between_ = model_.body_contact()->hard_contact_pairs(q.data());
+    std::erase_if(between_, [&](const BodyContactTerm::HardContactPair& each) {
         return std::none_of(each.near.pair.nodes.begin(), each.near.pair.nodes.end(),
                             [&](Index node) { return node >= 0 && matrix_.solves(node); });
     });
     pairs_.erase(pairs_.begin() + static_cast<std::ptrdiff_t>(obstacles_.size()), pairs_.end());
-    for (const BodyContactTerm::HardPair& each : between_) {
+    for (const BodyContactTerm::HardContactPair& each : between_) {
         Pair& pair = pairs_.emplace_back(Pair{each.near.pair.nodes, nodes_of(each.near.pair.kind),
                                               each.at.weights, each.friction, each.gap, each.at.normal});
         if (const auto found = pushed.find(key(each.near)); found != pushed.end()) pair.force = found->second;

@@ -72,8 +72,8 @@ class CoulombContact {
         }
     };
     struct OnObstacle {
-        ContactTerm::Keeping keeping;
-        StandingObstacle obstacle;
+        ContactTerm::HardContact keeping;
+        ObstacleState obstacle;
     };
 
     /// The force on a pair that would be at `without`, `ahead` of where it was looked at, if it had none.
@@ -91,7 +91,7 @@ class CoulombContact {
     double time_, negligible_;
     std::vector<OnObstacle> obstacles_;
     std::vector<Pair> pairs_;  // of obstacles, in their order, then of bodies
-    std::vector<BodyContactTerm::HardPair> between_;
+    std::vector<BodyContactTerm::HardContactPair> between_;
     VectorXd forces_;
 };
 

@@ -19,20 +19,20 @@ double depth_at(double pull, double w, const ContactLaw& law) {
 }  // namespace
 
 VectorXd landing(const Model& model, const VectorXd& q, const Controls& controls, const VectorXd& weights,
-                 const std::vector<ContactTerm::Touch>& expected) {
+                 const std::vector<ContactTerm::ActiveContact>& expected) {
     const ContactTerm& contact = *model.contact();
-    const auto before = [](const ContactTerm::Touch* one, const ContactTerm::Touch* other) {
-        const auto key = [](const ContactTerm::Touch& touch) {
+    const auto before = [](const ContactTerm::ActiveContact* one, const ContactTerm::ActiveContact* other) {
+        const auto key = [](const ContactTerm::ActiveContact& touch) {
             return std::tie(touch.contact, touch.obstacle, touch.point);
         };
         return key(*one) < key(*other);
     };
-    std::vector<const ContactTerm::Touch*> sorted;
-    for (const ContactTerm::Touch& touch : expected) sorted.push_back(&touch);
+    std::vector<const ContactTerm::ActiveContact*> sorted;
+    for (const ContactTerm::ActiveContact& touch : expected) sorted.push_back(&touch);
     if (!std::is_sorted(sorted.begin(), sorted.end(), before))
         std::sort(sorted.begin(), sorted.end(), before);
     VectorXd move;
-    for (const ContactTerm::Touch& touch : contact.touches(q.data(), controls)) {
+    for (const ContactTerm::ActiveContact& touch : contact.active_contacts(q.data(), controls)) {
         const auto same = std::lower_bound(sorted.begin(), sorted.end(), &touch, before);
         const double force = same != sorted.end() && !before(&touch, *same) ? (*same)->force : 0.0;
         const ContactPoint& point = contact.point(touch);
@@ -52,10 +52,10 @@ VectorXd landing(const Model& model, const VectorXd& q, const Controls& controls
     return move;
 }
 
-std::vector<ContactTerm::Touch> after_step(const Model& model, const VectorXd& p) {
+std::vector<ContactTerm::ActiveContact> after_step(const Model& model, const VectorXd& p) {
     const ContactTerm& contact = *model.contact();
-    std::vector<ContactTerm::Touch> all = contact.touching();
-    for (ContactTerm::Touch& touch : all)
+    std::vector<ContactTerm::ActiveContact> all = contact.evaluated_contacts();
+    for (ContactTerm::ActiveContact& touch : all)
         touch.force = std::max(
             0.0, touch.force - touch.stiffness * touch.at.normal.dot(contact.at_point(touch, p.data())));
     return all;

@@ -14,9 +14,9 @@ namespace magshell {
 /// How vertices move from q that obstacles push more than twice as hard as they will, along what they are free to do;
 /// empty: none is. weights: those of an Anchor. expected: touches as ContactTerm has them, with these forces [N].
 VectorXd landing(const Model& model, const VectorXd& q, const Controls& controls, const VectorXd& weights,
-                 const std::vector<ContactTerm::Touch>& expected);
+                 const std::vector<ContactTerm::ActiveContact>& expected);
 
 /// What touched when the model was last evaluated, with the forces that a step p from there is to change linearly.
-std::vector<ContactTerm::Touch> after_step(const Model& model, const VectorXd& p);
+std::vector<ContactTerm::ActiveContact> after_step(const Model& model, const VectorXd& p);
 
 }  // namespace magshell

@@ -247,14 +247,14 @@ double Newton::obstacles_change(const VectorXd& step) const {
     if (!model_.has_contact()) return 0.0;
     const ContactTerm& contact = *model_.contact();
     VectorXd forces = VectorXd::Zero(step.size());
-    const auto add = [&](const std::vector<ContactTerm::Touch>& touching, double sign) {
-        for (const ContactTerm::Touch& touch : touching) {
+    const auto add = [&](const std::vector<ContactTerm::ActiveContact>& touching, double sign) {
+        for (const ContactTerm::ActiveContact& touch : touching) {
             const Vec3& n = touch.at.normal;
             const double pushed = touch.stiffness * n.dot(contact.at_point(touch, step.data()));
-            contact.spread(touch, Vec3(sign * pushed * n), forces);
+            contact.distribute(touch, Vec3(sign * pushed * n), forces);
         }
     };
-    add(contact.touching(), 1.0);
+    add(contact.evaluated_contacts(), 1.0);
     add(touched_, -1.0);
     return forces.norm();
 }

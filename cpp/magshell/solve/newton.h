@@ -182,8 +182,8 @@ class Newton {
     Watch watch_;
     mutable double watched_ = 1.0;  // the residual that the watch was told last
     std::shared_ptr<Factor> factor_;
-    std::vector<ContactTerm::Touch> touched_;  // what touched obstacles where that was factorized
-    bool unsymmetric_ = false;                 // whether what was assembled last is
+    std::vector<ContactTerm::ActiveContact> touched_;  // what touched obstacles where that was factorized
+    bool unsymmetric_ = false;                         // whether what was assembled last is
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     mutable double linear_time_ = 0.0;
 };

@@ -32,7 +32,7 @@ FactorReport Newton::factorize_assembled(const VectorXd& q, const Anchor& anchor
         model_.keep_spare(std::exchange(factor_, nullptr));
         factor_ = model_.new_factor([this] { watch(watched_); });
     }
-    if (model_.has_contact()) touched_ = model_.contact()->touching();
+    if (model_.has_contact()) touched_ = model_.contact()->evaluated_contacts();
     model_.reduce_matrix(*factor_);
     LargeVector<double>& values = factor_->values();
     if (anchor.weights) model_.reduction().add_weights(*anchor.weights, values);

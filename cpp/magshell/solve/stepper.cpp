@@ -118,8 +118,9 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<co
         q.head(coordinates) = x_hat.head(coordinates) +
                               step.stage_time() * (i == 0 ? state.v : rates.back().v).head(coordinates);
         if (model.has_contact() && !projective_)
-            if (const VectorXd move = landing(model, q, controls[i + 1], step.weights(),
-                                              model.contact()->touches(state.q.data(), controls.front()));
+            if (const VectorXd move =
+                    landing(model, q, controls[i + 1], step.weights(),
+                            model.contact()->active_contacts(state.q.data(), controls.front()));
                 move.size() > 0)
                 model.reduction().advance(q, move);
         if (model.reduction().carries() || model.has_body_contact()) {

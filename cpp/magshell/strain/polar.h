@@ -23,7 +23,7 @@ struct Polar {
         for (int sweep = 0; sweep < sweeps; ++sweep) {
             bool turned = false;
             for (const auto& [i, j] : {std::pair{0, 1}, std::pair{0, 2}, std::pair{1, 2}})
-                turned |= turn(b[i], b[j], v[i], v[j]);
+                turned |= orthogonalize(b[i], b[j], v[i], v[j]);
             if (!turned) break;
         }
         Pack squared[3] = {squared_norm(b[0]), squared_norm(b[1]), squared_norm(b[2])};
@@ -42,7 +42,7 @@ struct Polar {
     static constexpr int sweeps = 6;
 
     // Whether any lane was turned. One that is orthogonal stays as it is, whatever its neighbours do.
-    static bool turn(Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
+    static bool orthogonalize(Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
         const Pack of_a = squared_norm(a), of_b = squared_norm(b), gamma = Pack(2.0) * dot(a, b);
         const Pack negligible = gamma * gamma - Pack(1e-30) * of_a * of_b;
         if (none_positive(negligible)) return false;

@@ -7,6 +7,8 @@
 // A curved element has other a_i at each point; its middle nodes come in the order 01 12 20 03 13 23.
 #pragma once
 
+#include <array>
+
 #include "magshell/core/vector3.h"
 
 namespace magshell {
@@ -64,6 +66,19 @@ struct QuadraticTetrahedron {
         }
     }
 };
+
+/// Of straight elements: at the middle. `point` is the only one.
+inline std::array<double, 4> shapes_at(LinearTetrahedron, int /*point*/) {
+    return {0.25, 0.25, 0.25, 0.25};
+}
+
+inline std::array<double, 10> shapes_at(QuadraticTetrahedron, int point) {
+    std::array<double, 10> shapes;
+    const auto at = [&](int corner) { return QuadraticTetrahedron::barycentric(point, corner); };
+    for (int i = 0; i < 4; ++i) shapes[i] = at(i) * (2.0 * at(i) - 1.0);
+    for (int m = 0; m < 6; ++m) shapes[4 + m] = 4.0 * at(middle_of[m][0]) * at(middle_of[m][1]);
+    return shapes;
+}
 
 /// One element at rest: per point the gradients of l_1, l_2, l_3, and the volume that it stands for [m3].
 template <class Element>

@@ -48,7 +48,7 @@ void BallTorqueTerm::evaluate(const double* q, const Controls&, Residual& out) {
     }
 }
 
-void BallTorqueTerm::add_remainder(const double*, const Controls&, Remainder& out) const {
+void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const Controls&, Remainder& out) const {
     for (const Side& side : sides_)
         for (int i = 0; i < 4; ++i)
             for (int j = 0; j <= i; ++j)

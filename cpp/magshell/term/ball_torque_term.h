@@ -23,10 +23,10 @@ class BallTorqueTerm final : public Term {
 
     std::string_view name() const override { return "joints"; }
     bool set_values(const Values& values) override;
-    bool driven() const override { return false; }
+    bool depends_on_loads() const override { return false; }
     double energy(const double*, const Controls&) const override { return 0.0; }
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void add_remainder(const double* q, const Controls& controls, Remainder& out) const override;
+    void add_nonsymmetric_tangent(const double* q, const Controls& controls, Remainder& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
     std::size_t bytes() const override { return sides_.capacity() * sizeof(Side); }
 

@@ -10,21 +10,21 @@ namespace magshell {
 
 void BendingSixTerm::count_rotations_from_rest(bool from_rest) {
     from_rest_ = from_rest;
-    if (!from_rest) side_turns_ = {};
+    if (!from_rest) side_rotations_ = {};
 }
 
 void BendingSixTerm::prepare_assembly(const double* q, const Controls&) {
     if (!from_rest_) return;
-    side_turns_.resize(sheet_.folds.size());
+    side_rotations_.resize(sheet_.folds.size());
     chunks_.each([&](const Chunk& chunk) {
         for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, chunk.last_fold);
             for (int g = 0; g < 2; ++g) {
-                const std::array<FoldSix::Side, 2> sides = folds_at(first, last, g, q).sides();
+                const std::array<DihedralAngleSix::Side, 2> sides = dihedrals_at(first, last, g, q).sides();
                 for (int lane = 0; lane < last - first; ++lane)
                     for (int side = 0; side < 2; ++side)
-                        side_turns_[first + lane][g][side] = {lane_of(sides[side].along, lane),
-                                                              sides[side].foot[lane]};
+                        side_rotations_[first + lane][g][side] = {lane_of(sides[side].along, lane),
+                                                                  sides[side].foot[lane]};
             }
         }
     });
@@ -32,31 +32,31 @@ void BendingSixTerm::prepare_assembly(const double* q, const Controls&) {
 
 /// visit(rotation among all unknowns, node, its share of (theta_right - theta_left) / 2).
 template <class Visit>
-void BendingSixTerm::each_half_turn(const Visit& visit) const {
+void BendingSixTerm::each_half_rotation(const Visit& visit) const {
     for (std::size_t h = 0; h < sheet_.folds.size(); ++h) {
         const FoldSixStencil& fold = sheet_.folds[h];
         if (!fold.right_is_face) continue;
         const FaceSideSix& left = sheet_.sides[fold.left.face][fold.left.corner];
         for (int g = 0; g < 2; ++g)
             for (const bool on_left : {true, false}) {
-                const SideTurn& turn = side_turns_[h][g][on_left ? 0 : 1];
+                const SideRotation& turn = side_rotations_[h][g][on_left ? 0 : 1];
                 const Vec3 half = (on_left ? -0.5 : 0.5) * turn.along;
-                for (int place = 0; place < 6; ++place)
-                    visit(first_scalar_ + left.rotation[g], fold.nodes[node_on_side(place, on_left)],
-                          FoldSix::share(g, place, turn.foot) * half);
+                for (int index = 0; index < 6; ++index)
+                    visit(first_scalar_ + left.rotation[g], fold.nodes[node_on_side(index, on_left)],
+                          DihedralAngleSix::side_weight(g, index, turn.foot) * half);
             }
     }
 }
 
 void BendingSixTerm::rotations_from_sides(VectorXd& motion) const {
-    each_half_turn([&](Index rotation, Index node, const Vec3& by_node) {
+    each_half_rotation([&](Index rotation, Index node, const Vec3& by_node) {
         motion[rotation] -= by_node.dot(motion.segment<3>(3 * node));
     });
 }
 
 void BendingSixTerm::forces_from_rest(VectorXd& forces) const {
     if (forces.tail(forces.size() - first_scalar_).isZero(0.0)) return;
-    each_half_turn([&](Index rotation, Index node, const Vec3& by_node) {
+    each_half_rotation([&](Index rotation, Index node, const Vec3& by_node) {
         forces.segment<3>(3 * node) -= forces[rotation] * by_node;
     });
 }
@@ -81,11 +81,11 @@ void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatri
             const std::array<int, 6> own = face_order(i);
             for (int g = 0; g < 2; ++g) {
                 const int point = side.point(g);
-                const std::array<double, 27>& by_node = folds_[side.fold][point].gradient;
-                const SideTurn& turn = side_turns_[side.fold][point][side.on_left ? 0 : 1];
+                const std::array<double, 27>& by_node = dihedrals_[side.fold][point].gradient;
+                const SideRotation& turn = side_rotations_[side.fold][point][side.on_left ? 0 : 1];
                 const auto part = [&](int a) -> Vec3 {
                     if (is_held) return Vec3(by_node.data() + 3 * a);
-                    return FoldSix::share(point, place_on_side(a), turn.foot) * turn.along;
+                    return DihedralAngleSix::side_weight(point, index_on_side(a), turn.foot) * turn.along;
                 };
                 for (int k = 0; k < 6; ++k) {
                     Pack3& row = rows.at[3 * i + g][own[k]];

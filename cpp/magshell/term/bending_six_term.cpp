@@ -6,6 +6,13 @@
 #include "magshell/term/side_nodes.h"
 
 namespace magshell {
+namespace {
+
+Vec3 normal_of(const std::array<Vec3, 6>& x) {
+    return (x[1] - x[0]).cross(x[2] - x[0]).normalized();
+}
+
+}  // namespace
 
 BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
                                const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
@@ -23,7 +30,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
       elements_(loop_.packs()),
       rest_measures_(loop_.packs()),
       stiffness_(loop_.packs()),
-      folds_(sheet.folds.size()) {
+      dihedrals_(sheet.folds.size()) {
     for (Index pack = 0; pack < loop_.packs(); ++pack) {
         Pack3 x[6];
         for (int lane = 0; lane < Pack::width; ++lane) {
@@ -52,13 +59,13 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
         }
     }
     for (const FoldSixStencil& fold : sheet.folds) {
-        PairSlots<9>& slots = fold_slots_.emplace_back(pair_slots<9>(matrix, fold.nodes));
+        PairSlots<9>& slots = dihedral_slots_.emplace_back(pair_slots<9>(matrix, fold.nodes));
         for (int a = 6; a < 9; ++a)  // the two wings do not meet in d2theta
             for (int b = 3; b < 6; ++b) slots[lower_index(a - 1, b)] = -1;
     }
 }
 
-FoldSix BendingSixTerm::folds_at(Index first, Index last, int point, const double* q) const {
+DihedralAngleSix BendingSixTerm::dihedrals_at(Index first, Index last, int point, const double* q) const {
     Pack3 x[9] = {};
     Pack right_is_face(0.0);
     for (int lane = 0; lane < Pack::width; ++lane) {
@@ -67,26 +74,26 @@ FoldSix BendingSixTerm::folds_at(Index first, Index last, int point, const doubl
             if (fold.nodes[a] >= 0) set_lane(x[a], lane, q + 3 * fold.nodes[a]);
         right_is_face.set(lane, fold.right_is_face ? 1.0 : 0.0);
     }
-    return FoldSix(x, right_is_face, point);
+    return DihedralAngleSix(x, right_is_face, point);
 }
 
-double BendingSixTerm::turn_from(Index fold, int point, double angle) const {
+double BendingSixTerm::angle_change(Index fold, int point, double angle) const {
     return std::remainder(angle - sheet_.folds[fold].rest_angle[point], 2.0 * std::numbers::pi);
 }
 
-void BendingSixTerm::store_folds(const double* q) {
+void BendingSixTerm::store_dihedrals(const double* q) {
     state_.assign(q, q + 3 * nodes_.n_nodes());
     chunks_.each([&](const Chunk& chunk) {
         for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, chunk.last_fold);
             for (int g = 0; g < 2; ++g) {
-                const FoldSix fold = folds_at(first, last, g, q);
+                const DihedralAngleSix fold = dihedrals_at(first, last, g, q);
                 const Pack angle = fold.angle();
                 Pack3 by_node[9];
                 fold.gradient(by_node);
                 for (int lane = 0; lane < last - first; ++lane) {
-                    FoldState& state = folds_[first + lane][g];
-                    state.turn = turn_from(first + lane, g, angle[lane]);
+                    DihedralState& state = dihedrals_[first + lane][g];
+                    state.angle_change = angle_change(first + lane, g, angle[lane]);
                     for (int a = 0; a < 9; ++a) {
                         state.gradient[3 * a] = by_node[a].x[lane];
                         state.gradient[3 * a + 1] = by_node[a].y[lane];
@@ -101,7 +108,7 @@ void BendingSixTerm::store_folds(const double* q) {
 void BendingSixTerm::store_rates(const double* p) {
     chunks_.each([&](const Chunk& chunk) {
         for (Index h = chunk.first_fold; h < chunk.last_fold; ++h)
-            for (FoldState& state : folds_[h]) {
+            for (DihedralState& state : dihedrals_[h]) {
                 state.rate = 0.0;
                 for (int a = 0; a < 9; ++a) {
                     const Index node = sheet_.folds[h].nodes[a];
@@ -127,7 +134,7 @@ void BendingSixTerm::measure(Index pack, const double* q, const Turn& turn, Pack
         }
 }
 
-void BendingSixTerm::inside(Index pack, const double* q, Pack f[9]) const {
+void BendingSixTerm::interior(Index pack, const double* q, Pack f[9]) const {
     Pack3 x[6];
     loop_.gather(pack, q, x);
     BendingSix(x).measures(elements_[pack], f);
@@ -135,8 +142,8 @@ void BendingSixTerm::inside(Index pack, const double* q, Pack f[9]) const {
 }
 
 void BendingSixTerm::strain(Index pack, const double* q, Pack d[9]) const {
-    inside(pack, q, d);
-    measure(pack, q, [&](Index fold, int g) { return folds_[fold][g].turn; }, d);
+    interior(pack, q, d);
+    measure(pack, q, [&](Index fold, int g) { return dihedrals_[fold][g].angle_change; }, d);
 }
 
 void BendingSixTerm::rate(Index pack, const double* p, Pack d[9]) const {
@@ -146,39 +153,39 @@ void BendingSixTerm::rate(Index pack, const double* p, Pack d[9]) const {
     loop_.gather(pack, p, along);
     BendingSix(x).rows(elements_[pack], rows);
     rows.along(along, d);
-    measure(pack, p, [&](Index fold, int g) { return folds_[fold][g].rate; }, d);
+    measure(pack, p, [&](Index fold, int g) { return dihedrals_[fold][g].rate; }, d);
 }
 
-std::vector<std::array<double, 2>> BendingSixTerm::turns_at(const double* q) const {
-    std::vector<std::array<double, 2>> turns(folds_.size());
+std::vector<std::array<double, 2>> BendingSixTerm::angle_changes_at(const double* q) const {
+    std::vector<std::array<double, 2>> changes(dihedrals_.size());
     chunks_.each([&](const Chunk& chunk) {
         for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, chunk.last_fold);
             for (int g = 0; g < 2; ++g) {
-                const Pack angle = folds_at(first, last, g, q).angle();
-                for (Index h = first; h < last; ++h) turns[h][g] = turn_from(h, g, angle[h - first]);
+                const Pack angle = dihedrals_at(first, last, g, q).angle();
+                for (Index h = first; h < last; ++h) changes[h][g] = angle_change(h, g, angle[h - first]);
             }
         }
     });
-    return turns;
+    return changes;
 }
 
-Strains BendingSixTerm::look(const double* q) const {
-    const std::vector<std::array<double, 2>> turns = turns_at(q);
+Strains BendingSixTerm::strains_at(const double* q) const {
+    const std::vector<std::array<double, 2>> changes = angle_changes_at(q);
     Strains out(sheet_.n_faces(), 9);
     each_pack([&](Index pack) {
-        inside(pack, q, out.at(pack));
-        measure(pack, q, [&](Index fold, int g) { return turns[fold][g]; }, out.at(pack));
+        interior(pack, q, out.at(pack));
+        measure(pack, q, [&](Index fold, int g) { return changes[fold][g]; }, out.at(pack));
     });
     return out;
 }
 
 double BendingSixTerm::energy(const double* q, const Controls&) const {
-    const std::vector<std::array<double, 2>> turns = turns_at(q);
+    const std::vector<std::array<double, 2>> changes = angle_changes_at(q);
     return loop_.sum([&](Index pack) {
         Pack d[9], stress[9];
-        inside(pack, q, d);
-        measure(pack, q, [&](Index fold, int g) { return turns[fold][g]; }, d);
+        interior(pack, q, d);
+        measure(pack, q, [&](Index fold, int g) { return changes[fold][g]; }, d);
         stiffness_[pack].times(d, stress);
         Pack sum = d[0] * stress[0];
         for (int r = 1; r < 9; ++r) sum += d[r] * stress[r];
@@ -187,11 +194,11 @@ double BendingSixTerm::energy(const double* q, const Controls&) const {
 }
 
 void BendingSixTerm::evaluate(const double* q, const Controls&, Residual& out) {
-    store_folds(q);
+    store_dihedrals(q);
     each_pack([&](Index pack) {
         Pack d[9];
         strain(pack, q, d);
-        keep_stress(pack, d);
+        store_stress(pack, d);
     });
     add_forces(stress_, out);
 }
@@ -221,7 +228,8 @@ void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
                 for (int a = 0; a < 9; ++a) {
                     const Index node = sheet_.folds[h].nodes[a];
                     if (node < 0) continue;
-                    for (int c = 0; c < 3; ++c) out.add(3 * node + c, m * folds_[h][g].gradient[3 * a + c]);
+                    for (int c = 0; c < 3; ++c)
+                        out.add(3 * node + c, m * dihedrals_[h][g].gradient[3 * a + c]);
                 }
             }
         for (Index f = chunk.first; f < chunk.last; ++f)
@@ -243,7 +251,7 @@ void BendingSixTerm::assemble(const Chunk& chunk, const double* q, const Control
     }
     ElementLoop<6>::over_packs(chunk, [&](Index pack) { assemble_faces(pack, q, stress, out); });
     for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width)
-        assemble_folds(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
+        assemble_dihedrals(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
 }
 
 void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& stress,
@@ -264,7 +272,7 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
             const SideNodes& at = side.on_left ? left_side : right_side;
             const std::array<int, 6> own = face_order(i);
             for (int g = 0; g < 2; ++g) {
-                const std::array<double, 27>& by_node = folds_[side.fold][side.point(g)].gradient;
+                const std::array<double, 27>& by_node = dihedrals_[side.fold][side.point(g)].gradient;
                 const auto part = [&](int a) -> Vec3 { return side.weight * Vec3(by_node.data() + 3 * a); };
                 for (int k = 0; k < 6; ++k) {
                     Pack3& row = rows.at[3 * i + g][own[k]];
@@ -333,17 +341,17 @@ void BendingSixTerm::add_rotations(Index pack, int lane, const Pack sign[3], con
                                   stiffness(3 * (a / 2) + a % 2, 3 * (b / 2) + b % 2)[lane]);
 }
 
-void BendingSixTerm::assemble_folds(Index first, Index last, const double* q, const Strains& stress,
-                                    SystemMatrix& out) const {
+void BendingSixTerm::assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
+                                        SystemMatrix& out) const {
     Pack33 h[45] = {};
     for (int g = 0; g < 2; ++g) {
         Pack moments(0.0);
         for (Index fold = first; fold < last; ++fold)
             moments.set(fold - first, moment(sheet_.folds[fold], g, stress));
-        folds_at(first, last, g, q).add_curvature(moments, h);
+        dihedrals_at(first, last, g, q).add_curvature(moments, h);
     }
     for (Index fold = first; fold < last; ++fold)
-        scatter_blocks<9>(out, sheet_.folds[fold].nodes, fold_slots_[fold], h, fold - first);
+        scatter_blocks<9>(out, sheet_.folds[fold].nodes, dihedral_slots_[fold], h, fold - first);
 }
 
 // As for triangles of three nodes: angles are exact to a unit of round-off, or as the positions over the heights.
@@ -364,9 +372,184 @@ void BendingSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
 }
 
 std::size_t BendingSixTerm::bytes() const {
-    return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + growth_.bytes() +
+    return bytes_of(face_slots_) + bytes_of(dihedral_slots_) + materials_.bytes() + growth_.bytes() +
            bytes_of(rest_) + bytes_of(rest_inside_) + bytes_of(elements_) + bytes_of(rest_measures_) +
-           bytes_of(stiffness_) + bytes_of_stresses() + bytes_of(folds_) + bytes_of(state_) + loop_.bytes();
+           bytes_of(stiffness_) + bytes_of_stresses() + bytes_of(dihedrals_) + bytes_of(state_) +
+           loop_.bytes();
+}
+
+bool BendingSixTerm::set_values(const Values& values) {
+    const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
+    if (!material_changed && !grew) return false;
+    if (grew) grow();
+    for (Index pack = 0; pack < loop_.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = loop_.element(pack, lane);
+            set_lane(stiffness_[pack], lane, rest_[f].bending_stiffness(materials_[f]));
+        }
+    return true;
+}
+
+Vec9 BendingSixTerm::rest_angles(Index face) const {
+    Vec9 angles = Vec9::Zero();
+    for (int i = 0; i < 3; ++i) {
+        const FaceSideSix& side = sheet_.sides[face][i];
+        for (int g = 0; g < 2 && side.fold >= 0; ++g)
+            angles[3 * i + g] = side.weight * sheet_.folds[side.fold].rest_angle[side.point(g)];
+    }
+    return angles;
+}
+
+// Turns of folds are measured from their rest angles already.
+void BendingSixTerm::grow() {
+    for (Index pack = 0; pack < loop_.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const GrownSix face = grown(f);
+            rest_[f] = face.face();
+            for (int p = 0; p < BendingSix::points; ++p)
+                elements_[pack].inverse_jacobian[p].set(lane, rest_[f].inverse_jacobian[p]);
+            const Vec9 angles = rest_angles(f);
+            const Vec9 natural = face.rest().cwiseProduct(rest_inside_[f] + angles) + face.bent() - angles;
+            for (int r = 0; r < 9; ++r) {
+                elements_[pack].scale[r].set(lane, rest_[f].scale[r]);
+                rest_measures_[pack][r].set(lane, natural[r]);
+            }
+        }
+}
+
+// Of by . d in a fixed shape, which inside has `inside`.
+GrownFace::ByNatural BendingSixTerm::strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
+                                                       const Vec9& interior) const {
+    GrownFace::ByNatural found = face.natural_by_growth(-by, rest_inside_[number] + rest_angles(number));
+    found.growth += face.inside_by_growth(by, interior);
+    return found;
+}
+
+void BendingSixTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+    store_rates(lambda);
+    std::vector<Eigen::Vector2d> of_faces(sheet_.n_faces());
+    each_pack([&](Index pack) {
+        Pack d[9], along[9];
+        strain(pack, q, d);
+        history_.apply<9>(pack, d);
+        rate(pack, lambda, along);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const Eigen::Vector<double, 9> rates = lane_of<9>(along, lane);
+            of_faces[f] = {rates.dot(lane_of<9>(stress_.at(pack), lane)),
+                           rates.dot(rest_[f].bending_by_poisson_ratio(materials_[f]) * lane_of<9>(d, lane))};
+        }
+    });
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        materials_.add_vjp(f, 3, of_faces[f][0], of_faces[f][1], out);
+    if (growth_.any()) add_growth_vjp(q, lambda, out);
+}
+
+void BendingSixTerm::add_growth_vjp(const double* q, const double* lambda, Gradient& out) const {
+    std::vector<GrownFace::ByNatural> by_faces(sheet_.n_faces());
+    each_pack([&](Index pack) {
+        Pack3 x[6], p[6];
+        Pack now[9], along_inside[9], d[9], along[9], stresses[9];
+        SixNodeRows rows;
+        loop_.gather(pack, q, x);
+        loop_.gather(pack, lambda, p);
+        const BendingSix interior(x);
+        interior.measures(elements_[pack], now);
+        interior.rows(elements_[pack], rows);
+        rows.along(p, along_inside);
+        strain(pack, q, d);
+        history_.apply<9>(pack, d);
+        rate(pack, lambda, along);
+        stiffness_[pack].times(along, stresses);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const GrownSix face = grown(f);
+            GrownFace::ByNatural& by = by_faces[f];
+            by = strains_by_growth(face, f, history_.factor() * lane_of<9>(stresses, lane),
+                                   lane_of<9>(now, lane));
+            by.growth +=
+                face.bending_by_growth(materials_[f], lane_of<9>(along, lane), lane_of<9>(d, lane)) +
+                face.inside_by_growth(lane_of<9>(stress_.at(pack), lane), lane_of<9>(along_inside, lane));
+        }
+    });
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const GrownSix face = grown(f);
+        growth_.add_vjp(f, face.in_world(by_faces[f].growth), face.in_world(by_faces[f].curvature), out);
+    }
+}
+
+void BendingSixTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
+    if (!growth_.any()) return;
+    for (Index pack = 0; pack < loop_.packs(); ++pack) {
+        Pack3 x[6];
+        Pack now[9];
+        loop_.gather(pack, state_.data(), x);
+        BendingSix(x).measures(elements_[pack], now);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const GrownSix face = grown(f);
+            Vec9 by;
+            for (int r = 0; r < 9; ++r) by[r] = stresses.number(f, r);
+            const GrownFace::ByNatural found = strains_by_growth(face, f, by, lane_of<9>(now, lane));
+            growth_.add_vjp(f, face.in_world(found.growth), face.in_world(found.curvature), out);
+        }
+    }
+}
+
+std::vector<std::array<std::array<double, 9>, 2>> BendingSixTerm::slopes_at_rest() const {
+    VectorXd q(3 * nodes_.n_nodes());
+    for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
+    const Index n = sheet_.n_folds();
+    std::vector<std::array<std::array<double, 9>, 2>> slopes(n);
+    for (Index first = 0; first < n; first += Pack::width) {
+        const Index last = std::min<Index>(first + Pack::width, n);
+        for (int g = 0; g < 2; ++g) {
+            Pack3 by_node[9];
+            dihedrals_at(first, last, g, q.data()).gradient(by_node);
+            for (Index h = first; h < last; ++h) {
+                Vec3 normal = Vec3::Zero();
+                for (const FoldStencil::Side& side : {sheet_.folds[h].left, sheet_.folds[h].right})
+                    if (side.face >= 0) normal += normal_of(sheet_.rest[side.face]);
+                normal.normalize();
+                for (int a = 0; a < 9; ++a) slopes[h][g][a] = lane_of(by_node[a], h - first).dot(normal);
+            }
+        }
+    }
+    return slopes;
+}
+
+bool BendingSixTerm::add_projective_stiffness(NodeMatrix& out) const {
+    const std::vector<std::array<std::array<double, 9>, 2>> slopes = slopes_at_rest();
+    for (Index pack = 0; pack < loop_.packs(); ++pack) {
+        Pack3 x[6];
+        for (int lane = 0; lane < Pack::width; ++lane)
+            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet_.rest[loop_.element(pack, lane)][k]);
+        SixNodeRows interior;
+        BendingSix(x).rows(elements_[pack], interior);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.element(pack, lane);
+            const Vec3 normal = normal_of(sheet_.rest[f]);
+            NodeRows rows(9);
+            for (int r = 0; r < 9; ++r)
+                for (int k = 0; k < 6; ++k)
+                    rows.add(r, sheet_.own_nodes[f][k], lane_of(interior.at[r][k], lane).dot(normal));
+            for (int i = 0; i < 3; ++i) {
+                const FaceSideSix& side = sheet_.sides[f][i];
+                for (int g = 0; g < 2; ++g) {
+                    for (int a = 0; a < 9 && side.fold >= 0; ++a)
+                        if (const Index node = sheet_.folds[side.fold].nodes[a]; node >= 0)
+                            rows.add(3 * i + g, node, side.weight * slopes[side.fold][side.point(g)][a]);
+                    if (side.rotation[g] < 0) continue;
+                    rows.add(3 * i + g, out.point(side.rotation[g]), side.sign);
+                    const std::array<Index, 6>& own = sheet_.own_nodes[f];
+                    out.add_beside(side.rotation[g], {own[0], own[1], own[2]});
+                }
+            }
+            rows.add_to(out, [&](int r, int s) { return stiffness_[pack](r, s)[lane]; });
+        }
+    }
+    return true;
 }
 
 }  // namespace magshell

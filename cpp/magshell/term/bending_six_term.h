@@ -1,5 +1,5 @@
 // The bending energy of a sheet of six-node faces: what the curvature inside a face makes (energy/bending_six.h), plus the
-// turn and the rotation at two points of each edge (strain/fold_six.h).
+// turn and the rotation at two points of each edge (strain/dihedral_angle_six.h).
 //
 // As for three nodes: folds are found once an edge, faces combine them, and the Hessian is the faces' J^T C J plus what is
 // curved, each fold's and each face's own, times the moments.
@@ -10,10 +10,10 @@
 #include "magshell/energy/bending_six.h"
 #include "magshell/energy/grown_six.h"
 #include "magshell/energy/six_node_face.h"
-#include "magshell/strain/fold_six.h"
+#include "magshell/strain/dihedral_angle_six.h"
 #include "magshell/term/elastic_term.h"
-#include "magshell/term/sheet_growth.h"
-#include "magshell/term/sheet_materials.h"
+#include "magshell/term/shell_growth.h"
+#include "magshell/term/shell_materials.h"
 
 namespace magshell {
 
@@ -33,7 +33,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
-    bool add_surrogate(NodeMatrix& out) const override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
@@ -43,7 +43,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     std::size_t bytes() const override;
 
     /// d at a state that is only looked at.
-    Strains look(const double* q) const;
+    Strains strains_at(const double* q) const;
     const SixNodeFace& rest(Index face) const { return rest_[face]; }
     bool grows() const { return growth_.any(); }
     /// From what strains are measured.
@@ -54,18 +54,18 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
   private:
     friend class StrainScaffold<BendingSixTerm, 9>;
     // A fold at one of its points, at the last evaluated state.
-    struct FoldState {
-        double turn;                      // theta - theta~
+    struct DihedralState {
+        double angle_change;              // theta - theta~
         std::array<double, 27> gradient;  // by its nine nodes
         double rate;                      // of theta, along the last step that was asked for
     };
-    using FoldStates = std::array<FoldState, 2>;
+    using DihedralStates = std::array<DihedralState, 2>;
     // How a side of it turns about the edge: see FoldSix::sides.
-    struct SideTurn {
+    struct SideRotation {
         Vec3 along;
         double foot;
     };
-    using SideTurns = std::array<std::array<SideTurn, 2>, 2>;  // at [point][on its right]
+    using SideRotations = std::array<std::array<SideRotation, 2>, 2>;  // at [point][on its right]
     struct FaceSlots {
         PairSlots<15> nodes;
         std::array<std::array<Index, 15>, 6> rotation_nodes;
@@ -77,25 +77,25 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
         loop_.each_pack(body);
     }
     /// theta - theta~ at both points of every fold.
-    std::vector<std::array<double, 2>> turns_at(const double* q) const;
-    FoldSix folds_at(Index first, Index last, int point, const double* q) const;
-    double turn_from(Index fold, int point, double angle) const;
+    std::vector<std::array<double, 2>> angle_changes_at(const double* q) const;
+    DihedralAngleSix dihedrals_at(Index first, Index last, int point, const double* q) const;
+    double angle_change(Index fold, int point, double angle) const;
     template <class Turn>
     void measure(Index pack, const double* q, const Turn& turn, Pack d[9]) const;
-    void inside(Index pack, const double* q, Pack f[9]) const;
+    void interior(Index pack, const double* q, Pack f[9]) const;
     Vec9 rest_angles(Index face) const;
     void grow();
     void add_growth_vjp(const double* q, const double* lambda, Gradient& out) const;
     GrownFace::ByNatural strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
-                                           const Vec9& inside) const;
-    void begin_strains(const double* q) { store_folds(q); }
+                                           const Vec9& interior) const;
+    void begin_strains(const double* q) { store_dihedrals(q); }
     void begin_rates(const double* p) { store_rates(p); }
     void strain(Index pack, const double* q, Pack d[9]) const;
     void rate(Index pack, const double* p, Pack d[9]) const;
     const Symmetric9& stiffness(Index pack) const { return stiffness_[pack]; }
     /// Of each fold at rest, at both points, how its angle goes with its nodes along a normal of both of its sides.
     std::vector<std::array<std::array<double, 9>, 2>> slopes_at_rest() const;
-    void store_folds(const double* q);
+    void store_dihedrals(const double* q);
     void store_rates(const double* p);
     double moment(const FoldSixStencil& fold, int point, const Strains& stress) const;
     void assemble_faces(Index pack, const double* q, const Strains& stress, SystemMatrix& out) const;
@@ -105,9 +105,9 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void add_rotations(Index pack, int lane, const Pack sign[3], const Symmetric9& stiffness,
                        SystemMatrix& out) const;
     template <class Visit>
-    void each_half_turn(const Visit& visit) const;
-    void assemble_folds(Index first, Index last, const double* q, const Strains& stress,
-                        SystemMatrix& out) const;
+    void each_half_rotation(const Visit& visit) const;
+    void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
+                            SystemMatrix& out) const;
 
     const SixNodeSheet& sheet_;
     const Index body_;
@@ -115,19 +115,19 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     const Index first_scalar_;
     const ChunkLoop& chunks_;
     ElementLoop<6> loop_;
-    SheetMaterials materials_;
-    SheetGrowth growth_;
+    ShellMaterials materials_;
+    ShellGrowth growth_;
     std::vector<SixNodeFace> rest_;
     std::vector<BendingSix::Element> elements_;
     std::vector<std::array<Pack, 9>> rest_measures_;
     std::vector<Vec9> rest_inside_;  // a face, of the shape at rest, where anything grows
     std::vector<FaceSlots> face_slots_;
-    std::vector<PairSlots<9>> fold_slots_;
+    std::vector<PairSlots<9>> dihedral_slots_;
     std::vector<Symmetric9> stiffness_;
-    std::vector<FoldStates> folds_;
+    std::vector<DihedralStates> dihedrals_;
     std::vector<double> state_;  // the nodes at which all of this holds
     bool from_rest_ = false;
-    std::vector<SideTurns> side_turns_;  // of each fold, where rotations count from rest
+    std::vector<SideRotations> side_rotations_;  // of each fold, where rotations count from rest
 };
 
 }  // namespace magshell

@@ -31,7 +31,7 @@ BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks
       growth_(sheet.owner, sheet.faces, growth, registry),
       curvature_scale_(registry.values.add(sheet.owner, "curvature_scale", "1", sheet.n_edges(), 1)),
       stiffness_(face_packs()),
-      turns_(sheet.folds.size()),
+      angle_changes_(sheet.folds.size()),
       rates_(sheet.folds.size()),
       gradients_(sheet.folds.size()) {
     face_slots_.reserve(sheet.n_faces());
@@ -67,7 +67,7 @@ bool BendingTerm::set_values(const Values& values) {
             const Mat3 scaled = scale.asDiagonal() * stiffness * scale.asDiagonal();
             set_lane(stiffness_[pack], lane, scaled);
         }
-    if (grew) turn();
+    if (grew) find_natural_angles();
     return true;
 }
 
@@ -84,14 +84,14 @@ Vec3 BendingTerm::rest_angles(Index face) const {
     return angles;
 }
 
-void BendingTerm::turn() {
-    std::vector<Vec3> turns(sheet_.n_faces());
-    for (Index f = 0; f < sheet_.n_faces(); ++f) turns[f] = grown(f).turns(rest_angles(f));
-    turned_.resize(face_packs());
+void BendingTerm::find_natural_angles() {
+    std::vector<Vec3> changes(sheet_.n_faces());
+    for (Index f = 0; f < sheet_.n_faces(); ++f) changes[f] = grown(f).natural_angle_changes(rest_angles(f));
+    natural_angles_.resize(face_packs());
     for (Index pack = 0; pack < face_packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
-            const Vec3 of_face = shared(turns, element_of(pack, lane, sheet_.n_faces()));
-            for (int i = 0; i < 3; ++i) turned_[pack][i].set(lane, of_face[i]);
+            const Vec3 of_face = shared(changes, element_of(pack, lane, sheet_.n_faces()));
+            for (int i = 0; i < 3; ++i) natural_angles_[pack][i].set(lane, of_face[i]);
         }
 }
 
@@ -114,25 +114,25 @@ Vec3 BendingTerm::shared(const std::vector<Vec3>& of_faces, Index face) const {
     return numbers;
 }
 
-Vec3 BendingTerm::grown_turns(Index face) const {
-    if (turned_.empty()) return Vec3::Zero();
-    return lane_of(turned_[face / Pack::width].data(), face % Pack::width);
+Vec3 BendingTerm::natural_angle_changes(Index face) const {
+    if (natural_angles_.empty()) return Vec3::Zero();
+    return lane_of(natural_angles_[face / Pack::width].data(), face % Pack::width);
 }
 
-void BendingTerm::add_turns_vjp(const std::vector<Vec3>& by_turns, Gradient& out) const {
+void BendingTerm::add_natural_angles_vjp(const std::vector<Vec3>& by_angles, Gradient& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const GrownFace face = grown(f);
-        const GrownFace::ByNatural by = face.turns_by_natural(rest_angles(f), shared(by_turns, f));
+        const GrownFace::ByNatural by = face.natural_angle_changes_vjp(rest_angles(f), shared(by_angles, f));
         growth_.add_vjp(f, face.in_world(by.growth), face.in_world(by.curvature), out);
     }
 }
 
 void BendingTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
     if (!growth_.any()) return;
-    std::vector<Vec3> by_turns(sheet_.n_faces());
+    std::vector<Vec3> by_angles(sheet_.n_faces());
     for (Index f = 0; f < sheet_.n_faces(); ++f)
-        by_turns[f] = {-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)};
-    add_turns_vjp(by_turns, out);
+        by_angles[f] = {-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)};
+    add_natural_angles_vjp(by_angles, out);
 }
 
 Vec3 BendingTerm::scales_of(Index face) const {
@@ -140,16 +140,16 @@ Vec3 BendingTerm::scales_of(Index face) const {
     return {curvature_scales_[e[0]], curvature_scales_[e[1]], curvature_scales_[e[2]]};
 }
 
-void BendingTerm::store_folds(const double* q) {
+void BendingTerm::store_dihedrals(const double* q) {
     chunks_.each([&](const Chunk& chunk) {
         for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, chunk.last_fold);
-            const Fold fold = folds_at(sheet_, first, last, q);
+            const DihedralAngle fold = folds_at(sheet_, first, last, q);
             const Pack angle = fold.angle();
             Pack3 g[4];
             fold.gradient(g);
             for (int lane = 0; lane < last - first; ++lane) {
-                turns_[first + lane] = turn_from(sheet_.folds[first + lane], angle[lane]);
+                angle_changes_[first + lane] = turn_from(sheet_.folds[first + lane], angle[lane]);
                 double* const gradient = gradients_[first + lane].data();
                 for (int k = 0; k < 4; ++k) {
                     gradient[3 * k] = g[k].x[lane];
@@ -162,9 +162,9 @@ void BendingTerm::store_folds(const double* q) {
 }
 
 /// delta of a pack of faces from a number a fold and the rotations in q; linear, so it serves rates as well.
-void BendingTerm::measure(Index pack, const double* q, const std::vector<double>& turns,
+void BendingTerm::measure(Index pack, const double* q, const std::vector<double>& changes,
                           Pack delta[3]) const {
-    const auto turn_of = [&](Index fold) { return turns[fold]; };
+    const auto turn_of = [&](Index fold) { return changes[fold]; };
     const double* rotation = q + first_scalar_;
     const SidesOfPack sides = sides_of(pack);
     for (int i = 0; i < 3; ++i)
@@ -172,20 +172,20 @@ void BendingTerm::measure(Index pack, const double* q, const std::vector<double>
 }
 
 double BendingTerm::energy(const double* q, const Controls&) const {
-    std::vector<double> turns(sheet_.folds.size());
+    std::vector<double> changes(sheet_.folds.size());
     chunks_.each([&](const Chunk& chunk) {
         for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
             const Index last = std::min(first + Pack::width, chunk.last_fold);
             const Pack angle = folds_at(sheet_, first, last, q).angle();
-            for (Index h = first; h < last; ++h) turns[h] = turn_from(sheet_.folds[h], angle[h - first]);
+            for (Index h = first; h < last; ++h) changes[h] = turn_from(sheet_.folds[h], angle[h - first]);
         }
     });
-    const auto turn_of = [&](Index fold) { return turns[fold]; };
+    const auto turn_of = [&](Index fold) { return changes[fold]; };
     const double* rotation = q + first_scalar_;
     return chunks_.sum([&](const Chunk& chunk) {
         double total = 0.0;
         for (Index f = chunk.first; f < chunk.last; ++f) {
-            const Vec3 turned = grown_turns(f);
+            const Vec3 turned = natural_angle_changes(f);
             double delta[3];
             for (int i = 0; i < 3; ++i)
                 delta[i] = bending_strain(sheet_.sides[f][i], turn_of, rotation) - turned[i];
@@ -199,11 +199,11 @@ double BendingTerm::energy(const double* q, const Controls&) const {
 }
 
 void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
-    store_folds(q);
+    store_dihedrals(q);
     each_pack([&](Index pack) {
         Pack delta[3];
         strain(pack, q, delta);
-        keep_stress(pack, delta);
+        store_stress(pack, delta);
     });
     add_forces(stress_, out);
 }
@@ -242,7 +242,7 @@ void BendingTerm::assemble(const Chunk& chunk, const double* q, const Controls&,
     FaceLoop::over_packs(chunk, [&](Index pack) { assemble_faces(pack, out); });
     const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
     for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width)
-        assemble_folds(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
+        assemble_dihedrals(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
 }
 
 void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
@@ -300,11 +300,11 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
     }
 }
 
-void BendingTerm::assemble_folds(Index first, Index last, const double* q, const Strains& stress,
-                                 SystemMatrix& out) const {
+void BendingTerm::assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
+                                     SystemMatrix& out) const {
     const Pack moments =
         pack_of([&](int lane) { return moment(sheet_.folds[std::min(first + lane, last - 1)], stress); });
-    const FoldCurvature curvature(folds_at(sheet_, first, last, q), moments);
+    const DihedralHessian curvature(folds_at(sheet_, first, last, q), moments);
     for (Index h = first; h < last; ++h)
         scatter_blocks<4>(out, sheet_.folds[h].nodes, fold_slots_[h], curvature.block, h - first);
 }
@@ -323,8 +323,8 @@ void BendingTerm::store_rates(const double* p) {
 // With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T C + C e_i e_i^T.
 void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
     store_rates(lambda);
-    std::vector<Vec3> by_scale(sheet_.n_faces()), by_turns(growth_.any() ? sheet_.n_faces() : 0);
-    std::vector<Mat3> by_stiffness(by_turns.size());
+    std::vector<Vec3> by_scale(sheet_.n_faces()), by_angles(growth_.any() ? sheet_.n_faces() : 0);
+    std::vector<Mat3> by_stiffness(by_angles.size());
     each_pack([&](Index pack) {
         Pack delta[3], along[3], stress_rate[3];
         strain(pack, q, delta);
@@ -340,8 +340,8 @@ void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gr
                                rates.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d)), out);
             by_scale[f] = (rates.cwiseProduct(stress) + d.cwiseProduct(lane_of(stress_rate, lane)))
                               .cwiseQuotient(scale);
-            if (by_turns.empty()) continue;
-            by_turns[f] = -history_.factor() * lane_of(stress_rate, lane);
+            if (by_angles.empty()) continue;
+            by_angles[f] = -history_.factor() * lane_of(stress_rate, lane);
             const GrownFace face = grown(f);
             by_stiffness[f] = face.in_world(face.triangle().bending_by_growth(
                 materials_[f], scale.cwiseProduct(rates), scale.cwiseProduct(d)));
@@ -349,7 +349,7 @@ void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gr
     });
     for (Index f = 0; f < static_cast<Index>(by_stiffness.size()); ++f)
         growth_.add_vjp(f, by_stiffness[f], Mat3::Zero(), out);
-    if (growth_.any()) add_turns_vjp(by_turns, out);
+    if (growth_.any()) add_natural_angles_vjp(by_angles, out);
     for (Index f = 0; f < sheet_.n_faces(); ++f)
         for (int i = 0; i < 3; ++i) out.values[curvature_scale_.at(sheet_.edges[f][i])] += by_scale[f][i];
 }
@@ -374,8 +374,46 @@ void BendingTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
 
 std::size_t BendingTerm::bytes() const {
     return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + growth_.bytes() +
-           bytes_of(stiffness_) + bytes_of(turned_) + bytes_of_stresses() + bytes_of(turns_) +
+           bytes_of(stiffness_) + bytes_of(natural_angles_) + bytes_of_stresses() + bytes_of(angle_changes_) +
            bytes_of(rates_) + bytes_of(gradients_);
+}
+
+std::vector<std::array<double, 4>> BendingTerm::slopes_at_rest() const {
+    VectorXd q(3 * nodes_.n_nodes());
+    for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
+    const Index n = sheet_.n_folds();
+    std::vector<std::array<double, 4>> slopes(n);
+    for (Index first = 0; first < n; first += Pack::width) {
+        const Index last = std::min<Index>(first + Pack::width, n);
+        Pack3 g[4];
+        folds_at(sheet_, first, last, q.data()).gradient(g);
+        for (int lane = 0; lane < last - first; ++lane) {
+            std::array<Vec3, 4> gradient;
+            for (int k = 0; k < 4; ++k) gradient[k] = Vec3(g[k].x[lane], g[k].y[lane], g[k].z[lane]);
+            const Vec3 normal = (gradient[2].normalized() + gradient[3].normalized()).normalized();
+            for (int k = 0; k < 4; ++k) slopes[first + lane][k] = gradient[k].dot(normal);
+        }
+    }
+    return slopes;
+}
+
+bool BendingTerm::add_projective_stiffness(NodeMatrix& out) const {
+    const std::vector<std::array<double, 4>> slopes = slopes_at_rest();
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const Symmetric3& stiffness = stiffness_[f / Pack::width];
+        NodeRows rows(3);
+        for (int i = 0; i < 3; ++i) {
+            const FaceSide& side = sheet_.sides[f][i];
+            for (int k = 0; k < 4 && side.fold >= 0; ++k)
+                rows.add(i, sheet_.folds[side.fold].nodes[k],
+                         static_cast<double>(side.weight) * slopes[side.fold][k]);
+            if (side.rotation < 0) continue;
+            rows.add(i, out.point(side.rotation), side.sign);
+            out.add_beside(side.rotation, sheet_.corners[f]);
+        }
+        rows.add_to(out, [&](int r, int s) { return stiffness(r, s)[f % Pack::width]; });
+    }
+    return true;
 }
 
 }  // namespace magshell

@@ -1,4 +1,4 @@
-// The bending energy of a whole sheet, `hinge` and `midedge` alike: energy/bending.h over strain/fold_angle.h.
+// The bending energy of a whole sheet, `hinge` and `midedge` alike: energy/bending.h over strain/dihedral_angle.h.
 //
 // Fold angles and their gradients are found once an edge; faces combine three of them. The Hessian is the
 // faces' J^T C J, plus each fold's curvature times the moment of the faces beside it.
@@ -8,10 +8,10 @@
 #include "magshell/body/sheet.h"
 #include "magshell/energy/bending.h"
 #include "magshell/energy/grown_face.h"
-#include "magshell/strain/fold_angle.h"
+#include "magshell/strain/dihedral_angle.h"
 #include "magshell/term/elastic_term.h"
-#include "magshell/term/sheet_growth.h"
-#include "magshell/term/sheet_materials.h"
+#include "magshell/term/shell_growth.h"
+#include "magshell/term/shell_materials.h"
 
 namespace magshell {
 
@@ -30,7 +30,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
-    bool add_surrogate(NodeMatrix& out) const override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
@@ -41,7 +41,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     GrownFace grown(Index face) const {
         return {sheet_.rest_corners(face), growth_.growth(face), growth_.curvature(face)};
     }
-    Vec3 grown_turns(Index face) const;
+    Vec3 natural_angle_changes(Index face) const;
 
   private:
     friend class StrainScaffold<BendingTerm>;
@@ -63,48 +63,48 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void each_pack(const Body& body) const {
         chunks_.each([&](const Chunk& chunk) { FaceLoop::over_packs(chunk, body); });
     }
-    void measure(Index pack, const double* q, const std::vector<double>& turns, Pack delta[3]) const;
-    void begin_strains(const double* q) { store_folds(q); }
+    void measure(Index pack, const double* q, const std::vector<double>& changes, Pack delta[3]) const;
+    void begin_strains(const double* q) { store_dihedrals(q); }
     void begin_rates(const double* p) { store_rates(p); }
     void strain(Index pack, const double* q, Pack d[3]) const {
-        measure(pack, q, turns_, d);
-        if (turned_.empty()) return;
-        for (int i = 0; i < 3; ++i) d[i] -= turned_[pack][i];
+        measure(pack, q, angle_changes_, d);
+        if (natural_angles_.empty()) return;
+        for (int i = 0; i < 3; ++i) d[i] -= natural_angles_[pack][i];
     }
     void rate(Index pack, const double* p, Pack d[3]) const { measure(pack, p, rates_, d); }
     const Symmetric3& stiffness(Index pack) const { return stiffness_[pack]; }
     /// Of each fold at rest, how its angle goes with its nodes along a normal of both of its sides.
     std::vector<std::array<double, 4>> slopes_at_rest() const;
     double moment(const FoldStencil& fold, const Strains& stress) const;
-    void store_folds(const double* q);
+    void store_dihedrals(const double* q);
     void store_rates(const double* p);
     Vec3 scales_of(Index face) const;
     RestFace rest_face(Index face) const;
     Vec3 rest_angles(Index face) const;
     /// Of a number an edge of each face as its two faces share it; its own transpose.
     Vec3 shared(const std::vector<Vec3>& of_faces, Index face) const;
-    void turn();
-    void add_turns_vjp(const std::vector<Vec3>& by_turns, Gradient& out) const;
+    void find_natural_angles();
+    void add_natural_angles_vjp(const std::vector<Vec3>& by_angles, Gradient& out) const;
     void assemble_faces(Index pack, SystemMatrix& out) const;
-    void assemble_folds(Index first, Index last, const double* q, const Strains& stress,
-                        SystemMatrix& out) const;
+    void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
+                            SystemMatrix& out) const;
 
     const Sheet& sheet_;
     const Index body_;
     const ChunkLoop& chunks_;
     const Nodes& nodes_;
     const Index first_scalar_;
-    SheetMaterials materials_;
-    SheetGrowth growth_;
+    ShellMaterials materials_;
+    ShellGrowth growth_;
     Slot curvature_scale_;
     LargeVector<FaceSlots> face_slots_;
     LargeVector<PairSlots<4>> fold_slots_;
     VectorXd curvature_scales_;  // one an edge, [Chen22] k_cur
     LargeVector<Symmetric3> stiffness_;
-    std::vector<std::array<Pack, 3>> turned_;  // grown_turns, where anything grows
+    std::vector<std::array<Pack, 3>> natural_angles_;  // grown_turns, where anything grows
     // Of each fold at the last evaluated state: theta - theta~, its gradient by the four nodes, and the rate of theta along
     // the last extrapolated step.
-    std::vector<double> turns_, rates_;
+    std::vector<double> angle_changes_, rates_;
     LargeVector<std::array<double, 12>> gradients_;
 };
 

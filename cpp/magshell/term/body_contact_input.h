@@ -20,7 +20,7 @@ struct ContactSurfaceInput {
 struct BodyContactInput {
     Index a, b;
     bool penalty = false;  // else a barrier
-    bool rubs = false,
+    bool has_friction = false,
          lagged = false;  // whether there is friction, and whether with the normal force of before
 };
 

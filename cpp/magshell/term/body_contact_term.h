@@ -24,7 +24,7 @@ namespace magshell {
 class BodyContactTerm final : public Term {
   public:
     /// A pair that touches.
-    struct Touch {
+    struct ActiveContact {
         NearPair near;
         PairEnergy at;
         double far;  // [m] its largest coordinate
@@ -35,28 +35,30 @@ class BodyContactTerm final : public Term {
                     const std::vector<BodyContactInput>& contacts, ContactLayer& layer, Registry& registry);
 
     /// The pairs that touch at q, always in the same order; and those at the last evaluated state.
-    std::vector<Touch> touches(const double* q) const { return aside_ ? std::vector<Touch>() : *found(q); }
-    const std::vector<Touch>& touching() const { return *touching_; }
+    std::vector<ActiveContact> active_contacts(const double* q) const {
+        return switched_off_ ? std::vector<ActiveContact>() : *found(q);
+    }
+    const std::vector<ActiveContact>& evaluated_contacts() const { return *evaluated_contacts_; }
     /// Whether any pair touches at q.
     bool acts(const double* q) const { return !found(q)->empty(); }
     /// How the energy at q changes along p [J]; how it does at the last evaluated state, and how fast that changes, but
     /// for what turns.
     double slope(const double* q, const double* p) const { return slope(*found(q), p); }
-    double slope(const double* p) const { return slope(touching(), p); }
+    double slope(const double* p) const { return slope(evaluated_contacts(), p); }
     double curvature(const double* p) const;
     /// Of the pairs that touch at the last evaluated state, along their normals.
     void add_stiffness(std::vector<PairStiffness>& out) const;
     /// From now on, until told otherwise, nothing touches: somebody else keeps bodies apart. Steps pass none all the same.
-    void stand_aside(bool aside) const { aside_ = aside; }
+    void set_switched_off(bool off) const { switched_off_ = off; }
     /// A pair as hard contact has it: kept at the distance at which the law begins.
-    struct HardPair {
+    struct HardContactPair {
         NearPair near;
         Proximity at;
         double gap;  // [m] that is left to that
         double friction;
     };
     /// Those near each other at q: points and triangles, and edges that cross.
-    std::vector<HardPair> hard_pairs(const double* q) const;
+    std::vector<HardContactPair> hard_contact_pairs(const double* q) const;
     /// Throws InvalidInput where what sticks has another coefficient of friction than what slides.
     void require_one_coefficient() const;
     /// The faces that push each other hardest at the last evaluated state, in words; empty: none touch.
@@ -65,16 +67,16 @@ class BodyContactTerm final : public Term {
     /// without a name where their mesh puts none nearer than they push each other.
     std::pair<double, std::string> nearest_neighbours(Index contact) const;
     std::size_t n_contacts() const { return laws_.size(); }
-    const FrictionLaw& friction(const Touch& touch) const { return friction_[touch.near.contact]; }
+    const FrictionLaw& friction(const ActiveContact& active) const { return friction_[active.near.contact]; }
 
     /// Which faces are in the way of a step p from q, in words.
     std::string blocking(const double* q, const double* p) const;
     /// Whether what is negative of the Hessians of pairs is left out from now on.
-    void be_cautious(bool cautious) override { cautious_ = cautious; }
+    void set_psd_projection(bool project_psd) override { psd_projection_ = project_psd; }
     /// Adds the magnitude of forces that cancel inside those between pairs at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
     /// Adds the gradient by the numbers of a pair's contact.
-    void add_vjp(const Touch& touch, const PairEnergy::ByLaw& by, const FrictionLaw& by_friction,
+    void add_vjp(const ActiveContact& active, const PairEnergy::ByLaw& by, const FrictionLaw& by_friction,
                  VectorXd& by_values) const;
     ContactLayer& layer() const { return layer_; }
     /// From now on as if no state had been looked at: a solve has the same bits whatever came before it.
@@ -83,20 +85,20 @@ class BodyContactTerm final : public Term {
         found_.clear();
         layer_.couple({});
         layer_.use(false);
-        untouched_ = 0;
-        assembled_ = often;
+        assemblies_without_contact_ = 0;
+        assemblies_since_coupling_ = often;
         ahead_ = least_ahead;
-        soon_ = {};
+        coupled_margin_ = {};
     }
     /// The layer couples these as well, whether they still touch or not, until others take their place.
-    void keep_coupled(const std::vector<Touch>& touches);
+    void set_extra_couplings(const std::vector<ActiveContact>& active_contacts);
 
     std::string_view name() const override { return "body contact"; }
     bool set_values(const Values& values) override;
-    bool refuses_states() const override { return true; }
-    double largest_share(const double* q, const double* p) const override;
-    std::string refusal(const double* q) const override;
-    bool driven() const override { return false; }
+    bool has_infeasible_states() const override { return true; }
+    double max_step_length(const double* q, const double* p) const override;
+    std::string invalid_state_reason(const double* q) const override;
+    bool depends_on_loads() const override { return false; }
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void prepare_assembly(const double* q, const Controls& controls) override;
@@ -109,20 +111,20 @@ class BodyContactTerm final : public Term {
         Slot stiffness, reach, distance, smoothing, kinetic, fixed, sticking_speed;
     };
 
-    using Touches = std::shared_ptr<const std::vector<Touch>>;
+    using ActiveContacts = std::shared_ptr<const std::vector<ActiveContact>>;
 
     /// Where touching nodes are, and what touches there.
     struct FoundAt {
         VectorXd at;
-        std::shared_ptr<std::vector<Touch>> touches;
+        std::shared_ptr<std::vector<ActiveContact>> active_contacts;
     };
 
     static constexpr double least_ahead = 0.25;
     static constexpr int often = 32;  // assemblies, after which it is coupled anew
 
     /// Those that touch at q; asked again at the same place, the same.
-    Touches found(const double* q) const;
-    static double slope(const std::vector<Touch>& touches, const double* p);
+    ActiveContacts found(const double* q) const;
+    static double slope(const std::vector<ActiveContact>& active_contacts, const double* p);
     /// Calls found(pair, share) where a pair lets a step go less far than all before it; nullptr: its length does.
     template <class Found>
     void each_limit(const double* q, const double* p, const Found& found) const;
@@ -133,17 +135,17 @@ class BodyContactTerm final : public Term {
     std::vector<double> least_;  // of each contact, what no distance goes below [m]
     mutable ContactCandidates candidates_;
     ContactLayer& layer_;
-    mutable std::deque<FoundAt> found_;              // the last few
-    mutable std::vector<std::vector<Touch>> parts_;  // room for what tasks find
-    Touches touching_ = std::make_shared<const std::vector<Touch>>();
-    std::vector<ContactLayer::Group> kept_;
-    bool cautious_ = false;
-    mutable bool aside_ = false;
+    mutable std::deque<FoundAt> found_;                      // the last few
+    mutable std::vector<std::vector<ActiveContact>> parts_;  // room for what tasks find
+    ActiveContacts evaluated_contacts_ = std::make_shared<const std::vector<ActiveContact>>();
+    std::vector<ContactLayer::Group> extra_couplings_;
+    bool psd_projection_ = false;
+    mutable bool switched_off_ = false;
     // Assemblies since anything touched, and since the layer couples what it couples; what it has coupled ahead of its
     // touching then, as a share of the margin: little, as it fills the factorization, but more where pairs change fast.
-    mutable int untouched_ = 0, assembled_ = often;
+    mutable int assemblies_without_contact_ = 0, assemblies_since_coupling_ = often;
     mutable double ahead_ = least_ahead;
-    mutable ContactCandidates::Soon soon_;  // what it coupled then
+    mutable ContactCandidates::CandidateMargin coupled_margin_;  // what it coupled then
 };
 
 }  // namespace magshell

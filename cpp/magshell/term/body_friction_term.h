@@ -16,35 +16,35 @@ namespace magshell {
 class BodyFrictionTerm final : public ForceTerm {
   public:
     /// One flag a contact, as in FrictionTerm.
-    BodyFrictionTerm(BodyContactTerm& contact, std::vector<bool> rubs, std::vector<bool> lagged)
-        : contact_(contact), rubs_(std::move(rubs)), lagged_(std::move(lagged)) {}
+    BodyFrictionTerm(BodyContactTerm& contact, std::vector<bool> has_friction, std::vector<bool> lagged)
+        : contact_(contact), has_friction_(std::move(has_friction)), lagged_(std::move(lagged)) {}
 
     std::string_view name() const override { return "body friction"; }
     void set_values(const Values&) override {}  // the contact's
     void begin_step(const VectorXd& q, const Controls& controls) override;
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
-    void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
+    void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
                   Remainder& rest) const override;
     void add_stiffness(const Kinematics& at, std::vector<PairStiffness>& out) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              Gradient& out) const override;
-    void hold(bool held) override;
+    void set_frozen(bool frozen) override;
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 
   private:
-    using Touch = BodyContactTerm::Touch;
-    struct Rub {
-        const Touch* touch;
+    using ActiveContact = BodyContactTerm::ActiveContact;
+    struct FrictionContact {
+        const ActiveContact* active;
         bool lagged;
         PairFriction friction;
     };
 
     BodyContactTerm& contact_;
-    std::vector<bool> rubs_, lagged_;
-    std::vector<Touch> before_;  // of lagged contacts, when the step began
-    std::vector<Touch> held_, now_;
-    bool holds_ = false;
-    std::vector<Rub> rubbing_;  // at the last evaluated state
+    std::vector<bool> has_friction_, lagged_;
+    std::vector<ActiveContact> before_;  // of lagged contacts, when the step began
+    std::vector<ActiveContact> frozen_contacts_, now_;
+    bool frozen_ = false;
+    std::vector<FrictionContact> friction_contacts_;  // at the last evaluated state
 };
 
 }  // namespace magshell

@@ -25,37 +25,41 @@ class ContactCandidates {
 
     /// Those that touch at q, and others; and whether one of them, by its number, may be among those that touch.
     const std::vector<NearPair>& near(const double* q);
-    bool may_touch(std::size_t k) const { return slack_[k] <= come_nearer_; }
+    bool may_be_active(std::size_t k) const { return slack_[k] <= possible_approach_; }
     /// What may touch if nodes come nearer by a share of the margin; and whether nothing else may now.
-    struct Soon {
-        std::int64_t looks = -1;
+    struct CandidateMargin {
+        std::int64_t searches = -1;
         double nearer = 0.0;  // [m]
     };
-    Soon soon(double share) const { return {looks_, come_nearer_ + share * margin_}; }
-    bool may_touch(std::size_t k, const Soon& soon) const { return slack_[k] <= soon.nearer; }
-    bool only_those_before(const Soon& soon) const {
-        return soon.looks == looks_ && come_nearer_ <= soon.nearer;
+    CandidateMargin margin_ahead(double share) const {
+        return {searches_, possible_approach_ + share * margin_};
     }
-    void forget() { looked_at_.resize(0); }
+    bool may_be_active(std::size_t k, const CandidateMargin& margin) const {
+        return slack_[k] <= margin.nearer;
+    }
+    bool covers_all_candidates(const CandidateMargin& margin) const {
+        return margin.searches == searches_ && possible_approach_ <= margin.nearer;
+    }
+    void forget() { searched_at_.resize(0); }
     /// Where all that can touch is.
-    VectorXd places(const double* q) const;
+    VectorXd contact_positions(const double* q) const;
     /// Points and triangles, and edges, that may come nearer than that, one a contact, on straight ways from q to
     /// q + share p.
-    std::vector<NearPair> on_the_way(const double* q, const double* p, double share,
-                                     const std::vector<double>& distances);
+    std::vector<NearPair> near_along_path(const double* q, const double* p, double share,
+                                          const std::vector<double>& distances);
     /// The longest of what p moves them by [m].
-    double longest_move(const double* p) const;
+    double largest_displacement(const double* p) const;
     /// See BroadPhase.
-    const std::optional<BroadPhase::Neighboured>& nearest_neighbours(Index contact) const {
+    const std::optional<BroadPhase::NeighbourPair>& nearest_neighbours(Index contact) const {
         return phase_.nearest_neighbours(contact);
     }
     /// Faces that pass through each other at q.
     std::vector<NearPair> crossings(const double* q) { return phase_.crossings(q); }
 
     /// As far as a step lets a node go at most [m]: what may be met on a longer way would be nearly everything.
-    double longest_way() const { return longest_way_; }
+    double max_displacement() const { return max_displacement_; }
     /// The faces of a pair, in words.
-    std::string names(const NearPair& pair) const;
+    std::string describe(const NearPair& pair) const;
     std::size_t bytes() const;
 
   private:
@@ -68,15 +72,15 @@ class ContactCandidates {
     std::vector<BodyContactInput> contacts_;
     std::vector<Name> names_;  // of each surface
     BroadPhase phase_;
-    double margin_, longest_way_;    // [m]
-    std::vector<double> distances_;  // with the margin
-    std::vector<Index> touching_nodes_;
+    double margin_, max_displacement_;  // [m]
+    std::vector<double> distances_;     // with the margin
+    std::vector<Index> contact_nodes_;
     std::vector<NearPair> near_;
-    VectorXd looked_at_;         // where those nodes were; empty: nowhere
-    std::vector<double> slack_;  // by how much a pair was farther apart then than where it touches [m]
-    double round_off_ = 0.0;     // of distances [m]
-    std::int64_t looks_ = 0;     // how often it looked
-    double come_nearer_ = 0.0;   // by how much any pair may have come nearer since [m]
+    VectorXd searched_at_;            // where those nodes were; empty: nowhere
+    std::vector<double> slack_;       // by how much a pair was farther apart then than where it touches [m]
+    double round_off_ = 0.0;          // of distances [m]
+    std::int64_t searches_ = 0;       // how often it looked
+    double possible_approach_ = 0.0;  // by how much any pair may have come nearer since [m]
 };
 
 }  // namespace magshell

@@ -92,22 +92,22 @@ bool ContactTerm::set_values(const Values& values) {
     return false;  // none of its forces cancel in add_cancelling_forces
 }
 
-StandingObstacle ContactTerm::standing(Index obstacle, const Controls& controls) const {
+ObstacleState ContactTerm::obstacle_state(Index obstacle, const Controls& controls) const {
     const Slot& pose = obstacle_slots_[obstacle].pose;
     const auto row = [&](Index k) -> Vec3 { return controls.segment<3>(pose.at(k)); };
     return {obstacles_[obstacle], ObstaclePose{row(0), row(1), row(2), row(3)}};
 }
 
-void ContactTerm::add_vjp(const Touch& touch, double by_force, const ContactLaw& by_friction,
+void ContactTerm::add_vjp(const ActiveContact& active, double by_force, const ContactLaw& by_friction,
                           const ObstacleGradient& by_obstacle, VectorXd& by_values,
                           Controls& by_controls) const {
-    const Contact& contact = contacts_[touch.contact];
-    by_values[contact.stiffness.first] += by_force * touch.force / law(touch).stiffness;
-    by_values[contact.smoothing.first] += by_force * touch.by_smoothing;
-    by_values[contact.offset.first] += by_force * touch.stiffness;
+    const Contact& contact = contacts_[active.contact];
+    by_values[contact.stiffness.first] += by_force * active.force / law(active).stiffness;
+    by_values[contact.smoothing.first] += by_force * active.by_smoothing;
+    by_values[contact.offset.first] += by_force * active.stiffness;
     by_values[contact.friction.first] += by_friction.friction;
     by_values[contact.sticking_speed.first] += by_friction.sticking_speed;
-    const ObstacleSlots& obstacle = obstacle_slots_[touch.obstacle];
+    const ObstacleSlots& obstacle = obstacle_slots_[active.obstacle];
     by_values.segment<3>(obstacle.center.first) += by_obstacle.placement.center;
     by_values.segment<3>(obstacle.rotation.first) += by_obstacle.placement.rotation_vector;
     const auto by_row = [&](Index k) { return by_controls.segment<3>(obstacle.pose.at(k)); };
@@ -117,15 +117,16 @@ void ContactTerm::add_vjp(const Touch& touch, double by_force, const ContactLaw&
     by_row(3) += by_obstacle.pose.spin;
 }
 
-std::vector<ContactTerm::Touch> ContactTerm::touches(const double* q, const Controls& controls) const {
-    std::vector<Touch> all;
+std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(const double* q,
+                                                                     const Controls& controls) const {
+    std::vector<ActiveContact> all;
     for (std::size_t c = 0; c < contacts_.size(); ++c) {
         const Contact& contact = contacts_[c];
         const ContactLaw& law = laws_[c];
         const Index count = static_cast<Index>(contact.points.size());
         for (const Index o : contact.obstacles) {
-            const StandingObstacle obstacle = standing(o, controls);
-            std::vector<std::vector<Touch>> found((count + block_length - 1) / block_length);
+            const ObstacleState obstacle = obstacle_state(o, controls);
+            std::vector<std::vector<ActiveContact>> found((count + block_length - 1) / block_length);
             parallel_for(static_cast<int>(found.size()), [&](int block) {
                 const Index first = block * block_length, last = std::min(count, first + block_length);
                 for (Index p = first; p < last; ++p) {
@@ -139,7 +140,8 @@ std::vector<ContactTerm::Touch> ContactTerm::touches(const double* q, const Cont
                                             law.stiffness * penalty.force_by_smoothing});
                 }
             });
-            for (const std::vector<Touch>& part : found) all.insert(all.end(), part.begin(), part.end());
+            for (const std::vector<ActiveContact>& part : found)
+                all.insert(all.end(), part.begin(), part.end());
         }
     }
     return all;
@@ -149,7 +151,8 @@ Index ContactTerm::passes_through(const VectorXd& q, const Controls& controls, c
                                   const Controls& controls_at_end) const {
     for (const Contact& contact : contacts_)
         for (const Index o : contact.obstacles) {
-            const StandingObstacle before = standing(o, controls), after = standing(o, controls_at_end);
+            const ObstacleState before = obstacle_state(o, controls),
+                                after = obstacle_state(o, controls_at_end);
             for (const ContactPoint& point : contact.points)
                 if (passes(*obstacles_[o].shape, before.own(weighted(point, q.data())),
                            after.own(weighted(point, end.data()))))
@@ -158,58 +161,59 @@ Index ContactTerm::passes_through(const VectorXd& q, const Controls& controls, c
     return -1;
 }
 
-Vec3 ContactTerm::at_point(const Touch& touch, const double* all) const {
-    return weighted(point(touch), all);
+Vec3 ContactTerm::at_point(const ActiveContact& active, const double* all) const {
+    return weighted(point(active), all);
 }
 
-void ContactTerm::spread(const Touch& touch, const Vec3& vector, VectorXd& out) const {
-    const ContactPoint& p = point(touch);
+void ContactTerm::distribute(const ActiveContact& active, const Vec3& vector, VectorXd& out) const {
+    const ContactPoint& p = point(active);
     for (int k = 0; k < 3; ++k)
         if (p.nodes[k] >= 0) out.segment<3>(3 * p.nodes[k]) += p.weights[k] * vector;
 }
 
-void ContactTerm::spread(const Touch& touch, const Vec3& force, Residual& out) const {
-    const ContactPoint& p = point(touch);
+void ContactTerm::distribute(const ActiveContact& active, const Vec3& force, Residual& out) const {
+    const ContactPoint& p = point(active);
     for (int k = 0; k < 3; ++k)
         if (p.nodes[k] >= 0)
             for (int axis = 0; axis < 3; ++axis) out.add(3 * p.nodes[k] + axis, p.weights[k] * force[axis]);
 }
 
-void ContactTerm::add_cancelling_force(const Touch& touch, double stiffness, VectorXd& out) const {
-    const ContactPoint& p = point(touch);
+void ContactTerm::add_cancelling_force(const ActiveContact& active, double stiffness, VectorXd& out) const {
+    const ContactPoint& p = point(active);
     for (int k = 0; k < 3; ++k)
         if (p.nodes[k] >= 0)
-            out.segment<3>(3 * p.nodes[k]).array() += p.weights[k] * stiffness * touch.place.norm();
+            out.segment<3>(3 * p.nodes[k]).array() += p.weights[k] * stiffness * active.position.norm();
 }
 
 void ContactTerm::add_cancelling_normal_forces(VectorXd& out) const {
-    for (const Touch& touch : touching_) add_cancelling_force(touch, touch.stiffness, out);
+    for (const ActiveContact& active : evaluated_contacts_)
+        add_cancelling_force(active, active.stiffness, out);
 }
 
-void ContactTerm::add_block(const Touch& touch, const Mat3& block, SystemMatrix& out) const {
-    const Contact& contact = contacts_[touch.contact];
-    const ContactPoint& p = point(touch);
-    if (touch.point < contact.first_on_face) {
+void ContactTerm::add_block(const ActiveContact& active, const Mat3& block, SystemMatrix& out) const {
+    const Contact& contact = contacts_[active.contact];
+    const ContactPoint& p = point(active);
+    if (active.point < contact.first_on_face) {
         out.add_diagonal_block(p.nodes[0], to_pack(block), 0);
         return;
     }
     Pack33 blocks[6];
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j <= i; ++j) blocks[lower_index(i, j)] = to_pack(p.weights[i] * p.weights[j] * block);
-    scatter_blocks<3>(out, p.nodes, contact.slots[touch.point - contact.first_on_face], blocks, 0);
+    scatter_blocks<3>(out, p.nodes, contact.slots[active.point - contact.first_on_face], blocks, 0);
 }
 
 double ContactTerm::energy(const double* q, const Controls& controls) const {
     double total = 0.0;
-    for (const Touch& touch : touches(q, controls)) {
-        const ContactLaw& of = law(touch);
-        total += of.stiffness * Penalty(of.offset - touch.at.value, of.smoothing).energy;
+    for (const ActiveContact& active : active_contacts(q, controls)) {
+        const ContactLaw& of = law(active);
+        total += of.stiffness * Penalty(of.offset - active.at.value, of.smoothing).energy;
     }
     return total;
 }
 
-std::vector<ContactTerm::Keeping> ContactTerm::keepings() const {
-    std::vector<Keeping> all;
+std::vector<ContactTerm::HardContact> ContactTerm::hard_contacts() const {
+    std::vector<HardContact> all;
     for (std::size_t c = 0; c < contacts_.size(); ++c)
         for (const Index obstacle : contacts_[c].obstacles)
             for (const ContactPoint& p : contacts_[c].points) {
@@ -220,42 +224,43 @@ std::vector<ContactTerm::Keeping> ContactTerm::keepings() const {
     return all;
 }
 
-void ContactTerm::add_touching_stiffness(VectorXd& of_nodes) const {
-    for (const Touch& touch : touching_) {
-        const ContactPoint& p = point(touch);
+void ContactTerm::add_contact_stiffness(VectorXd& of_nodes) const {
+    for (const ActiveContact& active : evaluated_contacts_) {
+        const ContactPoint& p = point(active);
         for (int k = 0; k < 3; ++k)  // of a w w^T, the sums of its rows
-            if (p.nodes[k] >= 0) of_nodes[p.nodes[k]] += p.weights[k] * touch.stiffness;
+            if (p.nodes[k] >= 0) of_nodes[p.nodes[k]] += p.weights[k] * active.stiffness;
     }
 }
 
 void ContactTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
-    touching_ = aside_ ? std::vector<Touch>() : touches(q, controls);
-    for (const Touch& touch : touching_) spread(touch, -touch.force * touch.at.normal, out);
+    evaluated_contacts_ = switched_off_ ? std::vector<ActiveContact>() : active_contacts(q, controls);
+    for (const ActiveContact& active : evaluated_contacts_)
+        distribute(active, -active.force * active.at.normal, out);
 }
 
 void ContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix& out) const {
-    for (const Touch& touch : touching_) {
-        const Distance& at = touch.at;
-        add_block(touch, touch.stiffness * at.normal * at.normal.transpose() - touch.force * at.curvature,
+    for (const ActiveContact& active : evaluated_contacts_) {
+        const Distance& at = active.at;
+        add_block(active, active.stiffness * at.normal * at.normal.transpose() - active.force * at.curvature,
                   out);
     }
 }
 
 // The gradient is g = - N n.
 void ContactTerm::vjp(const double*, const Controls& controls, const double* lambda, Gradient& out) {
-    for (const Touch& touch : touching_) {
-        const Vec3 along = at_point(touch, lambda);
-        const double by_force = -along.dot(touch.at.normal);
+    for (const ActiveContact& active : evaluated_contacts_) {
+        const Vec3 along = at_point(active, lambda);
+        const double by_force = -along.dot(active.at.normal);
         ObstacleGradient by_obstacle;
-        standing(touch.obstacle, controls)
-            .vjp(touch.place, touch.at, -touch.stiffness * by_force, -touch.force * along, Vec3::Zero(),
-                 by_obstacle);
-        add_vjp(touch, by_force, {}, by_obstacle, out.values, out.controls);
+        obstacle_state(active.obstacle, controls)
+            .vjp(active.position, active.at, -active.stiffness * by_force, -active.force * along,
+                 Vec3::Zero(), by_obstacle);
+        add_vjp(active, by_force, {}, by_obstacle, out.values, out.controls);
     }
 }
 
 std::size_t ContactTerm::bytes() const {
-    std::size_t total = bytes_of(touching_);
+    std::size_t total = bytes_of(evaluated_contacts_);
     for (const Contact& contact : contacts_) total += bytes_of(contact.points) + bytes_of(contact.slots);
     return total;
 }

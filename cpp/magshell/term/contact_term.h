@@ -9,7 +9,7 @@
 #include "magshell/assembly/lanes.h"
 #include "magshell/body/nodes.h"
 #include "magshell/energy/contact.h"
-#include "magshell/obstacle/placed_obstacle.h"
+#include "magshell/obstacle/obstacle_state.h"
 #include "magshell/term/term.h"
 
 namespace magshell {
@@ -24,7 +24,7 @@ struct ContactPoint {
 struct ContactInput {
     std::vector<Index> obstacles;
     std::vector<ContactPoint> points;  // with the caller's vertices
-    bool rubs = false,
+    bool has_friction = false,
          lagged = false;  // whether there is friction, and whether with the normal force of before
 };
 
@@ -34,9 +34,9 @@ Pack33 to_pack(const Mat3& block);
 class ContactTerm final : public Term {
   public:
     /// A point that touches an obstacle.
-    struct Touch {
+    struct ActiveContact {
         Index contact, obstacle, point;
-        Vec3 place;
+        Vec3 position;
         Distance at;
         double force, stiffness;  // N [N] and dN/d(depth) [N/m]
         double by_smoothing;      // dN/d(smoothing) [N/m]
@@ -46,53 +46,53 @@ class ContactTerm final : public Term {
                 const std::vector<std::shared_ptr<const Obstacle>>& obstacles, Registry& registry);
 
     bool set_values(const Values& values) override;
-    void add_touching_stiffness(VectorXd& of_nodes) const override;
+    void add_contact_stiffness(VectorXd& of_nodes) const override;
 
     /// A vertex that an obstacle keeps at a distance.
-    struct Keeping {
+    struct HardContact {
         Index node, obstacle;
         double offset, friction;
     };
     /// All of them. Throws InvalidInput where points on faces touch as well.
-    std::vector<Keeping> keepings() const;
+    std::vector<HardContact> hard_contacts() const;
     /// From now on, until told otherwise, nothing touches: somebody else sees to that.
-    void stand_aside(bool aside) { aside_ = aside; }
+    void set_switched_off(bool off) { switched_off_ = off; }
 
     /// The points that touch at q, in the order of contacts, obstacles and points.
-    std::vector<Touch> touches(const double* q, const Controls& controls) const;
+    std::vector<ActiveContact> active_contacts(const double* q, const Controls& controls) const;
     /// Those at the last evaluated state.
-    const std::vector<Touch>& touching() const { return touching_; }
+    const std::vector<ActiveContact>& evaluated_contacts() const { return evaluated_contacts_; }
 
     /// The first vertex of a point that comes out on another side of an obstacle than it went in, on its
     /// straight way from q to `end` as the obstacle sees it; -1 where none does.
     Index passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
                          const Controls& controls_at_end) const;
 
-    const ContactPoint& point(const Touch& touch) const {
-        return contacts_[touch.contact].points[touch.point];
+    const ContactPoint& point(const ActiveContact& active) const {
+        return contacts_[active.contact].points[active.point];
     }
-    const ContactLaw& law(const Touch& touch) const { return laws_[touch.contact]; }
-    StandingObstacle standing(Index obstacle, const Controls& controls) const;
+    const ContactLaw& law(const ActiveContact& active) const { return laws_[active.contact]; }
+    ObstacleState obstacle_state(Index obstacle, const Controls& controls) const;
     /// Adds the gradient of a function of a point's normal force and friction: by what the force is made
     /// from, by friction's own numbers and by the place of the obstacle; by its pose to `by_controls`, those that
     /// it stood at.
-    void add_vjp(const Touch& touch, double by_force, const ContactLaw& by_friction,
+    void add_vjp(const ActiveContact& active, double by_force, const ContactLaw& by_friction,
                  const ObstacleGradient& by_obstacle, VectorXd& by_values, Controls& by_controls) const;
 
     /// Adds a symmetric block between the nodes of a point, weighted.
-    void add_block(const Touch& touch, const Mat3& block, SystemMatrix& out) const;
+    void add_block(const ActiveContact& active, const Mat3& block, SystemMatrix& out) const;
     /// The weighted sum over a point's nodes of a vector of all unknowns.
-    Vec3 at_point(const Touch& touch, const double* all) const;
+    Vec3 at_point(const ActiveContact& active, const double* all) const;
     /// Adds a vector to a point's nodes, weighted.
-    void spread(const Touch& touch, const Vec3& vector, VectorXd& out) const;
-    void spread(const Touch& touch, const Vec3& force, Residual& out) const;
+    void distribute(const ActiveContact& active, const Vec3& vector, VectorXd& out) const;
+    void distribute(const ActiveContact& active, const Vec3& force, Residual& out) const;
     /// Adds the magnitude of forces that cancel inside one that depends on the point's place by a stiffness [N/m].
-    void add_cancelling_force(const Touch& touch, double stiffness, VectorXd& out) const;
+    void add_cancelling_force(const ActiveContact& active, double stiffness, VectorXd& out) const;
     /// Those inside the normal forces at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
 
     std::string_view name() const override { return "contact"; }
-    bool driven() const override { return false; }
+    bool depends_on_loads() const override { return false; }
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
@@ -115,10 +115,10 @@ class ContactTerm final : public Term {
 
     std::vector<Contact> contacts_;
     std::vector<ContactLaw> laws_;
-    std::vector<PlacedObstacle> obstacles_;
+    std::vector<PositionedObstacle> obstacles_;
     std::vector<ObstacleSlots> obstacle_slots_;
-    std::vector<Touch> touching_;
-    bool aside_ = false;
+    std::vector<ActiveContact> evaluated_contacts_;
+    bool switched_off_ = false;
 };
 
 }  // namespace magshell

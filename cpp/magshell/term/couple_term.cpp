@@ -3,7 +3,7 @@
 #include <iterator>
 #include <numbers>
 
-#include "magshell/strain/fold_six.h"
+#include "magshell/strain/dihedral_angle_six.h"
 
 namespace magshell {
 namespace {
@@ -17,12 +17,12 @@ CoupleTerm::Nine places(const CoupleTerm::Couple& couple, const double* q) {
     return x;
 }
 
-Fold flat_fold(const CoupleTerm::Nine& x) {
-    return Fold(x[0], x[1], x[2], x[3], Pack(0.0));
+DihedralAngle flat_fold(const CoupleTerm::Nine& x) {
+    return DihedralAngle(x[0], x[1], x[2], x[3], Pack(0.0));
 }
 
-FoldSix curved_fold(const CoupleTerm::Nine& x, int point) {
-    return FoldSix(x.data(), Pack(0.0), point);
+DihedralAngleSix curved_fold(const CoupleTerm::Nine& x, int point) {
+    return DihedralAngleSix(x.data(), Pack(0.0), point);
 }
 
 }  // namespace
@@ -113,7 +113,7 @@ void CoupleTerm::finish_assembly(const double* q, const Controls& controls, Syst
         const Pack moment(-controls[factor_.first] * couple.couple);
         Pack33 h[45] = {};
         if (couple.point < 0) {
-            const FoldCurvature curvature(flat_fold(x), moment);
+            const DihedralHessian curvature(flat_fold(x), moment);
             std::copy(std::begin(curvature.block), std::end(curvature.block), h);
         } else {
             curved_fold(x, couple.point).add_curvature(moment, h);

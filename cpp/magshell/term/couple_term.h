@@ -16,7 +16,7 @@ namespace magshell {
 class CoupleTerm final : public Term {
   public:
     struct Couple {
-        // Edge from, to, the face's third corner, the direction; or those of strain/fold_six.h. Others are -1.
+        // Edge from, to, the face's third corner, the direction; or those of strain/dihedral_angle_six.h. Others are -1.
         std::array<Index, 9> nodes;
         int point;  // which of the two Gauss points; -1 on a face of three nodes
         double rest_angle;
@@ -42,8 +42,10 @@ class CoupleTerm final : public Term {
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
-    std::vector<double> turns() const override { return last_turn_; }
-    void set_turns(const std::vector<double>& turns) override { last_turn_ = turns; }
+    std::vector<double> angle_branches() const override { return last_turn_; }
+    void set_angle_branches(const std::vector<double>& angle_branches) override {
+        last_turn_ = angle_branches;
+    }
     std::size_t bytes() const override { return bytes_of(couples_) + bytes_of(slots_); }
 
   private:

@@ -8,8 +8,8 @@ namespace magshell {
 
 class ElasticTerm : public Term {
   public:
-    bool driven() const override { return false; }
-    bool add_surrogate(NodeMatrix&) const override { return false; }
+    bool depends_on_loads() const override { return false; }
+    bool add_projective_stiffness(NodeMatrix&) const override { return false; }
 
     /// From now on; an empty history makes the term elastic again.
     void set_history(const StrainHistory& history) { history_ = history; }
@@ -88,7 +88,7 @@ class StrainScaffold : public ElasticTerm {
 
   protected:
     /// Keeps the stress of a pack, given its strain.
-    void keep_stress(Index pack, Pack strain[N]) {
+    void store_stress(Index pack, Pack strain[N]) {
         history_.apply<N>(pack, strain);
         kernel().stiffness(pack).times(strain, stress_.at(pack));
     }

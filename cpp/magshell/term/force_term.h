@@ -48,7 +48,7 @@ class ForceTerm {
 
     /// Adds K at the last evaluated state. Cautious: what keeps an iteration from overshooting instead of the
     /// exact derivatives, where there is such a thing.
-    virtual void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
+    virtual void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
                           Remainder& rest) const = 0;
 
     /// Of pairs that touch, at the last evaluated state: what never overshoots.
@@ -60,7 +60,7 @@ class ForceTerm {
                      KinematicsGradient& by, Gradient& out) const = 0;
 
     /// From now on, what makes the force unsymmetric stays as it was at the last evaluated state, or does not.
-    virtual void hold(bool /*held*/) {}
+    virtual void set_frozen(bool /*frozen*/) {}
 
     /// Adds the magnitude of forces that cancel inside velocities at the last evaluated state.
     virtual void add_cancelling_forces(const Kinematics& /*at*/, VectorXd& /*out*/) const {}

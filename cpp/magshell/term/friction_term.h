@@ -14,36 +14,36 @@ namespace magshell {
 class FrictionTerm final : public ForceTerm {
   public:
     /// One flag a contact: whether it rubs, and whether it does so with the normal force of before.
-    FrictionTerm(const ContactTerm& contact, std::vector<bool> rubs, std::vector<bool> lagged)
-        : contact_(contact), rubs_(std::move(rubs)), lagged_(std::move(lagged)) {}
+    FrictionTerm(const ContactTerm& contact, std::vector<bool> has_friction, std::vector<bool> lagged)
+        : contact_(contact), has_friction_(std::move(has_friction)), lagged_(std::move(lagged)) {}
 
     std::string_view name() const override { return "friction"; }
     void set_values(const Values&) override {}  // the contact's
     void begin_step(const VectorXd& q, const Controls& controls) override;
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
-    void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
+    void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
                   Remainder& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              Gradient& out) const override;
     /// Normal forces and normals: with held ones, friction is the slope of a convex potential of the velocities.
-    void hold(bool held) override;
+    void set_frozen(bool frozen) override;
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 
   private:
-    struct Rub {
-        ContactTerm::Touch touch;
+    struct FrictionContact {
+        ContactTerm::ActiveContact active;
         bool lagged;
-        StandingObstacle obstacle;
+        ObstacleState obstacle;
         Friction friction;
     };
 
     const ContactTerm& contact_;
-    std::vector<bool> rubs_, lagged_;
-    std::vector<ContactTerm::Touch> before_;  // of lagged contacts, when the step began
-    std::vector<ContactTerm::Touch> held_;
-    bool holds_ = false;
+    std::vector<bool> has_friction_, lagged_;
+    std::vector<ContactTerm::ActiveContact> before_;  // of lagged contacts, when the step began
+    std::vector<ContactTerm::ActiveContact> frozen_contacts_;
+    bool frozen_ = false;
     Controls controls_before_;
-    std::vector<Rub> rubbing_;  // at the last evaluated state
+    std::vector<FrictionContact> friction_contacts_;  // at the last evaluated state
 };
 
 }  // namespace magshell

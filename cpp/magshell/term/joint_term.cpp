@@ -37,14 +37,14 @@ JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& 
         };
         if (each.act == Act::closure) {
             each.slots.push_back(add("stiffness", "N/m", 1));
-            each.place = add("origin", "m", 3);
+            each.geometry = add("origin", "m", 3);
         } else {
             for (const char* name : names_of(joint.kind, each.act))
                 each.slots.push_back(name ? add(name, "SI", 1) : Slot{});
             if (each.act == Act::ball_servo)
-                each.place = add("target_rotation", "rad", 3);
+                each.geometry = add("target_rotation", "rad", 3);
             else if (each.act == Act::cone || joint.has_axis())
-                each.place = add("axis", "1", 3);
+                each.geometry = add("axis", "1", 3);
             if (each.act == Act::cone)
                 each.top = each.cosine = 1.0;
             else if (joint.kind == JointKind::ball)
@@ -60,7 +60,7 @@ void JointTerm::Each::find_form() {
             form = JointForm(joint, links);
             break;
         case Act::ball_servo:
-            form = JointForm::product(links, rotation(wanted), Mat3::Identity());
+            form = JointForm::product(links, rotation(target_rotation), Mat3::Identity());
             break;
         case Act::cone:
             form = JointForm::product(links, joint.axis, joint.axis);
@@ -80,9 +80,9 @@ bool JointTerm::set_values(const Values& values) {
         const auto number = [&](int k) {
             return each.slots[k].size() > 0 ? values.number(each.slots[k]) : 0.0;
         };
-        if (each.place.size() > 0 && values.changed(each.place)) {
-            const Vec3 now = values.vector(each.place);
-            (each.act == Act::ball_servo ? each.wanted
+        if (each.geometry.size() > 0 && values.changed(each.geometry)) {
+            const Vec3 now = values.vector(each.geometry);
+            (each.act == Act::ball_servo ? each.target_rotation
              : each.act == Act::closure  ? each.joint.origin
                                          : each.joint.axis) = now;
             each.find_form();
@@ -194,7 +194,7 @@ void JointTerm::vjp(const double* q, const Controls&, const double* lambda, Grad
         for (int n = 0; n < JointLaw::size; ++n)
             if (each.slots[n].size() > 0) out.values[each.slots[n].first] += along * law.force_by[n];
         // The coordinate of a joint with an axis, and its rate, do not feel the axis by themselves (skeleton_places.cpp).
-        if (each.act != Act::coordinate) place_vjp(each, now, q, rate, out);
+        if (each.act != Act::coordinate) geometry_vjp(each, now, q, rate, out);
     }
 }
 
@@ -204,17 +204,17 @@ void JointTerm::closure_vjp(const Each& each, const double* q, const Corners& ra
     out.values[each.slots[0].first] += off.dot(along);
     for (int c = 0; c < 3; ++c) {
         const CornerSum by = each.links.vector(true, Vec3::Unit(c)) - each.links.vector(false, Vec3::Unit(c));
-        out.values[each.place.first + c] +=
+        out.values[each.geometry.first + c] +=
             each.stiffness * ((at * by.weights + by.fixed).dot(along) + off.dot(rate * by.weights));
     }
 }
 
-void JointTerm::place_vjp(const Each& each, const State& now, const double* q, const Corners& rate,
-                          Gradient& out) const {
+void JointTerm::geometry_vjp(const Each& each, const State& now, const double* q, const Corners& rate,
+                             Gradient& out) const {
     const Corners at = each.links.positions(q);
     const double along = CornerForm::inner(now.form.first, rate);
     const Vec3& axis = each.joint.axis;
-    const Mat3 turn = rotation(each.wanted);
+    const Mat3 turn = rotation(each.target_rotation);
     Vec3 by = Vec3::Zero();
     for (int c = 0; c < 3; ++c) {
         const Vec3 unit = Vec3::Unit(c);
@@ -232,8 +232,9 @@ void JointTerm::place_vjp(const Each& each, const State& now, const double* q, c
             add(JointForm::product(each.links, axis, unit));
         }
     }
-    out.values.segment<3>(each.place.first) +=
-        each.act == Act::ball_servo ? transposed_jacobian_times(each.wanted, by) : by - axis.dot(by) * axis;
+    out.values.segment<3>(each.geometry.first) += each.act == Act::ball_servo
+                                                      ? transposed_jacobian_times(each.target_rotation, by)
+                                                      : by - axis.dot(by) * axis;
 }
 
 }  // namespace magshell

@@ -31,14 +31,16 @@ class JointTerm final : public Term {
 
     std::string_view name() const override { return "joints"; }
     bool set_values(const Values& values) override;
-    bool driven() const override { return false; }
+    bool depends_on_loads() const override { return false; }
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
-    std::vector<double> turns() const override { return last_turn_; }
-    void set_turns(const std::vector<double>& turns) override { last_turn_ = turns; }
+    std::vector<double> angle_branches() const override { return last_turn_; }
+    void set_angle_branches(const std::vector<double>& angle_branches) override {
+        last_turn_ = angle_branches;
+    }
     std::size_t bytes() const override { return each_.capacity() * sizeof(Each); }
 
   private:
@@ -52,8 +54,8 @@ class JointTerm final : public Term {
         double reach;  // what rounds at rest: a length, in lengths of a link where the coordinate is an angle
         double top = 0.0, cosine = 0.0;  // c; zero where the form is the coordinate
         std::vector<Slot> slots;         // of the law; of a closure, its stiffness
-        Slot place;  // what the form depends on: axis, origin of a closure, what a servo wants
-        Vec3 wanted = Vec3::Zero();  // the rotation vector
+        Slot geometry;  // what the form depends on: axis, origin of a closure, what a servo wants
+        Vec3 target_rotation = Vec3::Zero();  // the rotation vector
         JointLaw law;
         double stiffness = 0.0;  // of a closure
 
@@ -73,8 +75,8 @@ class JointTerm final : public Term {
     static JointEnergy law_at(const Each& joint, double coordinate) { return {joint.law, coordinate}; }
     void closure_vjp(const Each& joint, const double* q, const CornerForm::Corners& rate,
                      Gradient& out) const;
-    void place_vjp(const Each& joint, const State& now, const double* q, const CornerForm::Corners& rate,
-                   Gradient& out) const;
+    void geometry_vjp(const Each& joint, const State& now, const double* q, const CornerForm::Corners& rate,
+                      Gradient& out) const;
 
     std::vector<Each> each_;
     std::vector<double> last_turn_;

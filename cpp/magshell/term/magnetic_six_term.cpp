@@ -53,15 +53,15 @@ bool MagneticSixTerm::set_values(const Values& values) {
     return true;
 }
 
-void MagneticSixTerm::place(const double* q, std::vector<Vec3>& places,
-                            std::vector<Vec3>& magnetizations) const {
+void MagneticSixTerm::find_points(const double* q, std::vector<Vec3>& places,
+                                  std::vector<Vec3>& magnetizations) const {
     places.resize(static_cast<std::size_t>(sheet_.n_faces()) * points);
     magnetizations.resize(places.size());
     loop_.each_pack([&](Index pack) {
         Pack3 x[6];
         loop_.gather(pack, q, x);
         for (int p = 0; p < points; ++p) {
-            const Pack3 at = MagneticSix::place(x, p),
+            const Pack3 at = MagneticSix::position(x, p),
                         m = MagneticSix(x, p).frame().magnetization(elements_[pack].at[p]);
             for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
                 const Index n = loop_.element(pack, lane) * points + p;
@@ -76,7 +76,7 @@ std::vector<MagneticSixTerm::Fields> MagneticSixTerm::sample(const double* q, co
                                                              int order) const {
     if (!field_.varies(controls)) return {};
     std::vector<Vec3> places, moments;
-    place(q, places, moments);
+    find_points(q, places, moments);
     return in_packs<points>(loop_, field_.sample(places, moments, order, controls), order,
                             field_.uniform(controls));
 }
@@ -106,7 +106,7 @@ void MagneticSixTerm::evaluate(const double* q, const Controls& controls, Residu
             const MagneticSix at(x, p);
             const MagneticSix::Element& e = elements_[pack].at[p];
             at.add_gradient(e, fields.empty() ? everywhere : fields[pack].at[p].flux, g);
-            if (!fields.empty()) at.add_gradient_by_place(e, fields[pack].at[p], g);
+            if (!fields.empty()) at.add_gradient_by_position(e, fields[pack].at[p], g);
         }
         loop_.scatter(pack, g, out);
     });
@@ -130,7 +130,7 @@ void MagneticSixTerm::assemble(const Chunk& chunk, const double* q, const Contro
             const MagneticSix at(x, p);
             const MagneticSix::Element& e = elements_[pack].at[p];
             at.add_hessian(e, varies ? fields_[pack].at[p].flux : everywhere, h);
-            if (varies) at.add_hessian_by_place(e, fields_[pack].at[p], h);
+            if (varies) at.add_hessian_by_position(e, fields_[pack].at[p], h);
         }
         loop_.scatter(pack, h, out);
     });
@@ -143,7 +143,7 @@ void MagneticSixTerm::vjp(const double* q, const Controls& controls, const doubl
     const double factor = field_.factor(controls);
     const Vec3 everywhere = field_.uniform(controls);
     std::vector<Vec3> places, magnetizations;
-    place(q, places, magnetizations);
+    find_points(q, places, magnetizations);
     const FieldSamples samples = field_.at_factor_one(places, magnetizations);
 
     FieldProbe probe;  // - V_p (M', M, v)
@@ -157,7 +157,7 @@ void MagneticSixTerm::vjp(const double* q, const Controls& controls, const doubl
             const MagneticSix at(x, p);
             Pack3 rate[3];
             at.rates(along, rate);
-            const Pack3 speed = MagneticSix::place(along, p);
+            const Pack3 speed = MagneticSix::position(along, p);
             const MagneticSix::Element& e = elements_[pack].at[p];
             for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
                 const Index f = loop_.element(pack, lane), n = f * points + p;

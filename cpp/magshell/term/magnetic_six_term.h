@@ -4,9 +4,9 @@
 #include "magshell/assembly/element_loop.h"
 #include "magshell/body/six_node_sheet.h"
 #include "magshell/energy/magnetic_six.h"
-#include "magshell/term/felt_field.h"
 #include "magshell/term/field_packs.h"
 #include "magshell/term/term.h"
+#include "magshell/term/total_applied_field.h"
 
 namespace magshell {
 
@@ -37,14 +37,14 @@ class MagneticSixTerm final : public Term {
     /// (a~_1, a~_2, n~) at a point of a face.
     Mat3 rest_frame(Index face, int point) const;
     /// The places and the magnetizations [A/m] of the points, one face after another.
-    void place(const double* q, std::vector<Vec3>& places, std::vector<Vec3>& magnetizations) const;
+    void find_points(const double* q, std::vector<Vec3>& places, std::vector<Vec3>& magnetizations) const;
     /// The applied field there, in packs; none where it is uniform. Order as in AppliedField::add_samples.
     std::vector<Fields> sample(const double* q, const Controls& controls, int order) const;
 
     const SixNodeSheet& sheet_;
     const Index body_;
     const ElementLoop<6> loop_;
-    const FeltField field_;
+    const TotalAppliedField field_;
     Slot magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     std::vector<Points> elements_;

@@ -2,9 +2,9 @@
 
 #include "magshell/assembly/element_loop.h"
 #include "magshell/energy/magnetic_solid.h"
-#include "magshell/strain/tetrahedron_shapes.h"
-#include "magshell/term/felt_field.h"
+#include "magshell/strain/tetrahedron.h"
 #include "magshell/term/field_packs.h"
+#include "magshell/term/total_applied_field.h"
 
 namespace magshell {
 namespace {
@@ -76,7 +76,7 @@ class MagneticSolidTerm final : public Term {
             for (int p = 0; p < points; ++p) {
                 const Point& point = elements_[pack].at[p];
                 point.add_gradient(fields.empty() ? everywhere : fields[pack].at[p].flux, g);
-                if (!fields.empty()) point.add_gradient_by_place(shapes_[p], x, fields[pack].at[p], g);
+                if (!fields.empty()) point.add_gradient_by_position(shapes_[p], x, fields[pack].at[p], g);
             }
             loop_.scatter(pack, g, out);
         });
@@ -106,9 +106,9 @@ class MagneticSolidTerm final : public Term {
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override {
         const Vec3 everywhere = field_.uniform(controls);
         const double factor = field_.factor(controls);
-        std::vector<Vec3> places, magnetizations, rates, turns;
+        std::vector<Vec3> places, magnetizations, rates, angle_branches;
         at_points(q, places, magnetizations);
-        at_points(lambda, rates, turns);
+        at_points(lambda, rates, angle_branches);
         const FieldSamples samples = field_.at_factor_one(places, magnetizations);
         FieldProbe probe;  // - V_p (F' M, F M, v)
         probe.direction = rates;
@@ -123,7 +123,7 @@ class MagneticSolidTerm final : public Term {
                            flux_rate = factor * (samples.gradient[n] * rates[n]);
                 by_magnetization -=
                     rest.volume[p] * (g.transpose() * (along.transpose() * flux + x.transpose() * flux_rate));
-                probe.flux.push_back(-rest.volume[p] * turns[n]);
+                probe.flux.push_back(-rest.volume[p] * angle_branches[n]);
                 probe.moment.push_back(-rest.volume[p] * magnetizations[n]);
             }
             out.values.segment<3>(magnetization_.at(t)) += by_magnetization;
@@ -160,7 +160,8 @@ class MagneticSolidTerm final : public Term {
             Pack3 x[N];
             loop_.gather(pack, q, x);
             for (int p = 0; p < points; ++p) {
-                const Pack3 place = Point::place(shapes_[p], x), m = elements_[pack].at[p].magnetization(x);
+                const Pack3 place = Point::position(shapes_[p], x),
+                            m = elements_[pack].at[p].magnetization(x);
                 for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
                     const Index n = loop_.element(pack, lane) * points + p;
                     places[n] = lane_of(place, lane);
@@ -182,7 +183,7 @@ class MagneticSolidTerm final : public Term {
     const Solid& solid_;
     const Index body_;
     const ElementLoop<N> loop_;
-    const FeltField field_;
+    const TotalAppliedField field_;
     Slot magnetization_;
     std::array<double, N> shapes_[points];
     std::vector<Points> elements_;

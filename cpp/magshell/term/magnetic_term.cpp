@@ -50,8 +50,8 @@ bool MagneticTerm::set_values(const Values& values) {
     return true;
 }
 
-void MagneticTerm::place(const double* q, std::vector<Vec3>& points,
-                         std::vector<Vec3>& magnetizations) const {
+void MagneticTerm::find_points(const double* q, std::vector<Vec3>& points,
+                               std::vector<Vec3>& magnetizations) const {
     points.resize(surface_.n_faces());
     magnetizations.resize(surface_.n_faces());
     loop_.each_pack([&](Index pack) {
@@ -70,7 +70,7 @@ std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Control
                                                   int order) const {
     if (!field_.varies(controls)) return {};
     std::vector<Vec3> points, moments;
-    place(q, points, moments);
+    find_points(q, points, moments);
     const FieldSamples samples = field_.sample(points, moments, order, controls);
     const Vec3 everywhere = field_.uniform(controls);
     std::vector<Magnetic::Field> packs(loop_.packs());
@@ -100,7 +100,7 @@ void MagneticTerm::evaluate(const double* q, const Controls& controls, Residual&
         const Magnetic face(x);
         face.gradient(elements_[pack], varies ? fields[pack].flux : everywhere, g);
         if (varies) {
-            const Pack3 pull = face.gradient_by_place(elements_[pack], fields[pack]);
+            const Pack3 pull = face.gradient_by_position(elements_[pack], fields[pack]);
             for (Pack3& at_node : g) at_node += pull;
         }
         loop_.scatter(pack, g, out);
@@ -123,7 +123,7 @@ void MagneticTerm::assemble(const Chunk& chunk, const double* q, const Controls&
         loop_.gather(pack, q, x);
         const Magnetic face(x);
         face.hessian(elements_[pack], varies ? fields_[pack].flux : everywhere, h);
-        if (varies) face.add_hessian_by_place(elements_[pack], fields_[pack], h);
+        if (varies) face.add_hessian_by_position(elements_[pack], fields_[pack], h);
         loop_.scatter(pack, h, out);
     });
 }
@@ -138,7 +138,7 @@ void MagneticTerm::vjp(const double* q, const Controls& controls, const double* 
     const double factor = field_.factor(controls);
     const Vec3 everywhere = field_.uniform(controls);
     std::vector<Vec3> points, magnetizations;
-    place(q, points, magnetizations);
+    find_points(q, points, magnetizations);
     const FieldSamples samples = field_.at_factor_one(points, magnetizations);
 
     FieldProbe probe;  // - A~ h (M', M, v)

@@ -7,8 +7,8 @@
 #include "magshell/assembly/face_loop.h"
 #include "magshell/body/surface.h"
 #include "magshell/energy/magnetic.h"
-#include "magshell/term/felt_field.h"
 #include "magshell/term/term.h"
+#include "magshell/term/total_applied_field.h"
 
 namespace magshell {
 
@@ -31,14 +31,14 @@ class MagneticTerm final : public Term {
 
   private:
     /// The barycenters and the magnetizations [A/m] there, by face.
-    void place(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
+    void find_points(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
     /// The applied field at every barycenter, in packs; none where it is uniform. Order as in AppliedField::add_samples.
     std::vector<Magnetic::Field> sample(const double* q, const Controls& controls, int order) const;
 
     const Surface& surface_;
     const Index body_;
     const FaceLoop& loop_;
-    const FeltField field_;
+    const TotalAppliedField field_;
     Slot magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     LargeVector<Magnetic::Element> elements_;

@@ -1,6 +1,9 @@
 #include "magshell/term/membrane_six_term.h"
 
+#include <Eigen/LU>
 #include <cmath>
+
+#include "magshell/strain/six_nodes.h"
 
 namespace magshell {
 
@@ -68,7 +71,7 @@ void MembraneSixTerm::evaluate(const double* q, const Controls&, Residual& out) 
     loop_.each_pack([&](Index pack) {
         Pack d[9];
         strain(pack, q, d);
-        keep_stress(pack, d);
+        store_stress(pack, d);
     });
     add_forces(stress_, out);
 }
@@ -88,7 +91,7 @@ void MembraneSixTerm::assemble(const Chunk& chunk, const double* q, const Contro
     });
 }
 
-Strains MembraneSixTerm::look(const double* q) const {
+Strains MembraneSixTerm::strains_at(const double* q) const {
     Strains out(sheet_.n_faces(), 9);
     loop_.each_pack([&](Index pack) { strain(pack, q, out.at(pack)); });
     return out;
@@ -189,6 +192,33 @@ void MembraneSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const 
 std::size_t MembraneSixTerm::bytes() const {
     return materials_.bytes() + growth_.bytes() + bytes_of(stiffness_) + bytes_of(rest_measures_) +
            bytes_of(rest_) + bytes_of_stresses() + bytes_of(state_) + loop_.bytes();
+}
+
+// As of three nodes: h w grad N_k . grad N_l over the points inside, w = E/(1 - nu^2).
+bool MembraneSixTerm::add_projective_stiffness(NodeMatrix& out) const {
+    constexpr auto first = six_nodes::inside_towards(2, 1.0), second = six_nodes::inside_towards(1, -1.0);
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const ShellMaterial& m = materials_[f];
+        const double modulus = m.thickness * m.young_modulus / (1.0 - m.poisson_ratio * m.poisson_ratio);
+        const std::array<Index, 6>& nodes = sheet_.own_nodes[f];
+        for (std::size_t p = 0; p < six_nodes::inside.size(); ++p) {
+            Eigen::Matrix<double, 3, 2> tangents = Eigen::Matrix<double, 3, 2>::Zero();
+            Eigen::Matrix<double, 2, 6> by_place;
+            for (int k = 0; k < 6; ++k) {
+                by_place.col(k) << first[p][k], second[p][k];
+                tangents += sheet_.rest[f][k] * by_place.col(k).transpose();
+            }
+            const Eigen::Matrix2d metric = tangents.transpose() * tangents;
+            const double factor =
+                0.5 * six_nodes::inside[p].weight * std::sqrt(metric.determinant()) * modulus;
+            const Eigen::Matrix<double, 6, 6> h = factor * by_place.transpose() * metric.inverse() * by_place;
+            for (int k = 0; k < 6; ++k) {
+                out.add_diagonal(nodes[k], h(k, k));
+                for (int l = 0; l < k; ++l) out.add_pair(nodes[k], nodes[l], h(k, l));
+            }
+        }
+    }
+    return true;
 }
 
 }  // namespace magshell

@@ -7,8 +7,8 @@
 #include "magshell/energy/membrane_six.h"
 #include "magshell/energy/six_node_face.h"
 #include "magshell/term/elastic_term.h"
-#include "magshell/term/sheet_growth.h"
-#include "magshell/term/sheet_materials.h"
+#include "magshell/term/shell_growth.h"
+#include "magshell/term/shell_materials.h"
 
 namespace magshell {
 
@@ -27,15 +27,15 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
-    bool add_surrogate(NodeMatrix& out) const override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
     std::size_t bytes() const override;
 
     /// d at a state that is only looked at.
-    Strains look(const double* q) const;
-    const SheetMaterial& material(Index face) const { return materials_[face]; }
+    Strains strains_at(const double* q) const;
+    const ShellMaterial& material(Index face) const { return materials_[face]; }
 
   private:
     friend class StrainScaffold<MembraneSixTerm, 9>;
@@ -54,8 +54,8 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     const SixNodeSheet& sheet_;
     const Index body_, nodes_;
     ElementLoop<6> loop_;
-    SheetMaterials materials_;
-    SheetGrowth growth_;
+    ShellMaterials materials_;
+    ShellGrowth growth_;
     std::vector<SixNodeFace> rest_;
     std::vector<std::array<Pack, 9>> rest_measures_;
     std::vector<Symmetric9> stiffness_;

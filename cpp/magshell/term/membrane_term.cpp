@@ -58,11 +58,11 @@ bool MembraneTerm::set_values(const Values& values) {
 
 // A h w g_k . g_l, with the modulus of waves in a sheet at rest, w = E/(1 - nu^2); of edges opposite to the nodes,
 // g_k . g_l = e_k . e_l / 4 A^2.
-bool MembraneTerm::add_surrogate(NodeMatrix& out) const {
+bool MembraneTerm::add_projective_stiffness(NodeMatrix& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         double modulus = 0.0;
         for (const MembraneFaces::Share& share : faces_.shares(f)) {
-            const SheetMaterial& material = materials_[share.face];
+            const ShellMaterial& material = materials_[share.face];
             modulus += share.part * material.thickness * material.young_modulus /
                        (1.0 - material.poisson_ratio * material.poisson_ratio);
         }
@@ -97,7 +97,7 @@ void MembraneTerm::evaluate(const double* q, const Controls&, Residual& out) {
         const Membrane membrane(x);
         Pack strain[3];
         membrane.strain(elements_[pack], strain);
-        keep_stress(pack, strain);
+        store_stress(pack, strain);
         membrane.gradient(stress_.at(pack), g);
         loop_.scatter(pack, g, out);
     });
@@ -145,7 +145,7 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, G
             for (int k = 0; k < 2; ++k) {
                 const MembraneFaces::Share share = faces_.shares(f)[k];
                 if (share.part == 0.0) continue;
-                const SheetMaterial& m = materials_[share.face];
+                const ShellMaterial& m = materials_[share.face];
                 by_shares[f][k] =
                     share.part * Eigen::Vector2d(along.dot(rest.membrane_stiffness(m) * d),
                                                  along.dot(rest.membrane_by_poisson_ratio(m) * d));

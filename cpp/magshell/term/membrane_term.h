@@ -6,8 +6,8 @@
 #include "magshell/energy/grown_face.h"
 #include "magshell/energy/membrane.h"
 #include "magshell/term/elastic_term.h"
-#include "magshell/term/sheet_growth.h"
-#include "magshell/term/sheet_materials.h"
+#include "magshell/term/shell_growth.h"
+#include "magshell/term/shell_materials.h"
 
 namespace magshell {
 
@@ -27,7 +27,7 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
-    bool add_surrogate(NodeMatrix& out) const override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
@@ -56,8 +56,8 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     const MembraneFaces& faces_;
     const FaceLoop& loop_;
     const Index nodes_;
-    SheetMaterials materials_;
-    SheetGrowth growth_;
+    ShellMaterials materials_;
+    ShellGrowth growth_;
     LargeVector<Membrane::Element> elements_;
     std::vector<double> state_;  // the nodes at which stress_ holds
 };

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "magshell/body/nodes.h"
-#include "magshell/term/felt_field.h"
 #include "magshell/term/term.h"
+#include "magshell/term/total_applied_field.h"
 
 namespace magshell {
 
@@ -52,7 +52,7 @@ class MomentTerm final : public Term {
     FieldSamples sample(const double* q, const Controls& controls, int order, std::vector<Vec3>& points,
                         std::vector<Vec3>& moments) const;
 
-    const FeltField field_;
+    const TotalAppliedField field_;
     std::vector<Chunk> chunks_;
 };
 

@@ -28,7 +28,7 @@ struct MuscleInput {
 
 /// Puts in place, or adds, the forces alpha_k pull of a point.
 template <int N>
-inline void add_pulls(const CarriedVector<N>& m, const Pack3& pull, bool first, Pack3 g[N]) {
+inline void add_pulls(const PushedForwardVector<N>& m, const Pack3& pull, bool first, Pack3 g[N]) {
     for (int k = 0; k < N; ++k) {
         const Pack3 share = m.alpha[k] * pull;
         g[k] = first ? share : g[k] + share;
@@ -38,7 +38,7 @@ inline void add_pulls(const CarriedVector<N>& m, const Pack3& pull, bool first, 
 /// The blocks alpha_k alpha_l M of a point, as a tangent for add_blocks.
 template <int N>
 struct FibreTangent {
-    const CarriedVector<N>& m;
+    const PushedForwardVector<N>& m;
     Pack33 stiffness;
 
     Pack33 block(int k, int l) const { return (m.alpha[k] * m.alpha[l]) * stiffness; }
@@ -51,7 +51,7 @@ class MuscleFibres {
     using Nodes = std::array<Index, N>;
 
     struct Pieces {
-        CarriedVector<N> m[points];
+        PushedForwardVector<N> m[points];
         Pack volume[points];
         Pack strength, activation;
     };

@@ -47,33 +47,33 @@ class MuscleRateTerm final : public ForceTerm {
         });
     }
 
-    void assemble(const Kinematics& at, const Controls&, bool cautious, SystemMatrix& out,
+    void assemble(const Kinematics& at, const Controls&, bool convexified, SystemMatrix& out,
                   Remainder& rest) const override {
         std::vector<std::array<Vec3, N*(N + 1) / 2>> axes(fibres_->fibres.n_elements());
         const Pack rate(at.rate), half(0.5);
         loop_.scatter_packs([&](Index pack) {
             const Pieces& each = fibres_->at(pack);
-            Pack3 x[N], v[N], turns[N * (N + 1) / 2];
+            Pack3 x[N], v[N], angle_branches[N * (N + 1) / 2];
             loop_.gather(pack, at.q.data(), x);
             loop_.gather(pack, at.v.data(), v);
             Pack33 h[N * (N + 1) / 2];
             for (int p = 0; p < points; ++p) {
                 const Point point(*this, pack, p, x, v);
-                const FibrePlace& place = point.place;
+                const DeformedFibre& place = point.place;
                 const Pack3 u = (point.by_rate * place.inverse) * place.across(point.moves);
                 Pack along = point.by_length + rate * point.by_rate, across = point.tension * place.inverse;
-                if (cautious) {
+                if (convexified) {
                     along = max(along, Pack(0.0));
                     across = max(across, Pack(0.0));
                 }
                 Pack33 stiffness = place.stiffness(along, across);
-                if (!cautious) stiffness += half * symmetric_outer(place.n, u);
+                if (!convexified) stiffness += half * symmetric_outer(place.n, u);
                 add_blocks<N>(FibreTangent<N>{each.m[p], each.volume[p] * stiffness}, p == 0, h);
                 const Pack3 axis = (half * each.volume[p]) * cross(u, place.n);
                 for (int k = 0; k < N; ++k)
                     for (int l = 0; l <= k; ++l) {
                         const Pack3 share = (each.m[p].alpha[k] * each.m[p].alpha[l]) * axis;
-                        Pack3& into = turns[lower_index(k, l)];
+                        Pack3& into = angle_branches[lower_index(k, l)];
                         into = p == 0 ? share : into + share;
                     }
             }
@@ -81,9 +81,9 @@ class MuscleRateTerm final : public ForceTerm {
             loop_.scatter(pack, h, out);
             for (int lane = 0; lane < loop_.lanes_in(pack); ++lane)
                 for (int pair = 0; pair < N * (N + 1) / 2; ++pair)
-                    axes[loop_.element(pack, lane)][pair] = lane_of(turns[pair], lane);
+                    axes[loop_.element(pack, lane)][pair] = lane_of(angle_branches[pair], lane);
         });
-        if (cautious) return;
+        if (convexified) return;
         for (Index t = 0; t < fibres_->fibres.n_elements(); ++t) {
             const std::span<const Index> nodes = fibres_->fibres.nodes_of(t);
             for (int k = 0; k < N; ++k)
@@ -110,7 +110,7 @@ class MuscleRateTerm final : public ForceTerm {
             typename Shared::Found found;
             for (int p = 0; p < points; ++p) {
                 const Point point(*this, pack, p, x, v);
-                const FibrePlace& place = point.place;
+                const DeformedFibre& place = point.place;
                 const Pack3 turned = each.m[p].at(adjoint);
                 const Pack along = each.volume[p] * dot(place.n, turned);
                 found.strength += along * point.by_strength;
@@ -159,7 +159,7 @@ class MuscleRateTerm final : public ForceTerm {
   private:
     /// T and its derivatives, by l, l', w and a.
     struct Point {
-        FibrePlace place;
+        DeformedFibre place;
         Pack3 moves;  // y'
         Pack rate;    // l'
         Pack tension, by_length, by_rate, by_strength, by_activation;
@@ -175,7 +175,7 @@ class MuscleRateTerm final : public ForceTerm {
             rate = dot(place.n, moves);
             Pack more, steep;
             for (int lane = 0; lane < Pack::width; ++lane) {
-                const FibreCurve::Sample at = law.beside_isometric(rate[lane] / term.largest_rate_);
+                const FibreCurve::Sample at = law.excess_over_isometric(rate[lane] / term.largest_rate_);
                 more.set(lane, at.value);
                 steep.set(lane, at.slope / term.largest_rate_);
             }

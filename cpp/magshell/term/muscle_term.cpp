@@ -20,12 +20,12 @@ class MuscleEnergy final : public MuscleTerm {
           fibres_(std::move(fibres)),
           loop_(fibres_->loop),
           shortening_rate_(shortening_rate),
-          kept_(loop_.packs()) {}
+          stiffness_(loop_.packs()) {}
 
     Index body() const override { return body_; }
-    bool driven() const override { return false; }
+    bool depends_on_loads() const override { return false; }
     bool varies() const override { return true; }
-    void be_cautious(bool cautious) override { cautious_ = cautious; }
+    void set_psd_projection(bool project_psd) override { psd_projection_ = project_psd; }
 
     bool set_values(const Values& values) override {
         if (shortening_rate_.size() > 0) largest_rate_ = values.number(shortening_rate_);
@@ -40,13 +40,13 @@ class MuscleEnergy final : public MuscleTerm {
             Pack total(0.0);
             for (int p = 0; p < points; ++p)
                 total += each.volume[p] *
-                         fibres_->law.at(FibrePlace(each.m[p].at(x)).length, each.activation).energy;
+                         fibres_->law.at(DeformedFibre(each.m[p].at(x)).length, each.activation).energy;
             return each.strength * total;
         });
     }
 
     /// w m m^T, as stiff as it is at rest, fully activated: so that it stays the same whatever the activation.
-    bool add_surrogate(NodeMatrix& out) const override {
+    bool add_projective_stiffness(NodeMatrix& out) const override {
         const FibreLaw::Response law = fibres_->law.at(Pack(1.0), Pack(1.0));
         const Pack stiffness = max(max(law.slope, law.tension), Pack(0.0));
         for (Index pack = 0; pack < loop_.packs(); ++pack) {
@@ -76,10 +76,10 @@ class MuscleEnergy final : public MuscleTerm {
             Pack3 x[N], g[N];
             loop_.gather(pack, q, x);
             for (int p = 0; p < points; ++p) {
-                const FibrePlace at(each.m[p].at(x));
+                const DeformedFibre at(each.m[p].at(x));
                 const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
-                kept_[pack].along[p] = law.slope;
-                kept_[pack].across[p] = at.over_length(law);
+                stiffness_[pack].along[p] = law.slope;
+                stiffness_[pack].across[p] = at.over_length(law);
                 const Pack3 pull = (each.volume[p] * each.strength * law.tension) * at.n;
                 add_pulls<N>(each.m[p], pull, p == 0, g);
             }
@@ -95,12 +95,12 @@ class MuscleEnergy final : public MuscleTerm {
             loop_.gather(pack, q, x);
             Symmetric3 stiffness[points];
             for (int p = 0; p < points; ++p) {
-                Pack along = kept_[pack].along[p], across = kept_[pack].across[p];
-                if (cautious_) {
+                Pack along = stiffness_[pack].along[p], across = stiffness_[pack].across[p];
+                if (psd_projection_) {
                     along = max(along, Pack(0.0));
                     across = max(across, Pack(0.0));
                 }
-                const Pack33 m = FibrePlace(each.m[p].at(x)).stiffness(along, across);
+                const Pack33 m = DeformedFibre(each.m[p].at(x)).stiffness(along, across);
                 const Pack scale = each.volume[p] * each.strength;
                 for (int r = 0; r < 3; ++r)
                     for (int c = 0; c <= r; ++c) stiffness[p].at[lower_index(r, c)] = scale * m.at[3 * r + c];
@@ -120,7 +120,7 @@ class MuscleEnergy final : public MuscleTerm {
             loop_.gather(pack, lambda, adjoint);
             typename Shared::Found found;
             for (int p = 0; p < points; ++p) {
-                const FibrePlace at(each.m[p].at(x));
+                const DeformedFibre at(each.m[p].at(x));
                 const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
                 const Pack3 rate = each.m[p].at(adjoint);
                 const Pack along = dot(at.n, rate), scale = each.volume[p] * each.strength;
@@ -169,7 +169,7 @@ class MuscleEnergy final : public MuscleTerm {
             loop_.gather(pack, q, x);
             if (v) loop_.gather(pack, v, moves);
             for (int p = 0; p < points; ++p) {
-                const FibrePlace at(each.m[p].at(x));
+                const DeformedFibre at(each.m[p].at(x));
                 const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
                 for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
                     const Index t = loop_.element(pack, lane);
@@ -179,7 +179,7 @@ class MuscleEnergy final : public MuscleTerm {
                     if (v && largest_rate_ > 0.0) {
                         const double rate = dot(at.n, each.m[p].at(moves))[lane] / largest_rate_;
                         tension += each.activation[lane] * law.by_activation[lane] *
-                                   fibres_->law.beside_isometric(rate).value;
+                                   fibres_->law.excess_over_isometric(rate).value;
                     }
                     out.stretches[place] = at.length[lane];
                     out.tensions[place] = each.strength[lane] * tension;
@@ -190,7 +190,7 @@ class MuscleEnergy final : public MuscleTerm {
         return out;
     }
 
-    std::size_t bytes() const override { return fibres_->bytes() + bytes_of(kept_); }
+    std::size_t bytes() const override { return fibres_->bytes() + bytes_of(stiffness_); }
 
   private:
     // At the last evaluated state: T' and T/l.
@@ -222,8 +222,8 @@ class MuscleEnergy final : public MuscleTerm {
     const ElementLoop<N>& loop_;
     const Slot shortening_rate_;
     double largest_rate_ = 0.0;
-    bool cautious_ = false;
-    std::vector<Stiffness> kept_;
+    bool psd_projection_ = false;
+    std::vector<Stiffness> stiffness_;
 };
 
 template <class Element>

@@ -19,13 +19,13 @@ constexpr std::array<int, 6> face_order(int i) {
 }
 
 /// Of a side's six nodes one after another, the place of the fold's node a.
-constexpr int place_on_side(int a) {
+constexpr int index_on_side(int a) {
     return a < 6 ? a : a - 3;
 }
 
 /// The fold's node at a place of its left side, or its right one.
-constexpr int node_on_side(int place, bool on_left) {
-    return on_left || place < 3 ? place : place + 3;
+constexpr int node_on_side(int index, bool on_left) {
+    return on_left || index < 3 ? index : index + 3;
 }
 
 }  // namespace magshell

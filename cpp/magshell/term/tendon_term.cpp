@@ -53,7 +53,7 @@ TendonTerm::TendonTerm(const std::vector<TendonInput>& inputs, const Nodes& node
     }
 }
 
-void TendonTerm::add_string(Index tendon, double share, const RidingPoint* first, std::size_t points,
+void TendonTerm::add_string(Index tendon, double share, const EmbeddedPoint* first, std::size_t points,
                             const Nodes& nodes, const SystemMatrix& matrix) {
     String& added = strings_.emplace_back();
     added.tendon = tendon;

@@ -11,25 +11,25 @@
 #include <vector>
 
 #include "magshell/body/nodes.h"
-#include "magshell/term/border_term.h"
+#include "magshell/term/low_rank_term.h"
 
 namespace magshell {
 
 /// A point that rides on the caller's vertices.
-struct RidingPoint {
+struct EmbeddedPoint {
     std::vector<Index> vertices;
     std::vector<double> weights;
 };
 
 struct TendonInput {
     std::string owner;  // under which its numbers are registered
-    std::vector<RidingPoint> points;
+    std::vector<EmbeddedPoint> points;
     /// Whether each segment is a string of its own, and then its share of the length at rest, one a segment.
     bool slides = true;
     std::vector<double> shares;
 };
 
-class TendonTerm final : public BorderTerm {
+class TendonTerm final : public LowRankTerm {
   public:
     TendonTerm(const std::vector<TendonInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                Registry& registry);
@@ -77,7 +77,7 @@ class TendonTerm final : public BorderTerm {
         Pull(const std::array<double, n_numbers>& numbers, double share, double length);
     };
 
-    void add_string(Index tendon, double share, const RidingPoint* first, std::size_t points,
+    void add_string(Index tendon, double share, const EmbeddedPoint* first, std::size_t points,
                     const Nodes& nodes, const SystemMatrix& matrix);
 
     Slot factor_;

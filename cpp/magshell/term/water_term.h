@@ -16,7 +16,7 @@ class WaterTerm final : public ForceTerm {
     std::string_view name() const override { return "water"; }
     void set_values(const Values& values) override;
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
-    void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
+    void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
                   Remainder& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              Gradient& out) const override;

@@ -1,10 +1,10 @@
-#include "magshell/obstacle/placed_obstacle.h"
+#include "magshell/obstacle/obstacle_state.h"
 
 #include "magshell/core/rotation_vector.h"
 
 namespace magshell {
 
-StandingObstacle::StandingObstacle(const PlacedObstacle& placed, const ObstaclePose& pose)
+ObstacleState::ObstacleState(const PositionedObstacle& placed, const ObstaclePose& pose)
     : shape_(placed.shape.get()),
       placement_(placed.placement),
       pose_(pose),
@@ -12,15 +12,15 @@ StandingObstacle::StandingObstacle(const PlacedObstacle& placed, const ObstacleP
       moved_(rotation(pose.rotation_vector)),
       axes_(moved_ * rotation(placement_.rotation_vector)) {}
 
-Distance StandingObstacle::distance(const Vec3& x) const {
+Distance ObstacleState::distance(const Vec3& x) const {
     Distance at = shape_->distance(own(x));
     at.normal = axes_ * at.normal;
     at.curvature = axes_ * at.curvature * axes_.transpose();
     return at;
 }
 
-void StandingObstacle::vjp(const Vec3& x, const Distance& at, double by_distance, const Vec3& by_normal,
-                           const Vec3& by_relative_velocity, ObstacleGradient& out) const {
+void ObstacleState::vjp(const Vec3& x, const Distance& at, double by_distance, const Vec3& by_normal,
+                        const Vec3& by_relative_velocity, ObstacleGradient& out) const {
     const Vec3 from_center = x - center_, by_place = by_distance * at.normal + at.curvature * by_normal;
     const Vec3 by_center = by_relative_velocity.cross(pose_.spin) - by_place;
     out.placement.center += by_center;

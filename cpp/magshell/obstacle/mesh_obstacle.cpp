@@ -1,4 +1,4 @@
-#include "magshell/obstacle/mesh_body.h"
+#include "magshell/obstacle/mesh_obstacle.h"
 
 #include <algorithm>
 #include <cmath>
@@ -57,7 +57,7 @@ void check_outside(const std::vector<double>& values, const std::array<Index, 3>
 
 }  // namespace
 
-MeshBody::MeshBody(const TriangleMesh& mesh, Index resolution)
+MeshObstacle::MeshObstacle(const TriangleMesh& mesh, Index resolution)
     : middle_(0.5 * (lowest(mesh) + highest(mesh))), bounds_(0.5 * (highest(mesh) - lowest(mesh)), 0.0) {
     for (Index e = 0; e < mesh.n_edges(); ++e)
         if (mesh.is_boundary(e))
@@ -74,7 +74,7 @@ MeshBody::MeshBody(const TriangleMesh& mesh, Index resolution)
     coefficients_ = grid_coefficients(values, samples_);
 }
 
-bool MeshBody::contains(const Vec3& point) const {
+bool MeshObstacle::contains(const Vec3& point) const {
     for (int a = 0; a < 3; ++a) {
         const double u = (point[a] - origin_[a]) / cell_;
         if (!(u >= 0.0 && u <= samples_[a] - 1.0)) return false;
@@ -82,7 +82,7 @@ bool MeshBody::contains(const Vec3& point) const {
     return true;
 }
 
-MeshBody::Level MeshBody::level(const Vec3& point) const {
+MeshObstacle::Level MeshObstacle::level(const Vec3& point) const {
     std::array<SplineWeights, 3> w;
     std::array<std::ptrdiff_t, 3> first;
     for (int a = 0; a < 3; ++a) {
@@ -121,7 +121,7 @@ MeshBody::Level MeshBody::level(const Vec3& point) const {
 }
 
 // Newton's iteration for the saddle of |p - x|^2 / 2 + m phi(p): p - x + m dphi = 0 and phi = 0.
-bool MeshBody::nearest(const Vec3& point, const Level& start, Distance& out) const {
+bool MeshObstacle::nearest(const Vec3& point, const Level& start, Distance& out) const {
     constexpr int most = 12;
     constexpr double close = 1e-8;    // cells; the next step is far below rounding
     constexpr double flattest = 0.2;  // |dphi|, which is near one by a surface
@@ -150,7 +150,7 @@ bool MeshBody::nearest(const Vec3& point, const Level& start, Distance& out) con
     return false;
 }
 
-Distance MeshBody::distance(const Vec3& point) const {
+Distance MeshObstacle::distance(const Vec3& point) const {
     if (!contains(point)) return bounds_.distance(point - middle_);
     const Level at = level(point);
     const double slope = at.gradient.norm();

@@ -19,10 +19,10 @@ struct GrowthForm {
     TensorForm growth, rest_curvature;
 };
 
-class SheetGrowth {
+class ShellGrowth {
   public:
     /// `faces` has to outlive it.
-    SheetGrowth(const std::string& owner, const Renumbering& faces, const GrowthForm& form,
+    ShellGrowth(const std::string& owner, const Renumbering& faces, const GrowthForm& form,
                 Registry& registry);
 
     bool any() const { return growth_.slot.rows > 0 || curvature_.slot.rows > 0; }

@@ -17,11 +17,11 @@
 
 namespace magshell {
 
-class MeshBody final : public Obstacle {
+class MeshObstacle final : public Obstacle {
   public:
     /// A mesh without boundary, its normals outwards; `resolution` cells along its longest side. Throws
     /// InvalidInput on other meshes: with a boundary, or with space outside that counts as inside.
-    MeshBody(const TriangleMesh& mesh, Index resolution);
+    MeshObstacle(const TriangleMesh& mesh, Index resolution);
 
     Distance distance(const Vec3& point) const override;
 

@@ -7,10 +7,10 @@
 
 namespace magshell {
 
-class FeltField {
+class TotalAppliedField {
   public:
     /// Registers the controls "applied_flux_density" and "field_factor". The sources have to outlive it.
-    FeltField(const FieldSources& sources, Registry& registry);
+    TotalAppliedField(const FieldSources& sources, Registry& registry);
 
     /// The part that is the same everywhere [T].
     Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }

@@ -6,31 +6,31 @@
 //   0, 1, 2   the edge: from, to, middle      3, 4, 5 and 6, 7, 8   left and right: the corner, the middles between `to`
 //                                                                   and it, and between it and `from`
 //
-// so the angle is that of strain/fold_angle.h about (0, t) with the wings u_left and u_right. A direction in place of the
+// so the angle is that of strain/dihedral_angle.h about (0, t) with the wings u_left and u_right. A direction in place of the
 // right face is node 6 alone.
 #pragma once
 
 #include "magshell/energy/symmetric3.h"
-#include "magshell/strain/fold_angle.h"
-#include "magshell/strain/from_first.h"
+#include "magshell/strain/dihedral_angle.h"
+#include "magshell/strain/relative_to_first_node.h"
 #include "magshell/strain/six_nodes.h"
 
 namespace magshell {
 
-class FoldSix {
+class DihedralAngleSix {
   public:
-    FoldSix(const Pack3 x[9], const Pack& right_is_face, int point)
-        : point_(point), right_is_face_(right_is_face), fold_(angle_of(x, right_is_face, point)) {}
+    DihedralAngleSix(const Pack3 x[9], const Pack& right_is_face, int point)
+        : point_(point), right_is_face_(right_is_face), dihedral_(angle_of(x, right_is_face, point)) {}
 
-    Pack angle() const { return fold_.angle(); }
+    Pack angle() const { return dihedral_.angle(); }
 
     void gradient(Pack3 g[9]) const {
         Pack3 by[4];
-        fold_.gradient(by);
+        dihedral_.gradient(by);
         for (int a = 0; a < 3; ++a)
-            g[a] = Pack(tangent(a)) * by[1] + Pack(wing(a)) * (by[2] + right_is_face_ * by[3]);
+            g[a] = Pack(tangent(a)) * by[1] + Pack(inward_weight(a)) * (by[2] + right_is_face_ * by[3]);
         for (int a = 3; a < 6; ++a) {
-            g[a] = Pack(wing(a)) * by[2];
+            g[a] = Pack(inward_weight(a)) * by[2];
             g[a + 3] = right(a) * by[3];
         }
     }
@@ -42,19 +42,20 @@ class FoldSix {
         Pack foot;
     };
     std::array<Side, 2> sides() const {
-        return {{{fold_.left.by_point(), fold_.left.foot}, {-fold_.right.by_point(), fold_.right.foot}}};
+        return {{{dihedral_.left.by_point(), dihedral_.left.foot},
+                 {-dihedral_.right.by_point(), dihedral_.right.foot}}};
     }
     /// place: of a side's six nodes.
-    static double share(int point, int place, double foot) {
-        return wings_[point][place] - (place < 3 ? foot * tangents_[point][place] : 0.0);
+    static double side_weight(int point, int place, double foot) {
+        return inward_weights_[point][place] - (place < 3 ? foot * tangents_[point][place] : 0.0);
     }
 
     /// Adds moment d2theta, as lower blocks of the nine nodes at lower_index.
     void add_curvature(const Pack& moment, Pack33 h[45]) const {
-        const FoldCurvature c(fold_, moment);
-        const Pack33 &tt = c.block[FoldCurvature::B11], &lt = c.block[FoldCurvature::B21],
-                     &rt = c.block[FoldCurvature::B31], &ll = c.block[FoldCurvature::B22],
-                     &rr = c.block[FoldCurvature::B33];
+        const DihedralHessian c(dihedral_, moment);
+        const Pack33 &tt = c.block[DihedralHessian::B11], &lt = c.block[DihedralHessian::B21],
+                     &rt = c.block[DihedralHessian::B31], &ll = c.block[DihedralHessian::B22],
+                     &rr = c.block[DihedralHessian::B33];
         // Of the edge's nodes, which enter by t, and by u on both sides alike.
         const Pack33 both_t = lt + right_is_face_ * rt, both = ll + right_is_face_ * rr,
                      t_both = transpose(both_t);
@@ -62,21 +63,21 @@ class FoldSix {
             for (int b = 0; b <= a; ++b) {
                 Pack33& into = h[lower_index(a, b)];
                 into += Pack(tangent(a) * tangent(b)) * tt;
-                into += Pack(wing(a) * tangent(b)) * both_t;
-                into += Pack(tangent(a) * wing(b)) * t_both;
-                into += Pack(wing(a) * wing(b)) * both;
+                into += Pack(inward_weight(a) * tangent(b)) * both_t;
+                into += Pack(tangent(a) * inward_weight(b)) * t_both;
+                into += Pack(inward_weight(a) * inward_weight(b)) * both;
             }
         for (int a = 3; a < 6; ++a)
             for (int b = 0; b < 3; ++b) {
                 Pack33 &left = h[lower_index(a, b)], &opposite = h[lower_index(a + 3, b)];
-                left += Pack(wing(a) * tangent(b)) * lt;
-                left += Pack(wing(a) * wing(b)) * ll;
+                left += Pack(inward_weight(a) * tangent(b)) * lt;
+                left += Pack(inward_weight(a) * inward_weight(b)) * ll;
                 opposite += (Pack(tangent(b)) * right(a)) * rt;
-                opposite += (Pack(wing(b)) * right(a) * right_is_face_) * rr;
+                opposite += (Pack(inward_weight(b)) * right(a) * right_is_face_) * rr;
             }
         for (int a = 3; a < 6; ++a)
             for (int b = 3; b <= a; ++b) {
-                h[lower_index(a, b)] += Pack(wing(a) * wing(b)) * ll;
+                h[lower_index(a, b)] += Pack(inward_weight(a) * inward_weight(b)) * ll;
                 h[lower_index(a + 3, b + 3)] += (right(a) * right(b)) * rr;
             }
     }
@@ -84,20 +85,20 @@ class FoldSix {
   private:
     static constexpr std::array<std::array<double, 3>, 2> tangents_ = {six_nodes::along(six_nodes::gauss[0]),
                                                                        six_nodes::along(six_nodes::gauss[1])};
-    static constexpr std::array<std::array<double, 6>, 2> wings_ = {six_nodes::inward(six_nodes::gauss[0]),
-                                                                    six_nodes::inward(six_nodes::gauss[1])};
+    static constexpr std::array<std::array<double, 6>, 2> inward_weights_ = {
+        six_nodes::inward(six_nodes::gauss[0]), six_nodes::inward(six_nodes::gauss[1])};
     double tangent(int a) const { return tangents_[point_][a]; }
-    double wing(int a) const { return wings_[point_][a]; }
+    double inward_weight(int a) const { return inward_weights_[point_][a]; }
     /// Of node a + 3 on the right, where a direction is the wing itself.
     Pack right(int a) const {
         const double alone = a == 3 ? 1.0 : 0.0;
-        return Pack(alone) + right_is_face_ * Pack(wing(a) - alone);
+        return Pack(alone) + right_is_face_ * Pack(inward_weight(a) - alone);
     }
 
-    static Fold angle_of(const Pack3 places[9], const Pack& right_is_face, int point) {
+    static DihedralAngle angle_of(const Pack3 places[9], const Pack& right_is_face, int point) {
         const std::array<double, 3>& t = tangents_[point];
-        const std::array<double, 6>& u = wings_[point];
-        std::array<Pack3, 9> x = from_first<9>(places);
+        const std::array<double, 6>& u = inward_weights_[point];
+        std::array<Pack3, 9> x = relative_to_first_node<9>(places);
         x[6] = places[6] - right_is_face * places[0];  // a direction has no place
         Pack3 tangent = {Pack(0.0), Pack(0.0), Pack(0.0)}, shared = tangent;
         for (int a = 1; a < 3; ++a) {
@@ -111,12 +112,12 @@ class FoldSix {
             right += (Pack(alone) + right_is_face * Pack(u[a] - alone)) * x[a + 3];
         }
         const Pack3 zero = {Pack(0.0), Pack(0.0), Pack(0.0)};
-        return Fold(zero, tangent, left, right, Pack(0.0));
+        return DihedralAngle(zero, tangent, left, right, Pack(0.0));
     }
 
     const int point_;
     const Pack right_is_face_;
-    const Fold fold_;
+    const DihedralAngle dihedral_;
 };
 
 }  // namespace magshell

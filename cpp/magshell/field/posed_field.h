@@ -9,9 +9,9 @@
 
 namespace magshell {
 
-class PlacedField final : public AppliedField {
+class PosedField final : public AppliedField {
   public:
-    PlacedField(std::shared_ptr<const AppliedField> field, const Vec3& center, const Vec3& rotation);
+    PosedField(std::shared_ptr<const AppliedField> field, const Vec3& center, const Vec3& rotation);
 
     std::string_view name() const override { return field_->name(); }
     void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
@@ -27,7 +27,7 @@ class PlacedField final : public AppliedField {
     bool needs_gil() const override { return field_->needs_gil(); }
 
   private:
-    void place(const Vec3& center, const Vec3& rotation);
+    void set_pose(const Vec3& center, const Vec3& rotation);
     std::vector<Vec3> own_points(std::span<const Vec3> points) const;
     std::vector<Vec3> own_axes(std::span<const Vec3> vectors) const;
 

@@ -10,6 +10,6 @@ namespace magshell {
 /// Adds to `all`, for the pairs of a point and a triangle from `first` on, those of the same points with the edges and
 /// vertices that these triangles share, as far as they are nearer than `margin` [m] with nodes at q. Pairs of one point
 /// stand together.
-void add_recounts(std::size_t first, const double* q, double margin, std::vector<NearPair>& all);
+void add_overcount_corrections(std::size_t first, const double* q, double margin, std::vector<NearPair>& all);
 
 }  // namespace magshell

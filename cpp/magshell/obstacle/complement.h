@@ -8,9 +8,9 @@
 
 namespace magshell {
 
-class Inverted final : public Obstacle {
+class Complement final : public Obstacle {
   public:
-    explicit Inverted(std::shared_ptr<const Obstacle> body) : body_(std::move(body)) {}
+    explicit Complement(std::shared_ptr<const Obstacle> body) : body_(std::move(body)) {}
 
     Distance distance(const Vec3& point) const override {
         const Distance d = body_->distance(point);

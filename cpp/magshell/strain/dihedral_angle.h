@@ -24,7 +24,7 @@
 
 namespace magshell {
 
-struct Wing {
+struct HalfPlane {
     Pack3 edge_direction;  // e^
     Pack3 normal;          // n
     Pack3 away;            // t
@@ -32,7 +32,7 @@ struct Wing {
     Pack height;           // h
     Pack foot;             // s, where the point stands along the edge: 0 at x0, 1 at x1
 
-    Wing(const Pack3& e, const Pack3& r) {
+    HalfPlane(const Pack3& e, const Pack3& r) {
         const Pack e2 = squared_norm(e);
         edge_length = sqrt(e2);
         const Pack3 across = cross(e, r);
@@ -49,29 +49,30 @@ struct Wing {
 
 /// factor d2α of one wing in its own variables (r, e); the (e, r) block is the transpose of `point_edge`. Of the two wings of
 /// a fold the (e, e) blocks are added up.
-inline void add_wing_curvature(const Wing& w, const Pack& factor, Pack33& point_point, Pack33& point_edge,
-                               Pack33& edge_edge) {
+inline void add_half_plane_hessian(const HalfPlane& w, const Pack& factor, Pack33& point_point,
+                                   Pack33& point_edge, Pack33& edge_edge) {
     const Pack inverse_h = Pack(1.0) / w.height;
     const Pack inverse_e = Pack(1.0) / w.edge_length;
-    const Pack33 turn = symmetric_outer(w.normal, w.away);
-    const Pack33 slide = outer(w.edge_direction, w.normal);
+    const Pack33 rotation = symmetric_outer(w.normal, w.away);
+    const Pack33 shift = outer(w.edge_direction, w.normal);
     const Pack a = factor * inverse_h * inverse_h, b = w.foot * a, c = factor * inverse_e * inverse_h;
     const Pack d = w.foot * b + Pack(0.5) * factor * inverse_e * inverse_e, f = w.foot * c;
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column) {
             const int k = 3 * row + column, transposed = 3 * column + row;
-            point_point.at[k] = -a * turn.at[k];
-            point_edge.at[k] = b * turn.at[k] - c * slide.at[k];
-            edge_edge.at[k] += f * (slide.at[k] + slide.at[transposed]) - d * turn.at[k];
+            point_point.at[k] = -a * rotation.at[k];
+            point_edge.at[k] = b * rotation.at[k] - c * shift.at[k];
+            edge_edge.at[k] += f * (shift.at[k] + shift.at[transposed]) - d * rotation.at[k];
         }
 }
 
 /// A fold about the edge x0-x1 between the wings of x2 (left) and x3 (right).
-struct Fold {
-    Wing left, right;
+struct DihedralAngle {
+    HalfPlane left, right;
     Pack right_is_point;  // 1: x3 is a point, r = x3 - x0;  0: x3 is a direction, r = x3
 
-    Fold(const Pack3& x0, const Pack3& x1, const Pack3& x2, const Pack3& x3, const Pack& right_is_point_)
+    DihedralAngle(const Pack3& x0, const Pack3& x1, const Pack3& x2, const Pack3& x3,
+                  const Pack& right_is_point_)
         : left(x1 - x0, x2 - x0),
           right(x1 - x0, x3 - right_is_point_ * x0),
           right_is_point(right_is_point_) {}
@@ -95,16 +96,16 @@ struct Fold {
 
 /// moment d2theta as 3x3 blocks of the nodes 0..3, the lower triangle at row (row + 1) / 2 + column. The last but
 /// one, (3, 2), is zero.
-struct FoldCurvature {
+struct DihedralHessian {
     enum Block { B00, B10, B11, B20, B21, B22, B30, B31, B32, B33, count };
     Pack33 block[count];
 
-    explicit FoldCurvature(const Fold& fold, const Pack& moment) {
-        const Pack p = fold.right_is_point;
+    explicit DihedralHessian(const DihedralAngle& dihedral, const Pack& moment) {
+        const Pack p = dihedral.right_is_point;
         // x1 enters by e, x2 by r_left, x3 by r_right, and x0 by minus their sum (r_right only where x3 is a point).
         block[B11] = block[B32] = {};
-        add_wing_curvature(fold.left, moment, block[B22], block[B21], block[B11]);
-        add_wing_curvature(fold.right, -moment, block[B33], block[B31], block[B11]);
+        add_half_plane_hessian(dihedral.left, moment, block[B22], block[B21], block[B11]);
+        add_half_plane_hessian(dihedral.right, -moment, block[B33], block[B31], block[B11]);
         // Number by number: whole blocks would be copied.
         for (int row = 0; row < 3; ++row)
             for (int column = 0; column < 3; ++column) {

@@ -9,7 +9,7 @@
 namespace magshell {
 
 template <int count>
-std::array<Pack3, count> from_first(const Pack3 x[count]) {
+std::array<Pack3, count> relative_to_first_node(const Pack3 x[count]) {
     std::array<Pack3, count> seen;
     seen[0] = {Pack(0.0), Pack(0.0), Pack(0.0)};
     for (int a = 1; a < count; ++a) seen[a] = x[a] - x[0];

@@ -8,7 +8,7 @@
 namespace magshell {
 
 template <int N>
-struct CarriedVector {
+struct PushedForwardVector {
     Pack alpha[N];  // g_k . m
 
     /// F m; of rates, its rate.

@@ -9,18 +9,18 @@
 
 namespace magshell {
 
-class SheetMaterials {
+class ShellMaterials {
   public:
-    SheetMaterials(const Surface& surface, Registry& registry)
-        : SheetMaterials(surface.owner, surface.faces, registry) {}
+    ShellMaterials(const Surface& surface, Registry& registry)
+        : ShellMaterials(surface.owner, surface.faces, registry) {}
     /// `faces` has to outlive the registry.
-    SheetMaterials(const std::string& owner, const Renumbering& faces, Registry& registry);
+    ShellMaterials(const std::string& owner, const Renumbering& faces, Registry& registry);
 
     /// Whether any has changed.
     bool set_values(const Values& values);
-    const SheetMaterial& operator[](Index face) const { return of_faces_[face]; }
+    const ShellMaterial& operator[](Index face) const { return of_faces_[face]; }
     double thinnest() const;
-    std::size_t bytes() const { return of_faces_.capacity() * sizeof(SheetMaterial); }
+    std::size_t bytes() const { return of_faces_.capacity() * sizeof(ShellMaterial); }
 
     /// Adds what an energy says of a face's material whose stiffness goes with this power of the thickness:
     /// `work` = lambda . g, and lambda . dg/dnu.
@@ -32,7 +32,7 @@ class SheetMaterials {
 
   private:
     Slot thickness_, young_modulus_, poisson_ratio_;
-    std::vector<SheetMaterial> of_faces_;
+    std::vector<ShellMaterial> of_faces_;
 };
 
 }  // namespace magshell

@@ -1,4 +1,4 @@
-#include "magshell/field/placed_field.h"
+#include "magshell/field/posed_field.h"
 
 #include <algorithm>
 #include <utility>
@@ -7,35 +7,35 @@
 
 namespace magshell {
 
-PlacedField::PlacedField(std::shared_ptr<const AppliedField> field, const Vec3& center, const Vec3& rotation)
+PosedField::PosedField(std::shared_ptr<const AppliedField> field, const Vec3& center, const Vec3& rotation)
     : field_(std::move(field)) {
     for (const FieldParameter& p : field_->parameters()) n_own_ += static_cast<std::size_t>(p.rows) * p.width;
-    place(center, rotation);
+    set_pose(center, rotation);
 }
 
-void PlacedField::place(const Vec3& center, const Vec3& rotation) {
+void PosedField::set_pose(const Vec3& center, const Vec3& rotation) {
     center_ = center;
     rotation_ = rotation;
     turn_ = magshell::rotation(rotation);
     moved_ = !center.isZero(0.0) || !rotation.isZero(0.0);
 }
 
-std::vector<Vec3> PlacedField::own_points(std::span<const Vec3> points) const {
+std::vector<Vec3> PosedField::own_points(std::span<const Vec3> points) const {
     std::vector<Vec3> own;
     own.reserve(points.size());
     for (const Vec3& x : points) own.push_back(turn_.transpose() * (x - center_));
     return own;
 }
 
-std::vector<Vec3> PlacedField::own_axes(std::span<const Vec3> vectors) const {
+std::vector<Vec3> PosedField::own_axes(std::span<const Vec3> vectors) const {
     std::vector<Vec3> own;
     own.reserve(vectors.size());
     for (const Vec3& v : vectors) own.push_back(turn_.transpose() * v);
     return own;
 }
 
-void PlacedField::add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order,
-                              double scale, FieldSamples& out) const {
+void PosedField::add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order,
+                             double scale, FieldSamples& out) const {
     if (!moved_) {
         field_->add_samples(points, moments, order, scale, out);
         return;
@@ -50,33 +50,33 @@ void PlacedField::add_samples(std::span<const Vec3> points, std::span<const Vec3
         out.curvature[k] += turn_ * own.curvature[k] * turn_.transpose();
 }
 
-std::vector<FieldParameter> PlacedField::parameters() const {
+std::vector<FieldParameter> PosedField::parameters() const {
     std::vector<FieldParameter> result = field_->parameters();
     result.push_back({"center", "m", 1, 3});
     result.push_back({"rotation", "rad", 1, 3});
     return result;
 }
 
-std::shared_ptr<AppliedField> PlacedField::clone() const {
-    auto copy = std::make_shared<PlacedField>(*this);
+std::shared_ptr<AppliedField> PosedField::clone() const {
+    auto copy = std::make_shared<PosedField>(*this);
     copy->own_ = field_->clone();
     if (copy->own_) copy->field_ = copy->own_;
     return copy;
 }
 
-void PlacedField::set_values(std::span<const double> values) {
+void PosedField::set_values(std::span<const double> values) {
     const std::span<const double> of_field = values.first(n_own_);
     if (own_ && !std::equal(of_field.begin(), of_field.end(), last_.begin(), last_.end())) {
         last_.assign(of_field.begin(), of_field.end());
         own_->set_values(of_field);
     }
-    place(Vec3(values.data() + n_own_), Vec3(values.data() + n_own_ + 3));
+    set_pose(Vec3(values.data() + n_own_), Vec3(values.data() + n_own_ + 3));
 }
 
 // w = u . B + m . (G v), G = dB/dx, with all vectors in the field's own axes. As the field moves, w changes as
 // by the point, reversed; as it turns, as if u, m, v and the point turned about the center, reversed.
-void PlacedField::add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
-                          std::span<double> out) const {
+void PosedField::add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
+                         std::span<double> out) const {
     const std::vector<Vec3> y = own_points(points);
     const FieldProbe own{own_axes(probe.flux), own_axes(probe.moment), own_axes(probe.direction)};
     if (n_own_ > 0) field_->add_vjp(y, own, scale, out.first(n_own_));

@@ -7,9 +7,13 @@
 #include <memory>
 
 #include "magshell/obstacle/obstacle.h"
-#include "magshell/obstacle/pose.h"
 
 namespace magshell {
+
+struct ObstaclePose {
+    Vec3 displacement = Vec3::Zero(), rotation_vector = Vec3::Zero();
+    Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of its center [m/s]; [rad/s], world axes
+};
 
 /// Where it was put.
 struct Placement {
@@ -22,15 +26,15 @@ struct ObstacleGradient {
     ObstaclePose pose;
 };
 
-struct PlacedObstacle {
+struct PositionedObstacle {
     std::shared_ptr<const Obstacle> shape;
     Placement placement;
 };
 
 /// A placed obstacle at one time. The shape has to outlive it.
-class StandingObstacle {
+class ObstacleState {
   public:
-    StandingObstacle(const PlacedObstacle& placed, const ObstaclePose& pose);
+    ObstacleState(const PositionedObstacle& placed, const ObstaclePose& pose);
 
     /// As Obstacle::distance, at a point of the world and in its axes.
     Distance distance(const Vec3& x) const;

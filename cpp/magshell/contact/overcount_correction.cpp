@@ -1,4 +1,4 @@
-#include "magshell/contact/recount.h"
+#include "magshell/contact/overcount_correction.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,8 @@ void each_group(const std::vector<Shared>& all, const Visit& visit) {
 
 // Triangles less edges between two of them, plus vertices: 1 for any part of a surface without holes. Pairs that have
 // less room than the law would take do not count, as each has a law of its own.
-void add_recounts(std::size_t first, const double* q, double margin, std::vector<NearPair>& all) {
+void add_overcount_corrections(std::size_t first, const double* q, double margin,
+                               std::vector<NearPair>& all) {
     std::vector<Shared> edges, vertices;
     std::vector<int> shared;  // how many edges of two triangles a vertex has, at the first of its entries
     const auto add = [&](const Shared& shared, PairKind kind, int times) {
@@ -36,7 +37,7 @@ void add_recounts(std::size_t first, const double* q, double margin, std::vector
         near.pair.area *= times;
         near.pair.nodes = {near.pair.nodes[0], shared.nodes[0],
                            kind == PairKind::point_edge ? shared.nodes[1] : -1, -1};
-        if (pair_distance(kind, places_of(near.pair, q)) < margin) all.push_back(near);
+        if (pair_distance(kind, positions_of(near.pair, q)) < margin) all.push_back(near);
     };
     const std::size_t end = all.size();
     for (std::size_t begin = first, next; begin < end; begin = next) {

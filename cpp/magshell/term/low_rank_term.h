@@ -6,7 +6,7 @@
 
 namespace magshell {
 
-class BorderTerm : public Term {
+class LowRankTerm : public Term {
   public:
     /// Adds that of the Hessian at the last evaluated state.
     virtual void add_low_rank(const Controls& controls, LowRank& out) const = 0;
@@ -17,13 +17,13 @@ class BorderTerm : public Term {
     /// Whether what it assembles from now on is curved as its extrapolated pressures or tensions have it: in mixed steps
     /// these are unknowns of their own, condensed, which what is stiff needs.
     /// Cautious: a state's own pressure says nothing where what is stiff is not yet as it should be; it is left out.
-    void take_extrapolated(bool extrapolated, bool cautious) {
+    void take_extrapolated(bool extrapolated, bool convexified) {
         extrapolated_ = extrapolated;
-        cautious_ = cautious && !extrapolated;
+        convexified_ = convexified && !extrapolated;
     }
 
   protected:
-    bool extrapolated_ = false, cautious_ = false;
+    bool extrapolated_ = false, convexified_ = false;
 };
 
 }  // namespace magshell

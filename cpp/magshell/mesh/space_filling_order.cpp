@@ -1,4 +1,4 @@
-#include "magshell/mesh/curve_order.h"
+#include "magshell/mesh/space_filling_order.h"
 
 #include <algorithm>
 #include <limits>
