@@ -14,7 +14,7 @@ BallTorqueTerm::BallTorqueTerm(const std::vector<Input>& joints, const std::vect
             std::copy_n(corners, 4, side.corners.begin());
             side.sign = corners == input.child ? 1.0 : -1.0;
             side.slot = slot;
-            double squares = 0.0;  // six edges of 8 l^2
+            double squares = 0.0;  // sum over six edges, 8 l^2 each
             for (int i = 0; i < 4; ++i)
                 for (int j = 0; j < i; ++j) squares += (rest[corners[i]] - rest[corners[j]]).squaredNorm();
             side.share = 6.0 / squares;

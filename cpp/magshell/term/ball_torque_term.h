@@ -1,6 +1,9 @@
-// Moments in ball joints, with axes that the world holds: m on the child, -m on the parent. Such a moment has no potential.
+// BallTorqueTerm: moments in ball joints about axes fixed in the world, m on the child link and -m on the
+// parent. Such a moment has no potential, so its tangent has a nonsymmetric part.
 //
-//   f_k = m x (x_k - c)/(8 l^2)      on the four corners, as sum rho rho^T = 4 l^2 I
+//   f_k = m x (x_k - c)/(8 l^2)      force on corner k of a link's tetrahedron, as sum rho rho^T = 4 l^2 I
+//
+// c is the mean of the four corners and l a length of the tetrahedron (edges sqrt(8) l).
 #pragma once
 
 #include <array>
@@ -15,7 +18,7 @@ class BallTorqueTerm final : public Term {
   public:
     struct Input {
         std::string owner;
-        const Index* parent;  // four corners, or nullptr: the world
+        const Index* parent;  // four corners; nullptr for the world
         const Index* child;
     };
 
@@ -31,9 +34,9 @@ class BallTorqueTerm final : public Term {
     std::size_t bytes() const override { return sides_.capacity() * sizeof(Side); }
 
   private:
-    struct Side {  // one link of a joint
+    struct Side {  // one of the two links of a joint
         std::array<Index, 4> corners;
-        double sign, share;  // 1/(8 l^2)
+        double sign, share;  // share: 1/(8 l^2)
         Slot slot;
         Vec3 moment = Vec3::Zero();
 

@@ -1,8 +1,10 @@
-// The Hessian at rest with rotations of edges that count from where the edge was, as how far the sheet's normal turns there.
+// The Hessian of the reference shape with edge rotations measured from the reference orientation of the edge:
+// they are then the rotation of the shell's normal there.
 //
-// Between two faces a side measures w (theta_left + theta_right) +- phi, with theta_left and theta_right how far the faces
-// turn about the edge, phi what counts from their mean, and w = 1/2. With psi = phi + (theta_right - theta_left) / 2 that is
-// theta_left + psi on one side and theta_right - psi on the other: what a face measures is its own.
+// Between two faces, a face measures w (theta_left + theta_right) +- phi at an edge, with theta_left and
+// theta_right the rotations of the faces about the edge, phi the rotation relative to their mean, and w = 1/2.
+// With psi = phi + (theta_right - theta_left) / 2 this is theta_left + psi on one side and theta_right - psi on
+// the other, so each face depends on its own nodes only.
 #include "magshell/term/bending_six_term.h"
 #include "magshell/term/side_nodes.h"
 
@@ -30,7 +32,8 @@ void BendingSixTerm::prepare_assembly(const double* q, const Controls&) {
     });
 }
 
-/// visit(rotation among all unknowns, node, its share of (theta_right - theta_left) / 2).
+/// Calls visit(dof of the rotation, node, weight of the node in (theta_right - theta_left) / 2) for all
+/// rotations.
 template <class Visit>
 void BendingSixTerm::each_half_rotation(const Visit& visit) const {
     for (std::size_t h = 0; h < sheet_.folds.size(); ++h) {
@@ -66,7 +69,7 @@ void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatri
     SixNodeRows rows;
     loop_.gather(pack, q, x);
     BendingSix(x).rows(elements_[pack], rows);
-    // The only nodes beyond a face are directions that hold its edges.
+    // The only nodes outside a face are the directors of clamped edges.
     Pack3 held[3][2] = {};
     Pack sign[3] = {};
     std::array<bool, 3> any_held{};
@@ -116,7 +119,8 @@ void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatri
     if (any_held[0] || any_held[1] || any_held[2]) add_held(pack, held, sign, stiffness, stiff, out);
 }
 
-/// What directions that hold edges feel of the nodes and rotations of their faces, and of each other.
+/// Adds the blocks between the fixed directors of clamped edges and the nodes and rotations of their faces, and
+/// among directors.
 void BendingSixTerm::add_held(Index pack, const Pack3 (&held)[3][2], const Pack sign[3],
                               const Symmetric9& stiffness, const SixNodeRows& stiff,
                               SystemMatrix& out) const {
@@ -140,7 +144,7 @@ void BendingSixTerm::add_held(Index pack, const Pack3 (&held)[3][2], const Pack 
                 add(row, k,
                     outer(held[i][0], stiff.at[3 * i][k]) + outer(held[i][1], stiff.at[3 * i + 1][k]));
             for (int j = 0; j < 3; ++j) {
-                Pack3 felt[2];  // by what edge j measures
+                Pack3 felt[2];  // coupling with the strains of edge j
                 for (int g = 0; g < 2; ++g)
                     felt[g] = stiffness(3 * i, 3 * j + g) * held[i][0] +
                               stiffness(3 * i + 1, 3 * j + g) * held[i][1];

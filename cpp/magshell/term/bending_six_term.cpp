@@ -119,7 +119,8 @@ void BendingSixTerm::store_rates(const double* p) {
     });
 }
 
-/// Adds what the edges of a pack of faces measure, from a number turn(fold, point) and the rotations in q; linear.
+/// Adds the strains of the edges of a pack of faces, from a number changes(edge, point) and the rotations in q.
+/// It is linear, so it serves rates as well.
 template <class Turn>
 void BendingSixTerm::measure(Index pack, const double* q, const Turn& turn, Pack d[9]) const {
     const double* rotation = q + first_scalar_;
@@ -203,7 +204,7 @@ void BendingSixTerm::evaluate(const double* q, const Controls&, Residual& out) {
     add_forces(stress_, out);
 }
 
-/// dE/dtheta at a point of a fold: what the strains that it enters are worth.
+/// Returns dE/dtheta at a point of a dihedral stencil: the sum of the stresses whose strains depend on theta.
 double BendingSixTerm::moment(const FoldSixStencil& fold, int point, const Strains& stress) const {
     double sum = 0.0;
     if (fold.left.face >= 0) sum += stress.number(fold.left.face, 3 * fold.left.corner + point);
@@ -220,7 +221,8 @@ void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
         rows.forces(stresses.at(pack), g);
         loop_.scatter(pack, g, out);
     });
-    // Faces that share a rotation share an edge and so a node: chunks of one colour meet at no rotation either.
+    // Faces that share a rotation share an edge and hence a node, so chunks of one colour do not share
+    // rotations either.
     chunks_.scatter([&](const Chunk& chunk) {
         for (Index h = chunk.first_fold; h < chunk.last_fold; ++h)
             for (int g = 0; g < 2; ++g) {
@@ -261,7 +263,8 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
     loop_.gather(pack, q, x);
     const BendingSix face(x);
     face.rows(elements_[pack], rows);
-    // Folds add to the rows of their edge: to the face's own nodes, and to the three beyond.
+    // Dihedral angles add to the rows of their edge: for the face's own nodes, and for the three nodes across
+    // the edge.
     Pack3 beyond[3][2][3] = {};
     Pack sign[3] = {};
     for (int lane = 0; lane < Pack::width; ++lane)
@@ -293,7 +296,7 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
                 h[lower_index(row, a)] = outer(beyond[i][0][k], stiff.at[3 * i][a]) +
                                          outer(beyond[i][1][k], stiff.at[3 * i + 1][a]);
             for (int j = 0; j <= i; ++j) {
-                // What the nodes beyond edge i feel of those beyond edge j.
+                // The coupling of the nodes across edge i with those across edge j.
                 Pack3 felt[2];
                 for (int g = 0; g < 2; ++g)
                     felt[g] = stiffness(3 * i, 3 * j + g) * beyond[i][0][k] +
@@ -304,7 +307,7 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
                             outer(felt[0], beyond[j][0][l]) + outer(felt[1], beyond[j][1][l]);
             }
         }
-    Pack3 beside[6][15];  // rotation 2 i + g against the nodes
+    Pack3 beside[6][15];  // row of rotation 2 i + g against the nodes
     for (int i = 0; i < 3; ++i)
         for (int g = 0; g < 2; ++g) {
             for (int a = 0; a < 6; ++a) beside[2 * i + g][a] = sign[i] * stiff.at[3 * i + g][a];
@@ -330,7 +333,7 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
     }
 }
 
-/// What the rotations of a face feel of each other.
+/// Adds the blocks between the rotations of a face.
 void BendingSixTerm::add_rotations(Index pack, int lane, const Pack sign[3], const Symmetric9& stiffness,
                                    SystemMatrix& out) const {
     const std::array<Index, 21>& slots = face_slots_[loop_.element(pack, lane)].rotations;
@@ -354,7 +357,8 @@ void BendingSixTerm::assemble_dihedrals(Index first, Index last, const double* q
         scatter_blocks<9>(out, sheet_.folds[fold].nodes, dihedral_slots_[fold], h, fold - first);
 }
 
-// As for triangles of three nodes: angles are exact to a unit of round-off, or as the positions over the heights.
+// Bounds round-off as BendingTerm does: an angle is exact to one unit of round-off, or to that of the positions
+// divided by the heights of the faces.
 void BendingSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const double height = sheet_.smallest_height(f);
@@ -400,7 +404,8 @@ Vec9 BendingSixTerm::rest_angles(Index face) const {
     return angles;
 }
 
-// Turns of folds are measured from their rest angles already.
+// Dihedral angles are measured from their reference values already, so `angles` is subtracted from the natural
+// measures.
 void BendingSixTerm::grow() {
     for (Index pack = 0; pack < loop_.packs(); ++pack)
         for (int lane = 0; lane < Pack::width; ++lane) {
@@ -418,7 +423,7 @@ void BendingSixTerm::grow() {
         }
 }
 
-// Of by . d in a fixed shape, which inside has `inside`.
+// Returns the gradient of by . d by growth for a fixed shape whose interior measures are `inside`.
 GrownFace::ByNatural BendingSixTerm::strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
                                                        const Vec9& interior) const {
     GrownFace::ByNatural found = face.natural_by_growth(-by, rest_inside_[number] + rest_angles(number));

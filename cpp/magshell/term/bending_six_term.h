@@ -1,8 +1,10 @@
-// The bending energy of a sheet of six-node faces: what the curvature inside a face makes (energy/bending_six.h), plus the
-// turn and the rotation at two points of each edge (strain/dihedral_angle_six.h).
+// BendingSixTerm: the bending energy of a shell of quadratic triangles. Its strains combine the curvature
+// inside each face (energy/bending_six.h) with the dihedral angle and the director rotation at two Gauss points
+// of each edge (strain/dihedral_angle_six.h).
 //
-// As for three nodes: folds are found once an edge, faces combine them, and the Hessian is the faces' J^T C J plus what is
-// curved, each fold's and each face's own, times the moments.
+// The structure is that of BendingTerm: dihedral angles are computed once per edge and combined by the faces;
+// the Hessian is J^T C J of each face plus the second derivatives of its curvature and of each dihedral angle,
+// scaled by the moments.
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
@@ -42,30 +44,30 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void forces_from_rest(VectorXd& forces) const override;
     std::size_t bytes() const override;
 
-    /// d at a state that is only looked at.
+    /// Returns the strains d at q without changing the term.
     Strains strains_at(const double* q) const;
     const SixNodeFace& rest(Index face) const { return rest_[face]; }
     bool grows() const { return growth_.any(); }
-    /// From what strains are measured.
+    /// Returns the natural (stress-free) configuration of a face, from which strains are measured.
     GrownSix grown(Index face) const {
         return {sheet_.rest[face], growth_.growth(face), growth_.curvature(face)};
     }
 
   private:
     friend class StrainScaffold<BendingSixTerm, 9>;
-    // A fold at one of its points, at the last evaluated state.
+    // The dihedral angle at one Gauss point of an edge, at the last evaluated state.
     struct DihedralState {
-        double angle_change;              // theta - theta~
-        std::array<double, 27> gradient;  // by its nine nodes
-        double rate;                      // of theta, along the last step that was asked for
+        double angle_change;              // change of the dihedral angle, theta - theta~ [rad]
+        std::array<double, 27> gradient;  // by the nine nodes of the stencil
+        double rate;                      // of theta, along the last step of store_rates()
     };
     using DihedralStates = std::array<DihedralState, 2>;
-    // How a side of it turns about the edge: see FoldSix::sides.
+    // The rotation of one adjacent face about the edge: see DihedralAngleSix::sides.
     struct SideRotation {
         Vec3 along;
         double foot;
     };
-    using SideRotations = std::array<std::array<SideRotation, 2>, 2>;  // at [point][on its right]
+    using SideRotations = std::array<std::array<SideRotation, 2>, 2>;  // [point][0: left, 1: right]
     struct FaceSlots {
         PairSlots<15> nodes;
         std::array<std::array<Index, 15>, 6> rotation_nodes;
@@ -76,7 +78,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void each_pack(const Body& body) const {
         loop_.each_pack(body);
     }
-    /// theta - theta~ at both points of every fold.
+    /// Returns theta - theta~ [rad] at both points of every dihedral stencil.
     std::vector<std::array<double, 2>> angle_changes_at(const double* q) const;
     DihedralAngleSix dihedrals_at(Index first, Index last, int point, const double* q) const;
     double angle_change(Index fold, int point, double angle) const;
@@ -93,7 +95,8 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void strain(Index pack, const double* q, Pack d[9]) const;
     void rate(Index pack, const double* p, Pack d[9]) const;
     const Symmetric9& stiffness(Index pack) const { return stiffness_[pack]; }
-    /// Of each fold at rest, at both points, how its angle goes with its nodes along a normal of both of its sides.
+    /// Returns the derivative of each reference dihedral angle, at both points, with respect to its nodes along
+    /// the mean normal of the two sides.
     std::vector<std::array<std::array<double, 9>, 2>> slopes_at_rest() const;
     void store_dihedrals(const double* q);
     void store_rates(const double* p);
@@ -120,14 +123,15 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     std::vector<SixNodeFace> rest_;
     std::vector<BendingSix::Element> elements_;
     std::vector<std::array<Pack, 9>> rest_measures_;
-    std::vector<Vec9> rest_inside_;  // a face, of the shape at rest, where anything grows
+    std::vector<Vec9> rest_inside_;  // curvature measures of the reference shape, where anything grows
     std::vector<FaceSlots> face_slots_;
     std::vector<PairSlots<9>> dihedral_slots_;
     std::vector<Symmetric9> stiffness_;
     std::vector<DihedralStates> dihedrals_;
-    std::vector<double> state_;  // the nodes at which all of this holds
+    std::vector<double> state_;  // the positions of the last evaluated state
     bool from_rest_ = false;
-    std::vector<SideRotations> side_rotations_;  // of each fold, where rotations count from rest
+    // for each edge, while rotations are measured from the reference orientation
+    std::vector<SideRotations> side_rotations_;
 };
 
 }  // namespace magshell

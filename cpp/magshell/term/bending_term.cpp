@@ -7,7 +7,7 @@
 namespace magshell {
 namespace {
 
-// Asks for entries of an array that a loop comes to soon, if there are so many.
+// Prefetches entries of an array that a loop will read soon.
 template <class Array>
 void fetch(const Array& array, Index first, Index count) {
     const Index last = std::min(first + count, static_cast<Index>(array.size()));
@@ -95,8 +95,8 @@ void BendingTerm::find_natural_angles() {
         }
 }
 
-// With directors each side of an edge bends as its own face would, and at a free edge too. A hinge has one angle, at which
-// both sides have to be at rest, and at a free edge it has none.
+// With directors, each side of an edge has a natural angle of its own, also at a free edge. A hinge has one
+// angle per edge, so it takes the mean of both sides; at a free edge it has none.
 Vec3 BendingTerm::shared(const std::vector<Vec3>& of_faces, Index face) const {
     Vec3 numbers = of_faces[face];
     for (int i = 0; i < 3; ++i) {
@@ -161,7 +161,8 @@ void BendingTerm::store_dihedrals(const double* q) {
     });
 }
 
-/// delta of a pack of faces from a number a fold and the rotations in q; linear, so it serves rates as well.
+/// Computes the strains delta of a pack of faces from a number per dihedral stencil and the rotations in q. It
+/// is linear, so it serves rates as well.
 void BendingTerm::measure(Index pack, const double* q, const std::vector<double>& changes,
                           Pack delta[3]) const {
     const auto turn_of = [&](Index fold) { return changes[fold]; };
@@ -208,7 +209,7 @@ void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
     add_forces(stress_, out);
 }
 
-/// dE/dtheta of a fold: what the strains that it enters are worth.
+/// Returns dE/dtheta of a dihedral angle: the sum of the stresses whose strains depend on it.
 double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const {
     double sum = 0.0;
     for (const FoldStencil::Side& side : {fold.left, fold.right})
@@ -217,8 +218,9 @@ double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const
 }
 
 void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
-    // Faces that share a rotation share an edge and so a node: chunks of one colour meet at no rotation either.
-    constexpr Index ahead = 24;  // folds
+    // Faces that share a rotation share an edge and hence a node, so chunks of one colour do not share
+    // rotations either.
+    constexpr Index ahead = 24;  // prefetch distance [dihedral stencils]
     chunks_.scatter([&](const Chunk& chunk) {
         for (Index h = chunk.first_fold; h < chunk.last_fold; ++h) {
             fetch(sheet_.folds, h + ahead, 1);
@@ -255,7 +257,8 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
     const SidesOfPack sides = sides_of(pack);
     for (int i = 0; i < 3; ++i) {
         static constexpr std::array<double, 12> nothing = {};
-        // On its right face, a fold's first two nodes are swapped and so are its last two.
+        // For the right face of an edge, the first two nodes of the stencil are swapped, and so are its last
+        // two.
         const double* gradient[Pack::width];
         int swap[Pack::width];
         for (int lane = 0; lane < Pack::width; ++lane) {
@@ -320,7 +323,8 @@ void BendingTerm::store_rates(const double* p) {
     });
 }
 
-// With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T C + C e_i e_i^T.
+// Gradient by the parameters. With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T
+// C + C e_i e_i^T.
 void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
     store_rates(lambda);
     std::vector<Vec3> by_scale(sheet_.n_faces()), by_angles(growth_.any() ? sheet_.n_faces() : 0);
@@ -354,8 +358,9 @@ void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gr
         for (int i = 0; i < 3; ++i) out.values[curvature_scale_.at(sheet_.edges[f][i])] += by_scale[f][i];
 }
 
-// A fold angle is exact to about one unit of round-off of a radian, and no better than the positions over the
-// heights of its faces. Its moments are forces at the corners, over the same heights.
+// Bounds round-off. A dihedral angle is exact to about one unit of round-off of a radian, or to that of the
+// positions divided by the heights of its faces. Its moments are forces at the corners, divided by the same
+// heights.
 void BendingTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const double height = sheet_.smallest_height(f);

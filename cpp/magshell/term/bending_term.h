@@ -1,7 +1,9 @@
-// The bending energy of a whole sheet, `hinge` and `midedge` alike: energy/bending.h over strain/dihedral_angle.h.
+// BendingTerm: the bending energy of a shell of linear triangles, for both `hinge` and `midedge` bending
+// (energy/bending.h, strain/dihedral_angle.h).
 //
-// Fold angles and their gradients are found once an edge; faces combine three of them. The Hessian is the
-// faces' J^T C J, plus each fold's curvature times the moment of the faces beside it.
+// Dihedral angles and their gradients are computed once per edge; each face combines those of its three edges.
+// The Hessian is J^T C J of each face, plus the second derivative of each dihedral angle times the moment at
+// its edge.
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
@@ -37,7 +39,8 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     std::size_t bytes() const override;
 
     bool grows() const { return growth_.any(); }
-    /// From what strains are measured: the face, and the angles of its edges [rad] over those at rest.
+    /// grown() returns the natural (stress-free) configuration of a face; natural_angle_changes() returns the
+    /// angles [rad] of its edges there, relative to the reference shape.
     GrownFace grown(Index face) const {
         return {sheet_.rest_corners(face), growth_.growth(face), growth_.curvature(face)};
     }
@@ -47,8 +50,8 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     friend class StrainScaffold<BendingTerm>;
     struct FaceSlots {
         PairSlots<6> nodes;
-        std::array<Index, 18> rotation_nodes;  // rotation i against node k, at 6 i + k
-        std::array<Index, 6> rotations;        // rotations (i, j) at lower_index(i, j)
+        std::array<Index, 18> rotation_nodes;  // entry of rotation i and node k, at 6 i + k
+        std::array<Index, 6> rotations;        // entry of rotations i and j, at lower_index(i, j)
     };
 
     using SidesOfPack = std::array<const std::array<FaceSide, 3>*, Pack::width>;
@@ -73,7 +76,8 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     }
     void rate(Index pack, const double* p, Pack d[3]) const { measure(pack, p, rates_, d); }
     const Symmetric3& stiffness(Index pack) const { return stiffness_[pack]; }
-    /// Of each fold at rest, how its angle goes with its nodes along a normal of both of its sides.
+    /// Returns the derivative of each reference dihedral angle with respect to its nodes along the mean normal
+    /// of the two adjacent faces.
     std::vector<std::array<double, 4>> slopes_at_rest() const;
     double moment(const FoldStencil& fold, const Strains& stress) const;
     void store_dihedrals(const double* q);
@@ -81,7 +85,8 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     Vec3 scales_of(Index face) const;
     RestFace rest_face(Index face) const;
     Vec3 rest_angles(Index face) const;
-    /// Of a number an edge of each face as its two faces share it; its own transpose.
+    /// Averages a number per face and edge as the two adjacent faces share it. The operation is its own
+    /// transpose.
     Vec3 shared(const std::vector<Vec3>& of_faces, Index face) const;
     void find_natural_angles();
     void add_natural_angles_vjp(const std::vector<Vec3>& by_angles, Gradient& out) const;
@@ -99,11 +104,12 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     Slot curvature_scale_;
     LargeVector<FaceSlots> face_slots_;
     LargeVector<PairSlots<4>> fold_slots_;
-    VectorXd curvature_scales_;  // one an edge, [Chen22] k_cur
+    VectorXd curvature_scales_;  // one per edge, [Chen22] k_cur
     LargeVector<Symmetric3> stiffness_;
-    std::vector<std::array<Pack, 3>> natural_angles_;  // grown_turns, where anything grows
-    // Of each fold at the last evaluated state: theta - theta~, its gradient by the four nodes, and the rate of theta along
-    // the last extrapolated step.
+    // natural_angle_changes() of each pack, where anything grows
+    std::vector<std::array<Pack, 3>> natural_angles_;
+    // For each dihedral stencil at the last evaluated state: theta - theta~, the rate of theta along the last
+    // extrapolated step, and its gradient by the four nodes.
     std::vector<double> angle_changes_, rates_;
     LargeVector<std::array<double, 12>> gradients_;
 };

@@ -1,4 +1,4 @@
-// Contact of bodies as the caller describes it.
+// Contact between bodies as the caller describes it.
 #pragma once
 
 #include <array>
@@ -9,19 +9,19 @@
 
 namespace magshell {
 
-/// Triangles that touch others: of a body, or of a part of it.
+/// A surface that takes part in contact: the triangles of a body, or of a part of it.
 struct ContactSurfaceInput {
     std::string name;                         // of the body
-    std::vector<std::array<Index, 3>> faces;  // the caller's vertices
-    std::vector<Index> numbers;               // of the faces in the body
+    std::vector<std::array<Index, 3>> faces;  // in the caller's numbering of vertices
+    std::vector<Index> numbers;               // number of each face in its body
 };
 
-/// Surfaces that touch each other; one and the same: itself.
+/// A contact between two surfaces; between a surface and itself if both are the same.
 struct BodyContactInput {
     Index a, b;
-    bool penalty = false;  // else a barrier
+    bool penalty = false;  // false: a barrier
     bool has_friction = false,
-         lagged = false;  // whether there is friction, and whether with the normal force of before
+         lagged = false;  // lagged: friction uses the normal forces of the beginning of the step
 };
 
 }  // namespace magshell

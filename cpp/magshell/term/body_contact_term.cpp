@@ -12,8 +12,9 @@
 namespace magshell {
 namespace {
 
-constexpr Index block_length = 256;    // pairs a task
-constexpr double remaining_gap = 0.1;  // of a gap, at the end of the longest step
+constexpr Index block_length = 256;  // [pairs] size of a parallel task
+// [-] fraction of the gap that remains after the longest admissible step
+constexpr double remaining_gap = 0.1;
 
 }  // namespace
 
@@ -49,7 +50,7 @@ bool BodyContactTerm::set_values(const Values& values) {
         law.smoothing = values.number(slots.smoothing);
         friction_[c] = {values.number(slots.kinetic), values.number(slots.fixed),
                         values.number(slots.sticking_speed)};
-        if (!law.penalty) least_[c] = law.thickness;  // a penalty lets more in
+        if (!law.penalty) least_[c] = law.thickness;  // a penalty allows smaller distances
         distances.push_back(law.reach + law.thickness);
     }
     candidates_.set_distances(distances);
@@ -58,7 +59,7 @@ bool BodyContactTerm::set_values(const Values& values) {
 }
 
 BodyContactTerm::ActiveContacts BodyContactTerm::found(const double* q) const {
-    constexpr std::size_t most_found = 4;  // a step's two ends, and trials between them
+    constexpr std::size_t most_found = 4;  // both ends of a step, and trial states between them
     VectorXd at = candidates_.contact_positions(q);
     for (const FoundAt& each : found_)
         if (each.at == at) return each.active_contacts;
@@ -79,7 +80,7 @@ BodyContactTerm::ActiveContacts BodyContactTerm::found(const double* q) const {
             parts_[block].push_back({near[k], pair, far});
         }
     });
-    // Fresh memory costs page faults: that of what was found long ago will do.
+    // Reuses the memory of the oldest result: fresh memory costs page faults.
     std::shared_ptr<std::vector<ActiveContact>> all;
     if (found_.size() == most_found) {
         if (found_.back().active_contacts.use_count() == 1) all = std::move(found_.back().active_contacts);
@@ -129,7 +130,8 @@ void BodyContactTerm::add_stiffness(std::vector<PairStiffness>& out) const {
     }
 }
 
-// Where edges are nearly parallel their closest points are anywhere, and where one's is an end, that end and a face are near.
+// Hard contact leaves out nearly parallel edges, whose closest points are undetermined, and edges whose closest
+// point is an end: a pair of a vertex and a face covers the latter.
 std::vector<BodyContactTerm::HardContactPair> BodyContactTerm::hard_contact_pairs(const double* q) const {
     std::vector<HardContactPair> hard;
     for (const NearPair& near : candidates_.near(q)) {
@@ -189,8 +191,9 @@ void BodyContactTerm::set_extra_couplings(const std::vector<ActiveContact>& acti
 }
 
 void BodyContactTerm::prepare_assembly(const double* q, const Controls&) {
-    // Without it, as long as nothing touches: it more than doubles the work of a factorization.
-    constexpr int patience = 4;  // assemblies, after which it may touch again
+    // The layer is not used as long as there is no contact, because it more than doubles the work of a
+    // factorization.
+    constexpr int patience = 4;  // [-] assemblies without contact after which the layer is dropped
     assemblies_without_contact_ =
         evaluated_contacts().empty() && extra_couplings_.empty() ? assemblies_without_contact_ + 1 : 0;
     layer_.matrix().clear();
@@ -290,7 +293,7 @@ std::string BodyContactTerm::invalid_state_reason(const double* q) const {
     }
     const NearPair* worst = nullptr;
     double gap = 0.0, distance = 0.0, least = 0.0;
-    const ActiveContacts active_contacts = found(q);  // pairs that are too near touch
+    const ActiveContacts active_contacts = found(q);  // pairs that are too close are active
     for (const ActiveContact& active : *active_contacts) {
         const NearPair& each = active.near;
         const double at = active.at.near().distance,

@@ -1,9 +1,10 @@
-// Contact of bodies with each other and with themselves: pairs of a vertex and a face, and of two edges, that are nearer
-// than they may be.
+// BodyContactTerm: contact of bodies with each other and with themselves. It acts between pairs of a vertex and
+// a face, and of two edges, that are closer than the activation distance.
 //
 //   E = sum A k m b(d - d_min)                                             [J]    contact/pair_energy.h
 //
-// Where a pair has no gap there is no energy: the term refuses such states, and steps that lead through them.
+// A pair without a gap has no energy. The term therefore rejects such states, and limits steps that would lead
+// through them.
 #pragma once
 
 #include <deque>
@@ -23,63 +24,68 @@ namespace magshell {
 
 class BodyContactTerm final : public Term {
   public:
-    /// A pair that touches.
+    /// A pair closer than its activation distance.
     struct ActiveContact {
         NearPair near;
         PairEnergy at;
         double far;  // [m] its largest coordinate
     };
 
-    /// What of its Hessian there is goes to the layer.
+    /// Creates the term. Its Hessian is added to `layer`, not to the system matrix.
     BodyContactTerm(const Nodes& nodes, const std::vector<ContactSurfaceInput>& surfaces,
                     const std::vector<BodyContactInput>& contacts, ContactLayer& layer, Registry& registry);
 
-    /// The pairs that touch at q, always in the same order; and those at the last evaluated state.
+    /// Returns the active pairs at q, always in the same order; evaluated_contacts() returns those at the last
+    /// evaluated state.
     std::vector<ActiveContact> active_contacts(const double* q) const {
         return switched_off_ ? std::vector<ActiveContact>() : *found(q);
     }
     const std::vector<ActiveContact>& evaluated_contacts() const { return *evaluated_contacts_; }
-    /// Whether any pair touches at q.
+    /// Returns true if any pair is active at q.
     bool acts(const double* q) const { return !found(q)->empty(); }
-    /// How the energy at q changes along p [J]; how it does at the last evaluated state, and how fast that changes, but
-    /// for what turns.
+    /// Returns the directional derivative of the energy along p [J]: at q, or at the last evaluated state.
+    /// curvature() returns its second derivative at the last evaluated state, without the contribution of
+    /// rotating normals.
     double slope(const double* q, const double* p) const { return slope(*found(q), p); }
     double slope(const double* p) const { return slope(evaluated_contacts(), p); }
     double curvature(const double* p) const;
-    /// Of the pairs that touch at the last evaluated state, along their normals.
+    /// Adds the stiffness along the normal of every active pair at the last evaluated state.
     void add_stiffness(std::vector<PairStiffness>& out) const;
-    /// From now on, until told otherwise, nothing touches: somebody else keeps bodies apart. Steps pass none all the same.
+    /// Switches the smooth contact law off while another method enforces contact. Steps are limited as before,
+    /// so that no pair passes through each other.
     void set_switched_off(bool off) const { switched_off_ = off; }
-    /// A pair as hard contact has it: kept at the distance at which the law begins.
+    /// A pair as hard contact treats it: kept at the distance at which the smooth law begins.
     struct HardContactPair {
         NearPair near;
         Proximity at;
-        double gap;  // [m] that is left to that
+        double gap;  // [m] remaining distance until contact
         double friction;
     };
-    /// Those near each other at q: points and triangles, and edges that cross.
+    /// Returns the pairs near each other at q that hard contact constrains: points and triangles, and edges
+    /// that cross.
     std::vector<HardContactPair> hard_contact_pairs(const double* q) const;
-    /// Throws InvalidInput where what sticks has another coefficient of friction than what slides.
+    /// Throws InvalidInput if a contact has different static and kinetic coefficients of friction.
     void require_one_coefficient() const;
-    /// The faces that push each other hardest at the last evaluated state, in words; empty: none touch.
+    /// Names the two faces with the largest contact force at the last evaluated state; an empty string without
+    /// contact.
     std::string hardest() const;
-    /// The neighbours along a surface that a contact has nearest each other at rest: [m], and in words; endlessly far and
-    /// without a name where their mesh puts none nearer than they push each other.
+    /// Returns the smallest reference distance [m] between neighbouring parts of a surface, with the names of
+    /// the faces. The distance is infinite if the mesh has no neighbours closer than the activation distance.
     std::pair<double, std::string> nearest_neighbours(Index contact) const;
     std::size_t n_contacts() const { return laws_.size(); }
     const FrictionLaw& friction(const ActiveContact& active) const { return friction_[active.near.contact]; }
 
-    /// Which faces are in the way of a step p from q, in words.
+    /// Names the faces that limit a step p from q.
     std::string blocking(const double* q, const double* p) const;
-    /// Whether what is negative of the Hessians of pairs is left out from now on.
+    /// Replaces the Hessian of each pair by a positive semidefinite one, or uses the exact one again.
     void set_psd_projection(bool project_psd) override { psd_projection_ = project_psd; }
-    /// Adds the magnitude of forces that cancel inside those between pairs at the last evaluated state.
+    /// Adds the magnitude [N] of the forces that cancel within pair forces at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
-    /// Adds the gradient by the numbers of a pair's contact.
+    /// Adds the gradient by the parameters of a pair's contact.
     void add_vjp(const ActiveContact& active, const PairEnergy::ByLaw& by, const FrictionLaw& by_friction,
                  VectorXd& by_values) const;
     ContactLayer& layer() const { return layer_; }
-    /// From now on as if no state had been looked at: a solve has the same bits whatever came before it.
+    /// Resets all stored searches and couplings, so that the bits of a solve do not depend on earlier ones.
     void forget() const {
         candidates_.forget();
         found_.clear();
@@ -90,7 +96,8 @@ class BodyContactTerm final : public Term {
         ahead_ = least_ahead;
         coupled_margin_ = {};
     }
-    /// The layer couples these as well, whether they still touch or not, until others take their place.
+    /// Makes the contact layer couple these pairs as well, whether they are still active or not, until the next
+    /// call.
     void set_extra_couplings(const std::vector<ActiveContact>& active_contacts);
 
     std::string_view name() const override { return "body contact"; }
@@ -113,39 +120,41 @@ class BodyContactTerm final : public Term {
 
     using ActiveContacts = std::shared_ptr<const std::vector<ActiveContact>>;
 
-    /// Where touching nodes are, and what touches there.
+    /// The positions of all contact nodes, and the active pairs there.
     struct FoundAt {
         VectorXd at;
         std::shared_ptr<std::vector<ActiveContact>> active_contacts;
     };
 
     static constexpr double least_ahead = 0.25;
-    static constexpr int often = 32;  // assemblies, after which it is coupled anew
+    static constexpr int often = 32;  // [-] assemblies after which the layer is coupled anew
 
-    /// Those that touch at q; asked again at the same place, the same.
+    /// Returns the active pairs at q; repeated calls with the same positions return the stored result.
     ActiveContacts found(const double* q) const;
     static double slope(const std::vector<ActiveContact>& active_contacts, const double* p);
-    /// Calls found(pair, share) where a pair lets a step go less far than all before it; nullptr: its length does.
+    /// Calls found(pair, fraction) for each pair that limits the step more than all pairs before it; pair is
+    /// nullptr where the length of the step is the limit.
     template <class Found>
     void each_limit(const double* q, const double* p, const Found& found) const;
 
     std::vector<Slots> slots_;
     std::vector<BarrierLaw> laws_;
     std::vector<FrictionLaw> friction_;
-    std::vector<double> least_;  // of each contact, what no distance goes below [m]
+    std::vector<double> least_;  // minimum separation of each contact [m]
     mutable ContactCandidates candidates_;
     ContactLayer& layer_;
-    mutable std::deque<FoundAt> found_;                      // the last few
-    mutable std::vector<std::vector<ActiveContact>> parts_;  // room for what tasks find
+    mutable std::deque<FoundAt> found_;                      // the last few results
+    mutable std::vector<std::vector<ActiveContact>> parts_;  // per-task buffers
     ActiveContacts evaluated_contacts_ = std::make_shared<const std::vector<ActiveContact>>();
     std::vector<ContactLayer::Group> extra_couplings_;
     bool psd_projection_ = false;
     mutable bool switched_off_ = false;
-    // Assemblies since anything touched, and since the layer couples what it couples; what it has coupled ahead of its
-    // touching then, as a share of the margin: little, as it fills the factorization, but more where pairs change fast.
+    // The number of assemblies since a pair was active, and since the layer's couplings were chosen; and how
+    // far ahead pairs are coupled before they become active, as a fraction of the search margin. A small
+    // fraction keeps the factor sparse; it grows where pairs change quickly.
     mutable int assemblies_without_contact_ = 0, assemblies_since_coupling_ = often;
     mutable double ahead_ = least_ahead;
-    mutable ContactCandidates::CandidateMargin coupled_margin_;  // what it coupled then
+    mutable ContactCandidates::CandidateMargin coupled_margin_;  // margin of the pairs that the layer couples
 };
 
 }  // namespace magshell

@@ -73,7 +73,8 @@ void BodyFrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& l
     }
 }
 
-// A velocity is the difference of two places over a stage, and in what sticks a small one makes a large force.
+// Bounds round-off: a velocity is the difference of two positions over a stage, and in a sticking contact a
+// small velocity causes a large force.
 void BodyFrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const double stiffness = at.rate * each.friction.friction().by_velocity.norm() * each.active->far;

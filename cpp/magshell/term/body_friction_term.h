@@ -1,7 +1,8 @@
-// Friction of bodies that touch each other or themselves.                              contact/pair_friction.h
+// BodyFrictionTerm: friction between bodies in contact with each other or with themselves.
+// contact/pair_friction.h
 //
-// Exact: with the normal forces, the normals and the closest points at the end of the stage. Lagged: with those at the
-// beginning of the step, which leaves a symmetric matrix.                              [Li et al. 2020, IPC]
+// Exact friction uses the normal forces, normals and closest points at the end of the stage. Lagged friction
+// uses those at the beginning of the step, which leaves a symmetric matrix. [Li et al. 2020, IPC]
 #pragma once
 
 #include <memory>
@@ -15,12 +16,12 @@ namespace magshell {
 
 class BodyFrictionTerm final : public ForceTerm {
   public:
-    /// One flag a contact, as in FrictionTerm.
+    /// Creates friction for a contact term. Both lists have one flag per contact, as in FrictionTerm.
     BodyFrictionTerm(BodyContactTerm& contact, std::vector<bool> has_friction, std::vector<bool> lagged)
         : contact_(contact), has_friction_(std::move(has_friction)), lagged_(std::move(lagged)) {}
 
     std::string_view name() const override { return "body friction"; }
-    void set_values(const Values&) override {}  // the contact's
+    void set_values(const Values&) override {}  // the contact term reads them
     void begin_step(const VectorXd& q, const Controls& controls) override;
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
     void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
@@ -41,7 +42,7 @@ class BodyFrictionTerm final : public ForceTerm {
 
     BodyContactTerm& contact_;
     std::vector<bool> has_friction_, lagged_;
-    std::vector<ActiveContact> before_;  // of lagged contacts, when the step began
+    std::vector<ActiveContact> before_;  // lagged contacts at the beginning of the step
     std::vector<ActiveContact> frozen_contacts_, now_;
     bool frozen_ = false;
     std::vector<FrictionContact> friction_contacts_;  // at the last evaluated state

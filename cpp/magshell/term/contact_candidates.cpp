@@ -7,7 +7,8 @@
 namespace magshell {
 namespace {
 
-constexpr double margin_of_edges = 0.3, displacement_of_edges = 20.0;  // of the mean rest length
+// [-] both in mean reference edge lengths
+constexpr double margin_of_edges = 0.3, displacement_of_edges = 20.0;
 
 std::vector<ContactSurface> surfaces_of(const Nodes& nodes, const std::vector<ContactSurfaceInput>& given) {
     std::vector<ContactSurface> surfaces;

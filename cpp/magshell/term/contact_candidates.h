@@ -1,7 +1,9 @@
-// Pairs that may touch, kept as long as no node has moved far.
+// ContactCandidates: the pairs that may be in contact, found by a broad phase and kept until nodes have moved
+// far.
 //
-// They are found within a margin beyond what matters. Until two nodes could have come so much nearer, nothing else can
-// touch. Which pairs touch, and in which order, does not depend on when they were looked for.
+// The search includes a margin beyond the activation distance. As long as no two nodes can have approached by
+// more than the margin, no other pair can be in contact. The pairs that are found active, and their order, do
+// not depend on when the search was done.
 #pragma once
 
 #include <cstdint>
@@ -16,17 +18,19 @@ namespace magshell {
 
 class ContactCandidates {
   public:
-    /// The nodes have to outlive it.
+    /// Stores a reference to the nodes, which must outlive the object.
     ContactCandidates(const Nodes& nodes, const std::vector<ContactSurfaceInput>& surfaces,
                       const std::vector<BodyContactInput>& contacts);
 
-    /// Of each contact, the distance within which pairs touch [m].
+    /// Sets the distance [m] within which pairs of each contact are active.
     void set_distances(const std::vector<double>& distances);
 
-    /// Those that touch at q, and others; and whether one of them, by its number, may be among those that touch.
+    /// near() returns all active pairs at q, and others. may_be_active() tells whether pair k of them can be
+    /// active.
     const std::vector<NearPair>& near(const double* q);
     bool may_be_active(std::size_t k) const { return slack_[k] <= possible_approach_; }
-    /// What may touch if nodes come nearer by a share of the margin; and whether nothing else may now.
+    /// The pairs that can become active if nodes approach by a given fraction of the margin.
+    /// covers_all_candidates() tells whether every pair that can be active now was among them.
     struct CandidateMargin {
         std::int64_t searches = -1;
         double nearer = 0.0;  // [m]
@@ -41,24 +45,25 @@ class ContactCandidates {
         return margin.searches == searches_ && possible_approach_ <= margin.nearer;
     }
     void forget() { searched_at_.resize(0); }
-    /// Where all that can touch is.
+    /// Returns the positions [m] of all nodes of contact surfaces.
     VectorXd contact_positions(const double* q) const;
-    /// Points and triangles, and edges, that may come nearer than that, one a contact, on straight ways from q to
-    /// q + share p.
+    /// Returns the pairs of points and triangles, and of edges, that may come closer than the given distances
+    /// (one per contact, [m]) while nodes move straight from q to q + share p.
     std::vector<NearPair> near_along_path(const double* q, const double* p, double share,
                                           const std::vector<double>& distances);
-    /// The longest of what p moves them by [m].
+    /// Returns the largest displacement [m] of a contact node under p.
     double largest_displacement(const double* p) const;
-    /// See BroadPhase.
+    /// Returns the closest neighbouring parts of a contact; see BroadPhase.
     const std::optional<BroadPhase::NeighbourPair>& nearest_neighbours(Index contact) const {
         return phase_.nearest_neighbours(contact);
     }
-    /// Faces that pass through each other at q.
+    /// Returns the pairs of faces that intersect at q.
     std::vector<NearPair> crossings(const double* q) { return phase_.crossings(q); }
 
-    /// As far as a step lets a node go at most [m]: what may be met on a longer way would be nearly everything.
+    /// Returns the largest displacement [m] of a node that one step may have. Longer paths would meet nearly
+    /// every other face.
     double max_displacement() const { return max_displacement_; }
-    /// The faces of a pair, in words.
+    /// Names the two faces of a pair.
     std::string describe(const NearPair& pair) const;
     std::size_t bytes() const;
 
@@ -73,14 +78,14 @@ class ContactCandidates {
     std::vector<Name> names_;  // of each surface
     BroadPhase phase_;
     double margin_, max_displacement_;  // [m]
-    std::vector<double> distances_;     // with the margin
+    std::vector<double> distances_;     // activation distances including the margin [m]
     std::vector<Index> contact_nodes_;
     std::vector<NearPair> near_;
-    VectorXd searched_at_;            // where those nodes were; empty: nowhere
-    std::vector<double> slack_;       // by how much a pair was farther apart then than where it touches [m]
-    double round_off_ = 0.0;          // of distances [m]
-    std::int64_t searches_ = 0;       // how often it looked
-    double possible_approach_ = 0.0;  // by how much any pair may have come nearer since [m]
+    VectorXd searched_at_;            // positions at the last search; empty before the first one
+    std::vector<double> slack_;       // how much farther apart each pair was than its activation distance [m]
+    double round_off_ = 0.0;          // round-off of distances [m]
+    std::int64_t searches_ = 0;       // number of searches
+    double possible_approach_ = 0.0;  // bound of the approach of any pair since the last search [m]
 };
 
 }  // namespace magshell

@@ -9,7 +9,7 @@
 namespace magshell {
 namespace {
 
-constexpr Index block_length = 512;  // points a task
+constexpr Index block_length = 512;  // [points] size of a parallel task
 
 Vec3 weighted(const ContactPoint& point, const double* all) {
     Vec3 sum = Vec3::Zero();
@@ -18,13 +18,14 @@ Vec3 weighted(const ContactPoint& point, const double* all) {
     return sum;
 }
 
-// Steps of the distance's own length cannot miss a surface.
+// Tells whether a straight path enters an obstacle on one side and leaves it on another. Steps of the length of
+// the current distance cannot miss the surface (sphere tracing).
 bool passes(const Obstacle& shape, const Vec3& from, const Vec3& to) {
     const double length = (to - from).norm();
     Distance at = shape.distance(from);
     if (at.value > 0.0) {
         if (length <= at.value) return false;
-        constexpr double least_advance = 1e-3;  // of the way
+        constexpr double least_advance = 1e-3;  // [-] smallest advance, as a fraction of the path
         double travelled = at.value / length;
         while (at.value > 0.0) {
             if (travelled >= 1.0) return false;
@@ -32,7 +33,8 @@ bool passes(const Obstacle& shape, const Vec3& from, const Vec3& to) {
             travelled += std::max(at.value / length, least_advance);
         }
     }
-    return at.normal.dot(shape.distance(to).normal) < -1e-6;  // opposite faces; an edge of a box is none
+    // opposite sides; two faces next to an edge of a box do not count
+    return at.normal.dot(shape.distance(to).normal) < -1e-6;
 }
 
 }  // namespace
@@ -227,7 +229,7 @@ std::vector<ContactTerm::HardContact> ContactTerm::hard_contacts() const {
 void ContactTerm::add_contact_stiffness(VectorXd& of_nodes) const {
     for (const ActiveContact& active : evaluated_contacts_) {
         const ContactPoint& p = point(active);
-        for (int k = 0; k < 3; ++k)  // of a w w^T, the sums of its rows
+        for (int k = 0; k < 3; ++k)  // row sums of stiffness w w^T
             if (p.nodes[k] >= 0) of_nodes[p.nodes[k]] += p.weights[k] * active.stiffness;
     }
 }
@@ -246,7 +248,7 @@ void ContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix& 
     }
 }
 
-// The gradient is g = - N n.
+// The gradient of the energy is g = - N n.
 void ContactTerm::vjp(const double*, const Controls& controls, const double* lambda, Gradient& out) {
     for (const ActiveContact& active : evaluated_contacts_) {
         const Vec3 along = at_point(active, lambda);

@@ -1,6 +1,5 @@
-// Contact with obstacles: penalty energies of points of the sheet, its vertices and, if wanted, points on its faces.
-//
-//   E = k_n S(offset - distance(x)),   x = sum w_i x_i                    [J]    energy/contact.h
+// ContactTerm: contact of bodies with obstacles by penalty energies at points: the vertices and, optionally,
+// sample points on faces.
 #pragma once
 
 #include <memory>
@@ -14,26 +13,26 @@
 
 namespace magshell {
 
-/// A point that obstacles keep out: a vertex, or a weighted sum of the corners of a face.
+/// A point that contact acts on: a vertex, or a weighted sum of the corners of a face.
 struct ContactPoint {
     std::array<Index, 3> nodes{-1, -1, -1};
     Vec3 weights = Vec3::UnitX();
 };
 
-/// What touches what. Points on faces come after vertices.
+/// One contact: the obstacles and the points that they act on. Points on faces come after vertices.
 struct ContactInput {
     std::vector<Index> obstacles;
-    std::vector<ContactPoint> points;  // with the caller's vertices
+    std::vector<ContactPoint> points;  // in the caller's numbering of vertices
     bool has_friction = false,
-         lagged = false;  // whether there is friction, and whether with the normal force of before
+         lagged = false;  // lagged: friction uses the normal forces of the beginning of the step
 };
 
-/// A 3x3 block of a matrix in every lane.
+/// Returns a pack that holds the same 3x3 block in every lane.
 Pack33 to_pack(const Mat3& block);
 
 class ContactTerm final : public Term {
   public:
-    /// A point that touches an obstacle.
+    /// A point in contact with an obstacle.
     struct ActiveContact {
         Index contact, obstacle, point;
         Vec3 position;
@@ -48,23 +47,24 @@ class ContactTerm final : public Term {
     bool set_values(const Values& values) override;
     void add_contact_stiffness(VectorXd& of_nodes) const override;
 
-    /// A vertex that an obstacle keeps at a distance.
+    /// A vertex that hard contact keeps at a distance from an obstacle.
     struct HardContact {
         Index node, obstacle;
         double offset, friction;
     };
-    /// All of them. Throws InvalidInput where points on faces touch as well.
+    /// Returns all vertices under hard contact. Throws InvalidInput if points on faces are in contact as well.
     std::vector<HardContact> hard_contacts() const;
-    /// From now on, until told otherwise, nothing touches: somebody else sees to that.
+    /// Switches the penalty law off while another method enforces contact.
     void set_switched_off(bool off) { switched_off_ = off; }
 
-    /// The points that touch at q, in the order of contacts, obstacles and points.
+    /// Returns the points in contact at q, in the order of contacts, obstacles and points.
     std::vector<ActiveContact> active_contacts(const double* q, const Controls& controls) const;
-    /// Those at the last evaluated state.
+    /// Returns the points in contact at the last evaluated state.
     const std::vector<ActiveContact>& evaluated_contacts() const { return evaluated_contacts_; }
 
-    /// The first vertex of a point that comes out on another side of an obstacle than it went in, on its
-    /// straight way from q to `end` as the obstacle sees it; -1 where none does.
+    /// Returns the first vertex of a point that passes through an obstacle: on its straight path from q to
+    /// `end`, in the frame of the obstacle, it enters on one side and leaves on another. Returns -1 if there is
+    /// none.
     Index passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
                          const Controls& controls_at_end) const;
 
@@ -73,22 +73,23 @@ class ContactTerm final : public Term {
     }
     const ContactLaw& law(const ActiveContact& active) const { return laws_[active.contact]; }
     ObstacleState obstacle_state(Index obstacle, const Controls& controls) const;
-    /// Adds the gradient of a function of a point's normal force and friction: by what the force is made
-    /// from, by friction's own numbers and by the place of the obstacle; by its pose to `by_controls`, those that
-    /// it stood at.
+    /// Adds the gradient of a function of a point's normal force and friction, given its derivatives by the
+    /// normal force, by the friction law and by the obstacle. Gradients by the obstacle's pose go to
+    /// `by_controls`, which belong to the time at which the obstacle had that pose.
     void add_vjp(const ActiveContact& active, double by_force, const ContactLaw& by_friction,
                  const ObstacleGradient& by_obstacle, VectorXd& by_values, Controls& by_controls) const;
 
-    /// Adds a symmetric block between the nodes of a point, weighted.
+    /// Adds a symmetric block between the nodes of a point, weighted by their shape functions.
     void add_block(const ActiveContact& active, const Mat3& block, SystemMatrix& out) const;
-    /// The weighted sum over a point's nodes of a vector of all unknowns.
+    /// Returns the value at a point of a vector of all degrees of freedom.
     Vec3 at_point(const ActiveContact& active, const double* all) const;
-    /// Adds a vector to a point's nodes, weighted.
+    /// Distributes a vector at a point to the point's nodes, by their weights.
     void distribute(const ActiveContact& active, const Vec3& vector, VectorXd& out) const;
     void distribute(const ActiveContact& active, const Vec3& force, Residual& out) const;
-    /// Adds the magnitude of forces that cancel inside one that depends on the point's place by a stiffness [N/m].
+    /// Adds the magnitude [N] of the forces that cancel within a force that depends on the point's position by
+    /// a stiffness [N/m].
     void add_cancelling_force(const ActiveContact& active, double stiffness, VectorXd& out) const;
-    /// Those inside the normal forces at the last evaluated state.
+    /// Adds those within the normal forces at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
 
     std::string_view name() const override { return "contact"; }
@@ -102,15 +103,14 @@ class ContactTerm final : public Term {
   private:
     struct Contact {
         std::vector<Index> obstacles;
-        std::vector<ContactPoint> points;  // with our nodes
-        std::vector<PairSlots<3>>
-            slots;  // of the points with several nodes, from the first on: they come last
+        std::vector<ContactPoint> points;  // in the core's numbering of nodes
+        std::vector<PairSlots<3>> slots;   // for points on faces, which come last
         Index first_on_face = 0;
         Slot stiffness, smoothing, offset, friction, sticking_speed;
     };
     struct ObstacleSlots {
         Slot center, rotation;
-        Slot pose;  // a control
+        Slot pose;  // a load parameter
     };
 
     std::vector<Contact> contacts_;

@@ -1,9 +1,11 @@
-// Quadratic forms of the corners of two rigid links: lengths and sines between vectors that ride on them.
+// CornerForm: quadratic forms of the corner positions of two rigid links, such as lengths and sines between
+// vectors fixed to them.
 //
-//   f = 1/2 sum h_kl x_k . x_l + sum b_k . x_k + c          corners of the parent 0 to 3, of the child 4 to 7
+//   f = 1/2 sum h_kl x_k . x_l + sum b_k . x_k + c          corners 0 to 3 belong to the parent, 4 to 7 to the child
 //
-// A vector y of a link is R y = sum gamma_k x_k with gamma_k = rho_k . y / 4 l^2, a point of it has 1/4 more: products of two
-// such sums are forms. Where the parent is the world, its vectors are numbers and the form is linear.
+// A vector y fixed to a link is R y = sum gamma_k x_k with gamma_k = rho_k . y / 4 l^2; for a point each
+// gamma_k is larger by 1/4. Products of two such sums are quadratic forms. If the parent is the world its
+// vectors are constants and the form is linear.
 #pragma once
 
 #include <array>
@@ -14,7 +16,7 @@
 
 namespace magshell {
 
-/// A sum w . X of corners, plus a vector of the world.
+/// A linear combination w . X of corners, plus a constant vector.
 struct CornerSum {
     Eigen::Matrix<double, 8, 1> weights = Eigen::Matrix<double, 8, 1>::Zero();
     Vec3 fixed = Vec3::Zero();
@@ -41,7 +43,8 @@ struct CornerForm {
     }
     Corners gradient(const Corners& x) const { return x * pairs + linear; }
     double value(const Corners& x) const { return 0.5 * inner(x * pairs, x) + inner(linear, x) + constant; }
-    /// sum_ij a_ij b_ij; of each column, as gcc warns of what Eigen leaves open in a sum of all with AVX-512.
+    /// Returns sum_ij a_ij b_ij. It is computed column by column, because GCC warns about Eigen's code for the
+    /// whole sum with AVX-512.
     static double inner(const Corners& a, const Corners& b) {
         double sum = 0.0;
         for (int k = 0; k < 8; ++k) sum += a.col(k).dot(b.col(k));
@@ -49,19 +52,22 @@ struct CornerForm {
     }
 };
 
-/// The corners of two links, or of one and the world, among all unknowns.
+/// The corners of two links, or of one link and the world, among all degrees of freedom.
 class LinkPair {
   public:
     LinkPair() = default;
-    /// `parent` is nullptr for the world. rest: of all nodes.
+    /// Creates the pair. parent: nullptr for the world. rest: reference positions of all nodes.
     LinkPair(const Index* parent, const Index* child, const std::vector<Vec3>& rest,
              const SystemMatrix& matrix);
 
-    /// A vector, and a point, of the parent and of the child, from where they are at rest.
+    /// Express a vector or a point fixed to the parent or the child, given in the reference configuration, by
+    /// the corners.
     CornerSum vector(bool of_child, const Vec3& at_rest) const;
     CornerSum point(bool of_child, const Vec3& at_rest) const;
 
-    /// Where they are, from a place nearby: sums of no weight do not feel from where. Of the world: as it is.
+    /// positions() returns the corners relative to one of them, which loses no digits far from the origin: sums
+    /// with zero total weight do not depend on the origin. Corners of a link whose parent is the world are
+    /// returned unchanged.
     CornerForm::Corners positions(const double* q) const;
     CornerForm::Corners gather(const double* all) const;
     template <class Out>
@@ -72,11 +78,12 @@ class LinkPair {
     void add_to(const CornerForm::Corners& vectors, VectorXd& out) const {
         for (int k = first_; k < 8; ++k) out.segment<3>(3 * nodes_[k]) += vectors.col(k);
     }
-    /// Adds h_kl I + factor a_k a_l^T + cross (a_k b_l^T + b_k a_l^T).
+    /// Adds the blocks h_kl I + factor a_k a_l^T + cross (a_k b_l^T + b_k a_l^T) to the matrix.
     void add(const Eigen::Matrix<double, 8, 8>& h, const CornerForm::Corners& a, double factor,
              const CornerForm::Corners& b, double cross, SystemMatrix& out) const;
 
-    /// Where they are at rest; the largest coordinate there [m]; the smaller l.
+    /// rest() returns the reference positions; reach() their largest coordinate [m]; length() the smaller l of
+    /// the two links [m].
     const CornerForm::Corners& rest() const { return rest_; }
     double reach() const { return rest_.cwiseAbs().maxCoeff(); }
     double length() const;
@@ -84,12 +91,12 @@ class LinkPair {
   private:
     bool world() const { return first_ == 4; }
 
-    int first_ = 0;  // of the eight
+    int first_ = 0;  // first of the eight corners in use
     std::array<Index, 8> nodes_{};
     std::array<Vec3, 8> offsets_{};  // rho / 4 l^2
     std::array<Vec3, 2> middle_{};
     CornerForm::Corners rest_ = CornerForm::Corners::Zero();
-    std::array<std::array<SystemMatrix::Slot, 8>, 8> slots_{};  // row above column
+    std::array<std::array<SystemMatrix::Slot, 8>, 8> slots_{};  // lower triangle
 };
 
 }  // namespace magshell

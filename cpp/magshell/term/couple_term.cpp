@@ -8,7 +8,7 @@
 namespace magshell {
 namespace {
 
-// One couple a pack: they sit on boundaries and are few.
+// Each couple fills a whole pack: there are few of them, so the other lanes are not used for more.
 CoupleTerm::Nine places(const CoupleTerm::Couple& couple, const double* q) {
     CoupleTerm::Nine x{};
     for (int k = 0; k < 9; ++k)
@@ -51,7 +51,7 @@ CoupleTerm::CoupleTerm(const Nodes& nodes, const SystemMatrix& matrix, std::vect
       last_turn_(couples_.size(), 0.0) {
     for (const Couple& couple : couples_) {
         PairSlots<9>& slots = slots_.emplace_back(pair_slots<9>(matrix, couple.nodes));
-        // The face and the direction do not meet in the second derivative.
+        // The second derivative has no block between the face's own nodes and the direction.
         const int direction = couple.point < 0 ? 3 : 6;
         for (int own = couple.point < 0 ? 2 : 3; own < direction; ++own)
             slots[lower_index(direction - 1, own)] = -1;

@@ -1,10 +1,10 @@
-// Couples on free boundary edges, each turning the edge's director about the edge.
+// CoupleTerm: couples on free boundary edges of a shell, each rotating the edge's director about the edge.
 //
 //   E = - factor C psi,   psi = theta_d - theta~_d - s phi                          [J]
 //
-// theta_d is the angle of the edge's face to a fixed direction, and the director stands off that face by s
-// phi. The couple follows the edge: its axis is always the edge itself, the sheet to the left. On an edge of a six-node face
-// it acts at its two Gauss points, where both the angle and phi are known.
+// theta_d is the angle between the adjacent face and a fixed direction; the director is at the angle s phi to
+// that face. The couple follows the edge: its axis is the current edge, with the shell to the left. On an edge
+// of a quadratic triangle it acts at the two Gauss points, where both the angle and phi are known.
 #pragma once
 
 #include "magshell/assembly/lanes.h"
@@ -16,23 +16,25 @@ namespace magshell {
 class CoupleTerm final : public Term {
   public:
     struct Couple {
-        // Edge from, to, the face's third corner, the direction; or those of strain/dihedral_angle_six.h. Others are -1.
+        // The nodes from and to of the edge, the third corner of the face, and the fixed direction; or the
+        // nodes of strain/dihedral_angle_six.h. Unused entries are -1.
         std::array<Index, 9> nodes;
-        int point;  // which of the two Gauss points; -1 on a face of three nodes
+        int point;  // Gauss point, 0 or 1; -1 on a linear triangle
         double rest_angle;
         Index rotation;  // -1 without directors
         double rotation_sign;
-        Index row;            // whose couple
-        double share = 1.0;   // of it
-        double couple = 0.0;  // that share [N m]
+        Index row;            // index of the couple in the caller's array
+        double share = 1.0;   // fraction of that couple
+        double couple = 0.0;  // the fraction's couple [N m]
     };
     using Nine = std::array<Pack3, 9>;
 
-    /// The angle to the direction where the nodes are at q, and its gradient by them.
+    /// angle() returns the angle [rad] between the face and the direction at q; gradient() its derivatives by
+    /// the nodes.
     static double angle(const Couple& couple, const double* q);
     static Nine gradient(const Couple& couple, const double* q);
 
-    /// rows: how many couples there are, each on one edge.
+    /// Creates the term; rows is the number of couples, each on one edge.
     CoupleTerm(const Nodes& nodes, const SystemMatrix& matrix, std::vector<Couple> couples, Index rows,
                Registry& registry);
 
@@ -56,7 +58,7 @@ class CoupleTerm final : public Term {
     std::vector<Couple> couples_;
     std::vector<PairSlots<9>> slots_;
     std::vector<double>
-        last_turn_;  // full circles count: an angle is taken as the one nearest to the last evaluated
+        last_turn_;  // unwrapped angles: each is taken on the branch nearest to the last evaluated one
 };
 
 }  // namespace magshell

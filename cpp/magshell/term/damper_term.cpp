@@ -109,8 +109,9 @@ Strains DamperTerm::rates(const double* q, const double* v) const {
     return out;
 }
 
-// The coordinate itself does not feel the axis. Its rate does where nodes move as no turn about it moves them, which
-// velocities of finite steps have in them.
+// The gradient by a joint's axis. A coordinate does not depend on the axis itself, as the links rotate about
+// it. Its rate does wherever node velocities contain motions that the joint does not allow, which is the case
+// for the velocities of finite steps.
 //
 //   revolute   C = tr M - a . M a,  S = w . a,  s' = (C S' - S C')/(C^2 + S^2)     M_ij = e_i of the parent . e_j of the child
 //   prismatic  s' is linear in a

@@ -1,12 +1,13 @@
-// Dampers in the joints of skeletons: a torque against the rate of the joint's coordinate, of a ball joint against the rate
-// at which its links turn to each other.
+// DamperTerm: viscous dampers in joints. They apply a torque against the rate of the joint coordinate; in a
+// ball joint, against the relative angular velocity of the links.
 //
-// They are elastic terms without elasticity: their strains are the coordinates s, and in a stage of a time step, with what
-// set_history says,
+// A damper is an ElasticTerm without elastic energy: its strains are the joint coordinates s, and within a
+// stage of a time step, with the history of set_history,
 //
-//   sigma = d (s - s^)/(a dt),       -d s' of the method's own rate, so of its order, with a symmetric matrix
+//   sigma = d (s - s^)/(a dt)
 //
-// For a ball joint s are the nine products of the axes of both links: sum s'^2 = 2 omega^2.
+// which approximates d s' with the order of the time integrator and a symmetric matrix. The strains of a ball
+// joint are the nine products between the axes of both links: sum s'^2 = 2 omega^2.
 #pragma once
 
 #include <string>
@@ -22,7 +23,7 @@ class DamperTerm final : public ElasticTerm {
     struct Input {
         std::string owner;
         Joint joint;
-        const Index* parent;  // four corners, or nullptr: the world
+        const Index* parent;  // four corners; nullptr for the world
         const Index* child;
     };
 
@@ -48,22 +49,24 @@ class DamperTerm final : public ElasticTerm {
     Strains stresses(const Strains& strains) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
 
-    /// ds/dt at q, as the nodes move by v; and the gradients by q, v and values of a number that knows its own by them.
+    /// rates() returns ds/dt at q for node velocities v. rates_vjp() adds the gradients by q, v and parameters
+    /// of a function of these rates, given its gradient by them.
     Strains rates(const double* q, const double* v) const;
     void rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q, VectorXd& by_v,
                    Gradient& out) const;
 
-    /// The magnitude of forces that cancel in a stage, with coordinates larger than at rest by `beyond` [m].
+    /// Adds the magnitude [N] of the forces that cancel in a stage. `beyond` [m] is how much larger the
+    /// coordinates are than in the reference shape.
     void add_cancelling_stage_forces(double beyond, VectorXd& out) const;
 
   private:
     using Corners = JointForm::Corners;
-    struct Each {  // a scalar
+    struct Each {  // one scalar strain
         LinkPair links;
         JointForm form;
-        double share;  // of the joint's damping
+        double share;  // fraction of the joint's damping
         Slot slot;
-        Slot axis;  // of a joint that has one
+        Slot axis;  // if the joint has an axis
         Joint joint;
         bool length;
         JointForm::Corners at_rest;  // |ds/dx|
@@ -73,7 +76,7 @@ class DamperTerm final : public ElasticTerm {
         return each_[k].form.value(at, last_turn_[k]);
     }
     double stress_by_damping(std::size_t k, double strain) const;
-    /// d(ds/dt) by the axis.
+    /// Returns the derivative of ds/dt by the joint's axis.
     Vec3 rate_by_axis(const Each& each, const double* q, const Corners& v) const;
     JointForm::Local local(const Each& each, const double* q) const {
         return each.form.at(each.links.positions(q));

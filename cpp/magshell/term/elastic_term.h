@@ -1,4 +1,8 @@
-// Elastic energies of some strains an element, 1/2 d^T C d of a sheet's three: what they share, written once.
+// ElasticTerm: terms with an energy 1/2 d^T C d of strains d per element, and the part of their code that they
+// share.
+//
+// Terms of this kind can be made viscous by a strain history (strains.h) and take part in the mixed Newton
+// method, which extrapolates their stresses.
 #pragma once
 
 #include "magshell/term/strains.h"
@@ -11,29 +15,34 @@ class ElasticTerm : public Term {
     bool depends_on_loads() const override { return false; }
     bool add_projective_stiffness(NodeMatrix&) const override { return false; }
 
-    /// From now on; an empty history makes the term elastic again.
+    /// Sets the strain history that the stresses follow from now on. An empty history makes the term elastic
+    /// again.
     void set_history(const StrainHistory& history) { history_ = history; }
 
-    /// How many there are, each with so many strains.
+    /// Returns the number of elements.
     virtual Index elements() const = 0;
     virtual int strains_per_element() const { return 3; }
-    /// d at q.
+    /// Returns the strains d at q.
     virtual Strains strains(const double* q) = 0;
-    /// J p at the last evaluated state.
+    /// Returns the strain rates J p at the last evaluated state.
     virtual Strains strain_rates(const double* p) = 0;
-    /// C d, without history; of a solid, with its stiffness at rest.
+    /// Returns the stresses C d without history. A solid uses its stiffness in the reference configuration.
     virtual Strains stresses(const Strains& strains) const = 0;
-    /// Adds J^T s at the last evaluated state.
+    /// Adds the forces J^T s of the stresses s at the last evaluated state.
     virtual void add_forces(const Strains& stresses, Residual& out) = 0;
-    /// Adds s . dd/dk at the last evaluated state for every value k from which the strains are measured.
+    /// Adds s . dd/dk at the last evaluated state for every parameter k on which the reference strains depend,
+    /// such as growth.
     virtual void strains_vjp(const Strains& /*stresses*/, Gradient& /*out*/) const {}
 
-    /// An edge rotation counts from the mean of the faces on both sides, which it couples by that. To first order it may count
-    /// from where the edge was: then a face's energy is of its own nodes and rotations alone, and the Hessian has fewer
-    /// entries. From now on, or no longer, the Hessian is that: of the rest shape, evaluated last, without stress.
+    /// Switches to edge rotations that are measured from the reference orientation of the edge instead of from
+    /// the mean normal of the two adjacent faces. To first order both are equivalent, but measured from the
+    /// reference the energy of a face depends on its own nodes and rotations only, so that the Hessian has
+    /// fewer nonzeros. While it is on, the Hessian must be that of the unstressed reference shape, and that
+    /// shape must be the last evaluated state.
     virtual void count_rotations_from_rest(bool /*from_rest*/) {}
-    /// While it is: of a small motion of all unknowns, its rotations as they count otherwise; and forces on such ones as those
-    /// on what counts from rest.
+    /// Converts a small motion of all degrees of freedom, and forces on them, between the two ways of measuring
+    /// edge rotations: rotations_from_sides() makes the rotations of a motion relative to the mean normal
+    /// again; forces_from_rest() turns forces on relative rotations into forces on absolute ones.
     virtual void rotations_from_sides(VectorXd& /*motion*/) const {}
     virtual void forces_from_rest(VectorXd& /*forces*/) const {}
 
@@ -41,12 +50,11 @@ class ElasticTerm : public Term {
     StrainHistory history_;
 };
 
-/// The scaffold. A Kernel (the deriving class) has
-///     each_pack(body)                   body(pack) for all packs of its elements
-///     begin_strains(q), begin_rates(p)  what the strains of all elements need beforehand
-///     strain(pack, q, d), rate(pack, p, d)   d at q; J p at the last evaluated state
-///     stiffness(pack)                   C
-/// of N strains an element.
+/// ElasticTerm for a class `Kernel` that derives from it and provides, for N strains per element,
+///       each_pack(body)                        calls body(pack) for all packs of its elements
+///       begin_strains(q), begin_rates(p)       computes what the strains of all elements share
+///       strain(pack, q, d), rate(pack, p, d)   the strains d at q; J p at the last evaluated state
+///       stiffness(pack)                        C
 template <class Kernel, int N = 3>
 class StrainScaffold : public ElasticTerm {
   public:
@@ -87,7 +95,7 @@ class StrainScaffold : public ElasticTerm {
     }
 
   protected:
-    /// Keeps the stress of a pack, given its strain.
+    /// Computes and stores the stress of a pack from its strain.
     void store_stress(Index pack, Pack strain[N]) {
         history_.apply<N>(pack, strain);
         kernel().stiffness(pack).times(strain, stress_.at(pack));

@@ -1,5 +1,5 @@
-// Energies of single faces that need no more than their corners and some numbers a face: the kernel is all there
-// is to write. See docs/adding/energy.md.
+// FaceEnergy: energies of single linear triangles that depend on the corners and on some parameters per face
+// only. A kernel is all that has to be written for a new one; see docs/adding/energy.md.
 #pragma once
 
 #include <memory>
@@ -13,19 +13,19 @@
 
 namespace magshell {
 
-/// Which energy it is: makes its terms.
+/// Creates the terms of one kind of energy, whichever kernel it uses.
 class FaceEnergy {
   public:
     virtual ~FaceEnergy() = default;
 
-    /// `owner`: under which its inputs are registered.
+    /// Creates the term of a surface. Its parameters are registered under the name `owner`.
     virtual std::unique_ptr<Term> term(const std::string& owner, Index body, const Surface& surface,
                                        const FaceLoop& loop, Registry& registry) const = 0;
 };
 
-/// A kernel has: `name`; `inputs`, the numbers a face; a constructor from the corners x[3]; energy(in), gradient(in, g),
-/// hessian(in, h) as lower blocks; rate_by_inputs(in, rate, out), the derivatives of rate . gradient by each input.
-/// The load factor scales it.
+/// The term of a kernel. A kernel provides `name`; `inputs`, its parameters per face; a constructor from the
+/// corners x[3]; energy(in); gradient(in, g); hessian(in, h) as lower blocks; and rate_by_inputs(in, rate,
+/// out), the derivatives of rate . gradient by each parameter. The load factor scales the energy.
 template <class Kernel>
 class FaceEnergyTerm final : public Term {
   public:

@@ -1,4 +1,4 @@
-// The applied field as magnetic kernels take it.
+// Arranges samples of the applied field in SIMD packs, as the magnetic kernels take them.
 #pragma once
 
 #include <vector>
@@ -9,13 +9,13 @@
 
 namespace magshell {
 
-/// The field at all points of a pack of elements.
+/// The field at all integration points of a pack of elements.
 template <int points>
 struct PointFields {
     Magnetic::Field at[points];
 };
 
-/// Puts sample n in a lane, with a flux density that is the same everywhere [T]. Order as in AppliedField::add_samples.
+/// Stores sample n plus a uniform flux density [T] in one lane. Order as in AppliedField::add_samples.
 inline void set_field(Magnetic::Field& field, int lane, const FieldSamples& samples, Index n, int order,
                       const Vec3& everywhere) {
     set_lane(field.flux, lane, Vec3(samples.flux[n] + everywhere));
@@ -26,7 +26,7 @@ inline void set_field(Magnetic::Field& field, int lane, const FieldSamples& samp
         }
 }
 
-/// Those of every pack, from samples that stand one element after another.
+/// Returns the fields of every pack, from samples that are ordered element by element.
 template <int points, class Loop>
 std::vector<PointFields<points>> in_packs(const Loop& loop, const FieldSamples& samples, int order,
                                           const Vec3& everywhere) {

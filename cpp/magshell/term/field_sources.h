@@ -1,4 +1,4 @@
-// The field sources of a scene, with values of their own: what all its magnetized bodies feel.
+// FieldSources: all sources of the applied field of a scene, with their parameters.
 #pragma once
 
 #include <memory>
@@ -11,13 +11,13 @@ namespace magshell {
 
 class FieldSources {
   public:
-    /// Source k registers its parameters as those of "field k".
+    /// Registers the parameters of source k under the name "field k".
     FieldSources(const std::vector<std::shared_ptr<const AppliedField>>& sources, Registry& registry);
 
     void set_values(const Values& values);
     bool empty() const { return sources_.empty(); }
 
-    /// The sum over the sources; arguments as in AppliedField.
+    /// Adds the sum over all sources; arguments as in AppliedField.
     void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
                      FieldSamples& out) const;
     void add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale, Gradient& out) const;
@@ -25,8 +25,8 @@ class FieldSources {
   private:
     struct Source {
         std::shared_ptr<const AppliedField> field;
-        std::shared_ptr<AppliedField> own;  // the same one, where it has values
-        std::vector<Slot> slots;            // one behind the other
+        std::shared_ptr<AppliedField> own;  // the same object if it has parameters, else nullptr
+        std::vector<Slot> slots;            // consecutive
 
         Index count() const { return slots.back().first + slots.back().size() - slots.front().first; }
     };

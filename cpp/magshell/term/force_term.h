@@ -1,11 +1,13 @@
-// A force that no energy has: friction, drag. It depends on how the sheet moves, so only time steps see it.
+// ForceTerm: the base class of forces without an energy, such as friction and drag. They depend on velocities,
+// so only time steps include them.
 //
-// At an implicit stage that ends at q, velocities and accelerations follow from q,
+// At an implicit stage of duration tau that ends at q, velocities and accelerations follow from q,
 //
 //   v = (q - x^)/tau,   w = (v - v^)/tau,   K = - df/dq - df/dv/tau - df/dw/tau^2
 //
-// and K, the force's share of the stage's matrix, is in general not symmetric. What can well be kept of it in
-// the symmetric matrix goes there, the rest into a Remainder.
+// where x^ and v^ are predicted by the integrator. The force contributes the matrix K to the stage's tangent; K
+// is not symmetric in general. Its main symmetric part is added to the system matrix, the rest to the
+// nonsymmetric tangent, which only GMRES multiplies by.
 #pragma once
 
 #include "magshell/assembly/remainder.h"
@@ -14,22 +16,22 @@
 
 namespace magshell {
 
-/// How the unknowns move at a stage: what was predicted for it, and its duration.
+/// The prediction of a stage for all degrees of freedom, and the stage's duration.
 struct StageMotion {
     const VectorXd *x_hat, *v_hat;
     double time;  // tau [s]
 };
 
-/// A state of a stage, of all unknowns; v and w are zero for those that are no vertex.
+/// The state of a stage for all degrees of freedom. v and w are zero for those that do not belong to a vertex.
 struct Kinematics {
     VectorXd q, v, w;
     double rate = 0.0;  // 1/tau
 };
 
-/// By what a force depends on besides the end of the stage.
+/// Gradients by the arguments of a force other than the end of the stage.
 struct KinematicsGradient {
     VectorXd velocity, acceleration, begin;
-    Controls begin_controls;  // those at the beginning of the step
+    Controls begin_controls;  // load parameters at the beginning of the step
 };
 
 class ForceTerm {
@@ -40,29 +42,32 @@ class ForceTerm {
 
     virtual void set_values(const Values& values) = 0;
 
-    /// A step begins at q: what is lagged is taken from here.
+    /// Begins a step at q. Lagged friction takes its normal forces from this state.
     virtual void begin_step(const VectorXd& /*q*/, const Controls&) {}
 
-    /// Subtracts the force, once all energies were evaluated at the same state.
+    /// Subtracts the force from `out`, after all energies were evaluated at the same state.
     virtual void evaluate(const Kinematics& at, const Controls& controls, Residual& out) = 0;
 
-    /// Adds K at the last evaluated state. Cautious: what keeps an iteration from overshooting instead of the
-    /// exact derivatives, where there is such a thing.
+    /// Adds K at the last evaluated state. convexified: adds a majorant of the force's dissipation potential
+    /// instead of the exact derivatives where there is one, which keeps Newton's iteration from overshooting.
     virtual void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
                           Remainder& rest) const = 0;
 
-    /// Of pairs that touch, at the last evaluated state: what never overshoots.
+    /// Adds, for each frictional pair at the last evaluated state, a positive semidefinite stiffness that
+    /// bounds its exact one from above.
     virtual void add_stiffness(const Kinematics& /*at*/, std::vector<PairStiffness>& /*out*/) const {}
 
-    /// At the last evaluated state: adds lambda . df/dv, lambda . df/dw and lambda . df/d(begin) to `by`, and
-    /// - lambda . df/dk to the gradient.
+    /// Adds, at the last evaluated state, lambda . df/dv, lambda . df/dw and lambda . df/d(begin) to `by`, and
+    /// - lambda . df/dk to the gradient by parameters.
     virtual void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda,
                      KinematicsGradient& by, Gradient& out) const = 0;
 
-    /// From now on, what makes the force unsymmetric stays as it was at the last evaluated state, or does not.
+    /// Freezes the quantities that make the force nonsymmetric (normal forces and normals) at their values of
+    /// the last evaluated state, or releases them.
     virtual void set_frozen(bool /*frozen*/) {}
 
-    /// Adds the magnitude of forces that cancel inside velocities at the last evaluated state.
+    /// Adds the magnitude [N] of the forces that cancel within velocities at the last evaluated state, a bound
+    /// of their round-off.
     virtual void add_cancelling_forces(const Kinematics& /*at*/, VectorXd& /*out*/) const {}
 };
 

@@ -11,7 +11,8 @@ Mat3 cross_matrix(const Vec3& v) {
     return m;
 }
 
-// df/dx of the whole dependence on the place, but for the coefficient: through N, n and the body's velocity.
+// Returns df/dx for a coefficient of one: the total dependence on the position through N, n and the obstacle's
+// velocity.
 Mat3 by_position(const Friction& friction, const ContactTerm::ActiveContact& active, const Vec3& spin) {
     return -active.stiffness * friction.by_normal_force * active.at.normal.transpose() +
            friction.by_normal * active.at.curvature - friction.by_velocity * cross_matrix(spin);
@@ -95,7 +96,8 @@ void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambd
     }
 }
 
-// A velocity is the difference of two places over a stage, and in what sticks a small one makes a large force.
+// Bounds round-off: a velocity is the difference of two positions over a stage, and in a sticking contact a
+// small velocity causes a large force.
 void FrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const double stiffness = at.rate * each.friction.by_velocity.norm();

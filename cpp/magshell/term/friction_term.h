@@ -1,7 +1,7 @@
-// Friction at the points that touch an obstacle.                                        force/friction.h
+// FrictionTerm: friction at the points in contact with an obstacle. force/friction.h
 //
-// Exact: with the normal force and the normal at the end of the stage. Lagged: with those at the beginning of
-// the step, which leaves a symmetric matrix, as for a potential of the velocities.           [Geilinger et
+// Exact friction uses the normal force and the normal at the end of the stage. Lagged friction uses those at
+// the beginning of the step; it then has a potential of the velocities and a symmetric matrix. [Geilinger et
 // al. 2020]
 #pragma once
 
@@ -13,19 +13,21 @@ namespace magshell {
 
 class FrictionTerm final : public ForceTerm {
   public:
-    /// One flag a contact: whether it rubs, and whether it does so with the normal force of before.
+    /// Creates friction for a contact term. Both lists have one flag per contact: whether it has friction, and
+    /// whether friction is lagged.
     FrictionTerm(const ContactTerm& contact, std::vector<bool> has_friction, std::vector<bool> lagged)
         : contact_(contact), has_friction_(std::move(has_friction)), lagged_(std::move(lagged)) {}
 
     std::string_view name() const override { return "friction"; }
-    void set_values(const Values&) override {}  // the contact's
+    void set_values(const Values&) override {}  // the contact term reads them
     void begin_step(const VectorXd& q, const Controls& controls) override;
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
     void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
                   Remainder& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              Gradient& out) const override;
-    /// Normal forces and normals: with held ones, friction is the slope of a convex potential of the velocities.
+    /// Freezes normal forces and normals. Friction is then the gradient of a convex potential of the
+    /// velocities.
     void set_frozen(bool frozen) override;
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 
@@ -39,7 +41,7 @@ class FrictionTerm final : public ForceTerm {
 
     const ContactTerm& contact_;
     std::vector<bool> has_friction_, lagged_;
-    std::vector<ContactTerm::ActiveContact> before_;  // of lagged contacts, when the step began
+    std::vector<ContactTerm::ActiveContact> before_;  // lagged contacts at the beginning of the step
     std::vector<ContactTerm::ActiveContact> frozen_contacts_;
     bool frozen_ = false;
     Controls controls_before_;

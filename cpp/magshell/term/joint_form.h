@@ -1,11 +1,11 @@
-// A scalar that tells how two links stand to each other, read off their corners (corner_form.h), with what Newton needs
-// of it:
+// JointForm: a scalar coordinate of the relative pose of two links, computed from their corners
+// (corner_form.h), with the derivatives that Newton's method needs.
 //
-//   revolute   s = arg(C + i S),  C = u_p . u_c + v_p . v_c,  S = v_p . u_c - u_p . v_c      u, v across the axis
+//   revolute   s = arg(C + i S),  C = u_p . u_c + v_p . v_c,  S = v_p . u_c - u_p . v_c      u, v perpendicular to the axis
 //   prismatic  s = a_p . (o_c - o_p)
 //   ball       s = sum e_p . e_c = 1 + 2 cos(angle);  or one product of the rotation, a_p . b_c
 //
-// d2s/dx2 = pairs (x) I + cross (first other^T + other first^T), first = ds/dx; of an angle, other = d(log |C + i S|)/dx.
+//   d2s/dx2 = pairs (x) I + cross (first other^T + other first^T),  first = ds/dx; for an angle other = d(log |C + i S|)/dx
 #pragma once
 
 #include "magshell/body/joint.h"
@@ -22,7 +22,7 @@ class JointForm {
         Eigen::Matrix<double, 8, 8> pairs;
         double cross = 0.0;
 
-        /// d2s/dx2 times a motion of the corners.
+        /// Returns d2s/dx2 times a motion of the corners.
         Corners second(const Corners& along) const {
             Corners product = along * pairs;
             if (cross != 0.0)
@@ -33,22 +33,23 @@ class JointForm {
     };
 
     JointForm() = default;
-    /// That of a joint.
+    /// Creates the coordinate of a joint.
     JointForm(const Joint& joint, const LinkPair& links);
-    /// a_p . b_c of two vectors at rest; and the sum of those of three, the columns.
+    /// Creates a_p . b_c for two vectors given in the reference configuration, or the sum of such products over
+    /// the columns of two matrices.
     static JointForm product(const LinkPair& links, const Vec3& of_parent, const Vec3& of_child);
     static JointForm product(const LinkPair& links, const Mat3& of_parent, const Mat3& of_child);
 
     bool angle() const { return angle_; }
-    /// An angle from -pi to pi.
+    /// Returns the coordinate; an angle lies in [-pi, pi].
     double value(const Corners& at) const;
-    /// The same next to another one, full turns away if need be.
+    /// Returns the coordinate; an angle is taken on the branch nearest to `near`.
     double value(const Corners& at, double near) const;
     Local at(const Corners& at) const;
 
   private:
     bool angle_ = false;
-    CornerForm form_, sine_;  // of an angle, its cosine first
+    CornerForm form_, sine_;  // for an angle: cosine and sine
 };
 
 }  // namespace magshell

@@ -11,7 +11,8 @@ namespace {
 using Corners = CornerForm::Corners;
 
 constexpr double small_angle = 1e-4;
-constexpr double no_angle = 1e-100;  // in whose place ratios of odd functions of it are found
+// smallest angle [rad]: ratios of odd functions of the angle stay finite there
+constexpr double no_angle = 1e-100;
 
 const JointLaw::Names& names_of(JointKind kind, JointTerm::Act act) {
     if (act == JointTerm::Act::ball_servo) return JointLaw::of_ball_servos;
@@ -93,7 +94,7 @@ bool JointTerm::set_values(const Values& values) {
         else
             each.law = {number(0), number(1), number(2), number(3), number(4),
                         number(5), number(6), number(7), number(8), number(9)};
-        // An angle that only its cosine tells is not negative.
+        // An angle that is known by its cosine only is never negative, so the lower limit must not act.
         if (each.cosine > 0.0) each.law.lower = -1.0;
     }
     return changed;
@@ -193,7 +194,8 @@ void JointTerm::vjp(const double* q, const Controls&, const double* lambda, Grad
         const JointEnergy law = law_at(each, now.coordinate);
         for (int n = 0; n < JointLaw::size; ++n)
             if (each.slots[n].size() > 0) out.values[each.slots[n].first] += along * law.force_by[n];
-        // The coordinate of a joint with an axis, and its rate, do not feel the axis by themselves (skeleton_places.cpp).
+        // Joint coordinates and their rates do not depend on the axis through the form alone; assembly/ adds
+        // that part.
         if (each.act != Act::coordinate) geometry_vjp(each, now, q, rate, out);
     }
 }

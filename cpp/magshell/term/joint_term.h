@@ -1,9 +1,11 @@
-// What acts in the joints of skeletons: springs, torques, servos, limits; and closures of loops.
+// JointTerm: springs, torques, servos and limits that act in the joints of skeletons, and springs that close
+// kinematic loops.
 //
-// The coordinate s of a joint is read off the corners of its two links, as joint_form.h says. Of a ball joint there are three,
-// all angles by their cosine, form = top - c (1 - cos s): that of the rotation, that from the rotation which a servo wants to
-// it, and that by which an axis is off, which a cone limits.
-// A closure pulls a point of one link to a point of another: k/2 |o_c - o_p|^2.
+// The coordinate s of a joint is computed from the corners of its two links (joint_form.h). A ball joint has up
+// to three coordinates, each an angle known by its cosine, form = top - c (1 - cos s): the angle of its
+// rotation, the angle from there to a servo's target rotation, and the angle of an axis from its reference
+// direction, which a cone limits. A loop closure pulls a point of one link to a point of another: k/2 |o_c -
+// o_p|^2.
 #pragma once
 
 #include <string>
@@ -21,7 +23,7 @@ class JointTerm final : public Term {
     struct Input {
         std::string owner;
         Joint joint;
-        const Index* parent;  // four corners, or nullptr: the world
+        const Index* parent;  // four corners; nullptr for the world
         const Index* child;
         Act act = Act::coordinate;
     };
@@ -49,20 +51,20 @@ class JointTerm final : public Term {
         Joint joint;
         LinkPair links;
         JointForm form;
-        CornerSum gap;                // of a closure
-        CornerForm::Corners at_rest;  // |d(form)/dx|, of a closure |d(gap)/dx|
-        double reach;  // what rounds at rest: a length, in lengths of a link where the coordinate is an angle
-        double top = 0.0, cosine = 0.0;  // c; zero where the form is the coordinate
-        std::vector<Slot> slots;         // of the law; of a closure, its stiffness
-        Slot geometry;  // what the form depends on: axis, origin of a closure, what a servo wants
-        Vec3 target_rotation = Vec3::Zero();  // the rotation vector
+        CornerSum gap;                // of a loop closure
+        CornerForm::Corners at_rest;  // |d(form)/dx|; of a loop closure |d(gap)/dx|
+        double reach;  // magnitude that round-off is proportional to: [m], or in link lengths for angles
+        double top = 0.0, cosine = 0.0;  // c; zero if the form is the coordinate itself
+        std::vector<Slot> slots;         // of the law; the stiffness of a loop closure
+        Slot geometry;  // parameter of the form: axis, origin of a loop closure, or a servo's target rotation
+        Vec3 target_rotation = Vec3::Zero();  // rotation vector [rad]
         JointLaw law;
-        double stiffness = 0.0;  // of a closure
+        double stiffness = 0.0;  // of a loop closure
 
         void find_form();
         bool length() const { return act == Act::closure || joint.kind == JointKind::prismatic; }
     };
-    /// What of a joint a state tells: E' and E'' by its form.
+    /// The coordinate of a joint at a state, with E' and E'' by its form.
     struct State {
         JointForm::Local form;
         double coordinate, by_first, by_second;

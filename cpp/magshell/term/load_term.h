@@ -1,6 +1,5 @@
-// Dead loads: forces that keep size and direction. Gravity is one, point, edge and area loads are others.
-//
-//   E = - factor f . x                                                              [J]
+// LoadTerm: dead loads, forces that keep their magnitude and direction: gravity, and point, edge and area
+// loads.
 #pragma once
 
 #include <string>
@@ -12,7 +11,8 @@ namespace magshell {
 
 class LoadTerm final : public Term {
   public:
-    /// Registers its forces, three a vertex, as those of its own name, and the control that scales them.
+    /// Registers the forces, three components per vertex, under the term's name, and the load parameter that
+    /// scales them.
     LoadTerm(const std::string& name, const std::string& factor, const Nodes& nodes, Registry& registry)
         : name_(name),
           slot_(registry.values.add(name, "forces", "N", nodes.n_user_vertices(), 3, &nodes.vertices)),

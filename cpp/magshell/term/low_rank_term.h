@@ -1,4 +1,6 @@
-// Terms that couple all of their nodes with each other: what of their Hessian is of low rank is kept beside the matrix.
+// LowRankTerm: the base class of terms whose Hessian couples all of their nodes, as a cavity or a sliding
+// tendon does. The coupling has low rank, so it is kept as a few dense columns instead of filling the sparse
+// matrix (linalg/low_rank_factor.h).
 #pragma once
 
 #include "magshell/assembly/low_rank.h"
@@ -8,15 +10,18 @@ namespace magshell {
 
 class LowRankTerm : public Term {
   public:
-    /// Adds that of the Hessian at the last evaluated state.
+    /// Adds the low-rank part of the Hessian at the last evaluated state.
     virtual void add_low_rank(const Controls& controls, LowRank& out) const = 0;
 
-    /// Adds the magnitude of forces that cancel at the last evaluated state.
+    /// Adds the magnitude [N] of the forces that cancel at the last evaluated state, a bound of their
+    /// round-off.
     virtual void add_cancelling_here(VectorXd& out) const = 0;
 
-    /// Whether what it assembles from now on is curved as its extrapolated pressures or tensions have it: in mixed steps
-    /// these are unknowns of their own, condensed, which what is stiff needs.
-    /// Cautious: a state's own pressure says nothing where what is stiff is not yet as it should be; it is left out.
+    /// Chooses the pressures or tensions that the assembled curvature is scaled with from now on. extrapolated:
+    /// those at the end of the last linearized step; in mixed Newton steps they are unknowns of their own,
+    /// condensed, which a stiff liquid needs to converge. convexified: leaves out the state's own pressure of
+    /// laws with a target volume, because it says little while the stiff volume is still far from its target;
+    /// without effect if extrapolated.
     void take_extrapolated(bool extrapolated, bool convexified) {
         extrapolated_ = extrapolated;
         convexified_ = convexified && !extrapolated;

@@ -39,7 +39,8 @@ bool MagneticSixTerm::set_values(const Values& values) {
             for (int p = 0; p < points; ++p) {
                 const Mat3 frame = rest_frame(f, p);
                 Vec3 coordinates = frame.inverse() * m;
-                // What the inverse leaves of a tangential magnetization along the normal is round-off.
+                // A tangential magnetization keeps a normal coordinate of round-off size after the inverse: it
+                // is set to zero.
                 if (std::abs(coordinates[2]) <= 1e-14 * m.norm()) coordinates[2] = 0.0;
                 if (coordinates[2] != 0.0) normal_magnetization_ = true;
                 MagneticSix::Element& e = elements_[pack].at[p];
@@ -136,7 +137,8 @@ void MagneticSixTerm::assemble(const Chunk& chunk, const double* q, const Contro
     });
 }
 
-// As for triangles of three nodes, at each point: with M' and v the rates of F_0 M~_r and of x_p and G = dB/dx,
+// The rate of the energy along lambda at each point. As for linear triangles (magnetic_term.cpp), with M' and v
+// the rates of F_0 M~_r and of x_p, and G = dB/dx,
 //
 //   D = - V_p (M' . B + M . G v),   M' = alpha a_1' + beta a_2' + gamma n'.
 void MagneticSixTerm::vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) {

@@ -1,4 +1,5 @@
-// The magnetic energy of a sheet of six-node faces: energy/magnetic_six.h on every face, the field sampled at its points.
+// MagneticSixTerm: the magnetic energy of a shell of quadratic triangles. energy/magnetic_six.h on every face,
+// with the field sampled at its six points.
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
@@ -12,7 +13,7 @@ namespace magshell {
 
 class MagneticSixTerm final : public Term {
   public:
-    /// The sources have to outlive it.
+    /// Creates the term; the sources must outlive it.
     MagneticSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
                     const SystemMatrix& matrix, const FieldSources& sources, Registry& registry);
 
@@ -34,11 +35,12 @@ class MagneticSixTerm final : public Term {
     };
     using Fields = PointFields<points>;
 
-    /// (a~_1, a~_2, n~) at a point of a face.
+    /// Returns the matrix (a~_1, a~_2, n~) at a point of a face.
     Mat3 rest_frame(Index face, int point) const;
-    /// The places and the magnetizations [A/m] of the points, one face after another.
+    /// Computes the positions [m] and magnetizations [A/m] of all points, face by face.
     void find_points(const double* q, std::vector<Vec3>& places, std::vector<Vec3>& magnetizations) const;
-    /// The applied field there, in packs; none where it is uniform. Order as in AppliedField::add_samples.
+    /// Returns the applied field at all points in packs; empty in a uniform field. Order as in
+    /// AppliedField::add_samples.
     std::vector<Fields> sample(const double* q, const Controls& controls, int order) const;
 
     const SixNodeSheet& sheet_;
@@ -48,7 +50,7 @@ class MagneticSixTerm final : public Term {
     Slot magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     std::vector<Points> elements_;
-    std::vector<Fields> fields_;  // sampled for the assembly at hand; empty in a uniform field
+    std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
     bool normal_magnetization_ = false;
 };
 

@@ -140,7 +140,7 @@ class MagneticSolidTerm final : public Term {
         return RestElement<Element>(x);
     }
 
-    // The g_k of a point, one a row.
+    // Returns the gradients g_k of a point's shape functions, one per row.
     static Eigen::Matrix<double, N, 3> gradients(const RestElement<Element>& rest, int p) {
         return Element::shape_derivatives(p) * rest.gradients[p];
     }
@@ -152,7 +152,7 @@ class MagneticSolidTerm final : public Term {
         return at;
     }
 
-    // x_p and F M of each point, one element after another; of rates, theirs.
+    // Computes x_p and F M at every point, element by element. Applied to rates it computes their rates.
     void at_points(const double* q, std::vector<Vec3>& places, std::vector<Vec3>& magnetizations) const {
         places.resize(static_cast<std::size_t>(solid_.n_elements()) * points);
         magnetizations.resize(places.size());
@@ -171,7 +171,8 @@ class MagneticSolidTerm final : public Term {
         });
     }
 
-    // The applied field at every point, in packs; none where it is uniform. Order as in AppliedField::add_samples.
+    // Returns the applied field at every point in packs; empty in a uniform field. Order as in
+    // AppliedField::add_samples.
     std::vector<Fields> sample(const double* q, const Controls& controls, int order) const {
         if (!field_.varies(controls)) return {};
         std::vector<Vec3> places, moments;
@@ -187,7 +188,7 @@ class MagneticSolidTerm final : public Term {
     Slot magnetization_;
     std::array<double, N> shapes_[points];
     std::vector<Points> elements_;
-    std::vector<Fields> fields_;  // sampled for the assembly at hand; empty in a uniform field
+    std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
 };
 
 }  // namespace

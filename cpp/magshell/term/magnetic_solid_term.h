@@ -1,4 +1,5 @@
-// The magnetic energy of a solid that is magnetized throughout.                              energy/magnetic_solid.h
+// Creates the term of a magnetized solid's Zeeman energy.
+// energy/magnetic_solid.h
 #pragma once
 
 #include <memory>
@@ -9,7 +10,8 @@
 
 namespace magshell {
 
-/// Registers "remanent_magnetization" of the solid, one an element. The sources have to outlive it.
+/// Creates the term and registers "remanent_magnetization" [A/m], one vector per element. The sources must
+/// outlive it.
 std::unique_ptr<Term> make_magnetic_solid_term(const Solid& solid, Index body, const ChunkLoop& chunks,
                                                const SystemMatrix& matrix, const FieldSources& sources,
                                                Registry& registry);

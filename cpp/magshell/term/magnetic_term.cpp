@@ -7,7 +7,7 @@
 namespace magshell {
 namespace {
 
-// (a~_1, a~_2, n~)
+// Returns the matrix (a~_1, a~_2, n~) of a face.
 Mat3 rest_frame(const Surface& surface, Index face) {
     const std::array<Vec3, 3>& x = surface.rest_corners(face);
     const Vec3 a1 = x[1] - x[0], a2 = x[2] - x[0];
@@ -39,7 +39,8 @@ bool MagneticTerm::set_values(const Values& values) {
             const Mat3 frame = rest_frame(surface_, f);
             const Vec3 across = frame.col(0).cross(frame.col(1)), m = values.vector(magnetization_, f);
             Vec3 coordinates = frame.inverse() * m;
-            // What the inverse leaves of a tangential magnetization along the normal is round-off, not magnetization.
+            // A tangential magnetization keeps a normal coordinate of round-off size after the inverse: it is
+            // set to zero.
             if (std::abs(coordinates[2]) <= 1e-14 * m.norm()) coordinates[2] = 0.0;
             if (coordinates[2] != 0.0) normal_magnetization_ = true;
             elements_[pack].volume.set(lane, 0.5 * across.norm() * thicknesses_[f]);

@@ -1,7 +1,8 @@
-// The magnetic energy of a whole sheet, in a uniform applied flux density and any number of field sources.
+// MagneticTerm: the magnetic energy of a shell of linear triangles in a uniform applied flux density and any
+// number of field sources.
 //
-// Where the field is uniform nothing is sampled; where no face is magnetized along its normal as well, the
-// force does not depend on the deformation and there is no Hessian to add.
+// In a uniform field nothing is sampled. If no face has a normal magnetization either, the force does not
+// depend on the deformation, and there is no Hessian to add.
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
@@ -14,7 +15,7 @@ namespace magshell {
 
 class MagneticTerm final : public Term {
   public:
-    /// The sources have to outlive it.
+    /// Creates the term; the sources must outlive it.
     MagneticTerm(const Surface& surface, Index body, const FaceLoop& loop, const FieldSources& sources,
                  Registry& registry);
 
@@ -30,9 +31,10 @@ class MagneticTerm final : public Term {
     std::size_t bytes() const override;
 
   private:
-    /// The barycenters and the magnetizations [A/m] there, by face.
+    /// Computes the barycenters [m] of all faces and the magnetizations [A/m] there.
     void find_points(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
-    /// The applied field at every barycenter, in packs; none where it is uniform. Order as in AppliedField::add_samples.
+    /// Returns the applied field at every barycenter in packs; empty in a uniform field. Order as in
+    /// AppliedField::add_samples.
     std::vector<Magnetic::Field> sample(const double* q, const Controls& controls, int order) const;
 
     const Surface& surface_;
@@ -42,7 +44,7 @@ class MagneticTerm final : public Term {
     Slot magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     LargeVector<Magnetic::Element> elements_;
-    std::vector<Magnetic::Field> fields_;  // sampled for the assembly at hand; empty in a uniform field
+    std::vector<Magnetic::Field> fields_;  // sampled for the current assembly; empty in a uniform field
     bool normal_magnetization_ = false;
 };
 

@@ -170,7 +170,8 @@ void MembraneSixTerm::add_forces(const Strains& stresses, Residual& out) {
     });
 }
 
-// As for triangles of three nodes: squared derivatives carry their own round-off, and that of the positions.
+// Bounds round-off as MembraneTerm does: squared derivatives carry their own round-off, and that of the
+// positions.
 void MembraneSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const Index pack = f / Pack::width;
@@ -194,7 +195,8 @@ std::size_t MembraneSixTerm::bytes() const {
            bytes_of(rest_) + bytes_of_stresses() + bytes_of(state_) + loop_.bytes();
 }
 
-// As of three nodes: h w grad N_k . grad N_l over the points inside, w = E/(1 - nu^2).
+// Adds h w grad N_k . grad N_l over the integration points, with the plane-stress wave modulus w = E/(1 -
+// nu^2).
 bool MembraneSixTerm::add_projective_stiffness(NodeMatrix& out) const {
     constexpr auto first = six_nodes::inside_towards(2, 1.0), second = six_nodes::inside_towards(1, -1.0);
     for (Index f = 0; f < sheet_.n_faces(); ++f) {

@@ -1,4 +1,4 @@
-// The membrane energy of a sheet of six-node faces: energy/membrane_six.h on every face.
+// MembraneSixTerm: the membrane energy of a shell of quadratic triangles, energy/membrane_six.h on every face.
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
@@ -33,7 +33,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
     std::size_t bytes() const override;
 
-    /// d at a state that is only looked at.
+    /// Returns the strains d at q without changing the term.
     Strains strains_at(const double* q) const;
     const ShellMaterial& material(Index face) const { return materials_[face]; }
 
@@ -59,7 +59,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     std::vector<SixNodeFace> rest_;
     std::vector<std::array<Pack, 9>> rest_measures_;
     std::vector<Symmetric9> stiffness_;
-    std::vector<double> state_;  // the nodes at which stress_ holds
+    std::vector<double> state_;  // positions of the last evaluated state
 };
 
 }  // namespace magshell

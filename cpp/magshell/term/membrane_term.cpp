@@ -23,7 +23,7 @@ MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFac
         }
 }
 
-// Of a cut face, the mean of the faces that it is made of.
+// Returns the natural configuration of a face. A face that combines parts of two faces takes their mean growth.
 GrownFace MembraneTerm::grown(Index face) const {
     Mat3 growth = Mat3::Zero();
     for (const MembraneFaces::Share& share : faces_.shares(face))
@@ -56,7 +56,7 @@ bool MembraneTerm::set_values(const Values& values) {
     return true;
 }
 
-// A h w g_k . g_l, with the modulus of waves in a sheet at rest, w = E/(1 - nu^2); of edges opposite to the nodes,
+// Adds A h w g_k . g_l, with the plane-stress wave modulus w = E/(1 - nu^2). With e_k the edge opposite node k,
 // g_k . g_l = e_k . e_l / 4 A^2.
 bool MembraneTerm::add_projective_stiffness(NodeMatrix& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f) {
@@ -129,7 +129,8 @@ void MembraneTerm::rate(Index pack, const double* p, Pack d[3]) const {
 }
 
 void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
-    // Of each share: work, and work by the Poisson ratio. A share may be of a face in another chunk.
+    // Work of each part of a face, and its derivative by the Poisson ratio. A part may belong to a face of
+    // another chunk.
     using OfShares = std::array<Eigen::Vector2d, 2>;
     std::vector<OfShares> by_shares(surface_.n_faces(),
                                     OfShares{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});
@@ -204,8 +205,8 @@ void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {
     });
 }
 
-// |a|^2 carries its own round-off, and that of the positions whose difference a is: far from the origin, or
-// beside long radii, the larger one.
+// Bounds round-off: |a|^2 has its own, and that of the positions whose difference a is. Far from the origin, or
+// in slender faces, the latter is larger.
 void MembraneTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         const Membrane::Element& element = elements_[f / Pack::width];

@@ -1,4 +1,4 @@
-// The membrane energy of a whole sheet: energy/membrane.h on every face.
+// MembraneTerm: the membrane energy of a shell of linear triangles, energy/membrane.h on every face.
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
@@ -13,7 +13,7 @@ namespace magshell {
 
 class MembraneTerm final : public StrainScaffold<MembraneTerm> {
   public:
-    /// `loop` goes over the corners of `faces`.
+    /// Creates the term. `loop` iterates over the corners of `faces`.
     MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces, const FaceLoop& loop,
                  const GrowthForm& growth, const Nodes& nodes, Registry& registry);
 
@@ -34,7 +34,7 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     std::size_t bytes() const override;
 
     bool grows() const { return growth_.any(); }
-    /// From what strains are measured.
+    /// Returns the natural (stress-free) configuration of a face, from which strains are measured.
     GrownFace grown(Index face) const;
 
   private:
@@ -59,7 +59,7 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     ShellMaterials materials_;
     ShellGrowth growth_;
     LargeVector<Membrane::Element> elements_;
-    std::vector<double> state_;  // the nodes at which stress_ holds
+    std::vector<double> state_;  // positions of the last evaluated state
 };
 
 }  // namespace magshell

@@ -1,8 +1,9 @@
-// What the terms of a muscle share: its fibres in packs, their law, and the numbers that they read.
+// MuscleFibres: the fibres of a muscle in SIMD packs, their law and parameters, as the energy term and the rate
+// term of a muscle share them.
 //
-// Values: "fibres" (a unit vector an element, at rest), "strength" [Pa] (w, an element) and "activation" (a, one of each
-// segment; those of an element are its segment's). With a force-velocity curve also "shortening_rate" [1/s], at which a
-// shortening fibre pulls no more.
+// Parameters: "fibres" (unit vector of each element in the reference configuration), "strength" w [Pa] of each
+// element, and "activation" a of each segment, which its elements share. A muscle with a force-velocity curve
+// also has "shortening_rate" [1/s], the rate at which a shortening fibre has no active tension.
 #pragma once
 
 #include <algorithm>
@@ -18,15 +19,15 @@ namespace magshell {
 
 /// A muscle as the caller describes it.
 struct MuscleInput {
-    std::string owner;  // under which its values are registered
+    std::string owner;  // name under which its parameters are registered
     Index solid = 0;
     std::vector<Index> elements;  // of the solid
-    std::vector<Index> segments;  // of each of them
+    std::vector<Index> segments;  // segment of each element
     Index n_segments = 1;
     FibreLaw law;
 };
 
-/// Puts in place, or adds, the forces alpha_k pull of a point.
+/// Stores (first) or adds the nodal forces alpha_k pull of an integration point.
 template <int N>
 inline void add_pulls(const PushedForwardVector<N>& m, const Pack3& pull, bool first, Pack3 g[N]) {
     for (int k = 0; k < N; ++k) {
@@ -35,7 +36,7 @@ inline void add_pulls(const PushedForwardVector<N>& m, const Pack3& pull, bool f
     }
 }
 
-/// The blocks alpha_k alpha_l M of a point, as a tangent for add_blocks.
+/// The blocks alpha_k alpha_l M of an integration point, in the form that add_blocks takes.
 template <int N>
 struct FibreTangent {
     const PushedForwardVector<N>& m;
@@ -108,15 +109,15 @@ class MuscleFibres {
         return RestElement<Element>(x);
     }
 
-    // The g_k of a point, one a row.
+    // Returns the gradients g_k of a point's shape functions, one per row.
     static Eigen::Matrix<double, N, 3> gradients(const RestElement<Element>& rest, int p) {
         return Element::shape_derivatives(p) * rest.gradients[p];
     }
 
     std::size_t bytes() const { return loop.bytes() + bytes_of(pieces_) + bytes_of(segments_); }
 
-    /// What the terms find of an element by the values: `pulled` is F^T b of every point, as its nodes have it, sum_k g_k
-    /// pulled_k.
+    /// Gradients of an element by its parameters. `pulled` holds F^T b of every point by nodes: F^T b = sum_k
+    /// g_k pulled_k.
     struct Found {
         Pack strength{0.0}, activation{0.0};
         Pack pulled[points][N];
@@ -124,7 +125,7 @@ class MuscleFibres {
         Found() {
             for (Pack(&of_point)[N] : pulled) std::fill_n(of_point, N, Pack(0.0));
         }
-        /// By the F m of a point, where F is that of the nodes x.
+        /// Adds the gradient by the F m of a point, where F is the deformation gradient of the nodes x.
         void add(int p, const Pack3 x[N], const Pack3& by) {
             for (int k = 0; k < N; ++k) pulled[p][k] += dot(x[k], by);
         }

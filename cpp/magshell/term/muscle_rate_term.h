@@ -1,13 +1,14 @@
-// The force of a muscle's fibres that depends on how fast their length changes: Hill's force-velocity curve, beside the
-// isometric tension that is an energy.
+// MuscleRateTerm: the part of a muscle's tension that depends on the rate of its length by Hill's
+// force-velocity curve. The isometric tension has an energy and is in muscle_term.cpp.
 //
 //   f_k = - V_p alpha_k T n,   T = w a f_L(l) (f_V(l'/v) - 1),   l' = n . y',   y' = F' m
 //
-// At a stage of a step, 1/tau of how fast velocities follow positions, with P = I - n n^T and T_l, T_r its derivatives,
+// At a stage of a time step, where velocities follow positions by 1/tau, and with P = I - n n^T and the
+// derivatives T_l, T_r of T by l and l',
 //
 //   - df_k/dx_l = V_p alpha_k alpha_l ((T_l + T_r/tau) n n^T + T/l P + T_r/l n (P y')^T)
 //
-// of which the last is not symmetric: n u^T = (n u^T + u n^T)/2 + [u x n]/2.
+// The last part is not symmetric: n u^T = (n u^T + u n^T)/2 + [u x n]/2.
 #pragma once
 
 #include <memory>
@@ -157,7 +158,7 @@ class MuscleRateTerm final : public ForceTerm {
     }
 
   private:
-    /// T and its derivatives, by l, l', w and a.
+    /// The tension T and its derivatives by l, l', w and a.
     struct Point {
         DeformedFibre place;
         Pack3 moves;  // y'
@@ -168,7 +169,7 @@ class MuscleRateTerm final : public ForceTerm {
             : place(term.fibres_->at(pack).m[p].at(x)), moves(term.fibres_->at(pack).m[p].at(v)) {
             const Pieces& each = term.fibres_->at(pack);
             const FibreLaw& law = term.fibres_->law;
-            // Of the active part alone: all of it at activation 1, less what is there at 0.
+            // The slope of the active part alone: the total at activation 1 minus the total at 0.
             const FibreLaw::Response with = law.at(place.length, Pack(1.0)),
                                      without = law.at(place.length, Pack(0.0));
             const Pack active = with.by_activation, slope = with.slope - without.slope;

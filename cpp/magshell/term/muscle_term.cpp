@@ -45,7 +45,8 @@ class MuscleEnergy final : public MuscleTerm {
         });
     }
 
-    /// w m m^T, as stiff as it is at rest, fully activated: so that it stays the same whatever the activation.
+    /// Adds w m m^T with the stiffness of the fully activated reference configuration, so that the matrix does
+    /// not depend on the activation.
     bool add_projective_stiffness(NodeMatrix& out) const override {
         const FibreLaw::Response law = fibres_->law.at(Pack(1.0), Pack(1.0));
         const Pack stiffness = max(max(law.slope, law.tension), Pack(0.0));
@@ -136,7 +137,7 @@ class MuscleEnergy final : public MuscleTerm {
         gathered.hand_over(out);
     }
 
-    // Of l, coordinates cancel as in F.
+    // The stretch l loses digits to the cancellation of coordinates as F does.
     void add_cancelling_forces(double beyond, VectorXd& out) const override {
         for (Index t = 0; t < fibres_->fibres.n_elements(); ++t) {
             const Pieces& each = fibres_->at(t / Pack::width);
@@ -198,7 +199,8 @@ class MuscleEnergy final : public MuscleTerm {
         Pack along[points], across[points];
     };
 
-    // sum_p alpha_pk alpha_pl M_p for all pairs of nodes: symmetric blocks, six numbers each.
+    // Computes sum_p alpha_pk alpha_pl M_p for all pairs of nodes. The blocks are symmetric, so six numbers of
+    // each are computed.
     static void add_products(const Pieces& each, const Symmetric3 m[points], Pack33 h[]) {
         for (int k = 0; k < N; ++k) {
             Symmetric3 of_node[points];

@@ -1,12 +1,12 @@
-// What a pair that touches adds to a stiffness, of what is never negative and does not turn: a small matrix on the
-// difference of its closest points.
+// PairStiffness: the positive semidefinite stiffness of a contact pair, without the part of rotating normals: a
+// 3x3 matrix that acts on the difference of the pair's closest points.
 #pragma once
 
 #include "magshell/contact/proximity.h"
 
 namespace magshell {
 
-/// Between nodes i and j: weights[i] weights[j] stiffness.
+/// The block between nodes i and j is weights[i] weights[j] stiffness.
 struct PairStiffness {
     std::array<Index, 4> nodes;
     int count;

@@ -9,10 +9,10 @@
 namespace magshell {
 namespace {
 
-// Of the magnitudes that cancel between neighbours: what is left below is round-off.
+// Relative size below which the sum of contributions of neighbouring faces counts as round-off. [-]
 constexpr double cancelled = 1e-13, round_off = 8.0 * std::numeric_limits<double>::epsilon();
 
-// Of all parts of a face together.
+// Returns the sum of the coefficients of all parts of a face.
 template <class Kernel>
 const typename Kernel::Coefficients& of_all_parts() {
     static const typename Kernel::Coefficients known = [] {
@@ -113,7 +113,8 @@ bool PressureTerm::set_values(const Values& values) {
     return changed;
 }
 
-// The forces are of the second degree in the way s from rest, which two points of Gauss integrate exactly.
+// Along the straight path from the reference shape the forces are quadratic in the path parameter s, which two
+// Gauss points integrate exactly.
 double PressureTerm::energy(const double* q, const Controls& controls) const {
     double sum = 0.0;
     each_face([&](const auto& face) {
@@ -175,7 +176,7 @@ void PressureTerm::add_nonsymmetric_tangent(const double* q, const Controls& con
         for (int k = 0; k < static_cast<int>(x.size()); ++k)
             for (int l = 0; l <= k; ++l) {
                 const Index pair = face.pairs[lower_index(k, l)];
-                // Two places of a face that one node takes count as rows and as columns.
+                // A node that takes two places of a face counts both as row and as column.
                 const double twice = k != l && face.nodes[k] == face.nodes[l] ? 2.0 : 1.0;
                 const Vec3 axis = -0.5 * twice * (c[k][l] + c[l][k]);
                 axes[pair] += axis;

@@ -1,8 +1,10 @@
-// Pressures that follow the faces that they act on: of all bodies of a scene together, since what two of them do along the
-// border between them may cancel.                                                        energy/face_pressure.h
+// PressureTerm: pressures that follow the faces on which they act. One term holds the pressures of all bodies
+// of a scene, because the nonsymmetric parts of two bodies may cancel along their common border.
+// energy/face_pressure.h
 //
-// The energy is minus the work of the forces on the straight way from the shape at rest: minus p times the change of the
-// volume in front of the faces wherever there is a potential, whatever closes the surface.
+// The energy is minus the work of the forces along the straight path from the reference shape. Wherever the
+// pressure has a potential, this is minus p times the change of the volume in front of the faces, whatever
+// closes the surface.
 #pragma once
 
 #include <tuple>
@@ -15,13 +17,13 @@
 
 namespace magshell {
 
-/// The faces that one pressure acts on, in the caller's vertices.
+/// The faces on which one load acts, in the caller's numbering of vertices.
 struct PressureInput {
-    std::string owner;         // under which its pressures are registered
-    Index rows = 1;            // how many it has
-    int nodes_per_face = 3;    // or 6
+    std::string owner;         // name under which its pressures are registered
+    Index rows = 1;            // number of pressures
+    int nodes_per_face = 3;    // 3, or 6 for quadratic triangles
     std::vector<Index> nodes;  // of all faces, one after another
-    std::vector<Index> row;    // of each face's parts, 1 or 4; negative: none acts there
+    std::vector<Index> row;    // pressure of each face's parts (1 or 4 per face); negative: no pressure
 };
 
 class PressureTerm final : public Term {
@@ -44,12 +46,12 @@ class PressureTerm final : public Term {
         using Kernel = FacePressure<N>;
 
         std::array<Index, N> nodes;
-        std::array<Index, Kernel::parts> places;  // among the pressures of all loads; negative: none
+        std::array<Index, Kernel::parts> places;  // index among the pressures of all loads; negative: none
         PairSlots<N> slots;
-        std::array<Index, N*(N + 1) / 2> pairs;  // of nodes, among all, at lower_index
+        std::array<Index, N*(N + 1) / 2> pairs;  // pairs of nodes, at lower_index
 
         typename Kernel::Corners at(const double* q) const;
-        /// Times the pressures of its parts.
+        /// Returns the coefficients times the pressures of the face's parts.
         typename Kernel::Coefficients coefficients(const std::vector<double>& pressures) const;
     };
     /// The pressures of one load.
@@ -74,9 +76,9 @@ class PressureTerm final : public Term {
     const Nodes& nodes_;
     Slot factor_;
     std::vector<Load> loads_;
-    std::vector<double> pressures_;  // [Pa] of all loads
+    std::vector<double> pressures_;  // [Pa], of all loads
     std::tuple<std::vector<Face<3>>, std::vector<Face<6>>> faces_;
-    std::vector<std::array<Index, 2>> pairs_;  // of nodes that a face has both of, each once
+    std::vector<std::array<Index, 2>> pairs_;  // pairs of nodes of one face, each once
 };
 
 }  // namespace magshell

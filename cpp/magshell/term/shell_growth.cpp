@@ -2,7 +2,7 @@
 
 namespace magshell {
 
-// In the caller's order, so that they may vary in a solve.
+// Registers the tensors in the caller's order of faces, so that they may vary during a solve.
 void ShellGrowth::Tensors::add(const std::string& owner, const char* name, const char* unit,
                                const TensorForm& form, Registry& registry) {
     if (form.rows == 0) return;

@@ -1,4 +1,5 @@
-// How a sheet's faces have grown and bent by themselves, and the gradient by it. Numbers that may change during a solve.
+// ShellGrowth: the growth tensor and the natural curvature of a shell's faces, and the gradients by them. Both
+// may change during a solve.
 #pragma once
 
 #include <string>
@@ -9,8 +10,8 @@
 
 namespace magshell {
 
-/// How the caller gives a tensor: one for all faces or one each (rows), as a factor of unity (width 1) or whole (9); no rows:
-/// not at all.
+/// The layout in which the caller gives a tensor: `rows` is 1 for all faces or one per face, 0 if it is not
+/// given; `width` is 1 for a multiple of the identity or 9 for a full tensor.
 struct TensorForm {
     Index rows = 0, width = 1;
 };
@@ -21,19 +22,19 @@ struct GrowthForm {
 
 class ShellGrowth {
   public:
-    /// `faces` has to outlive it.
+    /// Stores a reference to `faces`, which must outlive the object.
     ShellGrowth(const std::string& owner, const Renumbering& faces, const GrowthForm& form,
                 Registry& registry);
 
     bool any() const { return growth_.slot.rows > 0 || curvature_.slot.rows > 0; }
-    /// Whether any has changed.
+    /// Reads the tensors; returns true if any has changed.
     bool set_values(const Values& values);
 
-    /// In world axes; only what lies in the face is meant.
+    /// Return the tensors of a face in world axes; only their components in the plane of the face matter.
     Mat3 growth(Index face) const { return growth_.at(row(growth_, face), 1.0); }
     Mat3 curvature(Index face) const { return curvature_.at(row(curvature_, face), 0.0); }
 
-    /// Adds derivatives by both tensors of a face.
+    /// Adds the gradient by both tensors of a face.
     void add_vjp(Index face, const Mat3& by_growth, const Mat3& by_curvature, Gradient& out) const;
 
     std::size_t bytes() const {

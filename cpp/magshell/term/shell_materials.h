@@ -1,4 +1,5 @@
-// What a sheet is made of, face by face, and the gradient by it.
+// ShellMaterials: thickness, Young's modulus and Poisson's ratio of every face of a shell, and the gradients by
+// them.
 #pragma once
 
 #include <vector>
@@ -13,17 +14,17 @@ class ShellMaterials {
   public:
     ShellMaterials(const Surface& surface, Registry& registry)
         : ShellMaterials(surface.owner, surface.faces, registry) {}
-    /// `faces` has to outlive the registry.
+    /// Registers the parameters. `faces` must outlive the registry.
     ShellMaterials(const std::string& owner, const Renumbering& faces, Registry& registry);
 
-    /// Whether any has changed.
+    /// Reads the parameters; returns true if any has changed.
     bool set_values(const Values& values);
     const ShellMaterial& operator[](Index face) const { return of_faces_[face]; }
     double thinnest() const;
     std::size_t bytes() const { return of_faces_.capacity() * sizeof(ShellMaterial); }
 
-    /// Adds what an energy says of a face's material whose stiffness goes with this power of the thickness:
-    /// `work` = lambda . g, and lambda . dg/dnu.
+    /// Adds the gradient of lambda . g by the material of a face, for an energy whose stiffness is proportional
+    /// to this power of the thickness. work: lambda . g; by_poisson_ratio: lambda . dg/dnu.
     void add_vjp(Index face, int power, double work, double by_poisson_ratio, Gradient& out) const {
         out.values[young_modulus_.at(face)] += work / of_faces_[face].young_modulus;
         out.values[thickness_.at(face)] += power * work / of_faces_[face].thickness;

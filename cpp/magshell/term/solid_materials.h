@@ -1,4 +1,5 @@
-// The terms of each family of materials, instantiated in a file of their own; nullptr where a name is not theirs.
+// Creates the solid terms of each family of materials. Each function is in a file of its own, so that its
+// templates compile in parallel; it returns nullptr if the material's name is not one of its family.
 #pragma once
 
 #include "magshell/term/solid_term.h"

@@ -1,5 +1,5 @@
-// What a solid is made of, element by element: the constants that users set, those that the energies take, and
-// the gradient from these back to those.
+// LameModuli, GuccioneModuli: the material constants of each element of a solid, as users set them and as the
+// energies take them, and the gradient from the latter to the former.
 #pragma once
 
 #include <vector>
@@ -9,17 +9,17 @@
 
 namespace magshell {
 
-/// Young's modulus and Poisson's ratio:
+/// Young's modulus and Poisson's ratio, converted to the Lame constants
 ///   lambda = E nu / ((1 + nu) (1 - 2 nu)),   mu = E / (2 (1 + nu))
 class LameModuli {
   public:
     LameModuli(const Solid& solid, Registry& registry);
 
     bool set_values(const Values& values);
-    /// lambda, mu [Pa]
+    /// Computes lambda and mu [Pa] of an element.
     void constants(Index element, double out[2]) const;
     void add_vjp(Index element, const double by[2], Gradient& out) const;
-    /// A modulus that the forces are of the size of [Pa].
+    /// Returns a modulus [Pa] of the size of the forces' stiffness, for bounds of round-off.
     double size(Index element) const;
 
   private:
@@ -30,7 +30,7 @@ class LameModuli {
     std::vector<Pair> of_elements_;
 };
 
-/// The constants of energy/guccione.h as they are.
+/// The constants of energy/guccione.h, unchanged.
 class GuccioneModuli {
   public:
     GuccioneModuli(const Solid& solid, Registry& registry);

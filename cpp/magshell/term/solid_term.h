@@ -1,4 +1,5 @@
-// The elastic energy of a solid, whatever its elements and its material; term/tetrahedra_term.h has them.
+// SolidTerm: the elastic energy of a solid, for all kinds of elements and materials. term/tetrahedra_term.h
+// implements it.
 #pragma once
 
 #include <memory>
@@ -10,28 +11,28 @@
 
 namespace magshell {
 
-/// At each point of integration of each element, one element after another in the caller's order.
+/// The state of a solid at each integration point, element by element in the caller's order.
 struct PointStates {
-    int points = 1;                           // an element
+    int points = 1;                           // per element
     std::vector<Mat3> deformation_gradients;  // F
     std::vector<Mat3> cauchy_stresses;        // P F^T / J [Pa]
-    std::vector<double> volumes;              // at rest [m3]
+    std::vector<double> volumes;              // reference volumes [m3]
 };
 
 class SolidTerm : public ElasticTerm {
   public:
     std::string_view name() const final { return "solid"; }
-    /// Of the elastic stress, without viscosity.
+    /// Returns deformation gradients and elastic stresses at q, without viscous stresses.
     virtual PointStates point_states(const double* q) const = 0;
 };
 
-/// How the elements of a solid respond.
+/// The material law of a solid.
 struct SolidResponse {
-    std::string material;      // "neo-Hookean ln J", ...: the names in term/solid_term.cpp
-    bool mean_volume = false;  // the volumetric chunk on the mean over each element
+    std::string material;      // a name of the solid_*.cpp files, such as "NeoHookean ln J"
+    bool mean_volume = false;  // evaluate the volumetric energy at the mean volume change of each element
 };
 
-/// Throws InvalidInput where there is no such material, or no such element.
+/// Creates the term. Throws InvalidInput if the material or the kind of element does not exist.
 std::unique_ptr<SolidTerm> make_solid_term(const SolidResponse& response, const Solid& solid, Index body,
                                            const ChunkLoop& chunks, const SystemMatrix& matrix,
                                            const Nodes& nodes, Registry& registry);

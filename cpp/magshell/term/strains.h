@@ -1,9 +1,10 @@
-// The strains of all elastic terms at a state, and what makes an elastic term viscous: a stress that knows
-// where the strain has been.
+// Strains of elastic terms, and the strain history that makes an elastic term viscous. With a history the
+// stress is
 //
-//   sigma = C (scale d - shift)
+//     sigma = C (scale d - shift)
 //
-// covers every linear law that is integrated implicitly in time; solve/viscosity.h has those that are used.
+// which covers every linear viscoelastic law that is integrated implicitly in time; solve/viscosity.h has the
+// laws that are implemented.
 #pragma once
 
 #include <vector>
@@ -12,8 +13,8 @@
 
 namespace magshell {
 
-/// `width` numbers an element, three of a sheet's, in the layout of packs: strain i of pack p at width p + i, one
-/// lane an element.
+/// Holds `width` numbers per element (three for a shell) in the layout of SIMD packs: strain i of pack p is
+/// stored at width p + i, with one element per lane.
 struct Strains {
     LargeVector<Pack> packs;
     Index elements = 0;
@@ -31,14 +32,14 @@ struct Strains {
     }
 };
 
-/// Of all elastic terms of a scene, one after another; a vector space.
+/// The strains of all elastic terms of a scene, one after another, with the operations of a vector space.
 struct StrainSet {
     std::vector<Strains> of_terms;
 
     bool empty() const { return of_terms.empty(); }
     void add(double factor, const StrainSet& other);
     StrainSet times(double factor) const;
-    /// The sum over the elements.
+    /// Returns the sum of products over all elements and strains.
     double dot(const StrainSet& other) const;
     std::size_t bytes() const;
 };
@@ -47,17 +48,17 @@ struct StrainHistory {
     double scale = 1.0;
     const Strains* shift = nullptr;
 
-    /// From d to scale d - shift.
+    /// Replaces d by scale d - shift.
     template <int N = 3>
     void apply(Index pack, Pack strain[N]) const {
         if (!shift) return;
         for (int i = 0; i < N; ++i) strain[i] = Pack(scale) * strain[i] - shift->at(pack)[i];
     }
 
-    /// How much of today's strain the stress has.
+    /// Returns the derivative of the effective strain by the current strain.
     double factor() const { return shift ? scale : 1.0; }
 
-    /// scale C.
+    /// Returns scale C.
     template <int N>
     Symmetric<N> scaled(const Symmetric<N>& stiffness) const {
         Symmetric<N> result = stiffness;

@@ -9,7 +9,8 @@
 namespace magshell {
 namespace {
 
-// Of a segment at rest: where its two points meet, its length has a smooth minimum, and no direction is lost.
+// Length below which a segment's length is smoothed, as a fraction of its reference length. [-] The direction
+// of a segment of length zero would be undefined.
 constexpr double softened = 1e-7;
 
 double softened_length(const Vec3& span, double softening) {

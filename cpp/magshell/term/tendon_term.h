@@ -1,10 +1,12 @@
-// Strings through points that ride on nodes, x_p = sum_j w_j x_j, free of friction: what counts is their length alone.
+// TendonTerm: tendons, frictionless strings through points embedded in elements, x_p = sum_j w_j x_j. Their
+// energy depends on their length only:
 //
 //   L = sum_i |x_{i+1} - x_i|,     E = T L + k/s S(L - s r)                                                         [J]
 //
-// with a tension T [N], a stiffness k [N/m] beyond the length r [m] at which it is slack, S of energy/contact.h, and s the
-// share of r that a string is of its tendon: 1 where the tendon slides, else one string a segment. The part of the Hessian
-// that couples all nodes of a string, k/s S'' dL/dx dL/dx^T, is of rank one: it never enters the matrix.
+// with a tension T [N], a stiffness k [N/m] beyond the slack length r [m], and S of energy/contact.h. s is the
+// fraction of r that belongs to the string: 1 where the tendon slides through its points, else each segment is
+// a string of its own. The part of the Hessian that couples all nodes of a string, k/s S'' dL/dx dL/dx^T, has
+// rank one and is kept out of the sparse matrix.
 #pragma once
 
 #include <string>
@@ -15,16 +17,17 @@
 
 namespace magshell {
 
-/// A point that rides on the caller's vertices.
+/// A point embedded in an element, as a weighted sum of the caller's vertices.
 struct EmbeddedPoint {
     std::vector<Index> vertices;
     std::vector<double> weights;
 };
 
 struct TendonInput {
-    std::string owner;  // under which its numbers are registered
+    std::string owner;  // name under which its parameters are registered
     std::vector<EmbeddedPoint> points;
-    /// Whether each segment is a string of its own, and then its share of the length at rest, one a segment.
+    /// slides: false if each segment is a string of its own; `shares` then holds each segment's fraction of the
+    /// reference length.
     bool slides = true;
     std::vector<double> shares;
 };
@@ -47,17 +50,17 @@ class TendonTerm final : public LowRankTerm {
 
   private:
     struct Segment {
-        std::vector<Index> places;              // among the nodes of its string
-        std::vector<double> weights;            // of these in x_b - x_a
+        std::vector<Index> places;              // indices among the nodes of the string
+        std::vector<double> weights;            // weights of these nodes in x_b - x_a
         std::vector<SystemMatrix::Slot> pairs;  // at lower_index(row - 1, column)
-        double softening;                       // [m], below which its length is no longer that of a line
+        double softening;                       // [m] length below which the segment's length is smoothed
     };
     struct String {
         Index tendon;
         double share;
         std::vector<Index> nodes;
         std::vector<Segment> segments;
-        // At the last evaluated state.
+        // Values at the last evaluated state.
         double length = 0.0, tension = 0.0, stiffness = 0.0, extrapolated = 0.0;
         std::vector<Vec3> slopes;  // dL/dx
 
@@ -70,7 +73,7 @@ class TendonTerm final : public LowRankTerm {
         std::array<Slot, n_numbers> slots;
         std::array<double, n_numbers> numbers{};  // T, k, r, smoothing
     };
-    /// Energy, dE/dL, d2E/dL2, and dE/dL by the numbers of its tendon.
+    /// Energy of a string, dE/dL, d2E/dL2, and the derivatives of dE/dL by the tendon's parameters.
     struct Pull {
         double energy, tension, stiffness = 0.0;
         std::array<double, n_numbers> tension_by{};

@@ -1,5 +1,5 @@
-// A solid's tetrahedra, of one kind and one material: their rest shapes and constants, and what follows from a
-// state alone.
+// Tetrahedra: the elements of a solid, all of one kind and one material: their reference shapes, constants,
+// energies and admissible steps.
 //
 //   E = sum over elements  sum_p V_p W(F_p)           W = w + U(v), v the material's measure of volume
 //   mean:                  sum_p V_p w(F_p) + V U(v^), v^ = sum_p V_p v_p / V
@@ -47,7 +47,7 @@ class Tetrahedra : public SolidTerm {
 
     Index body() const override { return body_; }
     Index elements() const override { return solid_.n_elements(); }
-    /// Strains change by as much as the nodes move, of the height of an element.
+    /// Returns the smallest height of an element [m]: a displacement of that size changes strains by about one.
     double length_scale() const override { return height_; }
 
     bool set_values(const Values& values) override {
@@ -74,7 +74,8 @@ class Tetrahedra : public SolidTerm {
         });
     }
 
-    /// w sum_p V_p g_k . g_l,  w what a material says, or the modulus of its waves at rest, 2 mu + lam.
+    /// Adds w sum_p V_p g_k . g_l. The weight w is the material's own, or the P-wave modulus of the reference
+    /// configuration, 2 mu + lambda.
     bool add_projective_stiffness(NodeMatrix& out) const override {
         for (Index pack = 0; pack < loop_.packs(); ++pack) {
             const RestModuli moduli = Material::rest_moduli(constants_[pack].at);
@@ -210,7 +211,7 @@ class Tetrahedra : public SolidTerm {
     struct Constants {
         Pack at[n_constants];
     };
-    // A pack of elements at q.
+    // The kinematics and the volumetric response of a pack of elements at q.
     struct State {
         Pack33 f[points];
         Material at[points];
@@ -220,7 +221,7 @@ class Tetrahedra : public SolidTerm {
         State(const Tetrahedra& term, Index pack, const double* q)
             : State(term, pack, Gradients(term, pack, q), std::make_index_sequence<points>()) {}
 
-        /// Takes the law elsewhere: two measures a point.
+        /// Evaluates the law at other measures, two per point.
         void take_measures(const Tetrahedra& term, Index pack, const Pack* measures) {
             Pack before[mean ? 1 : points];
             for (int k = 0; k < (mean ? 1 : points); ++k) before[k] = measure(k);
@@ -230,7 +231,7 @@ class Tetrahedra : public SolidTerm {
                 volumetric[k].bulk = Material::bulk_between(term.constants_[pack].at, measure(k), before[k]);
         }
 
-        /// At a point.
+        /// Returns the volumetric response at a point.
         const Volumetric& of(int p) const { return volumetric[mean ? 0 : p]; }
 
       private:
@@ -271,7 +272,7 @@ class Tetrahedra : public SolidTerm {
         return deformation_gradient<N>(x, g);
     }
 
-    // force_k += stress g_k
+    // Computes force_k += stress g_k.
     void add_pull(Index pack, int p, const Pack33& stress, Pack3 g[N], Pack3 force[N]) const {
         Element::gradients(rest_[pack].gradients[p], p, g);
         Pack3 sum{Pack(0.0), Pack(0.0), Pack(0.0)};

@@ -1,11 +1,12 @@
-// Forces and Hessian of a solid's tetrahedra.
+// TetrahedraTerm: forces and Hessian of a solid's tetrahedra.
 //
-// Mixed Newton keeps the stresses of a material (what of P does not just follow F) at every point, or the measures
-// that they are functions of, and with a mean volume the element's: unknowns of the linearization, condensed element
-// by element.
+// Mixed Newton stores the stresses of a material at every point (the part of P that is not linear in F), or the
+// measures of which they are functions, and with a mean volume those of the element. They are unknowns of the
+// linearization, condensed element by element.
 //
-// Viscosity goes by Green's strain d at every point and by the moduli at rest, see energy/viscous_strain.h: beside
-// the elastic stress acts  C ((scale - 1) d - shift), see term/strains.h. With a mean volume it resists shear only, or it would lock as the volumetric chunk itself.
+// The viscous stress follows from Green's strain d at every point and the moduli in the reference configuration
+// (energy/viscous_strain.h): C ((scale - 1) d - shift) is added to the elastic stress (term/strains.h). With a
+// mean volume it resists shear only; otherwise it would lock as the volumetric part does.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +25,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
         Base::gradient_of, Base::add_pull;
     using typename Base::State;
     static constexpr int stresses_ = Material::stresses;
-    // What is kept of a point: its stresses, or its measures at the end of a linearized step.
+    // Stored per point: its stresses, or its measures at the end of a linearized step.
     static constexpr bool measures_ = Material::keeps_measures;
     static constexpr int kept_ = measures_ ? 2 : stresses_;
 
@@ -42,7 +43,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
     void evaluate(const double* q, const Controls&, Residual& out) override {
         state_.assign(q, q + 3 * n_nodes_);
         if (this->history_.shift) viscous_.resize(this->elements(), points);
-        // Flattened: packs that go from function to function through memory cost a third of the time.
+        // All calls are inlined: passing packs between functions through memory takes a third of the time.
         loop_.scatter_packs([&](Index pack) __attribute__((flatten)) {
             const State state(*this, pack, q);
             Pack3 g[N], force[N];
@@ -246,7 +247,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
         return moduli;
     }
 
-    // (scale - 1) d - shift at a point.
+    // Computes (scale - 1) d - shift at a point.
     void beyond_elastic(Index pack, int p, const Pack33& f, Pack d[6]) const {
         ViscousStrain::at(f, d);
         const Pack* shift = this->history_.shift->at(pack) + 6 * p;
@@ -277,10 +278,10 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
     const Index n_nodes_;
     Strains stress_, extrapolated_;
     ViscousStresses viscous_;
-    std::vector<double> state_;  // the nodes at which stress_ holds
+    std::vector<double> state_;  // positions of the last evaluated state
 };
 
-/// The term of a solid's elements, straight or curved, with a material.
+/// Creates the term of a solid with linear or quadratic elements of a material.
 template <class Material, class Moduli>
 std::unique_ptr<SolidTerm> make_tetrahedra_term(bool mean_volume, const Solid& solid, Index body,
                                                 const ChunkLoop& chunks, const SystemMatrix& matrix,

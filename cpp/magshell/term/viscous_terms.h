@@ -1,4 +1,5 @@
-// The terms whose stress may know where their strain has been, as one: what a law of viscosity asks of a scene.
+// ViscousTerms: all terms whose stress can have a strain history, treated as one. This is the interface between
+// viscosity laws (solve/viscosity.h) and a scene.
 #pragma once
 
 #include <vector>
@@ -13,17 +14,18 @@ class ViscousTerms {
     const std::vector<ElasticTerm*>& all() const { return terms_; }
     bool empty() const { return terms_.empty(); }
 
-    /// Their stresses are C (scale d - shift) from now on, and C d without a shift.
+    /// Sets the history of all terms: their stresses are C (scale d - shift) from now on, or C d without a
+    /// shift.
     void set_history(double scale, const StrainSet* shift);
     double scale() const { return scale_; }
 
     StrainSet strains(const VectorXd& q) const;
-    /// At the last evaluated state: J p, and J^T s.
+    /// Return J p and J^T s at the last evaluated state.
     StrainSet rates(const VectorXd& p) const;
     VectorXd forces(const StrainSet& stresses, Index unknowns) const;
     void strains_vjp(const StrainSet& stresses, Gradient& out) const;
     StrainSet stresses(const StrainSet& strains) const;
-    /// Zeros; and how many numbers they are.
+    /// zeros() returns strains that are all zero; size() their number.
     StrainSet zeros() const;
     Index size() const;
 

@@ -116,14 +116,14 @@ bool VolumeTerm::set_values(const Values& values) {
     for (Volume& each : volumes_)
         for (int k = 0; k < 2; ++k)
             if (each.slots[k].entry >= 0) each.numbers[k] = values.number(each.slots[k], each.row);
-    return false;  // its round-off is that of the state
+    return false;  // its round-off depends on the state only
 }
 
 bool VolumeTerm::has_infeasible_states() const {
     return std::any_of(volumes_.begin(), volumes_.end(), [](const Volume& each) { return each.stays_open; });
 }
 
-// Along a straight way the volume is a cubic: V(q) + s V'(q) p + s^2 V'(p) q + s^3 V(p).
+// Along a straight path the volume is a cubic: V(q) + s V'(q) p + s^2 V'(p) q + s^3 V(p).
 double VolumeTerm::max_step_length(const double* q, const double* p) const {
     constexpr int samples = 64, halvings = 50;
     double share = 1.0;

@@ -1,10 +1,12 @@
-// Volumes inside closed surfaces, of cavities and of cells, and what each of them costs.            energy/volume_form.h,
-//                                                                                                   energy/volume_law.h
+// VolumeTerm: energies of the volumes of cavities and pneumatic cells, which closed surfaces bound.
+// energy/volume_form.h, energy/volume_law.h
+//
 //   g = E'(V) dV/dx,     H = E'(V) d2V/dx2 + E''(V) dV/dx dV/dx^T
 //
-// The last part couples all nodes of a surface: it goes into the matrix where these are coupled there, and is of low rank
-// beside it elsewhere. In mixed steps the pressure is an unknown of its own, condensed: the curvature sees the one to which
-// the linearized step leads, which a stiff liquid needs.
+// The last part couples all nodes of a surface. It goes into the sparse matrix if these nodes are coupled
+// there, else into the low-rank part. In mixed Newton steps the pressure is an unknown of its own, condensed:
+// the curvature uses the pressure at the end of the linearized step, without which a stiff liquid does not
+// converge.
 #pragma once
 
 #include <string>
@@ -18,18 +20,19 @@
 
 namespace magshell {
 
-/// A closed surface: nodes of its faces, in the caller's vertices, and a weight each: -1 where it runs the other way round.
+/// A closed surface: the nodes of its faces in the caller's numbering of vertices, and one weight per face, -1
+/// for a face of opposite orientation.
 struct ClosedSurface {
-    std::vector<Index> triangles, curved;  // three a face, six a face
+    std::vector<Index> triangles, curved;  // three nodes per face; six nodes per face
     std::vector<double> weights, curved_weights;
 };
 
-/// Volumes under one law, one number or pair of numbers each.
+/// Volumes under one law, each with one or two parameters.
 struct VolumeInput {
-    std::string owner;  // under which these are registered
+    std::string owner;  // name under which the parameters are registered
     VolumeLaw law = VolumeLaw::pressure;
-    bool stays_open = false;  // whether a state without volume has no energy
-    bool coupled = false;     // whether all nodes of a surface are to be coupled in the matrix
+    bool stays_open = false;  // true: states without volume have no energy
+    bool coupled = false;     // true: all nodes of a surface are coupled in the sparse matrix
     std::vector<ClosedSurface> surfaces;
 };
 
@@ -55,7 +58,7 @@ class VolumeTerm final : public LowRankTerm {
   private:
     template <int N>
     struct Face {
-        std::array<Index, N> places;  // among the nodes of its surface
+        std::array<Index, N> places;  // indices among the nodes of the surface
         PairSlots<N> slots;
         double weight;
     };
@@ -69,13 +72,14 @@ class VolumeTerm final : public LowRankTerm {
         bool stays_open;
         double rest = 0.0;  // [m3]
         std::vector<SystemMatrix::Slot>
-            pairs;  // of all nodes, at lower_index(row - 1, column); empty: low rank
+            pairs;  // of all pairs of nodes, at lower_index(row - 1, column); empty: low rank
         std::array<double, 2> numbers{};
-        // At the last evaluated state.
+        // Values at the last evaluated state.
         double volume = 0.0, slope = 0.0, curvature = 0.0, magnitude = 0.0, extrapolated = 0.0;
         std::vector<Vec3> slopes;  // dV/dx
 
-        /// Positions from the first node on: wherever the origin is, the volume is the same.
+        /// Returns the positions relative to the first node: the volume does not depend on the origin, and no
+        /// digits are lost far from it.
         std::vector<Vec3> at(const double* q) const;
         double volume_at(const std::vector<Vec3>& x) const;
         void add_slopes(const std::vector<Vec3>& x, std::vector<Vec3>& out) const;

@@ -42,8 +42,9 @@ void WaterTerm::evaluate(const Kinematics& at, const Controls&, Residual& out) {
     });
 }
 
-// Every corner feels the same force. Into the symmetric matrix goes what the symmetric part of its derivative
-// by the motion of the face as a whole has; it never lets the matrix lose its definiteness.
+// All corners of a face have the same force. The symmetric part of its derivative by the motion of the face as
+// a whole goes into the system matrix, which stays positive definite; the rest goes into the nonsymmetric
+// tangent.
 void WaterTerm::assemble(const Kinematics& at, const Controls&, bool, SystemMatrix& out,
                          Remainder& rest) const {
     Remainder::Shared* const shared = rest.extend(surface_.n_faces());

@@ -1,4 +1,5 @@
-// Drag, thrust and added mass of water on all faces.                                      force/drag.h
+// WaterTerm: drag, thrust and added mass of surrounding water on all faces of a shell.
+// force/drag.h
 #pragma once
 
 #include "magshell/assembly/face_loop.h"
@@ -10,7 +11,8 @@ namespace magshell {
 
 class WaterTerm final : public ForceTerm {
   public:
-    /// Takes the curves from `water`; its numbers come as values, of all surfaces alike.
+    /// Creates the term with the drag and thrust curves of `water`; its other numbers are parameters, which all
+    /// surfaces share.
     WaterTerm(const Surface& surface, const FaceLoop& faces, const Water& water, Registry& registry);
 
     std::string_view name() const override { return "water"; }
