@@ -1,13 +1,14 @@
-// Bending energy of a St. Venant-Kirchhoff shell.
+// Bending energy of a St. Venant-Kirchhoff shell of linear triangles.
 //
 //   E_f = 1/2 delta^T C delta                                                       [J]   [Chen22] (19), (23)
 //
-// delta_i is the change of the angle between the face's normal and a director at the midpoint of its edge i,
+// delta_i is the change of the angle between the face's normal and the director at the midpoint of its edge i,
 //
 //   delta_i = c_i (theta_i - theta~_i) + s_i phi_i
 //
-// with the fold angle theta of the edge, the rotation phi of its director, c = 1/2 between two faces and 1 at
-// a clamped edge, s = +1 and -1 on the two sides. `hinge` has no phi; a free edge has no theta. One face a lane.
+// with the dihedral angle theta of the edge, the rotation phi of its director, c = 1/2 between two faces and 1
+// at a clamped edge, and s = +1 and -1 on the two sides. `hinge` bending has no phi; a free edge has no theta.
+// One face per SIMD lane.
 #pragma once
 
 #include <string_view>
@@ -17,14 +18,16 @@
 
 namespace magshell {
 
-/// The J^T C J part of a face's Hessian; the curvature of theta itself is added per fold.
+/// The J^T C J part of a face's Hessian. The second derivatives of theta are added per edge.
 struct BendingFace {
-    // delta_i / d(node): `corner[i][k]` for the face's own vertex k, `beyond[i]` for the vertex across edge i.
+    // d delta_i / d(node): `corner[i][k]` for the face's own vertex k, `beyond[i]` for the vertex across edge
+    // i.
     Pack3 corner[3][3];
     Pack3 beyond[3];
     Pack sign[3];  // d delta_i / d phi_i
 
-    /// Blocks of the six nodes (corners 0-2, beyond 3-5) at lower_index(row, column).
+    /// Computes the blocks between the six nodes (corners 0-2, vertices across the edges 3-5) at
+    /// lower_index(row, column).
     void node_blocks(const Symmetric3& stiffness, Pack33 h[21], Pack3 stiff_corner[3][3]) const {
         for (int j = 0; j < 3; ++j)
             for (int k = 0; k < 3; ++k)
@@ -44,7 +47,7 @@ struct BendingFace {
         }
     }
 
-    /// Rows of phi_i: at [i][node], against the six nodes.
+    /// Computes the rows of phi_i against the six nodes: rows[i][node].
     void rotation_rows(const Symmetric3& stiffness, const Pack3 stiff_corner[3][3], Pack3 rows[3][6]) const {
         for (int i = 0; i < 3; ++i)
             for (int k = 0; k < 3; ++k) {

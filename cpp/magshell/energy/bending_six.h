@@ -1,11 +1,11 @@
-// The curvature inside a six-node face, against its test moments: the part of the nine bending measures that its own nodes
-// make.                                                                                        energy/six_node_face.h
+// BendingSix: the curvature inside a quadratic triangle, tested with the moments of its bending element: the
+// part of the nine bending strains that depends on the face's own nodes. energy/six_node_face.h
 //
 //   f[3 i + k] = scale sum_p w_p/2 psi_ik(p) / J~(p)  c_i . n(p),     c_i = 4 (x_i + m_i - m_{i+1} - m_{i+2})
 //
-// with m_i the middle opposite corner i: c_i is minus the second derivative along the two other edges, a constant.
-// For given stresses the energy at a point is b . n(a_1, a_2), linear in b = sum_a e_a x_a: derivatives are those of a
-// normal, mapped to the nodes.
+// with m_i the middle node opposite corner i. c_i is minus the mixed second derivative along the two other
+// edges, a constant of the face. For given stresses the energy at a point is b . n(a_1, a_2), linear in b =
+// sum_a e_a x_a: its derivatives are those of a unit normal, mapped to the nodes.
 #pragma once
 
 #include "magshell/energy/six_node_rows.h"
@@ -38,7 +38,7 @@ class BendingSix {
                                     x[six_nodes::middle((i + 2) % 3)]);
     }
 
-    /// Without what they are at rest.
+    /// Computes the measures f; the caller subtracts their reference values.
     void measures(const Element& element, Pack f[9]) const {
         for (int r = 0; r < 9; ++r) f[r] = Pack(0.0);
         for (int i = 0; i < 3; ++i)
@@ -53,7 +53,7 @@ class BendingSix {
         for (auto& row : out.at)
             for (Pack3& by_node : row) by_node = {Pack(0.0), Pack(0.0), Pack(0.0)};
         for (int i = 0; i < 3; ++i) {
-            Pack3 normal[3] = {};  // n, of each of the three, integrated
+            Pack3 normal[3] = {};  // integral of n times each of the three test functions
             for (int p = 0; p < points; ++p) {
                 Pack3 by_first, by_second;
                 at_[p].derivatives(bend_[i], by_first, by_second);
@@ -112,7 +112,7 @@ class BendingSix {
         Pack3 a1, a2, n;
         Pack inverse_area;
 
-        /// Of b . n, by a1 and a2.
+        /// Computes the derivatives of b . n by a1 and a2.
         void derivatives(const Pack3& b, Pack3& by_first, Pack3& by_second) const {
             const Pack3 across = inverse_area * (b - dot(b, n) * n);
             by_first = cross(a2, across);
@@ -120,7 +120,7 @@ class BendingSix {
         }
     };
 
-    /// The second derivative of b . n by (a1, a2, b): blocks with the row first.
+    /// The second derivatives of b . n by (a1, a2, b), as blocks with the row first.
     struct NormalCurvature {
         Pack33 first_first, first_second, second_second, b_first, b_second;
 
@@ -154,10 +154,10 @@ class BendingSix {
                  {six_nodes::middle((i + 1) % 3), -4.0},
                  {six_nodes::middle((i + 2) % 3), -4.0}}};
     }
-    /// The derivatives from corner 0 towards the two others.
+    /// Derivatives of the shape functions at point p, from corner 0 towards the two other corners.
     static constexpr const std::array<double, 6>& first(int p) { return firsts_[p]; }
     static constexpr const std::array<double, 6>& second(int p) { return seconds_[p]; }
-    /// Half a point's weight times the value there of a test function.
+    /// Half the weight of point p times the value of a test function there.
     static double weight(int i, int k, int p) { return weights_[3 * i + k][p]; }
     static Pack3 combination(const std::array<double, 6>& by_node, const Pack3 x[6]) {
         Pack3 sum = Pack(by_node[0]) * x[0];

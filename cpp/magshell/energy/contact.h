@@ -1,27 +1,27 @@
-// Penalty energy of a point that is too close to an obstacle.
+// Penalty: the penalty energy of a point that is closer to an obstacle than an offset.
 //
 //   E = k_n S(d),   N = k_n S'(d),   d = offset - distance                                       [J], [N]
 //
-// The force N pushes along the obstacle's normal. It is linear in the depth d, but for a short parabola that
-// makes its derivative continuous:  S' = d^2/(2 e) up to d = e, d - e/2 from there on.   [Geilinger et al.
-// 2020]
+// The force N acts along the obstacle's normal. It is linear in the depth d, except for a short parabola at the
+// beginning that makes its derivative continuous:  S' = d^2/(2 e) up to d = e, d - e/2 beyond.   [Geilinger et
+// al. 2020]
 #pragma once
 
 namespace magshell {
 
-/// What a contact is made of; one for all its points.
+/// The parameters of a contact with obstacles, the same for all of its points.
 struct ContactLaw {
     double stiffness = 0.0;       // k_n [N/m], of each point
     double smoothing = 0.0;       // e [m]
-    double offset = 0.0;          // [m], the distance that points keep
-    double friction = 0.0;        // coefficient of friction
-    double sticking_speed = 0.0;  // [m/s], below which friction holds
+    double offset = 0.0;          // [m] distance at which contact begins
+    double friction = 0.0;        // coefficient of friction [-]
+    double sticking_speed = 0.0;  // [m/s] speed below which friction is regularized
 };
 
-/// S and its derivatives at a depth [m] > 0, for a stiffness of one.
+/// S and its derivatives at a depth [m] > 0, for unit stiffness.
 struct Penalty {
     double energy, force, stiffness;
-    double force_by_smoothing;  // at the same depth
+    double force_by_smoothing;  // at constant depth
 
     Penalty(double depth, double smoothing) {
         if (depth < smoothing) {

@@ -1,12 +1,12 @@
-// Corotated linear elasticity. One point a lane.
+// Corotated: corotated linear elasticity. One point per SIMD lane.
 //
 //   W = mu |F - R|^2 + lam/2 (tr(R^T F) - 3)^2                                    [J/m3]
 //   P = 2 mu F + s R,   s = lam (tr U - 3) - 2 mu                                 [Pa]
 //   dR(D) = R [w],   w = (tr U I - U)^-1 axial(R^T D - D^T R)
 //
-// R the nearest rotation, U = R^T F with signed stretches s_i. The measure of volume is tr U - 2. s is the
-// stress that mixed Newton keeps. Where s_i + s_j = 0, R jumps: there, and only there, its derivative is cut
-// off, which keeps the Hessian finite.
+// R is the nearest rotation, U = R^T F with signed stretches s_i. The measure of volume is tr U - 2. Mixed
+// Newton stores the stress s. Where s_i + s_j = 0, R jumps; there, and only there, its derivative is bounded,
+// which keeps the Hessian finite.
 #pragma once
 
 #include "magshell/energy/invariant_solid.h"

@@ -7,7 +7,7 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-/// Shape functions of a triangle with corners (0, 0), (1, 0), (0, 1), and their slopes by s and t.
+/// Shape functions of a triangle with corners (0, 0), (1, 0), (0, 1), and their derivatives by s and t.
 template <int N>
 struct Shapes {
     double value[N];
@@ -28,8 +28,8 @@ struct Shapes {
     }
 };
 
-/// Adds the integral over the triangle a, b, c of the parameters, by the rule of Gauss with 3 x 3 points in the square that
-/// is drawn together into it: exact for polynomials of the fourth degree, which is what six nodes make.
+/// Adds the integral over the triangle a, b, c of the parameter plane, by a 3 x 3 Gauss rule in the unit square
+/// mapped onto the triangle. It is exact to fourth degree, which is the degree of the integrand of six nodes.
 template <int N>
 void integrate(const Vec2& a, const Vec2& b, const Vec2& c,
                typename FacePressure<N>::Coefficients& coefficients) {
@@ -56,7 +56,8 @@ template <int N>
 std::array<typename FacePressure<N>::Coefficients, FacePressure<N>::parts> integrated() {
     std::array<typename FacePressure<N>::Coefficients, FacePressure<N>::parts> parts{};
     const Vec2 nodes[6] = {{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}, {0.5, 0.0}, {0.5, 0.5}, {0.0, 0.5}};
-    // As a mesh of ten-node tetrahedra has its flat triangles.
+    // The four flat triangles that a curved face is shown as, in the same order as for faces of ten-node
+    // tetrahedra.
     const int flat[4][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}};
     if constexpr (N == 3)
         integrate<N>(nodes[0], nodes[1], nodes[2], parts[0]);

@@ -1,19 +1,19 @@
-// Forces of a pressure on a curved face, exactly: a pressure p pushes against the normals, f = - p n da, and with the
-// face's shape functions N_k over its parameters (s, t)
+// FacePressure: nodal forces of a uniform pressure on a curved face, integrated exactly. The pressure acts
+// against the normals, f = - p n da. With the face's shape functions N_k of its parameters (s, t)
 //
 //   g_k = - f_k = p int N_k (x_s x x_t) ds dt = p sum_{l<m} A_klm x_l x x_m                                    [N]
 //   A_klm = int N_k (N_l,s N_m,t - N_m,s N_l,t) ds dt
 //
-// where A is the same for all faces, and no point of integration is left. With c_kl = sum_m A_klm x_m
+// A is the same for all faces, so no integration points remain. With c_kl = sum_m A_klm x_m
 //
 //   dg_k/dx_l = - p [c_kl]x,    symmetric part - p/2 [c_kl - c_lk]x,    skew part - p/2 [c_kl + c_lk]x.
 //
-// Summed up over the faces of a surface the skew part is - 1/2 of the line integral of p v . (u x dx) around its border:
-// it vanishes where the surface is closed or its border held, and p is the same everywhere. There p times the volume
-// enclosed is a potential, elsewhere there is none.
+// Summed over the faces of a surface, the skew part equals - 1/2 of the line integral of p v . (u x dx) around
+// its border. It vanishes if the surface is closed or its border fixed, and p is uniform; then p times the
+// enclosed volume is a potential. Otherwise there is none.
 //
-// A face of six nodes (corners, then the middles 01, 12, 20) is shown to callers as four flat triangles, each of which may
-// have a pressure of its own: A is known for each of these parts.
+// Callers see a face of six nodes (corners, then the middles 01, 12, 20) as four flat triangles, each of which
+// may have its own pressure. A is therefore stored for each of these parts.
 #pragma once
 
 #include <array>
@@ -27,24 +27,24 @@ struct FacePressure {
     static_assert(N == 3 || N == 6);
     static constexpr int parts = N == 3 ? 1 : 4;
     static constexpr int pairs = N * (N - 1) / 2;
-    /// A_klm of a part, or a sum of them times pressures: rows k; columns the pairs l < m, row after row.
+    /// A_klm of a part, or a sum of them times pressures: k by rows, the pairs l < m by columns, row after row.
     using Coefficients = std::array<std::array<double, pairs>, N>;
     using Corners = std::array<Vec3, N>;
 
     static const std::array<Coefficients, parts>& of_parts();
 
-    /// Where nothing but shape and size count: coordinates from the first node on.
+    /// Returns the positions relative to the first node.
     static Corners relative(const Corners& x) {
         Corners y;
         for (int k = 0; k < N; ++k) y[k] = x[k] - x[0];
         return y;
     }
 
-    /// g_k at coordinates from the first node on.
+    /// Returns g_k / p for positions relative to the first node.
     static Corners forces(const Coefficients& a, const Corners& y) {
         Corners g;
         g.fill(Vec3::Zero());
-        for (int l = 1, pair = N - 1; l < N; ++l)  // the pairs with the first node have no share
+        for (int l = 1, pair = N - 1; l < N; ++l)  // pairs with the first node contribute nothing
             for (int m = l + 1; m < N; ++m, ++pair) {
                 const Vec3 across = y[l].cross(y[m]);
                 for (int k = 0; k < N; ++k) g[k] += a[k][pair] * across;
@@ -52,7 +52,7 @@ struct FacePressure {
         return g;
     }
 
-    /// c_kl, likewise.
+    /// Returns c_kl for positions relative to the first node.
     static std::array<Corners, N> axes(const Coefficients& a, const Corners& y) {
         std::array<Corners, N> c;
         for (int k = 0; k < N; ++k) {

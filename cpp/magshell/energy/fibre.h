@@ -1,17 +1,18 @@
-// A muscle's fibres at a point of integration of an element of N nodes.
+// FibreLaw: energy and tension of a muscle's fibres at an integration point of an element with N nodes.
 //
 //   E_p = V_p w psi(l, a),   l = |F m|,  F m = sum alpha_k x_k = y,  alpha_k = g_k . m                       [J]
 //
 //   target stretch   psi = (l - r)^2/2, r = 1 - a                                         Du et al. 2021 (DiffPD)
 //   active stress    psi = a l^2/2, P = w a (F m) m^T                                     Lee et al. 2018, [Qiao21]
-//   Hill             psi = a int f_L dl + int f_P dl, and in motion the force a f_L (f_V - 1) beside it
+//   Hill             psi = a int f_L dl + int f_P dl; in motion also the force a f_L (f_V - 1)
 //
-// with T = psi' the tension over w, n = y/l and T/l where l > 0:
+// with the stretch l, the strength w [Pa] and the activation a. With T = psi' the tension over w, n = y/l and
+// T/l where l > 0:
 //
 //   dE/dx_k = V_p w alpha_k T n,     d2E/dx_k dx_l = V_p w alpha_k alpha_l (T/l (I - n n^T) + T' n n^T)
 //
-// One element a lane. Nothing of it knows det F: flat and inverted elements are like others. Where l = 0, n is zero, the
-// mean over all directions, and T/l is taken as T'.
+// Nothing depends on det F, so flat and inverted elements need no special care. Where l = 0, n is set to zero,
+// its mean over all directions, and T/l to T'. One element per SIMD lane.
 #pragma once
 
 #include "magshell/core/pack_functions.h"
@@ -24,11 +25,11 @@ namespace magshell {
 
 enum class FibreForm { target_stretch, active_stress, hill };
 
-/// What fibres do, of unit strength.
+/// The law of a fibre of unit strength.
 struct FibreLaw {
     FibreForm form = FibreForm::active_stress;
     FibreCurve force_length, passive;  // f_L(l), f_P(l)
-    FibreCurve force_velocity;         // f_V(u), u the rate of l over its largest; empty: 1
+    FibreCurve force_velocity;         // f_V(u), u: rate of l over its largest; empty: 1
 
     struct Response {
         Pack energy, tension, slope;  // psi, T, T'
@@ -56,7 +57,7 @@ struct FibreLaw {
         return all;
     }
 
-    /// f_V - 1 and its slope.
+    /// Returns f_V - 1 and its slope.
     FibreCurve::Sample excess_over_isometric(double rate) const {
         FibreCurve::Sample sample = force_velocity.at(rate);
         sample.value -= 1.0;
@@ -64,10 +65,10 @@ struct FibreLaw {
     }
 };
 
-/// Where a fibre lies now.
+/// The current vector y of a fibre, its direction n and its stretch.
 struct DeformedFibre {
     Pack3 y, n;
-    Pack length, inverse;  // l, and 1/l, zero where l is
+    Pack length, inverse;  // l, and 1/l, which is zero where l is
 
     explicit DeformedFibre(const Pack3& pushed_forward)
         : y(pushed_forward), length(sqrt(squared_norm(pushed_forward))) {
@@ -76,18 +77,18 @@ struct DeformedFibre {
         n = inverse * y;
     }
 
-    /// T/l, or T' where l is zero.
+    /// Returns T/l, or T' where l is zero.
     Pack over_length(const FibreLaw::Response& law) const {
         return law.tension * inverse + (Pack(1.0) - length * inverse) * law.slope;
     }
 
-    /// along n n^T + across (I - n n^T)
+    /// Returns along n n^T + across (I - n n^T).
     Pack33 stiffness(const Pack& along, const Pack& across) const {
         Pack33 m = outer((along - across) * n, n);
         add_to_diagonal(m, across);
         return m;
     }
-    /// What is left of v across the fibre.
+    /// Returns the part of v perpendicular to the fibre.
     Pack3 across(const Pack3& v) const { return v - dot(n, v) * n; }
 };
 

@@ -1,5 +1,6 @@
-// A curve through samples at equally spaced places, twice continuously differentiable everywhere: a cubic B-spline whose
-// coefficients beyond both ends are the end's, so that it goes over into a constant there.    field/cubic_spline.h
+// FibreCurve: a curve through equally spaced samples, twice continuously differentiable everywhere. It is a
+// cubic B-spline whose coefficients beyond both ends repeat the last one, so that it becomes constant there.
+// field/cubic_spline.h
 #pragma once
 
 #include <algorithm>
@@ -19,7 +20,7 @@ class FibreCurve {
     };
 
     FibreCurve() = default;
-    /// coefficients c_i of the places origin + i spacing, two or more.
+    /// Creates the curve from the coefficients c_i at origin + i spacing, two or more.
     FibreCurve(double origin, double spacing, std::vector<double> coefficients)
         : origin_(origin), spacing_(spacing), c_(std::move(coefficients)), integrals_(size() + 4) {
         for (int i = -2; i <= size(); ++i) integrals_[i + 3] = integrals_[i + 2] + interval_integral(i);
@@ -27,10 +28,11 @@ class FibreCurve {
 
     bool empty() const { return c_.empty(); }
 
-    /// The integral is zero where the curve begins to be no constant.
+    /// Returns the curve and its integral at a position. The integral is zero where the curve stops being
+    /// constant at its lower end.
     Sample at(double place) const {
         const double s = (place - origin_) / spacing_;
-        // Constant before knot -2 and from knot n + 1 on.
+        // The curve is constant below knot -2 and above knot n + 1.
         if (!(s > -2.0)) return {(s + 2.0) * spacing_ * c_.front(), c_.front(), 0.0};
         if (s >= size() + 1.0)
             return {(integrals_.back() + (s - size() - 1.0) * c_.back()) * spacing_, c_.back(), 0.0};
@@ -53,7 +55,7 @@ class FibreCurve {
     int size() const { return static_cast<int>(c_.size()); }
     double coefficient(int i) const { return c_[std::clamp(i, 0, size() - 1)]; }
 
-    // Of the weights, from 0 to t.
+    // Returns the integrals of the four spline weights from 0 to t.
     static std::array<double, 4> integrated(double t) {
         const double u = 1.0 - t, t2 = t * t, t3 = t2 * t, t4 = t2 * t2, u4 = u * u * u * u;
         const double last = t4 / 24.0;
@@ -62,7 +64,7 @@ class FibreCurve {
         return {first, second, t - first - second - last, last};
     }
 
-    // Over the whole interval from knot i on, of the spacing.
+    // Returns the integral over the interval that begins at knot i, in units of the spacing.
     double interval_integral(int i) const {
         return (coefficient(i - 1) + 11.0 * coefficient(i) + 11.0 * coefficient(i + 1) + coefficient(i + 2)) /
                24.0;
@@ -70,7 +72,7 @@ class FibreCurve {
 
     double origin_ = 0.0, spacing_ = 1.0;
     std::vector<double> c_;
-    std::vector<double> integrals_;  // up to knot i, of the spacing, at i + 2
+    std::vector<double> integrals_;  // integral up to knot i in units of the spacing, at i + 2
 };
 
 }  // namespace magshell

@@ -21,11 +21,12 @@ std::array<Eigen::Vector2d, 3> edges_in(const Eigen::Matrix<double, 3, 2>& axes,
 
 }  // namespace
 
-// With tensors e(d) = sum_i d_i measure_i and s(d) their stress, the work is A' e(r) : s(d).
+// Derivatives of the work A' e(r) : s(d), with strain tensors e(d) = sum_i d_i measure_i and their stresses
+// s(d).
 struct GrownTriangle::Work {
     Vec3 on_r, on_d;  // A' measure_i : s(d) and A' measure_i : s(r)
     double total;
-    Mat2 by_growth;  // with both e changing as G^-1 e G^-1, the area as det G
+    Mat2 by_growth;  // both e change as G^-1 e G^-1, the area as det G
 };
 
 GrownTriangle::Work GrownTriangle::work(const std::array<Mat2, 3>& measures, double modulus, double nu,
@@ -54,7 +55,7 @@ Mat2 GrownTriangle::membrane_by_growth(const ShellMaterial& m, const Vec3& r, co
     return work(face.membrane_measures(), m.young_modulus * m.thickness, m.poisson_ratio, r, d).by_growth;
 }
 
-// R'_i = det G / (A~ l'_i) G^-1 (t~_i (x) t~_i) G^-1, with the turned edges.
+// R'_i = det G / (A~ l'_i) G^-1 (t~_i (x) t~_i) G^-1, with the rotated edges t~_i.
 Mat2 GrownTriangle::bending_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const {
     const double modulus = m.young_modulus * m.thickness * m.thickness * m.thickness / 12.0;
     const Work found = work(face.bending_measures(), modulus, m.poisson_ratio, r, d);

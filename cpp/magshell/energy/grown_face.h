@@ -1,13 +1,14 @@
-// A flat face that has grown: what it would be by itself, in axes of its plane at rest.
+// GrownFace: the natural (stress-free) configuration of a flat face with a growth tensor G and a natural
+// curvature K, in axes of its plane in the reference configuration.
 //
-//   edges      t'_i = G t~_i, area A' = A~ det G, so that C is that of the grown triangle (energy/material.h)
+//   edges      t'_i = G t~_i, area A' = A~ det G; the stiffness C is that of the grown triangle (energy/material.h)
 //   stretch    measured from |t'_i|^2
-//   bending    measured from  b = sqrt(det G) b~ + G K G  in axes at rest: the curvature of the rest shape b~, so that an even
-//              growth leaves its angles as they are, and K in axes of the grown face. As angles of edges, with alpha~_i
-//              that of the rest shape,
+//   bending    measured from  b = sqrt(det G) b~ + G K G  in reference axes, with the curvature b~ of the reference shape, so that
+//              uniform growth does not change its angles; K is in axes of the grown face. As an angle at edge i, with the
+//              reference angle alpha~_i,
 //              o_i = alpha~_i (l'_i / (l~_i sqrt(det G)) - 1) - l'_i / (4 A') t'_j . K t'_k
 //
-// In derivatives by G, sym(a (x) b) is that of a . G b.
+// In derivatives by G, sym(a (x) b) is the derivative of a . G b.
 #pragma once
 
 #include <array>
@@ -22,7 +23,7 @@ inline Mat2 symmetric_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b
     return 0.5 * (a * b.transpose() + b * a.transpose());
 }
 
-/// The stiffness of a grown triangle, and how the work r . C d of two strains goes with its growth.
+/// A grown triangle, and the derivatives of the work r . C d of two strains by its growth.
 class GrownTriangle {
   public:
     GrownTriangle(const std::array<Eigen::Vector2d, 3>& edges, const Mat2& growth)
@@ -34,7 +35,7 @@ class GrownTriangle {
 
     Mat2 membrane_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const;
     Mat2 bending_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const;
-    /// d|t'_i|^2 and, over l'_i, dl'_i.
+    /// Return the derivatives by G of |t'_i|^2, and of l'_i divided by l'_i.
     Mat2 squared_length_by_growth(int i) const { return 2.0 * symmetric_product(grown[i], edge[i]); }
     Mat2 relative_length_by_growth(int i) const {
         return symmetric_product(grown[i], edge[i]) / grown[i].squaredNorm();
@@ -53,26 +54,27 @@ class GrownTriangle {
 
 class GrownFace {
   public:
-    /// growth and curvature [1/m] as symmetric tensors in world axes: what of them lies in the face counts.
+    /// Creates the configuration. growth [-] and curvature [1/m] are symmetric tensors in world axes; only
+    /// their components in the plane of the face matter.
     GrownFace(const std::array<Vec3, 3>& rest, const Mat3& growth, const Mat3& curvature);
 
     const RestFace& face() const { return triangle_.face; }
     const GrownTriangle& triangle() const { return triangle_; }
-    /// In its plane.
+    /// Returns the corners in the plane of the face.
     std::array<Vec3, 3> corners() const;
     Vec3 squared_lengths() const;
-    /// o_i [rad], over the angles of the rest shape.
+    /// Returns o_i [rad], the natural angles relative to those of the reference shape.
     Vec3 natural_angle_changes(const Vec3& rest_angles) const;
 
-    /// Of by . |t'|^2.
+    /// Returns the gradient of by . |t'|^2 by growth.
     Mat2 lengths_by_growth(const Vec3& by) const;
     struct ByNatural {
         Mat2 growth, curvature;
     };
-    /// Of by . o.
+    /// Returns the gradient of by . o by growth and curvature.
     ByNatural natural_angle_changes_vjp(const Vec3& rest_angles, const Vec3& by) const;
 
-    /// A derivative in the face's axes as one by a tensor in world axes.
+    /// Converts a derivative in axes of the face to one by a tensor in world axes.
     Mat3 in_world(const Mat2& tensor) const { return axes_ * tensor * axes_.transpose(); }
 
   private:

@@ -19,7 +19,7 @@ Eigen::Matrix<double, 3, 2> corner_axes(const std::array<Vec3, 6>& x) {
     return plane_axes(edge, edge.cross(x[0] - x[2]).normalized());
 }
 
-/// Barycentric: where on edge i the Gauss point g is.
+/// Returns the barycentric coordinates of Gauss point g of edge i.
 std::array<double, 3> gauss_point(int i, int g) {
     std::array<double, 3> at{};
     at[(i + 1) % 3] = 1.0 - six_nodes::gauss[g];
@@ -128,8 +128,9 @@ Mat2 GrownSix::membrane_by_growth(const ShellMaterial& m, const Vec9& r, const V
     return sum;
 }
 
-// r . C d = r_ . S d_ with the moments r_ = C r and d_ = C d fixed and S the compliance, so that it changes by - r_ . dS d_. At a
-// point S is f w/2 J' (b_p tr(M_r M_d) + b_t tr M_r tr M_d), and moments are M = sum_a s'_a psi_a m_a T'_i, T' = G T~ G / det^2.
+// The work r . C d equals r_ . S d_ with the moments r_ = C r and d_ = C d and the compliance S = C^-1, so for
+// fixed r and d its change is - r_ . dS d_. At a point S is f w/2 J' (b_p tr(M_r M_d) + b_t tr M_r tr M_d),
+// with moments M = sum_a s'_a psi_a m_a T'_i and T' = G T~ G / det^2.
 Mat2 GrownSix::bending_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const {
     const Mat9 stiffness = face().bending_stiffness(m);
     const Vec9 of_r = stiffness * r, of_d = stiffness * d;
@@ -155,7 +156,7 @@ Mat2 GrownSix::bending_by_growth(const ShellMaterial& m, const Vec9& r, const Ve
         const Mat2 both = inverse_ * (moment_r * strain_d + moment_d * strain_r);
         sum += both + both.transpose() - 3.0 * moment_r.cwiseProduct(strain_d).sum() * inverse_;
     }
-    // S d_ is d again.
+    // S d_ equals d.
     return -sum - lengthened_by_growth(of_r.cwiseProduct(d) + of_d.cwiseProduct(r));
 }
 

@@ -1,12 +1,14 @@
-// A six-node face that has grown: what it would be by itself. As energy/grown_face.h, at the points of energy/six_node_face.h.
+// GrownSix: the natural (stress-free) configuration of a quadratic triangle with growth G and natural curvature
+// K. It corresponds to energy/grown_face.h, at the points of energy/six_node_face.h.
 //
-// Growth and curvature are given in axes of the plane through the corners, and hold along the face in axes that follow its
-// tangent plane: the first one's projection, and across it. So det G is one number, and
+// Growth and curvature are given in axes of the plane through the corners. At other points of the face they
+// hold in axes that follow the tangent plane: the projection of the first axis, and the direction perpendicular
+// to it. det G is therefore one number per face, and
 //
-//   stretch    measured from |G t~|^2 where |t~|^2 is at rest
-//   bending    f'[r] = s'_r/(s_r det G) f[r] inside, angles as they are; measured from
+//   stretch    measured from |G t~|^2, where |t~|^2 is the reference value
+//   bending    f'[r] = s'_r/(s_r det G) f[r] inside the face, angles unchanged; measured from
 //              s'_r/(s_r sqrt(det G)) f~[r] - s'_r sum_p w_p/2 psi_r(p)/(J~ det G) t'_j . K t'_k
-//              with f~ what the rest shape measures, its angles included, and s_r twice the length of edge i at r
+//              with f~ the measures of the reference shape, its angles included, and s_r twice the length of edge i at r
 #pragma once
 
 #include <cmath>
@@ -19,7 +21,7 @@ namespace magshell {
 
 using Vec9 = Eigen::Vector<double, 9>;
 
-/// A point of the face at rest: t~_0, t~_1, t~_2 in axes of its tangent plane, and these.
+/// A point of the reference face: t~_0, t~_1, t~_2 in axes of its tangent plane, and these axes.
 struct TangentPoint {
     std::array<Eigen::Vector2d, 3> along;
     Eigen::Matrix<double, 3, 2> axes;
@@ -29,22 +31,24 @@ struct TangentPoint {
 
 class GrownSix {
   public:
-    /// As GrownFace.
+    /// Creates the configuration; arguments as in GrownFace.
     GrownSix(const std::array<Vec3, 6>& rest, const Mat3& growth, const Mat3& curvature);
 
     SixNodeFace face() const;
-    /// Of membrane measures.
+    /// Returns the natural values of the membrane measures.
     Vec9 squared_lengths() const;
-    /// What of f~ the bending is measured from, and what beside it.
+    /// Natural bending measures: the factors of the reference measures f~, and the part due to natural
+    /// curvature.
     Vec9 rest() const { return lengthened_ / std::sqrt(determinant_); }
     Vec9 bent() const;
-    /// t_i at a point of the face at rest, grown, in world axes.
+    /// Returns the grown vectors t_i at a point, in world axes.
     std::array<Vec3, 3> grown_tangents(const std::array<double, 3>& at) const;
 
-    /// Of r . C d, with C of the face and r, d fixed.
+    /// Return the gradient by growth of the work r . C d of fixed strains r and d.
     Mat2 membrane_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const;
     Mat2 bending_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const;
-    /// Of by . squared_lengths; of by . f' in a fixed shape, f' as it is; and of by . (f~ rest + bent).
+    /// Return gradients by growth: of by . squared_lengths(); of by . f' for a fixed shape, where `inside` is
+    /// f'; and, with the gradient by curvature, of by . (f~ rest() + bent()).
     Mat2 lengths_by_growth(const Vec9& by) const;
     Mat2 inside_by_growth(const Vec9& by, const Vec9& inside) const;
     GrownFace::ByNatural natural_by_growth(const Vec9& by, const Vec9& rest) const;
@@ -58,8 +62,9 @@ class GrownSix {
     Eigen::Matrix<double, 3, 2> axes_;
     Mat2 growth_, inverse_, curvature_;
     double determinant_;
-    std::vector<TangentPoint> inside_, at_gauss_, at_middle_;  // 6; 3 i + g: only t_i counts; 3
-    Vec9 lengthened_, scale_;                                  // scale_: s'
+    // six points; Gauss points 3 i + g, where only t_i is used; three edge middles
+    std::vector<TangentPoint> inside_, at_gauss_, at_middle_;
+    Vec9 lengthened_, scale_;  // scale_: s'
 };
 
 }  // namespace magshell

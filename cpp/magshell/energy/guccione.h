@@ -1,9 +1,10 @@
-// The transversely isotropic solid of Guccione et al. 1995, for muscle. One point a lane.
+// Guccione: the transversely isotropic law of Guccione et al. 1995 for heart muscle. One point per SIMD lane.
 //
 //   W = C/2 (e^Q - 1) + K/2 (J - 1)^2                                             [J/m3]
 //   Q = bf E_ff^2 + bt (E_ss^2 + E_nn^2 + 2 E_sn^2) + 2 bfs (E_fs^2 + E_fn^2)
 //
-// in Green's strain E. With e = m . E m and q = |E m|^2, m the unit fibre at rest,
+// in Green's strain E. With e = m . E m and q = |E m|^2, m the unit fibre direction in the reference
+// configuration,
 //
 //   Q = bf e^2 + bt (tr E^2 - 2 q + e^2) + 2 bfs (q - e^2)
 //   D = dQ/dE = 2 (bf + bt - 2 bfs) e m (x) m + 2 bt E + 2 (bfs - bt) (m (x) E m + E m (x) m)
@@ -28,7 +29,7 @@ struct Guccione {
         Green::strain(f, e);
     }
 
-    /// Across the fibres.
+    /// Returns the moduli for small strains across the fibres.
     static RestModuli rest_moduli(const Pack c[]) { return {Pack(0.0), Pack(0.5) * c[0] * c[2]}; }
     static void rest_moduli_vjp(const Pack c[], const RestModuli& by, Pack out[]) {
         out[0] += Pack(0.5) * c[2] * by.mu;
@@ -83,7 +84,8 @@ struct Guccione {
             linear(unit, e, d);
             work[k] = scale * (Green::double_dot(d, rate) + exponent(unit) * total);
         }
-        // By the fibre: D:rate = 2 a e (m . L m) + 2 bt E:L + 2 b (E m) . (L m), dQ/dm = 4 a e E m + 2 b E^2 m.
+        // Derivative by the fibre direction: D:rate = 2 a e (m . L m) + 2 bt E:L + 2 b (E m) . (L m), dQ/dm = 4
+        // a e E m + 2 b E^2 m.
         const Pack a = c[1] + c[2] - Pack(2.0) * c[3], b = Pack(2.0) * (c[3] - c[2]);
         const Pack33 strain = Green::matrix(e), l = Green::matrix(rate);
         const Pack3 m{c[5], c[6], c[7]}, em = multiply(strain, m), lm = multiply(l, m);
@@ -151,7 +153,7 @@ struct Guccione {
     };
 
   private:
-    // D of a strain.
+    // Computes D of a strain.
     static void linear(const Pack c[], const Pack strain[6], Pack d[6]) {
         const Pack3 m{c[5], c[6], c[7]}, em = multiply(Green::matrix(strain), m);
         const Pack along = Pack(2.0) * (c[1] + c[2] - Pack(2.0) * c[3]) * dot(m, em);

@@ -1,16 +1,16 @@
-// Energies of a solid, a volume, that depend on I1 = |F|^2 and J = det F. One point a lane.
+// InvariantSolid: energy densities of a solid that depend on I1 = |F|^2 and J = det F. One point per SIMD lane.
 //
 //   W = w(I1, J) + U(J)                                                           [J/m3]
 //   P = s F + p cof F,   s = 2 dw/dI1,   p = dw/dJ + U'                           [Pa]
 //
-// U is what may act on the mean J of an element. s and p are the stresses that mixed Newton keeps: beside them
-// F enters its own derivative linearly, so nothing else of a trial step is spoiled by the turns in it. Where w
-// grows without bound towards J = 0 it keeps I1 and J instead, and takes the law's derivatives there, by J as a secant to
-// the J of the trial step: that one the turns have made larger, its own stiffness is too small for the stress, and K
-// would lose its sign.
+// U may be evaluated at the mean J of an element. Mixed Newton stores the stresses s and p: besides them P is
+// linear in F, so rotations within a trial step do not spoil anything else. A law w that grows without bound
+// towards J = 0 stores I1 and J instead, evaluates its derivatives there, and takes the derivative by J as a
+// secant to the J of the trial step: rotations have made that J larger, its own stiffness is too small for the
+// stored stress, and the tangent would become indefinite.
 //
-// A law has
-//     constants, refuses_inversion, constant_shear (s does not depend on the state)
+// A law provides
+//     constants, refuses_inversion, constant_shear (true if s does not depend on the state)
 //     derivatives(c, I1, J)           w and its derivatives
 //     volumetric(c, J)                U, U', U''
 #pragma once
@@ -20,11 +20,12 @@
 
 namespace magshell {
 
+/// The Lame constants of a material for small strains, which its viscosity uses.
 struct RestModuli {
     Pack lambda, mu;  // [Pa]
 };
 
-/// Materials whose constants are just these.
+/// The base of materials whose constants are lambda and mu.
 struct LameSolid {
     static constexpr int constants = 2;
 
@@ -40,7 +41,7 @@ struct InvariantDerivatives {
     Pack w, by_i, by_j, by_ii, by_ij, by_jj;
 };
 
-/// Of the part of the energy that depends on the measure of volume only.
+/// The part of the energy that depends on the measure of volume only, with its first and second derivatives.
 struct Volumetric {
     Pack energy, pressure, bulk;
 };
@@ -52,14 +53,14 @@ struct InvariantSolid : LameSolid {
     static constexpr bool keeps_measures = Law::refuses_inversion;
 
     Pack33 f, cof;
-    Pack i1, j, trial;  // trial: det F, whatever j is taken at
+    Pack i1, j, trial;  // trial: det F, even if j was replaced
 
     explicit InvariantSolid(const Pack33& gradient)
         : f(gradient), cof(cofactor(f)), i1(double_dot(f, f)), j(determinant(f, cof)), trial(j) {}
 
     static Volumetric volumetric(const Pack c[], const Pack& measure) { return Law::volumetric(c, measure); }
 
-    /// U'' as a secant of U' between two volumes.
+    /// Returns U'' as a secant of U' between two volumes.
     static Pack bulk_between(const Pack c[], const Pack& now, const Pack& before) {
         const Pack change = before - now, middle = Pack(0.5) * (now + before);
         const Pack secant = (Law::volumetric(c, before).pressure - Law::volumetric(c, now).pressure) / change;
@@ -91,18 +92,18 @@ struct InvariantSolid : LameSolid {
 
     Pack33 piola(const Pack c[], const Pack s[]) const { return shear(c, s) * f + s[0] * cof; }
 
-    /// J and I1 at the end of a linearized step; no less than a tenth of what they are.
+    /// Computes J and I1 at the end of a linearized step, at least a tenth of their current values.
     void measures_after(const Pack33& d, Pack out[2]) const {
         out[0] = max(j + double_dot(cof, d), Pack(0.1) * j);
         out[1] = max(i1 + Pack(2.0) * double_dot(f, d), Pack(0.1) * i1);
     }
-    /// From now on the law is taken at these.
+    /// Evaluates the law at these measures from now on.
     void take_measures(const Pack given[2]) {
         j = given[0];
         i1 = given[1];
     }
 
-    /// dP/dc : d of w, for each constant: these energies are linear in them.
+    /// Computes dP/dc : d of w for each constant c; these energies are linear in their constants.
     void work_by_constants(const Pack[], const Pack33& d, Pack work[]) const {
         for (int k = 0; k < constants; ++k) {
             const Pack unit[2] = {Pack(k == 0 ? 1.0 : 0.0), Pack(k == 1 ? 1.0 : 0.0)};
@@ -117,7 +118,8 @@ struct InvariantSolid : LameSolid {
         }
     }
 
-    /// The blocks of the Hessian at one point, for nodes with these gradients and with this much volume.
+    /// The blocks of the Hessian at one point, for nodes with given shape function gradients and a given
+    /// volume.
     template <int N>
     class Tangent {
       public:
@@ -125,7 +127,7 @@ struct InvariantSolid : LameSolid {
                 const Pack& volume, const Pack3* gradients)
             : g_(gradients), f_(volume * (s[0] * at.f)), shear_(volume * at.shear(c, s)) {
             const InvariantDerivatives w = Law::derivatives(c, at.i1, at.j);
-            // The secant of -mu/J, where that is the whole of it.
+            // The secant of -mu/J, for laws whose w depends on J only through it.
             const Pack own = stresses == 1 && keeps_measures ? w.by_jj * (at.j / at.trial) : w.by_jj;
             const Pack jj = volume * (own + bulk);
             for (int k = 0; k < N; ++k) {

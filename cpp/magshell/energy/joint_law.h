@@ -1,9 +1,9 @@
-// What a joint's coordinate s costs, an angle [rad] or a length [m]: a spring, a torque or force, a servo that pulls towards
-// a target with a limited torque, and soft limits.
+// JointLaw, JointEnergy: the energy of a joint coordinate s, an angle [rad] or a length [m]: a spring, a torque
+// or force, a servo that pulls towards a target with a limited torque, and soft limits.
 //
 //   E = k/2 (s - s_0)^2 - tau s + g e^2 / (1 + sqrt(1 + r^2)) + k_l S(s - upper) + k_l S(lower - s),   e = s - target,  r = g e / T
 //
-// so that the servo's torque g e / sqrt(1 + r^2) stays below T. S: energy/contact.h.
+// The torque of the servo, g e / sqrt(1 + r^2), stays below T. S: energy/contact.h.
 #pragma once
 
 #include <array>
@@ -20,8 +20,9 @@ struct JointLaw {
 
     static constexpr int size = 10;
     using Names = std::array<const char*, size>;
-    /// What a turn about an axis calls them, a slide along it, and a ball joint: of the angle of its rotation, of the angle
-    /// from there to the rotation that its servo wants, and of the angle that its axis is off.
+    /// The parameter names of revolute joints, prismatic joints and ball joints. A ball joint has three
+    /// coordinates: the angle of its rotation, the angle from there to the target rotation of its servo, and
+    /// the angle of its axis from the reference direction.
     static constexpr Names of_turns = {"spring_stiffness", "rest_angle",     "torque",      "target_angle",
                                        "servo_stiffness",  "torque_limit",   "lower_limit", "upper_limit",
                                        "limit_stiffness",  "limit_smoothing"};
@@ -37,12 +38,13 @@ struct JointLaw {
                                        nullptr, nullptr, "cone_limit", "limit_stiffness", "limit_smoothing"};
 };
 
-/// Energy, dE/ds, d2E/ds2, and by the law the derivative of dE/ds.
+/// Energy, dE/ds, d2E/ds2, and the derivatives of dE/ds by the parameters of the law.
 struct JointEnergy {
     double energy, force, stiffness;
     std::array<double, JointLaw::size> force_by{};
 
-    /// (stiffness - force/s)/s^2 of a law whose spring and servo want 0, within its limits; it stays finite at s = 0.
+    /// Returns (stiffness - force/s)/s^2 for a law whose spring and servo have the target 0, within its limits.
+    /// It stays finite at s = 0.
     static double softening(const JointLaw& law, double s) {
         if (!(law.servo_stiffness > 0.0)) return 0.0;
         const double by_limit = law.servo_stiffness / law.torque_limit, root = std::hypot(1.0, by_limit * s);

@@ -1,14 +1,14 @@
-// Zeeman energy of a uniformly magnetized face in an applied field.
+// Magnetic: the Zeeman energy of a uniformly magnetized linear triangle in an applied field.
 //
 //   E_f = - A~ h (F_0 M~_r) . B(x_b)                                                [J]   [Chen22] (20), (24)
 //
-// F_0 carries the rest tangents to the current ones and the rest normal to the current unit normal, so with
-// the rest coordinates (alpha, beta, gamma) of M~_r [A/m] in (a~_1, a~_2, n~)
+// F_0 maps the reference tangents to the current ones and the reference normal to the current unit normal. With
+// the coordinates (alpha, beta, gamma) of M~_r [A/m] in (a~_1, a~_2, n~)
 //
 //   F_0 M~_r = alpha a_1 + beta a_2 + gamma n,     a_1 = x_1 - x_0,  a_2 = x_2 - x_0.
 //
-// Derivatives as in [Chen22] (62), (63) without their misprints: the factor is (n~ . M~_r), and the signs are
-// those below (checked against automatic differentiation). One face a lane.
+// Derivatives follow [Chen22] (62), (63) without their misprints: the factor is (n~ . M~_r), and the signs are
+// those below (checked against automatic differentiation). One face per SIMD lane.
 #pragma once
 
 #include <string_view>
@@ -26,7 +26,7 @@ struct Magnetic {
         Pack alpha, beta, gamma;  // M~_r [A/m] in (a~_1, a~_2, n~)
     };
 
-    /// The applied field at the barycenter. Gradient and curvature only where it varies in space.
+    /// The applied field at the barycenter. Gradient and curvature are set only if the field varies in space.
     struct Field {
         Pack3 flux;        // B                      [T]
         Pack33 gradient;   // dB_i/dx_j              [T/m]
@@ -46,7 +46,7 @@ struct Magnetic {
 
     Pack energy(const Element& e, const Pack3& flux) const { return -e.volume * dot(magnetization(e), flux); }
 
-    /// d(M . b)/da_1 and d(M . b)/da_2 for a fixed vector b.
+    /// Computes d(M . b)/da_1 and d(M . b)/da_2 for a fixed vector b.
     void by_edges(const Element& e, const Pack3& b, Pack3& d1, Pack3& d2) const {
         const Pack3 p = tangential(b);
         d1 = e.alpha * b + e.gamma * cross(a2, p);
@@ -61,7 +61,8 @@ struct Magnetic {
         g[0] = -(g[1] + g[2]);
     }
 
-    /// What a field that varies adds to the gradient of each node: - A~ h (dB/dx)^T M / 3.
+    /// Returns the part of each node's gradient that is due to the gradient of the field: - A~ h (dB/dx)^T M /
+    /// 3.
     Pack3 gradient_by_position(const Element& e, const Field& field) const {
         const Pack3 m = magnetization(e);
         const Pack* g = field.gradient.at;
@@ -70,12 +71,12 @@ struct Magnetic {
         return (e.volume * Pack(-1.0 / 3.0)) * pull;
     }
 
-    /// How fast the normal turns while the nodes move at these rates.
+    /// Returns the rate of the unit normal for given nodal velocities.
     Pack3 normal_rate(const Pack3 rate[3]) const {
         return tangential(cross(rate[1] - rate[0], a2) + cross(a1, rate[2] - rate[0]));
     }
 
-    /// Lower blocks at lower_index(k, l), in a field taken as uniform.
+    /// Computes the lower blocks at lower_index(k, l) in a field taken as uniform.
     void hessian(const Element& e, const Pack3& flux, Pack33 h[6]) const {
         const Pack along = dot(normal, flux);
         // K = (3 (n.B) n n^T - n B^T - B n^T - (n.B) I) / |N|^2
@@ -100,7 +101,8 @@ struct Magnetic {
             }
     }
 
-    /// Adds what a field that varies in space brings: d2(M . B(x_b)) with one or two derivatives on x_b.
+    /// Adds the part due to the variation of the field in space: d2(M . B(x_b)) with one or two derivatives by
+    /// x_b.
     void add_hessian_by_position(const Element& e, const Field& field, Pack33 h[6]) const {
         Pack33 by_node[3];  // d(M . dB/dx_j)/dx_node, row = component of the node, column = j
         for (int j = 0; j < 3; ++j) {
@@ -122,7 +124,7 @@ struct Magnetic {
     }
 
   private:
-    /// P = (b - n (n . b)) / |N|
+    /// Returns P = (b - n (n . b)) / |N|.
     Pack3 tangential(const Pack3& b) const { return inverse_area2 * (b - dot(normal, b) * normal); }
 };
 

@@ -1,9 +1,11 @@
-// Zeeman energy of a magnetized six-node face in an applied field, at its six points inside.
+// MagneticSix: the Zeeman energy of a magnetized quadratic triangle in an applied field, at its six interior
+// points.
 //
 //   E_p = - w_p/2 J~_p h (alpha a_1 + beta a_2 + gamma n) . B(x_p)                               [J]   energy/magnetic.h
 //
-// with a_1, a_2 the derivatives of the place from corner 0 towards the two others, n their normal, and (alpha, beta, gamma)
-// the coordinates of M~_r in their frame at rest, which change from point to point on a curved face.
+// a_1 and a_2 are the derivatives of the position from corner 0 towards the other two corners, n their unit
+// normal, and (alpha, beta, gamma) the coordinates of M~_r in this frame of the reference shape, which differ
+// from point to point on a curved face.
 #pragma once
 
 #include "magshell/energy/magnetic.h"
@@ -26,7 +28,7 @@ class MagneticSix {
     }
 
     const Magnetic& frame() const { return frame_; }
-    /// How fast a_1, a_2 and n change while the nodes move at these rates.
+    /// Computes the rates of a_1, a_2 and n for given nodal velocities.
     void rates(const Pack3 along[6], Pack3 rate[3]) const {
         const Pack3 zero = {Pack(0.0), Pack(0.0), Pack(0.0)};
         const Pack3 ends[3] = {zero, combination(first(), along), combination(second(), along)};
@@ -41,13 +43,13 @@ class MagneticSix {
         for (int k = 0; k < 6; ++k) g[k] += (-e.volume) * (Pack(first()[k]) * d1 + Pack(second()[k]) * d2);
     }
 
-    /// Adds what a field that varies in space brings.
+    /// Adds the part of the gradient that is due to the gradient of the field.
     void add_gradient_by_position(const Element& e, const Magnetic::Field& field, Pack3 g[6]) const {
         const Pack3 pull = -e.volume * multiply(transpose(field.gradient), frame_.magnetization(e));
         for (int k = 0; k < 6; ++k) g[k] += Pack(shapes_[point_][k]) * pull;
     }
 
-    /// Adds lower blocks at lower_index(k, l), in a field taken as uniform.
+    /// Adds lower blocks at lower_index(k, l) in a field taken as uniform.
     void add_hessian(const Element& e, const Pack3& flux, Pack33 h[21]) const {
         Pack33 by_ends[6];
         frame_.hessian(e, flux, by_ends);
@@ -61,7 +63,8 @@ class MagneticSix {
         }
     }
 
-    /// Adds what a field that varies in space brings: d2(M . B(x_p)) with one or two derivatives on x_p.
+    /// Adds the part due to the variation of the field in space: d2(M . B(x_p)) with one or two derivatives by
+    /// x_p.
     void add_hessian_by_position(const Element& e, const Magnetic::Field& field, Pack33 h[21]) const {
         Pack33 by_first, by_second;  // d(M . dB/dx_j)/da, row = component of a, column = j
         for (int j = 0; j < 3; ++j) {

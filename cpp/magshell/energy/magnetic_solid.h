@@ -1,14 +1,15 @@
-// Zeeman energy of a magnetized solid in an applied field, at a point of integration of an element of N nodes.
+// MagneticSolid: the Zeeman energy of a magnetized solid in an applied field, at an integration point of an
+// element with N nodes.
 //
 //   E_p = - V_p (F M~_r) . B(x_p)                                                                        [J]
 //
-// F = sum x_k g_k^T and x_p = sum N_k x_k, so that with alpha_k = g_k . M~_r, which add up to zero,
+// With F = sum x_k g_k^T, x_p = sum N_k x_k and alpha_k = g_k . M~_r, which add up to zero,
 //
 //   F M~_r = sum alpha_k x_k = m
 //   dE/dx_k = - V_p (alpha_k B + N_k G^T m)                                       G = dB/dx
 //   d2E/dx_k dx_l = - V_p (alpha_k N_l G + N_k alpha_l G^T + N_k N_l d2(m . B)/dx dx)
 //
-// The force in a uniform field does not depend on the deformation. One element a lane.
+// In a uniform field the force does not depend on the deformation. One element per SIMD lane.
 #pragma once
 
 #include <array>
@@ -36,12 +37,12 @@ struct MagneticSolid : PushedForwardVector<N> {  // alpha_k [A/m2]
 
     Pack energy(const Pack3 x[N], const Pack3& flux) const { return -volume * dot(magnetization(x), flux); }
 
-    /// Adds what a field taken as uniform pulls at each node.
+    /// Adds the nodal gradients of a field taken as uniform.
     void add_gradient(const Pack3& flux, Pack3 g[N]) const {
         for (int k = 0; k < N; ++k) g[k] += (-volume * alpha[k]) * flux;
     }
 
-    /// Adds what comes with a field that varies in space.
+    /// Adds the part of the gradient that is due to the gradient of the field.
     void add_gradient_by_position(const std::array<double, N>& shapes, const Pack3 x[N],
                                   const Magnetic::Field& field, Pack3 g[N]) const {
         const Pack3 pull = -volume * multiply(transpose(field.gradient), magnetization(x));

@@ -1,6 +1,7 @@
-// The constant stiffness C of a face's strain measures, from its rest shape and material.
+// The constant stiffness C of the strain measures of a linear triangle, from its reference shape and material.
 //
-// St. Venant-Kirchhoff in plane stress; t~_i is the rest edge i turned by 90 degrees in the face's plane.
+// St. Venant-Kirchhoff in plane stress; t~_i is the reference edge i rotated by 90 degrees in the plane of the
+// face.
 //   membrane  S_i = - (t~_j (x) t~_k + t~_k (x) t~_j) / (16 A~^2), Green's strain is sum_i S_i s_i
 //                                                                    [Chen22] (18), (22)
 //             C_ij = Y A~ h / (1 - nu^2) ((1 - nu) tr(S_i S_j) + nu tr S_i tr S_j)
@@ -20,7 +21,7 @@ struct ShellMaterial {
     double thickness, young_modulus, poisson_ratio;
 };
 
-/// A face at rest, laid flat: its turned edges, their lengths and its area.
+/// A face of the reference shape in its plane: its rotated edges, their lengths [m] and its area [m2].
 struct RestFace {
     Eigen::Vector2d turned_edge[3];
     double edge_length[3];
@@ -37,7 +38,7 @@ struct RestFace {
         }
     }
 
-    /// From its edges in axes of its plane.
+    /// Creates the face from its edges in axes of its plane.
     explicit RestFace(const std::array<Eigen::Vector2d, 3>& edge)
         : area(0.5 * std::abs(edge[0].x() * edge[1].y() - edge[0].y() * edge[1].x())) {
         for (int i = 0; i < 3; ++i) {
@@ -49,7 +50,8 @@ struct RestFace {
     Mat3 membrane_stiffness(const ShellMaterial& m) const { return membrane(m).stiffness(m.poisson_ratio); }
     Mat3 bending_stiffness(const ShellMaterial& m) const { return bending(m).stiffness(m.poisson_ratio); }
 
-    /// dC/dnu. By the modulus C is linear; by the thickness linear (membrane) or cubic (bending).
+    /// Return dC/dnu. C is linear in Young's modulus, and linear (membrane) or cubic (bending) in the
+    /// thickness.
     Mat3 membrane_by_poisson_ratio(const ShellMaterial& m) const {
         return membrane(m).by_poisson_ratio(m.poisson_ratio);
     }
@@ -57,7 +59,8 @@ struct RestFace {
         return bending(m).by_poisson_ratio(m.poisson_ratio);
     }
 
-    /// S_i and R_i, in axes along edge 0 and, turned to the left, across it; or in those of the edges that it is made from.
+    /// Return S_i and R_i, in axes along edge 0 and, to its left, perpendicular to it; or in the axes of the
+    /// edges that the face was created from.
     std::array<Eigen::Matrix2d, 3> membrane_measures() const {
         std::array<Eigen::Matrix2d, 3> measure;
         for (int i = 0; i < 3; ++i) {
@@ -91,7 +94,7 @@ struct RestFace {
             return modulus / (1.0 - nu * nu) * ((1.0 - nu) * products + nu * traces);
         }
 
-        // products / (1 + nu) and traces nu / (1 - nu^2), differentiated
+        // Derivative of products / (1 + nu) and traces nu / (1 - nu^2).
         Mat3 by_poisson_ratio(double nu) const {
             const double both = 1.0 - nu * nu;
             return modulus *

@@ -1,8 +1,8 @@
-// Membrane energy of a St. Venant-Kirchhoff sheet in plane stress.
+// Membrane: the membrane energy of a St. Venant-Kirchhoff shell of linear triangles in plane stress.
 //
 //   E_f = 1/2 s^T C s,   s_i = |a_i|^2 - |a~_i|^2                                   [J]   [Chen22] (18), (22)
 //
-// a_i is the edge opposite vertex i. One face a lane.
+// a_i is the edge opposite vertex i. One face per SIMD lane.
 #pragma once
 
 #include <string_view>
@@ -40,9 +40,9 @@ struct Membrane {
         for (int k = 0; k < 3; ++k) g[k] = pull[(k + 1) % 3] - pull[(k + 2) % 3];
     }
 
-    /// The lower blocks (k, l) of J^T C J + sum_i sigma_i d2s_i, at lower_index(k, l).
+    /// Computes the lower blocks (k, l) of J^T C J + sum_i sigma_i d2s_i at lower_index(k, l).
     void hessian(const Symmetric3& stiffness, const Pack stress[3], Pack33 h[6]) const {
-        // Node k holds edge k+1 with + and edge k+2 with -; pair[i][j] = d2E/da_i da_j.
+        // Node k enters edge k+1 with + and edge k+2 with -; pair[i][j] = d2E/da_i da_j.
         Pack33 pair[3][3];
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j <= i; ++j) {

@@ -1,5 +1,5 @@
-// Membrane strains of a six-node face: squared derivatives along its edges, |dx/dt_i|^2, at two points of each and in the
-// mean.                                                                                        energy/six_node_face.h
+// MembraneSix: the membrane strain measures of a quadratic triangle: squared derivatives along its edges,
+// |dx/dt_i|^2, at the two Gauss points of each edge, and their mean over the face. energy/six_node_face.h
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,8 @@
 
 namespace magshell {
 
-/// d[3 i + k] is the sum over these of weight |sum_a by_node[a] x_a|^2: one for a Gauss point, three for a mean.
+/// Each measure d[3 i + k] is a sum of weight |sum_a by_node[a] x_a|^2: one summand for a Gauss point, three
+/// for the mean.
 class MembraneSix {
   public:
     explicit MembraneSix(const Pack3 places[6]) {
@@ -25,7 +26,7 @@ class MembraneSix {
         }
     }
 
-    /// Without what they are at rest.
+    /// Computes the measures; the caller subtracts their reference values.
     void measures(Pack d[9]) const {
         for (int i = 0; i < 3; ++i) {
             for (int g = 0; g < 2; ++g) d[3 * i + g] = squared_norm(on_edge_[i][g]);
@@ -74,7 +75,7 @@ class MembraneSix {
   private:
     static void add(Pack3& to, double factor, const Pack3& x) { to += Pack(factor) * x; }
 
-    /// take(node, coefficient) for the derivative along edge i at its Gauss point g.
+    /// Calls take(node, coefficient) for the derivative along edge i at its Gauss point g.
     template <class Take>
     static void each_along(int i, int g, const Take& take) {
         const std::array<double, 3> c = six_nodes::along(six_nodes::gauss[g]);
@@ -83,7 +84,7 @@ class MembraneSix {
         take(six_nodes::middle(i), c[2]);
     }
 
-    /// The derivative along t_i at the middle of edge m, of the nodes.
+    /// Returns the coefficients of the nodes in the derivative along t_i at the middle of edge m.
     static constexpr const std::array<double, 6>& of_middle(int i, int m) { return middles_[3 * i + m]; }
     static constexpr std::array<std::array<double, 6>, 9> middles_ = [] {
         std::array<std::array<double, 6>, 9> all{};

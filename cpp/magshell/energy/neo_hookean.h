@@ -1,10 +1,10 @@
-// The neo-Hookean solids that refuse inverted elements, by the volume change that they charge for.
+// Neo-Hookean laws that have no energy for inverted elements, by their measure of volume change.
 //
 //   ln J        mu/2 (I1 - 3) - mu ln J              + lam/2 (ln J)^2
 //   J           mu/2 (I1 - 3) - mu ln J              + lam/2 (J - 1)^2
 //   isochoric   mu/2 (J^(-2/3) I1 - 3)               + K/2 (J - 1)^2,   K = lam + 2/3 mu
 //
-// The last summand is the one that may act on the mean J of an element.
+// The last summand may be evaluated at the mean J of an element.
 #pragma once
 
 #include "magshell/core/pack_functions.h"
@@ -12,7 +12,7 @@
 
 namespace magshell {
 
-/// mu/2 (I1 - 3) - mu ln J
+/// Returns mu/2 (I1 - 3) - mu ln J and its derivatives.
 inline InvariantDerivatives shear_and_logarithm(const Pack& mu, const Pack& i1, const Pack& j) {
     const Pack inverse = Pack(1.0) / j, half = Pack(0.5) * mu;
     return {half * (i1 - Pack(3.0)) - mu * log(j),
@@ -23,7 +23,7 @@ inline InvariantDerivatives shear_and_logarithm(const Pack& mu, const Pack& i1, 
             mu * inverse * inverse};
 }
 
-/// k/2 (v - 1)^2
+/// Returns k/2 (v - 1)^2 and its derivatives.
 inline Volumetric quadratic_volume(const Pack& k, const Pack& v) {
     const Pack change = v - Pack(1.0);
     return {Pack(0.5) * k * change * change, k * change, k};

@@ -1,16 +1,18 @@
-// The energy of Projective Dynamics: distances to rotations and to matrices that keep the volume. One point a lane.
+// Projective: the energy of Projective Dynamics, squared distances of F to rotations and to matrices of unit
+// determinant. One point per SIMD lane.
 //
 //   W = mu |F - R|^2 + lam/2 |F - P|^2                                            [J/m3]  [Qiao21] (3)
 //   T = 2 mu (F - R) + lam (F - P) = (2 mu + lam) F - sum_i t_i u_i v_i^T,   t_i = 2 mu + lam d_i         [Pa]
 //
-// F = sum s_i u_i v_i^T; R the nearest rotation, P = sum d_i u_i v_i^T the nearest matrix with determinant 1. t_i are the
-// stresses that mixed Newton keeps. For small strains lam counts a third, as F - P is then tr(E)/3 I. In the frames of u and v, with n_i = 1/d_i and b_i = 1 + k n_i^2 (k: the multiplier),
+// F = sum s_i u_i v_i^T; R is the nearest rotation, P = sum d_i u_i v_i^T the nearest matrix with determinant
+// 1. Mixed Newton stores the stresses t_i. For small strains lam counts a third, since F - P is then tr(E)/3 I.
+// In the frames of u and v, with n_i = 1/d_i, b_i = 1 + k n_i^2 and the multiplier k of P,
 //
 //   dd_i/ds_i = (b_j n_l^2 + b_l n_j^2)/D,  dd_i/ds_j = - b_l n_i n_j/D,   D = sum of b_i b_j n_l^2
-//   (t_i - t_j)/(s_i - s_j) = lam/(1 + k d_l),   (t_i + t_j)/(s_i + s_j) = as it stands
+//   (t_i - t_j)/(s_i - s_j) = lam/(1 + k d_l),   (t_i + t_j)/(s_i + s_j) as it is
 //
-// Where s_i + s_j = 0, R and P jump, and P also where two small stretches are equal in an element far too large. There, and
-// only there, derivatives are cut off, which keeps the Hessian finite.
+// Where s_i + s_j = 0, R and P jump; P also jumps where two small stretches are equal in an element that is far
+// too large. There, and only there, derivatives are bounded, which keeps the Hessian finite.
 #pragma once
 
 #include "magshell/energy/invariant_solid.h"
@@ -29,7 +31,8 @@ struct Projective : LameSolid {
         out[0] += Pack(1.0 / 3.0) * by.lambda;
         out[1] += by.mu;
     }
-    /// No Hessian is larger: distances to a set grow no faster than to a point of it.
+    /// Returns a weight that bounds the Hessian from above: the squared distance to a set grows no faster than
+    /// the squared distance to one of its points.
     static Pack projective_weight(const Pack c[]) { return Pack(2.0) * c[1] + c[0]; }
 
     Pack33 f;
@@ -38,7 +41,7 @@ struct Projective : LameSolid {
 
     explicit Projective(const Pack33& gradient) : f(gradient), polar(f), nearest(polar.stretch) {}
 
-    /// No part of it follows a measure of volume.
+    /// The energy has no part that depends on a measure of volume.
     static Volumetric volumetric(const Pack[], const Pack&) { return {Pack(0.0), Pack(0.0), Pack(0.0)}; }
     Pack volume_measure() const { return Pack(1.0); }
     Pack volume_rate(const Pack33&) const { return Pack(0.0); }
@@ -106,7 +109,7 @@ struct Projective : LameSolid {
             }
         }
 
-        // In the frames: dF_ij = x_i g_j for a node that moves along x.
+        // In the frames of u and v: dF_ij = x_i g_j for a node that moves along x.
         Pack33 block(int k, int l) const {
             const Pack *a = g_[k], *b = g_[l];
             Pack33 h;
@@ -141,7 +144,7 @@ struct Projective : LameSolid {
         return sum;
     }
 
-    /// dd_i/ds_j
+    /// Returns dd_i/ds_j.
     Pack by_stretch(int i, int j) const {
         Pack n[3], b[3];
         for (int l = 0; l < 3; ++l) {

@@ -8,12 +8,13 @@ namespace magshell {
 
 using Row9 = Eigen::Matrix<double, 3, 9>;
 
-// Of each direction, the linear function of these two values on its edge and of this mean.
+// Returns, for each direction, the linear function with these two values on its edge and this mean over the
+// face.
 Row9 membrane_interpolation(const std::array<double, 3>& at) {
     Row9 rows = Row9::Zero();
     for (int i = 0; i < 3; ++i) {
-        // A linear function is its values at the corners; its mean is theirs. On the edge, test() gives both Gauss functions,
-        // whose mean over the face is a third of the sum of their two ends: 1/3 each.
+        // A linear function is given by its values at the corners, whose mean is its mean over the face. test()
+        // gives both Gauss functions of an edge; the mean of each over the face is 1/3.
         for (int g = 0; g < 2; ++g) rows(i, 3 * i + g) = six_nodes::test(i, g, at) - at[i];
         rows(i, 3 * i + 2) = 3.0 * at[i];
     }
@@ -35,7 +36,7 @@ void SixNodeFace::measure_area() {
 }
 
 SixNodeFace::SixNodeFace(std::array<Vec3, 6> rest) {
-    const Vec3 first = rest[0];  // far from the origin differences keep their digits
+    const Vec3 first = rest[0];  // differences keep their digits far from the origin
     for (Vec3& place : rest) place -= first;
     for (int p = 0; p < 6; ++p) {
         const six_nodes::Point& point = six_nodes::inside[p];
@@ -83,7 +84,7 @@ Mat9 SixNodeFace::membrane_by_poisson_ratio(const ShellMaterial& m) const {
     return membrane([&](const RestFace& face) { return face.membrane_by_poisson_ratio(m); });
 }
 
-// 12 / (Y h^3) (by_products tr(P_i P_l) + by_traces tr P_i tr P_l), integrated against the test functions.
+// Integrates 12 / (Y h^3) (by_products tr(P_i P_l) + by_traces tr P_i tr P_l) against the test functions.
 Mat9 SixNodeFace::compliance(double factor, double by_products, double by_traces) const {
     Mat9 sum = Mat9::Zero();
     for (int p = 0; p < 6; ++p) {

@@ -1,11 +1,12 @@
-// The constant stiffness C of the strain measures of a six-node face, from its rest shape, which may be curved, and its
-// material: the second-order Hellan-Herrmann-Johnson shell with Regge membrane strains (Neunteufel and Schoeberl 2019, 2021).
+// SixNodeFace: the constant stiffness C of the strain measures of a quadratic triangle, from its reference
+// shape, which may be curved, and its material. Element: second-order Hellan-Herrmann-Johnson shell with Regge
+// membrane strains (Neunteufel and Schoeberl 2019, 2021).
 //
 //   membrane  d[3 i + k]: the change of |dx/dt_i|^2 at the two Gauss points of edge i and (k = 2) its mean over the face.
 //             Green's strain along t_i is half the linear function with these three numbers: Regge's interpolation.
-//   bending   d[3 i + k]: the curvature against test moments tau = psi_k T_i, T_i = - sym(t_j (x) t_k) / J^2, that have a
-//             normal component on edge i alone; scaled so that d[3 i + k] is the angle between normal and director at Gauss
-//             point k plus what the curvature inside the face is worth there. C is the inverse of the moments' compliance.
+//   bending   d[3 i + k]: the curvature tested with moments tau = psi_k T_i, T_i = - sym(t_j (x) t_k) / J^2, which have a
+//             normal component on edge i only; scaled so that d[3 i + k] is the angle between normal and director at Gauss
+//             point k plus the contribution of the curvature inside the face. C is the inverse of the moments' compliance.
 #pragma once
 
 #include <array>
@@ -17,13 +18,13 @@ namespace magshell {
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
-/// The strain along each t_i at a point, doubled, from the membrane's measures.
+/// Returns the matrix that maps the membrane measures to twice the strain along each t_i at a point.
 Eigen::Matrix<double, 3, 9> membrane_interpolation(const std::array<double, 3>& at);
 
 class SixNodeFace {
   public:
     explicit SixNodeFace(std::array<Vec3, 6> rest);
-    /// From its tangents at the points inside.
+    /// Creates the face from its tangents at the interior points.
     SixNodeFace(const std::array<std::array<Vec3, 3>, 6>& tangents, const std::array<double, 9>& scale);
 
     Mat9 membrane_stiffness(const ShellMaterial& m) const;
@@ -31,17 +32,17 @@ class SixNodeFace {
     Mat9 bending_stiffness(const ShellMaterial& m) const;
     Mat9 bending_by_poisson_ratio(const ShellMaterial& m) const;
 
-    /// At a point inside: the inverse of J, twice the area of the tangent triangle there.
+    /// At each interior point: 1/J, with J twice the area of the tangent triangle there.
     std::array<double, 6> inverse_jacobian;
-    /// What measure 3 i + k of the bending multiplies its tested curvature by.
+    /// Factor of the tested curvature in bending measure 3 i + k.
     std::array<double, 9> scale;
     double area = 0.0;
 
-    /// What the moments' test functions are at a point, without their directions.
+    /// Returns the values of the moments' test functions at a point, without their directions.
     std::array<double, 9> tests(const std::array<double, 3>& at) const;
 
   private:
-    std::array<std::array<Vec3, 3>, 6> tangents_;  // at each point inside, dx/dt_i
+    std::array<std::array<Vec3, 3>, 6> tangents_;  // dx/dt_i at each interior point
 
     void measure_area();
     template <class Stiffness>

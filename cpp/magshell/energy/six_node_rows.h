@@ -1,4 +1,5 @@
-// The derivatives of an element's nine measures by its six nodes, and what they make of a stiffness.
+// SixNodeRows: the derivatives J of nine strain measures by the six nodes of a quadratic triangle, and their
+// products with a stiffness C.
 #pragma once
 
 #include "magshell/energy/symmetric3.h"
@@ -10,7 +11,7 @@ using Symmetric9 = Symmetric<9>;
 struct SixNodeRows {
     Pack3 at[9][6];
 
-    /// C J
+    /// Returns C J.
     SixNodeRows times(const Symmetric9& stiffness) const {
         SixNodeRows product;
         for (int r = 0; r < 9; ++r)
@@ -22,7 +23,7 @@ struct SixNodeRows {
         return product;
     }
 
-    /// The lower blocks (a, b) of J^T S, at lower_index(a, b), with S = C J.
+    /// Computes the lower blocks (a, b) of J^T S with S = C J, at lower_index(a, b).
     void blocks(const SixNodeRows& stiff, Pack33 h[21]) const {
         for (int a = 0; a < 6; ++a)
             for (int b = 0; b <= a; ++b) {
@@ -32,7 +33,7 @@ struct SixNodeRows {
             }
     }
 
-    /// J^T s
+    /// Computes the forces J^T s.
     void forces(const Pack stress[9], Pack3 g[6]) const {
         for (int a = 0; a < 6; ++a) {
             g[a] = stress[0] * at[0][a];
@@ -40,7 +41,7 @@ struct SixNodeRows {
         }
     }
 
-    /// J p
+    /// Computes the strain rates J p.
     void along(const Pack3 p[6], Pack rate[9]) const {
         for (int r = 0; r < 9; ++r) {
             rate[r] = dot(at[r][0], p[0]);

@@ -1,9 +1,10 @@
-// St. Venant-Kirchhoff solid, and what all energies in Green's strain E = (F^T F - I)/2 share. One point a lane.
+// StVenantKirchhoff: St. Venant-Kirchhoff law of a solid, and the operations that all laws in Green's strain E
+// = (F^T F - I)/2 share. One point per SIMD lane.
 //
 //   W = mu tr(E^2) + lam/2 (tr E)^2                                               [J/m3]
 //   P = F S,   S = 2 mu E + p I,   p = lam tr E                                   [Pa]
 //
-// The measure of volume is 1 + tr E. S are the stresses that mixed Newton keeps, as a sheet's.
+// The measure of volume is 1 + tr E. Mixed Newton stores the stresses S, as it does for a shell.
 #pragma once
 
 #include "magshell/energy/invariant_solid.h"
@@ -11,7 +12,7 @@
 
 namespace magshell {
 
-// Symmetric matrices as six numbers: 00 11 22 12 02 01.
+// Symmetric matrices as six numbers, in the order 00 11 22 12 02 01.
 struct Green {
     static constexpr int at[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
 
@@ -20,7 +21,7 @@ struct Green {
         for (int i = 0; i < 3; ++i) e[i] = Pack(0.5) * (c.at[4 * i] - Pack(1.0));
         shear(c, Pack(0.5), e);
     }
-    /// The symmetric part of F^T D.
+    /// Computes the symmetric part of F^T D.
     static void rate(const Pack33& f, const Pack33& d, Pack e[6]) {
         const Pack33 a = transposed_times(f, d);
         for (int i = 0; i < 3; ++i) e[i] = a.at[4 * i];

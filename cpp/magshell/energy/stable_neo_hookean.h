@@ -1,10 +1,10 @@
-// Neo-Hookean solids that stay finite where elements are flat or inverted, and come back from there.
+// Stable neo-Hookean laws, which stay finite for flat and inverted elements and restore them.
 //
 //   Smith, de Goes, Kim 2018, without the barrier, split into w + U with all of lam in U:
 //       mu/2 (I1 - 3) - mu (J - 1) + mu/2 (J - 1)^2     + lam/2 (J - 1)^2
-//   with its logarithmic barrier, (14) there, reparametrized so that small strains see lam and mu:
+//   with their logarithmic barrier (14), reparametrized so that small strains have the moduli lam and mu:
 //       m/2 (I1 - 3) + l/2 (J - a)^2 - m/2 ln(I1 + 1),   m = 4/3 mu,  l = lam + 5/6 mu,  a = 1 + m/l - m/(4 l)
-//   less what it is at rest, and as l (J - a) = l (J - 1) - mu:
+//   minus its reference value, and with l (J - a) = l (J - 1) - mu:
 //       m/2 (I1 - 3) - m/2 ln((I1 + 1)/4) - mu (J - 1) + 5/12 mu (J - 1)^2     + lam/2 (J - 1)^2
 #pragma once
 

@@ -1,4 +1,4 @@
-// Surface tension: what it costs a face to have an area.
+// SurfaceTension: the surface energy of a linear triangle.
 //
 //   E_f = gamma A(x),   A = |a_1 x a_2| / 2                                         [J]
 //
@@ -6,7 +6,7 @@
 //
 //   dA = (a_2 x n) . da_1 / 2 + (n x a_1) . da_2 / 2,   dn = (I - n n^T) (da_1 x a_2 + a_1 x da_2) / |a_1 x a_2|.
 //
-// One face a lane.
+// One face per SIMD lane.
 #pragma once
 
 #include <string_view>
@@ -39,7 +39,7 @@ struct SurfaceTension {
         g[0] = -(g[1] + g[2]);
     }
 
-    /// Lower blocks at lower_index(k, l).
+    /// Computes the lower blocks at lower_index(k, l).
     void hessian(const Pack in[1], Pack33 h[6]) const {
         const Pack half = Pack(0.5) * in[0];
         Pack33 k = Pack(-1.0) * outer(normal, normal);
@@ -56,7 +56,7 @@ struct SurfaceTension {
         h[lower_index(0, 0)] = h11 + h12 + h21 + h22;
     }
 
-    /// d(rate . gradient)/d(input) of each input.
+    /// Computes d(rate . gradient)/d(input) for each input.
     void rate_by_inputs(const Pack[1], const Pack3 rate[3], Pack out[1]) const {
         out[0] = Pack(0.5) *
                  (dot(rate[1] - rate[0], cross(a2, normal)) + dot(rate[2] - rate[0], cross(normal, a1)));

@@ -1,4 +1,5 @@
-// A symmetric matrix of packs, the stiffness C of an element's strain measures: 00 10 11 20 21 22 ...
+// Symmetric: a symmetric matrix of SIMD packs, such as the stiffness C of an element's strain measures, stored
+// as its lower triangle 00 10 11 20 21 22 ...
 #pragma once
 
 #include "magshell/core/vector3.h"

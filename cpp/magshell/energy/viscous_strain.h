@@ -1,8 +1,9 @@
-// Strains and stresses of a solid's viscosity at a point: linear, by the moduli at rest.
+// ViscousStrain: strains and stresses of a solid's linear viscosity at a point, with the moduli of the
+// reference configuration.
 //
 //   d = (E_00 E_11 E_22 2 E_12 2 E_02 2 E_01),   s_ii = 2 mu d_i + lam tr E,   s_ij = mu d_k
 //
-// so that s . d is S : E.
+// so that s . d = S : E.
 #pragma once
 
 #include "magshell/energy/st_venant_kirchhoff.h"
@@ -25,7 +26,7 @@ struct ViscousStrain {
         for (int i = 0; i < 3; ++i) s[i] = Pack(2.0) * moduli.mu * d[i] + pressure;
         for (int i = 3; i < size; ++i) s[i] = moduli.mu * d[i];
     }
-    /// The derivatives of stress(d) . rate by the moduli.
+    /// Returns the derivatives of stress(d) . rate by the moduli.
     static RestModuli work_by_moduli(const Pack d[size], const Pack rate[size]) {
         RestModuli by{(d[0] + d[1] + d[2]) * (rate[0] + rate[1] + rate[2]), Pack(0.0)};
         for (int i = 0; i < 3; ++i) by.mu += Pack(2.0) * d[i] * rate[i];

@@ -1,11 +1,11 @@
-// The volume behind a curved face, seen from the origin: with A of energy/face_pressure.h,
+// VolumeForm: the signed volume between a curved face and the origin. With A of energy/face_pressure.h,
 //
 //   V = 1/3 sum_k x_k . (sum_{l<m} A_klm x_l x x_m) = sum_{k<l<m} B_klm det(x_k, x_l, x_m)                        [m3]
-//   B_klm = (A_klm - A_lkm + A_mkl) / 3                                             of three nodes 1/6
+//   B_klm = (A_klm - A_lkm + A_mkl) / 3                                             1/6 for three nodes
 //
-// Summed up over a closed surface whose normals point outwards it is the volume inside, wherever the origin is. It is a number
-// of the positions alone, so its second derivatives are symmetric without any border to look at; with B x_m across from
-// node k to node l they are blocks [c]x.
+// Summed over a closed surface with outward normals it is the enclosed volume, wherever the origin is. It is a
+// function of the positions only, so its second derivatives are symmetric for every surface; the block between
+// nodes k and l is [c]x with c a sum of B_klm x_m.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ struct VolumeForm {
     static constexpr int triples = N * (N - 1) * (N - 2) / 6;
     using Corners = std::array<Vec3, N>;
 
-    /// B: the triples k < l < m, in that order.
+    /// Returns B for the triples k < l < m, in that order.
     static const std::array<double, triples>& coefficients() {
         static const std::array<double, triples> known = [] {
             std::array<double, triples> b{};
@@ -40,7 +40,7 @@ struct VolumeForm {
         return sum;
     }
 
-    /// dV/dx_k.
+    /// Returns dV/dx_k.
     static Corners slopes(const Corners& x) {
         Corners g;
         g.fill(Vec3::Zero());
@@ -53,7 +53,8 @@ struct VolumeForm {
         return g;
     }
 
-    /// visit(row, column, axis) for shares of the blocks below the diagonal, d2V/dx_row dx_column = [axis]x.
+    /// Calls visit(row, column, axis) for contributions to the blocks below the diagonal, d2V/dx_row dx_column
+    /// = [axis]x.
     template <class Visit>
     static void curvature(const Corners& x, const Visit& visit) {
         each_triple([&](int triple, int k, int l, int m) {

@@ -1,13 +1,14 @@
-// What a volume V costs, V_0 at rest, by two numbers of its own:
+// VolumeEnergy: the energy of a volume V with the reference value V_0, by laws of one or two parameters:
 //
 //   pressure    E = - p V                                                      p [Pa]
-//   gas         E = - p_g V_0 ln(V / V_0) + p_o (V - V_0)                      at constant temperature, n R T = p_g V_0;
-//                                                                              p_g [Pa] at the volume at rest, p_o outside
+//   gas         E = - p_g V_0 ln(V / V_0) + p_o (V - V_0)                      isothermal, n R T = p_g V_0; p_g [Pa]: pressure
+//                                                                              at the reference volume, p_o [Pa]: outside
 //   liquid      E = K/2 (V - V_t)^2 / V_0                                      V_t [m3], K [Pa] bulk modulus
-//   cell        E = V_0 K/2 (V / V_0 - a)^2                                    a, K [Pa]                         [Qiao21] 5
+//   cell        E = V_0 K/2 (V / V_0 - a)^2                                    a [-], K [Pa]                     [Qiao21] 5
 //
-// - dE/dV is the pressure inside, over that outside. A load factor f scales pressures, and with them E; what wants a volume
-// wants one on the way from that at rest, V_0 + f (V_t - V_0) or 1 + f (a - 1), at its full stiffness: so it is filled.
+// - dE/dV is the excess of the pressure inside over that outside. A load factor f scales pressures, and with
+// them E. Laws with a target volume are filled instead: their target is V_0 + f (V_t - V_0) or 1 + f (a - 1),
+// at full stiffness.
 #pragma once
 
 #include <array>
@@ -18,7 +19,7 @@ namespace magshell {
 
 enum class VolumeLaw { pressure, gas, liquid, cell };
 
-/// The names and units of its numbers; nullptr: it has only one.
+/// The names and units of a law's parameters; nullptr if it has only one.
 struct VolumeNames {
     std::array<const char*, 2> names, units;
 };
@@ -37,7 +38,8 @@ inline VolumeNames names_of(VolumeLaw law) {
     return {{"volume_ratio", "stiffness"}, {"1", "Pa"}};
 }
 
-/// Whether its first number is a volume that it wants, and the value which that has at rest.
+/// has_target_volume() tells whether the first parameter is a target volume; target_at_rest() returns its value
+/// for the reference volume.
 inline bool has_target_volume(VolumeLaw law) {
     return law == VolumeLaw::liquid || law == VolumeLaw::cell;
 }
@@ -45,13 +47,14 @@ inline double target_at_rest(VolumeLaw law, double rest) {
     return law == VolumeLaw::liquid ? rest : 1.0;
 }
 
-/// Energy, dE/dV, d2E/dV2, and dE/dV by its numbers; `magnitude`: of what cancels in dE/dV.
+/// Energy, dE/dV, d2E/dV2, and the derivatives of dE/dV by the parameters. magnitude: size of the terms that
+/// cancel in dE/dV.
 struct VolumeEnergy {
     double energy, slope, curvature = 0.0, magnitude = 0.0;
     std::array<double, 2> slope_by{};
     double slope_by_factor = 0.0;
 
-    /// Under a load factor.
+    /// Evaluates a law under a load factor.
     VolumeEnergy(VolumeLaw law, std::array<double, 2> numbers, double rest, double volume, double factor)
         : VolumeEnergy(law, loaded(law, numbers, rest, factor), rest, volume) {
         if (has_target_volume(law)) {
@@ -60,7 +63,7 @@ struct VolumeEnergy {
             return;
         }
         slope_by_factor = slope;
-        energy = factor == 0.0 ? 0.0 : factor * energy;  // not 0 times infinity
+        energy = factor == 0.0 ? 0.0 : factor * energy;  // avoids 0 times infinity
         for (double* each : {&slope, &curvature, &magnitude, &slope_by[0], &slope_by[1]}) *each *= factor;
     }
 
@@ -74,7 +77,7 @@ struct VolumeEnergy {
                 slope_by = {-1.0, 0.0};
                 return;
             case VolumeLaw::gas:
-                // Without gas there is nothing that would resist, not even at no volume.
+                // Without gas nothing resists compression, not even at zero volume.
                 energy = b * (volume - rest);
                 if (a != 0.0)
                     energy -=
