@@ -1,4 +1,4 @@
-// The first t in (0, longest] at which a cubic that is positive at 0 vanishes.
+// Finds the first root of a cubic that is positive at 0.
 #pragma once
 
 #include <algorithm>
@@ -7,11 +7,12 @@
 
 namespace magshell {
 
-/// c[0] + c[1] t + c[2] t^2 + c[3] t^3; `longest` where it stays positive.
+/// Returns the first t in (0, longest] at which c[0] + c[1] t + c[2] t^2 + c[3] t^3 vanishes; `longest` if it
+/// stays positive, 0 if c[0] is not positive.
 inline double first_root(const double c[4], double longest) {
     const auto value = [&](double t) { return c[0] + t * (c[1] + t * (c[2] + t * c[3])); };
     if (!(c[0] > 0.0)) return 0.0;
-    // Between the zeros of its derivative the cubic is monotone.
+    // Between the roots of its derivative the cubic is monotone, so bisection finds the root.
     double bounds[4] = {0.0, longest, longest, longest};
     const double p = c[2], discriminant = p * p - 3.0 * c[1] * c[3];
     if (discriminant > 0.0) {

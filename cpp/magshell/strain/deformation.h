@@ -1,16 +1,17 @@
-// The deformation gradient F of a point of a solid, and what its determinant does. One point a lane.
+// Deformation gradient F of a point of a solid, its determinant J, and their derivatives. One point per SIMD
+// lane.
 //
-//   F = sum_k x_k (x) g_k,   g_k the gradient of node k's shape function at rest [1/m]
+//   F = sum_k x_k (x) g_k,   g_k the gradient of node k's shape function in the reference configuration [1/m]
 //   J = det F,   dJ/dx_k = cof F g_k,   d2J/dx_k dx_l = -[F (g_k x g_l)]
 //
-// Nothing here divides by J: all of it holds for flat and inverted elements.
+// Nothing here divides by J, so all of it holds for flat and inverted elements.
 #pragma once
 
 #include "magshell/core/vector3.h"
 
 namespace magshell {
 
-/// a F, row by row a vector.
+/// Returns a v; `a` is stored row by row.
 inline Pack3 multiply(const Pack33& a, const Pack3& v) {
     return {a.at[0] * v.x + a.at[1] * v.y + a.at[2] * v.z, a.at[3] * v.x + a.at[4] * v.y + a.at[5] * v.z,
             a.at[6] * v.x + a.at[7] * v.y + a.at[8] * v.z};
@@ -30,7 +31,8 @@ inline Pack double_dot(const Pack33& a, const Pack33& b) {
     return sum;
 }
 
-/// sum_k x_k (x) g_k. The gradients add up to zero, so the nodes may be taken from the first of them.
+/// Returns sum_k x_k (x) g_k. The gradients g_k add up to zero, so positions are taken relative to the first
+/// node.
 template <int N>
 inline Pack33 deformation_gradient(const Pack3 x[N], const Pack3 g[N]) {
     Pack33 f = outer(x[1] - x[0], g[1]);
@@ -38,7 +40,7 @@ inline Pack33 deformation_gradient(const Pack3 x[N], const Pack3 g[N]) {
     return f;
 }
 
-/// cof F = J F^-T
+/// Returns cof F = J F^-T.
 inline Pack33 cofactor(const Pack33& f) {
     const Pack* a = f.at;
     return {{a[4] * a[8] - a[5] * a[7], a[5] * a[6] - a[3] * a[8], a[3] * a[7] - a[4] * a[6],
@@ -50,7 +52,7 @@ inline Pack determinant(const Pack33& f, const Pack33& cofactors) {
     return f.at[0] * cofactors.at[0] + f.at[1] * cofactors.at[1] + f.at[2] * cofactors.at[2];
 }
 
-/// det(F + t D) = c[0] + c[1] t + c[2] t^2 + c[3] t^3
+/// Computes the coefficients of det(F + t D) = c[0] + c[1] t + c[2] t^2 + c[3] t^3.
 inline void determinant_along(const Pack33& f, const Pack33& d, Pack c[4]) {
     const Pack33 cof_f = cofactor(f), cof_d = cofactor(d);
     c[0] = determinant(f, cof_f);

@@ -1,23 +1,23 @@
-// The angle by which a sheet is folded about an edge, its gradient and its second derivative.
+// DihedralAngle: the dihedral angle at an edge of a shell, with its gradient and second derivatives.
 //
-// An edge e = x1 - x0 and a point r = x2 - x0 beside it span a half-plane, a "wing". With
+// An edge e = x1 - x0 and a point r = x2 - x0 beside it span a half-plane. With
 //
-//   e^ = e/|e|,  n = e x r / |e x r|,  t = n x e^  (in the wing, away from the edge),  r = s e + h t,
+//   e^ = e/|e|,  n = e x r / |e x r|,  t = n x e^  (in the half-plane, away from the edge),  r = s e + h t,
 //
-// turning the wing about the edge by dα moves r by h dα along n, so the angle α of a wing has
+// a rotation of the half-plane about the edge by dα moves r by h dα along n, so its angle α has the derivatives
 //
 //   dα/dr = n/h,      dα/de = - s n/h
 //   d2α/dr2  = - (n t^T + t n^T) / h^2
 //   d2α/drde = (s/h^2) (n t^T + t n^T) - e^ n^T / (|e| h)
 //   d2α/de2  = - (s^2/h^2 + 1/(2|e|^2)) (n t^T + t n^T) + (s / (|e| h)) (e^ n^T + n e^^T)
 //
-// up to a rotation about e^ that two wings of one edge share and that cancels in the fold, the difference of
-// the two:
+// up to a rotation about e^ that both half-planes of an edge share; it cancels in their difference, the
+// dihedral angle
 //
-//   theta = α_left - α_right + π,   0 where the sheet is flat, positive where the two normals lean together.
+//   theta = α_left - α_right + π,   0 where the shell is flat, positive where the two normals lean towards each other.
 //
-// The right wing is either a second face (r = x3 - x0) or a fixed direction (r = x3), which makes a clamped
-// edge, an edge on a symmetry plane and an edge that a couple turns.
+// The right half-plane contains either a second face (r = x3 - x0) or a fixed director (r = x3). The latter
+// models a clamped edge, an edge on a symmetry plane and an edge under a couple.
 #pragma once
 
 #include "magshell/core/vector3.h"
@@ -25,12 +25,12 @@
 namespace magshell {
 
 struct HalfPlane {
-    Pack3 edge_direction;  // e^
+    Pack3 edge_direction;  // e^, unit vector along the edge
     Pack3 normal;          // n
     Pack3 away;            // t
-    Pack edge_length;      // |e|
-    Pack height;           // h
-    Pack foot;             // s, where the point stands along the edge: 0 at x0, 1 at x1
+    Pack edge_length;      // |e| [m]
+    Pack height;           // h, distance of the point from the edge [m]
+    Pack foot;             // s, foot of the point on the edge: 0 at x0, 1 at x1
 
     HalfPlane(const Pack3& e, const Pack3& r) {
         const Pack e2 = squared_norm(e);
@@ -47,8 +47,8 @@ struct HalfPlane {
     Pack3 by_point() const { return (Pack(1.0) / height) * normal; }
 };
 
-/// factor d2α of one wing in its own variables (r, e); the (e, r) block is the transpose of `point_edge`. Of the two wings of
-/// a fold the (e, e) blocks are added up.
+/// Computes factor d2α of one half-plane in its variables (r, e); the (e, r) block is the transpose of
+/// `point_edge`. The (e, e) block is added, so that those of both half-planes of an edge accumulate.
 inline void add_half_plane_hessian(const HalfPlane& w, const Pack& factor, Pack33& point_point,
                                    Pack33& point_edge, Pack33& edge_edge) {
     const Pack inverse_h = Pack(1.0) / w.height;
@@ -66,10 +66,10 @@ inline void add_half_plane_hessian(const HalfPlane& w, const Pack& factor, Pack3
         }
 }
 
-/// A fold about the edge x0-x1 between the wings of x2 (left) and x3 (right).
+/// The dihedral angle at the edge x0-x1 between the half-planes of x2 (left) and x3 (right).
 struct DihedralAngle {
     HalfPlane left, right;
-    Pack right_is_point;  // 1: x3 is a point, r = x3 - x0;  0: x3 is a direction, r = x3
+    Pack right_is_point;  // 1: x3 is a point, r = x3 - x0;  0: x3 is a director, r = x3
 
     DihedralAngle(const Pack3& x0, const Pack3& x1, const Pack3& x2, const Pack3& x3,
                   const Pack& right_is_point_)
@@ -77,7 +77,8 @@ struct DihedralAngle {
           right(x1 - x0, x3 - right_is_point_ * x0),
           right_is_point(right_is_point_) {}
 
-    /// theta in (-π, π]; the right wing's normal is that of a face turned round, hence the minus sign
+    /// Returns theta in (-π, π]. The right normal belongs to a face of reversed orientation, hence the minus
+    /// sign.
     Pack angle() const {
         const Pack cosine = -dot(left.normal, right.normal);
         const Pack sine = dot(left.normal, right.away);
@@ -94,19 +95,20 @@ struct DihedralAngle {
     }
 };
 
-/// moment d2theta as 3x3 blocks of the nodes 0..3, the lower triangle at row (row + 1) / 2 + column. The last but
-/// one, (3, 2), is zero.
+/// Computes moment d2theta as 3x3 blocks between the nodes 0 to 3, the lower triangle at row (row + 1) / 2 +
+/// column. The block (3, 2) is zero.
 struct DihedralHessian {
     enum Block { B00, B10, B11, B20, B21, B22, B30, B31, B32, B33, count };
     Pack33 block[count];
 
     explicit DihedralHessian(const DihedralAngle& dihedral, const Pack& moment) {
         const Pack p = dihedral.right_is_point;
-        // x1 enters by e, x2 by r_left, x3 by r_right, and x0 by minus their sum (r_right only where x3 is a point).
+        // theta depends on x1 through e, on x2 through r_left, on x3 through r_right, and on x0 through minus
+        // their sum (r_right only if x3 is a point).
         block[B11] = block[B32] = {};
         add_half_plane_hessian(dihedral.left, moment, block[B22], block[B21], block[B11]);
         add_half_plane_hessian(dihedral.right, -moment, block[B33], block[B31], block[B11]);
-        // Number by number: whole blocks would be copied.
+        // Entry by entry, because whole blocks would be copied through memory.
         for (int row = 0; row < 3; ++row)
             for (int column = 0; column < 3; ++column) {
                 const int k = 3 * row + column, transposed = 3 * column + row;

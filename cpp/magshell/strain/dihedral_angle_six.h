@@ -1,13 +1,14 @@
-// The angle by which two six-node faces are folded about the edge that they share, at its two Gauss points.
+// DihedralAngleSix: the dihedral angle between two quadratic triangles at the two Gauss points of their common
+// edge.
 //
-// At a place of the edge the tangent t along it and, in each face, the derivative u towards the corner opposite span the
-// tangent planes. All three are linear in the nine nodes
+// At a point of the edge, the tangent t along it and, in each face, the derivative u towards the opposite
+// corner span the tangent planes. All three are linear in the nine nodes
 //
-//   0, 1, 2   the edge: from, to, middle      3, 4, 5 and 6, 7, 8   left and right: the corner, the middles between `to`
-//                                                                   and it, and between it and `from`
+//   0, 1, 2            the edge: from, to, middle
+//   3, 4, 5; 6, 7, 8   left and right face: opposite corner, middle between `to` and it, middle between it and `from`
 //
-// so the angle is that of strain/dihedral_angle.h about (0, t) with the wings u_left and u_right. A direction in place of the
-// right face is node 6 alone.
+// so the angle is that of strain/dihedral_angle.h about the edge (0, t) with the half-planes of u_left and
+// u_right. A fixed director in place of the right face is node 6 alone.
 #pragma once
 
 #include "magshell/energy/symmetric3.h"
@@ -35,8 +36,9 @@ class DihedralAngleSix {
         }
     }
 
-    /// The same, side by side, where the right one is a face: a side turns about the edge by along . sum_a share_a x_a, with
-    /// its own nodes 0, 1, 2 and 3, 4, 5 or 6, 7, 8. The sum of both is the gradient.
+    /// The gradient split into the two sides, if the right side is a face. A side rotates about the edge by
+    /// along . sum_a weight_a x_a, with its own nodes 0, 1, 2 and 3, 4, 5 (left) or 6, 7, 8 (right). The sum of
+    /// both sides is the gradient.
     struct Side {
         Pack3 along;
         Pack foot;
@@ -45,18 +47,19 @@ class DihedralAngleSix {
         return {{{dihedral_.left.by_point(), dihedral_.left.foot},
                  {-dihedral_.right.by_point(), dihedral_.right.foot}}};
     }
-    /// place: of a side's six nodes.
+    /// Returns the weight of a node in the rotation of its side. place: position among the six nodes of the
+    /// side.
     static double side_weight(int point, int place, double foot) {
         return inward_weights_[point][place] - (place < 3 ? foot * tangents_[point][place] : 0.0);
     }
 
-    /// Adds moment d2theta, as lower blocks of the nine nodes at lower_index.
+    /// Adds moment d2theta as lower blocks of the nine nodes at lower_index.
     void add_curvature(const Pack& moment, Pack33 h[45]) const {
         const DihedralHessian c(dihedral_, moment);
         const Pack33 &tt = c.block[DihedralHessian::B11], &lt = c.block[DihedralHessian::B21],
                      &rt = c.block[DihedralHessian::B31], &ll = c.block[DihedralHessian::B22],
                      &rr = c.block[DihedralHessian::B33];
-        // Of the edge's nodes, which enter by t, and by u on both sides alike.
+        // Blocks of the edge's nodes, which enter through t, and through u on both sides alike.
         const Pack33 both_t = lt + right_is_face_ * rt, both = ll + right_is_face_ * rr,
                      t_both = transpose(both_t);
         for (int a = 0; a < 3; ++a)
@@ -89,7 +92,7 @@ class DihedralAngleSix {
         six_nodes::inward(six_nodes::gauss[0]), six_nodes::inward(six_nodes::gauss[1])};
     double tangent(int a) const { return tangents_[point_][a]; }
     double inward_weight(int a) const { return inward_weights_[point_][a]; }
-    /// Of node a + 3 on the right, where a direction is the wing itself.
+    /// Weight of node a + 3 in the right half-plane; a director is the half-plane's vector itself.
     Pack right(int a) const {
         const double alone = a == 3 ? 1.0 : 0.0;
         return Pack(alone) + right_is_face_ * Pack(inward_weight(a) - alone);
@@ -99,7 +102,7 @@ class DihedralAngleSix {
         const std::array<double, 3>& t = tangents_[point];
         const std::array<double, 6>& u = inward_weights_[point];
         std::array<Pack3, 9> x = relative_to_first_node<9>(places);
-        x[6] = places[6] - right_is_face * places[0];  // a direction has no place
+        x[6] = places[6] - right_is_face * places[0];  // a director does not depend on the origin
         Pack3 tangent = {Pack(0.0), Pack(0.0), Pack(0.0)}, shared = tangent;
         for (int a = 1; a < 3; ++a) {
             tangent += Pack(t[a]) * x[a];

@@ -1,9 +1,9 @@
-// The rotation nearest to F, with the signed stretches: F = U diag(s) V^T, R = U V^T, both proper rotations,
-// so that of an inverted element the smallest stretch is negative. One point a lane.
+// Polar: the polar decomposition of F with signed stretches, F = U diag(s) V^T and R = U V^T, with proper
+// rotations U and V. In an inverted element the smallest stretch is negative. One point per SIMD lane.
 //
-// One-sided Jacobi: the columns of F are turned among each other until they are orthogonal, which keeps small
-// stretches accurate. The direction of the smallest is the cross product of the two others, so R exists for a
-// flat element too; for one that is a line or a point, any that fits.
+// Method: one-sided Jacobi rotations make the columns of F orthogonal, which keeps small stretches accurate.
+// The direction of the smallest stretch is the cross product of the other two, so R exists for a flat element
+// too. For an element that has shrunk to a line or a point, any fitting rotation is returned.
 #pragma once
 
 #include "magshell/core/pack_functions.h"
@@ -12,7 +12,7 @@
 namespace magshell {
 
 struct Polar {
-    Pack stretch[3];  // signed, the third of smallest size
+    Pack stretch[3];  // signed; the third has the smallest magnitude
     Pack3 u[3];       // current principal directions
     Pack33 rotation;  // R
 
@@ -41,7 +41,8 @@ struct Polar {
   private:
     static constexpr int sweeps = 6;
 
-    // Whether any lane was turned. One that is orthogonal stays as it is, whatever its neighbours do.
+    // Rotates two columns so that they become orthogonal; returns true if any lane was rotated. Lanes that are
+    // orthogonal already stay unchanged, whatever the others do.
     static bool orthogonalize(Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
         const Pack of_a = squared_norm(a), of_b = squared_norm(b), gamma = Pack(2.0) * dot(a, b);
         const Pack negligible = gamma * gamma - Pack(1e-30) * of_a * of_b;
@@ -68,7 +69,7 @@ struct Polar {
         a = turned;
     }
 
-    // Where a is smaller: a quarter turn, which keeps V a rotation.
+    // Swaps two columns where the first is shorter, by a rotation of 90 degrees, which keeps V a rotation.
     static void larger_first(Pack& sa, Pack& sb, Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
         const Pack swap = where_negative(sa - sb, Pack(1.0), Pack(0.0)), stay = Pack(1.0) - swap;
         const Pack larger = max(sa, sb);
@@ -86,7 +87,8 @@ struct Polar {
         u[1] = (Pack(1.0) / width) * across;
         u[2] = cross(u[0], u[1]);
         for (int lane = 0; lane < Pack::width; ++lane) {
-            if (length[lane] > 0.0 && width[lane] > 1e-15 * length[lane]) continue;  // a line, or a point
+            // the element is a line or a point
+            if (length[lane] > 0.0 && width[lane] > 1e-15 * length[lane]) continue;
             Vec3 first(b[0].x[lane], b[0].y[lane], b[0].z[lane]), second;
             first = length[lane] > 0.0 ? Vec3(first / first.norm()) : Vec3(Vec3::UnitX());
             second = first.unitOrthogonal();

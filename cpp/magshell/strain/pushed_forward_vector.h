@@ -1,6 +1,7 @@
-// A vector of the rest shape that an element of N nodes carries along, at a point of integration. One element a lane.
+// PushedForwardVector: a material vector m pushed forward by the deformation gradient, F m, at an integration
+// point of an element with N nodes. One element per SIMD lane.
 //
-//   F m = sum_k (g_k . m) x_k
+//   F m = sum_k (g_k . m) x_k        g_k: gradient of the shape function of node k in the reference configuration [1/m]
 #pragma once
 
 #include "magshell/core/vector3.h"
@@ -11,7 +12,7 @@ template <int N>
 struct PushedForwardVector {
     Pack alpha[N];  // g_k . m
 
-    /// F m; of rates, its rate.
+    /// Returns F m. Applied to nodal velocities, it returns the rate of F m.
     Pack3 at(const Pack3 x[N]) const {
         Pack3 y = alpha[0] * x[0];
         for (int k = 1; k < N; ++k) y += alpha[k] * x[k];

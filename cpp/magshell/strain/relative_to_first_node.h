@@ -1,5 +1,5 @@
-// Places seen from the first of them: what is made of differences alone keeps its digits far from the origin, and a flat
-// face along the axes stays flat to the last bit.
+// Positions relative to the first node. Differences of coordinates then keep their digits far from the origin,
+// and a flat face along the axes stays flat to the last bit.
 #pragma once
 
 #include <array>

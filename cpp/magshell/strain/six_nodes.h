@@ -1,30 +1,32 @@
-// Triangles of six nodes: corners 0, 1, 2, then the middles of the edges 0-1, 1-2, 2-0. What the quadratic shape functions
-// are at the points that a second-order shell measures at.
+// Shape functions and integration points of quadratic triangles: corners 0, 1, 2, then the middle nodes of the
+// edges 0-1, 1-2, 2-0.
 //
-// Edge i is opposite corner i and runs from corner i + 1 to corner i + 2; t_i is its vector in the reference triangle. What
-// is measured on it stands at the two Gauss points of the edge. Points inside are those of the symmetric rule of six points,
-// exact to fourth degree.
+// Edge i is opposite corner i and runs from corner i + 1 to corner i + 2; t_i is its vector in the reference
+// triangle. Quantities on an edge are evaluated at its two Gauss points, quantities inside the face at the six
+// points of a symmetric rule that is exact to fourth degree.
 #pragma once
 
 #include <array>
 
 namespace magshell::six_nodes {
 
-/// The middle of the edge opposite corner i.
+/// Returns the middle node of the edge opposite corner i.
 constexpr int middle(int i) {
     return 3 + (i + 1) % 3;
 }
 
-/// Where along an edge: (1 -+ 1/sqrt(3)) / 2, each with half the weight.
+/// Gauss points of an edge: (1 -+ 1/sqrt(3)) / 2, each with weight 1/2.
 constexpr std::array<double, 2> gauss = {0.21132486540518711775, 0.78867513459481288225};
 
-/// d/ds at a place s of an edge, of its two ends and its middle.
+/// Returns the derivatives by s, at position s of an edge, of the shape functions of its two ends and its
+/// middle node.
 constexpr std::array<double, 3> along(double s) {
     return {4.0 * s - 3.0, 4.0 * s - 1.0, 4.0 - 8.0 * s};
 }
 
-/// The derivative towards the corner opposite: of the ends `from` and `to`, the middle, that corner, and the middles
-/// between `to` and it and between it and `from`.
+/// Returns the derivatives towards the opposite corner, at position s of an edge, of the shape functions of:
+/// the ends `from` and `to`, the middle node, the opposite corner, and the middle nodes between `to` and it and
+/// between it and `from`.
 constexpr std::array<double, 6> inward(double s) {
     return {(4.0 * s - 3.0) * (1.0 - s),
             (1.0 - 4.0 * s) * s,
@@ -35,8 +37,8 @@ constexpr std::array<double, 6> inward(double s) {
 }
 
 struct Point {
-    std::array<double, 3> at;  // barycentric
-    double weight;             // of the triangle's area
+    std::array<double, 3> at;  // barycentric coordinates
+    double weight;             // fraction of the triangle's area
 };
 
 constexpr std::array<Point, 6> inside = [] {
@@ -52,7 +54,7 @@ constexpr std::array<Point, 6> inside = [] {
     return points;
 }();
 
-/// Along t_i at a point of these barycentric coordinates, of the six nodes.
+/// Returns the derivatives of the six shape functions along t_i, at a point given by barycentric coordinates.
 constexpr std::array<double, 6> derivative(int i, const std::array<double, 3>& at) {
     double rate[3] = {};
     rate[(i + 1) % 3] = -1.0;
@@ -66,7 +68,7 @@ constexpr std::array<double, 6> derivative(int i, const std::array<double, 3>& a
     return by_node;
 }
 
-/// Along t_i, times a sign, at each of the points inside.
+/// Returns these derivatives along t_i, times a sign, at each of the six interior points.
 constexpr std::array<std::array<double, 6>, 6> inside_towards(int i, double sign) {
     std::array<std::array<double, 6>, 6> all{};
     for (int p = 0; p < 6; ++p) {
@@ -76,7 +78,7 @@ constexpr std::array<std::array<double, 6>, 6> inside_towards(int i, double sign
     return all;
 }
 
-/// The shape functions of the six nodes.
+/// Returns the values of the six shape functions at a point given by barycentric coordinates.
 constexpr std::array<double, 6> shapes(const std::array<double, 3>& at) {
     std::array<double, 6> by_node{};
     for (int k = 0; k < 3; ++k) {
@@ -86,11 +88,12 @@ constexpr std::array<double, 6> shapes(const std::array<double, 3>& at) {
     return by_node;
 }
 
-/// The linear functions of one direction i: two that are 1 at one Gauss point of edge i, 0 at the other and at the corner
-/// opposite, and the barycentric coordinate of that corner.
+/// Returns one of the three linear test functions of direction i at a point: functions 0 and 1 are 1 at one
+/// Gauss point of edge i, 0 at the other and 0 at the opposite corner; function 2 is the barycentric coordinate
+/// of that corner.
 constexpr double test(int i, int which, const std::array<double, 3>& at) {
     if (which == 2) return at[i];
-    // At the two ends of the edge: a line through 1 at one Gauss point and 0 at the other.
+    // Values at the two ends of the edge, of the line through 1 at one Gauss point and 0 at the other.
     const double first = gauss[which], other = gauss[1 - which];
     const double from = -other / (first - other), to = (1.0 - other) / (first - other);
     return from * at[(i + 1) % 3] + to * at[(i + 2) % 3];

@@ -1,10 +1,10 @@
-// Tetrahedra of four and of ten nodes: gradients of their shape functions at the points of integration.
+// Shape functions of tetrahedra with four and ten nodes, and their gradients, at the integration points.
 //
-// At a point with the barycentric coordinates l_i, whose gradients at rest are a_i:
+// At a point with barycentric coordinates l_i, whose gradients in the reference configuration are a_i:
 //   four nodes   N_i = l_i                              g_i = a_i
 //   ten nodes    N_i = l_i (2 l_i - 1)                  g_i = (4 l_i - 1) a_i
 //                N_ij = 4 l_i l_j                       g_ij = 4 (l_i a_j + l_j a_i)
-// A curved element has other a_i at each point; its middle nodes come in the order 01 12 20 03 13 23.
+// In a curved element the a_i differ from point to point. Middle nodes are in the order 01 12 20 03 13 23.
 #pragma once
 
 #include <array>
@@ -13,13 +13,13 @@
 
 namespace magshell {
 
-/// The corners that each middle node of a ten-node tetrahedron lies between.
+/// The two corners that each middle node of a ten-node tetrahedron lies between.
 constexpr int middle_of[6][2] = {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}};
 
 struct LinearTetrahedron {
     static constexpr int nodes = 4, points = 1;
 
-    /// Derivatives of the shape functions by (l_1, l_2, l_3) at a point.
+    /// Returns the derivatives of the shape functions by (l_1, l_2, l_3) at a point.
     static Eigen::Matrix<double, nodes, 3> shape_derivatives(int) {
         Eigen::Matrix<double, nodes, 3> d;
         d << -1.0, -1.0, -1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0;
@@ -37,7 +37,8 @@ struct QuadraticTetrahedron {
     static constexpr int nodes = 10, points = 4;
     static constexpr double reference_weight = 1.0 / 24.0;
 
-    /// Of second order exact: point p is nearer to corner p.
+    /// Returns the barycentric coordinates of an integration point; point p is nearest to corner p. The rule is
+    /// exact to second degree.
     static constexpr double barycentric(int point, int corner) {
         return point == corner ? 0.58541019662496845446
                                : 0.13819660112501051518;  // (5 + 3 sqrt 5)/20, (5 - sqrt 5)/20
@@ -67,7 +68,7 @@ struct QuadraticTetrahedron {
     }
 };
 
-/// Of straight elements: at the middle. `point` is the only one.
+/// Returns the shape functions at the integration point of a linear element, its center.
 inline std::array<double, 4> shapes_at(LinearTetrahedron, int /*point*/) {
     return {0.25, 0.25, 0.25, 0.25};
 }
@@ -80,16 +81,17 @@ inline std::array<double, 10> shapes_at(QuadraticTetrahedron, int point) {
     return shapes;
 }
 
-/// One element at rest: per point the gradients of l_1, l_2, l_3, and the volume that it stands for [m3].
+/// An element in the reference configuration: at each integration point the gradients of l_1, l_2, l_3 and the
+/// volume that the point represents [m3].
 template <class Element>
 struct RestElement {
-    Mat3 gradients[Element::points];  // rows
+    Mat3 gradients[Element::points];  // one per row
     double volume[Element::points];   // negative where the element is inverted
 
     explicit RestElement(const Vec3 x[Element::nodes]) {
         for (int p = 0; p < Element::points; ++p) {
             const Eigen::Matrix<double, Element::nodes, 3> by_reference = Element::shape_derivatives(p);
-            Mat3 jacobian = Mat3::Zero();  // dX/d(l_1, l_2, l_3), columns
+            Mat3 jacobian = Mat3::Zero();  // dX/d(l_1, l_2, l_3), by columns
             for (int k = 1; k < Element::nodes; ++k) jacobian += (x[k] - x[0]) * by_reference.row(k);
             volume[p] = Element::reference_weight * jacobian.determinant();
             gradients[p] = jacobian.inverse();

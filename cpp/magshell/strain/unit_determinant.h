@@ -1,10 +1,12 @@
-// The matrix with determinant 1 that is nearest to F = U diag(s) V^T: U diag(d) V^T with d the nearest to s whose product is
-// 1. Where s is sorted and only its last may be negative, all d are positive, and with a multiplier k
+// UnitDeterminant: the matrix with determinant 1 that is nearest to F = U diag(s) V^T. It is U diag(d) V^T,
+// with d the vector nearest to s whose product is 1. If s is sorted and only its last entry may be negative,
+// all d are positive, and with a Lagrange multiplier k
 //
 //   d_i - k/d_i = s_i,   d_i = (s_i + r_i)/2,   r_i = sqrt(s_i^2 + 4 k),   d_1 d_2 d_3 = 1
 //
-// k > 0 where F is too small. Where it is large and thin, the product is too large even at the smallest k that has roots,
-// -s_3^2/4: then d_3 = (s_3 - r_3)/2. One point a lane; what a lane gets does not depend on its neighbours.
+// k > 0 where det F < 1. If F is large and thin, the product exceeds 1 even at the smallest k with real roots,
+// -s_3^2/4; then d_3 = (s_3 - r_3)/2. One point per SIMD lane; the result of a lane does not depend on the
+// others.
 #pragma once
 
 #include <cmath>
@@ -16,7 +18,7 @@ namespace magshell {
 struct UnitDeterminant {
     Pack d[3], multiplier;
 
-    /// s: sorted by size, the last one of either sign.
+    /// Computes d. s: stretches sorted by magnitude; only the last one may be negative.
     explicit UnitDeterminant(const Pack s[3]) : multiplier(0.0) {
         constexpr int most = 12;
         Pack root[3];
@@ -50,14 +52,14 @@ struct UnitDeterminant {
         return all;
     }
 
-    // By bisection: of the multiplier on the branch that has the product 1.
+    // Finds the multiplier of one lane by bisection, on the branch that contains the product 1.
     void search(int lane, const Pack s[3]) {
         const double at[3] = {s[0][lane], s[1][lane], s[2][lane]};
         double k[3];
         const auto product = [&](double multiplier_, bool upper) {
             for (int i = 0; i < 3; ++i) {
                 const double root = std::sqrt(std::max(at[i] * at[i] + 4.0 * multiplier_, 0.0));
-                if (i == 2 && (!upper || at[i] < 0.0))  // without cancelling
+                if (i == 2 && (!upper || at[i] < 0.0))  // this form does not cancel
                     k[i] = upper ? 2.0 * multiplier_ / (root - at[i]) : -2.0 * multiplier_ / (at[i] + root);
                 else
                     k[i] = 0.5 * (at[i] + root);
