@@ -3,8 +3,8 @@
 namespace magshell {
 namespace {
 
-// c_{i-1} + 4 c_i + c_{i+1} = 6 f_i for first <= i <= last; c_{first-1} and c_{last+1} are known. The system
-// is diagonally dominant, so elimination needs no pivots. `c` and `f` are indexed alike.
+// Solves c_{i-1} + 4 c_i + c_{i+1} = 6 f_i for first <= i <= last; c_{first-1} and c_{last+1} are known. The
+// system is diagonally dominant, so elimination needs no pivots. `c` and `f` have the same indices.
 void solve_interior(std::span<Vec4> c, std::span<const Vec4> f, int first, int last) {
     std::vector<double> above(f.size());
     for (int i = first; i <= last; ++i) {
@@ -27,8 +27,8 @@ std::vector<Vec4> spline_coefficients(std::span<const Vec4> f) {
         const Vec4 bend = n == 3 ? second_difference(1) : Vec4(Vec4::Zero());
         for (int i = 0; i < n; ++i) c[i] = f[i] - bend / 6.0;
     } else {
-        // Not a knot: the fourth difference of c about knot 1 is zero, hence c and f have the same second
-        // difference there.
+        // Not-a-knot condition: the fourth difference of c about knot 1 is zero, hence c and f have the same
+        // second difference there.
         c[1] = f[1] - second_difference(1) / 6.0;
         c[n - 2] = f[n - 2] - second_difference(n - 2) / 6.0;
         solve_interior(c, f, 2, n - 3);
@@ -40,12 +40,12 @@ std::vector<Vec4> spline_coefficients(std::span<const Vec4> f) {
     return padded;
 }
 
-// The lines of spline_coefficients, transposed and from the last to the first.
+// Transpose of spline_coefficients: its lines, transposed and in reverse order.
 std::vector<Vec4> spline_samples_gradient(std::span<const Vec4> by_coefficients) {
     const int n = static_cast<int>(by_coefficients.size()) - 2;
     std::vector<Vec4> c(by_coefficients.begin() + 1, by_coefficients.end() - 1);
     std::vector<Vec4> f(n, Vec4(Vec4::Zero()));
-    // Of c_outer = 6 f_i - 4 c_i - c_inner.
+    // Transpose of c_outer = 6 f_i - 4 c_i - c_inner.
     const auto extrapolated = [&](const Vec4& by_outer, int i, int inner) {
         f[i] += 6.0 * by_outer;
         c[i] -= 4.0 * by_outer;
@@ -62,7 +62,7 @@ std::vector<Vec4> spline_samples_gradient(std::span<const Vec4> by_coefficients)
     }
     extrapolated(c[n - 1], n - 2, n - 3);
     extrapolated(c[0], 1, 2);
-    // The interior's matrix is symmetric: c = 6 A^-1 (f - ends / 6).
+    // The matrix of the interior is symmetric: c = 6 A^-1 (f - ends / 6).
     std::vector<Vec4> rhs(n), y(n, Vec4(Vec4::Zero()));
     for (int i = 2; i <= n - 3; ++i) rhs[i] = c[i] / 6.0;
     solve_interior(y, rhs, 2, n - 3);

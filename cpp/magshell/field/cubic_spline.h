@@ -1,11 +1,12 @@
-// Cubic B-splines on equally spaced knots: coefficients that interpolate samples, weights that evaluate.
+// Cubic B-splines on equally spaced knots: coefficients that interpolate samples, and weights that evaluate the
+// spline.
 //
 //   f(origin + (i + t) spacing) = sum_{k=0..3} w_k(t) c_{i-1+k},       0 <= t <= 1
 //
-// is twice continuously differentiable. n samples need n + 2 coefficients c_{-1} ... c_n; the two conditions
-// that the samples leave open are "not a knot": the third derivative does not jump at the second and the last
-// but one knot, so that cubics are reproduced up to the border. 3 samples give their parabola, 2 their
-// straight line.
+// is twice continuously differentiable. n samples determine n + 2 coefficients c_{-1} ... c_n up to two
+// conditions, for which "not a knot" is taken: the third derivative does not jump at the second and the last
+// but one knot, so that cubics are reproduced up to the border. 3 samples give their parabola, 2 their straight
+// line.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,13 +18,14 @@ namespace magshell {
 
 using Vec4 = Eigen::Vector4d;  // three components and a zero: one vector register
 
-/// The coefficients c_{-1} ... c_n that interpolate the samples f_0 ... f_{n-1}, n >= 2.
+/// Returns the coefficients c_{-1} ... c_n that interpolate the samples f_0 ... f_{n-1}, n >= 2.
 std::vector<Vec4> spline_coefficients(std::span<const Vec4> samples);
 
-/// The transpose of spline_coefficients: the gradient by the n samples from that by the n + 2 coefficients.
+/// Applies the transpose of spline_coefficients: returns the gradient by the n samples, given that by the n + 2
+/// coefficients.
 std::vector<Vec4> spline_samples_gradient(std::span<const Vec4> by_coefficients);
 
-/// The weights of four neighbouring coefficients: of the value, and of its first and second derivative in t.
+/// The weights of four neighbouring coefficients, for the value and for its first and second derivative by t.
 using SplineWeights = std::array<std::array<double, 4>, 3>;
 
 constexpr SplineWeights spline_weights(double t) {

@@ -6,29 +6,30 @@
 namespace magshell {
 namespace {
 
-// The potential is a sum over the corners, Phi(y) = sum -s_1 s_2 s_3 F(y - s h), s_i = -1, 1, with F_xyz =
-// 1/r and
+// Derivatives of the potential of a cuboid in closed form. The potential is a sum over the corners, Phi(y) =
+// sum -s_1 s_2 s_3 F(y - s h), s_i = -1, 1, with F_xyz = 1/r and
 //
-//   F_xx = -atan(y z/(x r)),   F_xy = atanh(z/r) = t (ln(r + |z|) - ln(rho)),   t = sign z, rho^2 = x^2 +
-//   y^2.
+//   F_xx = -atan(y z/(x r)),   F_xy = atanh(z/r) = t (ln(r + |z|) - ln(rho)),   t = sign z, rho^2 = x^2 + y^2.
 //
-// The logarithm of rho belongs to the edge along z: it cancels between its two ends unless z lies between
-// them. Left out there, the rest is regular on the lines that prolong edges. All further derivatives are
-// those of the logarithms and of 1/r; F_xxx = -F_xyy - F_xzz, since F is harmonic.
+// The logarithm of rho belongs to the edge along z: it cancels between the edge's two ends unless z lies
+// between them. If it is left out there, the rest is regular on the lines that prolong edges. All higher
+// derivatives are those of the logarithms and of 1/r; F_xxx = -F_xyy - F_xzz, because F is harmonic.
 
-/// A function of the place on a line and across it (b, c): its value, and its derivatives across.
+/// A function of the position relative to a line: its value, and its derivatives by the coordinates (b, c)
+/// perpendicular to it.
 struct LineFunction {
     double value, b, c, bb, bc, cc;
 };
 
-/// t ln(r + |z|), at the distances x, y across the line.
+/// Returns t ln(r + |z|), at the distances x, y from the line.
 LineFunction end_of_line(double x, double y, double z, double r, double t) {
     const double length = std::abs(z), sum = r + length;
-    const double g = t / (r * sum), h = -g * (2.0 * r + length) / (r * r * sum);  // slope / rho, twice
+    // slope / rho; once and twice differentiated
+    const double g = t / (r * sum), h = -g * (2.0 * r + length) / (r * r * sum);
     return {t * std::log(sum), x * g, y * g, g + x * x * h, x * y * h, g + y * y * h};
 }
 
-/// ln(rho^2); NaN on the line.
+/// Returns ln(rho^2); NaN on the line.
 LineFunction whole_line(double x, double y) {
     const double square = x * x + y * y;
     if (square == 0.0) {
@@ -39,7 +40,7 @@ LineFunction whole_line(double x, double y) {
     return {std::log(square), 2.0 * bx, 2.0 * by, bend, -4.0 * bx * by, -bend};
 }
 
-/// Adds F_bc = f and what follows from it.
+/// Adds F_bc = f and the derivatives that follow from it.
 void add_line(int b, int c, const LineFunction& f, int order, PotentialDerivatives& out) {
     out.second[derivative_index(b, c)] += f.value;
     if (order < 3) return;
@@ -57,7 +58,7 @@ void add_line(int b, int c, const LineFunction& f, int order, PotentialDerivativ
 
 constexpr std::array<int, 3> next = {1, 2, 0}, after = {2, 0, 1};
 
-/// F at x from a corner; side: the signs of x.
+/// Returns the derivatives of F at x relative to a corner; side: the signs of x.
 PotentialDerivatives corner(const Vec3& x, const Vec3& side, int order) {
     PotentialDerivatives out;
     double r = x.norm();
@@ -84,8 +85,8 @@ bool Cuboid::contains(const Vec3& y) const {
     return ((y - half_).array() < 0.0).all() && ((y + half_).array() > 0.0).all();
 }
 
-/// Calls add(factor, sides, derivatives) for each corner, and for each edge that the point lies between the
-/// ends of. A piece moves with the faces on its sides; an edge has none along itself.
+/// Calls add(factor, sides, derivatives) for each corner, and for each edge between whose ends the point lies.
+/// `sides` says with which faces a piece moves; an edge has no entry along itself.
 template <class Add>
 void Cuboid::for_each_piece(const Vec3& y, int order, const Add& add) const {
     const std::array<Vec3, 2> from = {y + half_, y - half_};  // the lower faces, and the upper ones

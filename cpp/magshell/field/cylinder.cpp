@@ -10,22 +10,22 @@
 namespace magshell {
 namespace {
 
-// By Gauss's theorem the gradient of the potential across the axis is that of a charge on the shell,
+// Derivatives of the potential of a cylinder, by quadrature around its end rings. By Gauss's theorem the
+// gradient of the potential perpendicular to the axis is that of a charge on the lateral surface,
 //
-//   Phi_i = -int n_i (L(z + h) - L(z - h)) R dphi,   L(z) = atanh(z/r) = t (ln(r + |z|) - ln(s)),   t = sign
-//   z,
+//   Phi_i = -int n_i (L(z + h) - L(z - h)) R dphi,   L(z) = atanh(z/r) = t (ln(r + |z|) - ln(s)),   t = sign z,
 //
-// over the circle; r is the distance from the point to that of the ring at an end, s its part across the
-// axis. What ln(s) adds cancels between the ends unless the point lies between them, and is then the
-// potential of a cylinder without ends, known in closed form. The rest is regular but for the ring. In
-// Jacobi's parameter u of the angle, phi = pi - 2 am(u), r is analytic with its zero K' away from the real
-// line, and the trapezoidal rule converges as exp(-pi n K'/K) with n points on the circle: to round-off in
-// about 30 points at a tenth of the radius from the ring, and 100 at a millionth. So the derivatives are
-// those of the integrand, with nothing to cancel near the axis.
+// integrated over the circle; r is the distance from the point to that of the ring at an end, s its part
+// perpendicular to the axis. The contribution of ln(s) cancels between the ends unless the point lies between
+// them; it is then the potential of an infinite cylinder, known in closed form. The rest is regular away from
+// the ring. In Jacobi's parameter u of the angle, phi = pi - 2 am(u), r is analytic with its zero at the
+// distance K' from the real line, so the trapezoidal rule converges as exp(-pi n K'/K) with n points on the
+// circle: to round-off with about 30 points at a tenth of the radius from the ring, and 100 at a millionth.
+// Derivatives are those of the integrand, so nothing cancels near the axis.
 //
-// All components are along x, away from the axis, y around it and z along it; odd ones in y vanish.
+// All components are along x, away from the axis, y around it and z along it; those odd in y vanish.
 
-/// The independent derivatives of a function that is harmonic, or has constant sources, and symmetric to y = 0.
+/// The independent derivatives of a function that is symmetric in y and harmonic, or has constant sources.
 struct SymmetricDerivatives {
     double xx = 0, yy = 0, xz = 0, xxx = 0, xyy = 0, xxz = 0, yyz = 0;
     double xxxx = 0, xxyy = 0, yyyy = 0, xxxz = 0, xyyz = 0;
@@ -41,25 +41,26 @@ struct SymmetricDerivatives {
     }
 };
 
-/// What a ring adds: the derivatives of int n_i L R dphi, and those of int L R dphi.
+/// The contribution of a ring: the derivatives of int n_i L R dphi, and those of int L R dphi.
 struct RingSums {
     SymmetricDerivatives charged, plain;
 };
 
-/// Sums over the points of a ring: of radius R, rho from the axis and z above it.
+/// Sums over the points of a ring of radius R, for a point at the distance rho from the axis and z above the
+/// ring.
 class Ring {
   public:
     Ring(double radius, double rho, double z, double t, int order, bool with_plain)
         : radius_(radius), away_(rho - radius), z_(z), t_(t), order_(order), with_plain_(with_plain) {}
 
-    /// The point with phi = pi - 2 theta, of this length of arc.
+    /// Adds the point with phi = pi - 2 theta, for this length of arc.
     void add(double sin, double cos, double arc) {
         const double nx = 2.0 * sin * sin - 1.0, ny = 2.0 * sin * cos;
         const double x = away_ + 2.0 * radius_ * cos * cos, y = -radius_ * ny;
         const double x2 = x * x, y2 = y * y, r2 = x2 + y2 + z_ * z_, r = std::sqrt(r2);
         const double length = std::abs(z_), sum = r + length, inverse = 1.0 / (r * sum);
         const double inverse_r = sum * inverse, inverse_sum = r * inverse, inverse_r2 = inverse_r * inverse_r;
-        // slope / s of L, and of this, and of that
+        // slope / s of L, and the same operation applied to it once and twice
         const double g = t_ * inverse, g1 = -g * (2.0 * r + length) * inverse_r2 * inverse_sum;
         const double cx = arc * nx, cy = arc * ny, c1 = arc * inverse_r, c3 = c1 * inverse_r2;
         SymmetricDerivatives& c = sums_.charged;
@@ -105,13 +106,13 @@ RingSums ring_sums(double radius, double rho, double z, double t, int order, boo
     Ring ring(radius, rho, z, t, order, with_plain);
     const double across = rho - radius, largest = (rho + radius) * (rho + radius) + z * z;
     const Modulus modulus{4.0 * radius * rho / largest, (across * across + z * z) / largest};
-    if (!(modulus.complement > 0.0)) {  // on the ring, or nowhere
+    if (!(modulus.complement > 0.0)) {  // on the ring, or NaN
         constexpr double nan = std::numeric_limits<double>::quiet_NaN();
         ring.add(nan, nan, nan);
         return ring.sums();
     }
     const double complementary = std::sqrt(modulus.complement);
-    // a floor so that the number of points has a bound
+    // The lower bounds limit the number of points.
     const double mean = arithmetic_geometric_mean(1.0, std::max(complementary, 1e-16));
     const double other = arithmetic_geometric_mean(1.0, std::max(std::sqrt(modulus.square), 1e-16));
     const double ratio = other / mean;  // K/K'
@@ -123,7 +124,7 @@ RingSums ring_sums(double radius, double rho, double z, double t, int order, boo
     const double arc = 4.0 * radius * step;
     for (int n = 0; n < quarter; ++n) {
         ring.add(at.sn, at.cn, arc * at.dn);
-        // as far from the other end, u = K, which is next to the point
+        // The mirror point, at the same distance from u = K, which is closest to the sample point.
         const double inverse = 1.0 / at.dn, k = complementary * inverse;
         ring.add(at.cn * inverse, k * at.sn, arc * k);
         at = sum_of_arguments(at, one, modulus);
@@ -131,7 +132,7 @@ RingSums ring_sums(double radius, double rho, double z, double t, int order, boo
     return ring.sums();
 }
 
-/// A cylinder without ends, and its derivative by the radius.
+/// Returns the derivatives of an infinite cylinder's potential, and those of its derivative by the radius.
 RingSums endless(double radius, double rho) {
     constexpr double pi = std::numbers::pi;
     RingSums result;
@@ -173,7 +174,8 @@ Mat3 Cylinder::frame(const Vec3& y) const {
     return axes;
 }
 
-/// Calls add(side, derivatives, by radius) for the ring of each end, and for the shell without ends between them.
+/// Calls add(side, factor, derivatives) for the ring of each end, and for the infinite cylinder if the point
+/// lies between the ends.
 template <class Add>
 void Cylinder::for_each_piece(const Vec3& y, int order, bool by_radius, const Add& add) const {
     const double rho = std::hypot(y[0], y[1]);

@@ -1,4 +1,4 @@
-// The potential of a uniform cylinder.
+// Cylinder: the potential of a uniformly magnetized cylinder.
 #pragma once
 
 #include <array>
@@ -10,19 +10,19 @@
 
 namespace magshell {
 
-/// A cylinder about the origin, its axis along the third axis. The interface is that of Cuboid.
+/// A cylinder about the origin along the third axis. The interface is that of Cuboid.
 class Cylinder {
   public:
     static constexpr std::string_view name = "cylinder magnet";
     static constexpr std::array<FieldParameter, 2> sizes = {{{"radius", "m", 1, 1}, {"height", "m", 1, 1}}};
     static constexpr int n_sizes = 2;
 
-    /// Both [m] and positive.
+    /// Creates the cylinder from radius and height [m], positive.
     Cylinder(double radius, double height);
     void set_sizes(std::span<const double> radius_and_height);
 
     bool contains(const Vec3& y) const;
-    /// Away from the axis, around it, and along it.
+    /// Returns the axes at y: away from the axis, around it, and along it.
     Mat3 frame(const Vec3& y) const;
 
     void derivatives(const Vec3& y, int order, PotentialDerivatives& out) const;

@@ -11,14 +11,15 @@
 namespace magshell {
 namespace {
 
-// p is the moment of the dipole, r the vector from it to the point, e = r/|r|, and m the moment of the point.
+// Flux density of a dipole and its derivatives. p is the dipole's moment, r the vector from it to the point, e
+// = r/|r|, and m the moment at the point.
 //
 //   B           = k/|r|^3  (3 (p.e) e - p)                                            k = mu_0/(4 pi)
 //   dB/dx       = 3k/|r|^4 (p e^T + e p^T + (p.e) (I - 5 e e^T))
 //   d2(m.B)/dx2 = 3k/|r|^5 (p m^T + m p^T - 5 (v e^T + e v^T) + (35 a b - 5 c) e e^T + (c - 5 a b) I)
 //
-// with a = p.e, b = m.e, c = p.m, v = b p + a m. B is harmonic and free of curl and divergence, so that both
-// matrices are symmetric and free of trace.
+// with a = p.e, b = m.e, c = p.m, v = b p + a m. B is harmonic and free of curl and divergence, so both
+// matrices are symmetric and have trace zero.
 
 Vec3 flux(const Vec3& p, const Vec3& e) {
     return 3.0 * p.dot(e) * e - p;
@@ -58,7 +59,7 @@ void Dipoles::add_samples(std::span<const Vec3> points, std::span<const Vec3> mo
         for (std::size_t d = 0; d < positions_.size(); ++d) {
             const Vec3 r = points[point] - positions_[d];
             const double distance = r.norm();
-            const Vec3 e = r / distance;  // NaN on the dipole itself, and so is all that follows
+            const Vec3 e = r / distance;  // NaN on the dipole itself, and so are all results
             const double k3 = k / (distance * distance * distance);
             out.flux[point] += k3 * flux(moments_[d], e);
             if (order >= 1) out.gradient[point] += 3.0 * k3 / distance * gradient(moments_[d], e);
@@ -70,8 +71,9 @@ void Dipoles::add_samples(std::span<const Vec3> points, std::span<const Vec3> mo
     });
 }
 
-// B and dB/dx are linear in p and, as matrices that take p to u . B and m . dB/dx v, symmetric: by p they are
-// the flux of u and the gradient of m along v. By the place of the dipole they change as by the point, reversed.
+// Gradients by the parameters: B and dB/dx are linear in p and, as matrices that map p to u . B and m . dB/dx
+// v, symmetric. The derivative by p is therefore the flux of a dipole u plus the gradient of a dipole m along
+// v. The derivative by the position of the dipole is minus that by the point.
 std::vector<FieldParameter> Dipoles::parameters() const {
     const Index n = static_cast<Index>(positions_.size());
     return {{"positions", "m", n, 3}, {"moments", "A m^2", n, 3}};

@@ -1,4 +1,4 @@
-// The flux density of point dipoles, with its first and second derivatives in closed form.
+// Dipoles: the flux density of point dipoles, with its first and second derivatives in closed form.
 #pragma once
 
 #include <vector>
@@ -12,7 +12,7 @@ constexpr double vacuum_permeability = 1.25663706127e-6;  // mu_0 [T m/A], CODAT
 /// Point dipoles in vacuum. A sample point that coincides with a dipole gets NaN.
 class Dipoles final : public AppliedField {
   public:
-    /// Positions [m] and moments [A m^2], one of each a dipole.
+    /// Creates the dipoles; positions [m] and moments [A m^2], one of each per dipole.
     Dipoles(std::vector<Vec3> positions, std::vector<Vec3> moments);
 
     std::string_view name() const override { return "dipoles"; }

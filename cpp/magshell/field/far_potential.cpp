@@ -11,7 +11,7 @@ namespace {
 constexpr double pi = std::numbers::pi;
 constexpr int most = 12;
 
-/// Points and weights on (-1, 1).
+/// Gauss points and weights on (-1, 1).
 struct GaussRule {
     int count;
     std::array<double, most> place, weight;
@@ -21,7 +21,7 @@ GaussRule gauss_rule(int count) {
     GaussRule rule{count, {}, {}};
     for (int k = 0; k < count; ++k) {
         double x = std::cos(pi * (k + 0.75) / (count + 0.5)), slope = 1.0;
-        for (int iteration = 0; iteration < 8; ++iteration) {  // Newton, on Legendre's polynomial
+        for (int iteration = 0; iteration < 8; ++iteration) {  // Newton's method for Legendre's polynomial
             double before = 1.0, value = x;
             for (int n = 2; n <= count; ++n) {
                 const double next = ((2 * n - 1) * x * value - (n - 1) * before) / n;
@@ -46,8 +46,9 @@ const GaussRule& rule_of(int count) {
     return rules[std::clamp(count, 1, most) - 1];
 }
 
-/// n points are exact for polynomials of degree 2n - 1, and 1/|y - y'| is harmonic in y': the error begins
-/// with the power 2n of size over distance, to be 1e-13.
+/// Returns the number of Gauss points for a ratio of size over distance. n points are exact for polynomials of
+/// degree 2n - 1, and 1/|y - y'| is harmonic in y', so the error begins with the power 2n of the ratio; it is
+/// to be 1e-13.
 int points_for(double ratio) {
     return static_cast<int>(std::ceil(15.0 / std::log(1.0 / ratio)));
 }
@@ -55,7 +56,7 @@ int points_for(double ratio) {
 }  // namespace
 
 FarPotential::FarPotential(FarShape shape, const Vec3& half) : shape_(shape), half_(half) {
-    // the sums over corners lose one digit more than those over circles
+    // Digits lost by the closed forms: sums over corners lose one digit more than those over circles.
     const double loss = shape == FarShape::cuboid ? 8e3 : 4e4;
     const double nearest = std::max(3.0 * half.norm(), std::cbrt(loss * half.prod()));
     nearest_squared_ = nearest * nearest;
@@ -76,7 +77,7 @@ void FarPotential::for_each_charge(const Vec3& y, const Add& add) const {
         return;
     }
     const int directions = 2 * across + 2;
-    const GaussRule& outward = rule_of((across + 1) / 2);  // in the square of the radius
+    const GaussRule& outward = rule_of((across + 1) / 2);  // in the squared radius
     for (int d = 0; d < directions; ++d) {
         const double angle = 2.0 * pi * (d + 0.5) / directions, cos = std::cos(angle), sin = std::sin(angle);
         for (int i = 0; i < outward.count; ++i) {

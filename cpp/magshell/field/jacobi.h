@@ -1,4 +1,5 @@
-// Jacobi's elliptic functions on a grid, and the integrals that say how fine it has to be.
+// Jacobi's elliptic functions on a grid, and the arithmetic-geometric mean that determines how fine the grid
+// must be.
 #pragma once
 
 #include <cmath>
@@ -15,8 +16,8 @@ struct Modulus {
     double square, complement;
 };
 
-/// Of the sum of two arguments. Errors off sn^2 + cn^2 = 1 and dn^2 = cn^2 + k'^2 sn^2 would grow from sum to
-/// sum, the latter as 1/k', so that the result is put back onto both.
+/// Returns the functions of the sum of two arguments. Deviations from sn^2 + cn^2 = 1 and dn^2 = cn^2 + k'^2
+/// sn^2 would grow from sum to sum, the latter as 1/k', so the result is projected onto both.
 inline Jacobi sum_of_arguments(const Jacobi& a, const Jacobi& b, const Modulus& m) {
     const double inverse = 1.0 / (1.0 - m.square * a.sn * a.sn * b.sn * b.sn);
     double sn = (a.sn * b.cn * b.dn + b.sn * a.cn * a.dn) * inverse;
@@ -27,7 +28,7 @@ inline Jacobi sum_of_arguments(const Jacobi& a, const Jacobi& b, const Modulus& 
     return {sn, cn, std::sqrt(cn * cn + m.complement * sn * sn)};
 }
 
-/// Of a small argument, |u| < 0.3: a series for a sixteenth of it, doubled four times.
+/// Returns the functions of a small argument, |u| < 0.3: a series for a sixteenth of it, doubled four times.
 inline Jacobi jacobi_near_zero(double u, const Modulus& modulus) {
     const double m = modulus.square, x = u / 16.0, x2 = x * x;
     const double sn =
@@ -40,7 +41,7 @@ inline Jacobi jacobi_near_zero(double u, const Modulus& modulus) {
     return result;
 }
 
-/// The arithmetic-geometric mean: K(k) = pi / (2 mean(1, k')).
+/// Returns the arithmetic-geometric mean: K(k) = pi / (2 mean(1, k')).
 inline double arithmetic_geometric_mean(double a, double b) {
     while (std::abs(a - b) > 1e-8 * a) {
         const double mean = 0.5 * (a + b);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double four_pi = 4.0 * std::numbers::pi;
 
-/// B = (d2 Phi + 4 pi [inside]) M, but for the factor in front.
+/// Returns the matrix d2 Phi + 4 pi [inside], which maps M to B up to a constant factor.
 Mat3 flux_matrix(const PotentialDerivatives& potential, bool inside) {
     Mat3 result = potential.matrix();
     if (inside) result.diagonal().array() += four_pi;
@@ -71,8 +71,9 @@ void Magnet<Shape>::set_values(std::span<const double> values) {
     set_pose(Vec3(rest), Vec3(rest + 3), Vec3(rest + 6));
 }
 
-// w = u . B + m . (G v), G = dB/dx, with all vectors in the axes of the shape. As the magnet moves, w changes
-// as by the point, reversed; as it turns, as if u, m, v and the point turned about the center, reversed.
+// Gradient of w = u . B + m . (G v), G = dB/dx, at one point, with all vectors in axes of the shape. A
+// displacement of the magnet changes w as the opposite displacement of the point does; a rotation as the
+// opposite rotation of u, m, v and the point about the center does.
 template <class Shape>
 typename Magnet<Shape>::Row Magnet<Shape>::gradient_at(const Vec3& point, const Vec3& u, const Vec3& m,
                                                        const Vec3& v) const {

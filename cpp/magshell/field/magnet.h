@@ -1,11 +1,11 @@
-// The flux density of uniformly magnetised permanent magnets, with its first and second derivatives.
+// Magnet: the flux density of uniformly magnetized permanent magnets, with its first and second derivatives.
 //
-// With Phi, the integral of 1/|x - x'| over the magnet, and M_r, its remanent magnetization,
+// With Phi, the integral of 1/|x - x'| over the magnet, and its remanent magnetization M_r,
 //
 //   B = mu_0/(4 pi) (d2 Phi + 4 pi [inside]) M_r
 //
-// so that a shape is known by the derivatives of Phi from the second to the fourth. Field and gradients
-// follow for all shapes at once.
+// A shape therefore only provides the derivatives of Phi from the second to the fourth; field and gradients are
+// the same code for all shapes.
 #pragma once
 
 #include <vector>
@@ -16,10 +16,11 @@
 
 namespace magshell {
 
-/// A magnet of a shape with its own frame: x = center + R(rotation) y. The remanent magnetization [A/m] is
-/// given in that frame and turns with it. A point on the surface counts as outside; on an edge the field is NaN.
+/// A magnet whose shape has a frame of its own: x = center + R(rotation) y. The remanent magnetization [A/m] is
+/// given in that frame and rotates with it. A point on the surface counts as outside; on an edge the field is
+/// NaN.
 ///
-/// A Shape has `name`, `sizes` (its parameters), and its potential: see Cuboid.
+/// A Shape provides `name`, `sizes` (its parameters), and its potential: see Cuboid.
 template <class Shape>
 class Magnet final : public AppliedField {
   public:
@@ -29,7 +30,7 @@ class Magnet final : public AppliedField {
     void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
                      FieldSamples& out) const override;
 
-    /// The sizes of the shape, and then remanent_magnetization, center and rotation.
+    /// Returns the sizes of the shape, then remanent_magnetization, center and rotation.
     std::vector<FieldParameter> parameters() const override;
     std::shared_ptr<AppliedField> clone() const override { return std::make_shared<Magnet>(*this); }
     void set_values(std::span<const double> values) override;
@@ -41,7 +42,7 @@ class Magnet final : public AppliedField {
     using Row = Eigen::Matrix<double, n_values, 1>;
 
     void set_pose(const Vec3& magnetization, const Vec3& center, const Vec3& rotation);
-    /// Of one point, by sizes, magnetization, center, and turns in the world's axes.
+    /// Returns the gradient at one point by sizes, magnetization, center, and rotation in world axes.
     Row gradient_at(const Vec3& point, const Vec3& u, const Vec3& m, const Vec3& v) const;
 
     Shape shape_;

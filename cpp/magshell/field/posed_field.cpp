@@ -73,8 +73,9 @@ void PosedField::set_values(std::span<const double> values) {
     set_pose(Vec3(values.data() + n_own_), Vec3(values.data() + n_own_ + 3));
 }
 
-// w = u . B + m . (G v), G = dB/dx, with all vectors in the field's own axes. As the field moves, w changes as
-// by the point, reversed; as it turns, as if u, m, v and the point turned about the center, reversed.
+// Gradient of w = u . B + m . (G v), G = dB/dx, with all vectors in the field's own axes. A displacement of the
+// field changes w as the opposite displacement of the point does; a rotation as the opposite rotation of u, m,
+// v and the point about the center does.
 void PosedField::add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
                          std::span<double> out) const {
     const std::vector<Vec3> y = own_points(points);

@@ -1,8 +1,8 @@
-// A field that was put somewhere: it is given in a frame of its own, x = center + R(rotation) y.
+// PosedField: a field given in a frame of its own with a pose in the world, x = center + R(rotation) y.
 //
 //   B(x) = R B_own(R^T (x - center))
 //
-// The samples of the field itself say how that changes with its place, whatever kind it is.
+// The gradient by the pose follows from samples of the field itself, whatever kind of field it is.
 #pragma once
 
 #include "magshell/field/applied_field.h"
@@ -17,7 +17,7 @@ class PosedField final : public AppliedField {
     void add_samples(std::span<const Vec3> points, std::span<const Vec3> moments, int order, double scale,
                      FieldSamples& out) const override;
 
-    /// The field's own, and then center and rotation.
+    /// Returns the field's own parameters, then center and rotation.
     std::vector<FieldParameter> parameters() const override;
     std::shared_ptr<AppliedField> clone() const override;
     void set_values(std::span<const double> values) override;
@@ -32,9 +32,10 @@ class PosedField final : public AppliedField {
     std::vector<Vec3> own_axes(std::span<const Vec3> vectors) const;
 
     std::shared_ptr<const AppliedField> field_;
-    std::shared_ptr<AppliedField> own_;  // the same one, where it has values that are this one's
-    std::size_t n_own_ = 0;              // how many numbers those are
-    std::vector<double> last_;           // those that it has; splines through a grid cost more than a place
+    std::shared_ptr<AppliedField> own_;  // the same object if its parameters belong to this one, else nullptr
+    std::size_t n_own_ = 0;              // number of values of its parameters
+    // its current values: they are set again only if they changed, since splines through a grid are expensive
+    std::vector<double> last_;
     Vec3 center_, rotation_;
     Mat3 turn_;
     bool moved_ = false;

@@ -1,4 +1,5 @@
-// Derivatives of a potential that is harmonic outside its sources, as the symmetric tensors they are.
+// PotentialDerivatives: the second to fourth derivatives of a potential that is harmonic outside its sources,
+// stored as symmetric tensors.
 #pragma once
 
 #include <array>
@@ -8,7 +9,7 @@
 
 namespace magshell {
 
-/// Where the derivative along these axes stands: those along x first, then y, then z.
+/// Return the index of the derivative along these axes: derivatives by x come first, then y, then z.
 constexpr int derivative_index(int i, int j) {
     const int p = (i > 0) + (j > 0), c = (i == 2) + (j == 2);
     return p * (p + 1) / 2 + c;
@@ -28,7 +29,7 @@ struct PotentialDerivatives {
     std::array<double, 10> third{};
     std::array<double, 15> fourth{};
 
-    /// Adds factor * other, up to the order of derivatives.
+    /// Adds factor * other, up to the given order of derivatives.
     void add(double factor, const PotentialDerivatives& other, int order) {
         for (int n = 0; n < 6; ++n) second[n] += factor * other.second[n];
         if (order >= 3)
@@ -43,7 +44,7 @@ struct PotentialDerivatives {
         for (double& each : fourth) each *= factor;
     }
 
-    /// Adds factor * d(other)/dx_axis, as far as it is known: second and third derivatives.
+    /// Adds factor * d(other)/dx_axis as far as it is known: to the second and third derivatives.
     void add_slope(double factor, const PotentialDerivatives& other, int axis) {
         for (int i = 0; i < 3; ++i)
             for (int j = i; j < 3; ++j) {
@@ -61,7 +62,7 @@ struct PotentialDerivatives {
         return result;
     }
 
-    /// The third derivatives, one of them along a.
+    /// Returns the third derivatives contracted with a.
     Mat3 along(const Vec3& a) const {
         Mat3 result;
         for (int i = 0; i < 3; ++i)
@@ -72,7 +73,7 @@ struct PotentialDerivatives {
         return result;
     }
 
-    /// The fourth derivatives, one of them along a and one along b.
+    /// Returns the fourth derivatives contracted with a and b.
     Mat3 along(const Vec3& a, const Vec3& b) const {
         Mat3 result;
         for (int i = 0; i < 3; ++i)
@@ -89,12 +90,13 @@ struct PotentialDerivatives {
     }
 };
 
-/// The sign of x, the coordinate from a face; on the face itself that of the side, so that it belongs to the outside.
+/// Returns the sign of x, the coordinate relative to a face; on the face the sign of its side, so that it
+/// belongs to the outside.
 inline double outward_sign(double x, double side) {
     return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : side;
 }
 
-/// Adds those of 1/|x|: with e = x/|x|, its n-th derivatives are polynomials of e over |x|^(n+1).
+/// Adds the derivatives of charge/|x|: with e = x/|x|, the n-th ones are polynomials of e divided by |x|^(n+1).
 inline void add_point_charge(double charge, const Vec3& x, int order, PotentialDerivatives& out) {
     const double inverse = 1.0 / x.norm(), k3 = charge * inverse * inverse * inverse;
     const double k4 = 3.0 * k3 * inverse, k5 = k4 * inverse;

@@ -12,7 +12,7 @@
 namespace magshell {
 namespace {
 
-// A dense array of three axes in C order.
+// A dense array with three axes in C order.
 struct Grid {
     std::array<Index, 3> size;
     std::vector<Vec4> values;
@@ -24,7 +24,7 @@ struct Grid {
     }
 };
 
-// Replaces every line of values along one axis by another one, two longer or two shorter.
+// Replaces every line of values along one axis by its image under `map`, which is two longer or two shorter.
 Grid map_lines(int axis, const Grid& from, std::vector<Vec4> (*map)(std::span<const Vec4>), Index longer) {
     const Index n = from.size[axis];
     Grid result{from.size, {}};
@@ -56,7 +56,7 @@ SampledField::SampledField(const Vec3& origin, const Vec3& spacing, const std::a
                            std::to_string(flux_density.size()) + " values");
     }
 
-    std::ptrdiff_t stride = 1;  // of coefficients, of which an axis has two more than samples
+    std::ptrdiff_t stride = 1;  // of coefficients: an axis has two more than samples
     for (int a = 2; a >= 0; --a) {
         const bool constant = samples[a] == 1;
         axes_[a] = {origin[a], constant ? 0.0 : 1.0 / spacing[a], samples[a], constant ? 0 : stride};
@@ -86,7 +86,7 @@ void SampledField::set_values(std::span<const double> values) {
 }
 
 bool SampledField::Axis::contains(double x) const {
-    constexpr double slack = 1e-9;  // of a spacing, beyond the samples' ends
+    constexpr double slack = 1e-9;  // [-] tolerance beyond the ends of the grid, in spacings
     const double u = grid_coordinate(x);
     return u >= -slack && u <= samples - 1 + slack;  // false for NaN
 }
@@ -114,7 +114,8 @@ void SampledField::add_sample(std::size_t k, const Vec3& point, const Vec3& mome
     const std::array<SplineWeights, 3>& w = found.weights;
     const Vec4* cell = coefficients_.data() + found.first;
 
-    // Partial derivatives by sum factorisation: d[a][b][c] differentiates a, b and c times along x, y and z.
+    // Computes partial derivatives by sum factorization: d[a][b][c] is differentiated a, b and c times along x,
+    // y and z.
     constexpr int n = Order + 1;
     const Vec4 zero = Vec4::Zero();
     Vec4 d[n][n][n];
@@ -171,8 +172,8 @@ void SampledField::add_samples(std::span<const Vec3> points, std::span<const Vec
     });
 }
 
-// The samples reach a point through the coefficients around it, linearly. One point after another, as they
-// share them.
+// Gradient by the samples. A point depends linearly on the coefficients around it. Points are processed one
+// after another, because they share coefficients.
 void SampledField::add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
                            std::span<double> out) const {
     Grid grid;

@@ -1,4 +1,5 @@
-// A flux density given by samples on a regular grid, interpolated by tensor-product cubic B-splines.
+// SampledField: a flux density given by samples on a regular grid, interpolated by tensor-product cubic
+// B-splines.
 #pragma once
 
 #include <array>
@@ -9,12 +10,13 @@
 
 namespace magshell {
 
-/// Twice continuously differentiable inside the grid, NaN outside. The error falls with the fourth power of
-/// the spacing, that of the gradient with the third, that of the second derivative with the second.
+/// The field is twice continuously differentiable inside the grid and NaN outside. Its error falls with the
+/// fourth power of the spacing, that of the gradient with the third, that of the second derivative with the
+/// second.
 class SampledField final : public AppliedField {
   public:
-    /// Samples B [T] in C order: the last axis runs fastest. An axis with one sample is one along which the
-    /// field does not change; its origin and spacing are not used.
+    /// Creates the field from samples B [T] in C order: the last axis runs fastest. Along an axis with one
+    /// sample the field is constant; its origin and spacing are not used.
     SampledField(const Vec3& origin, const Vec3& spacing, const std::array<Index, 3>& samples,
                  std::span<const Vec3> flux_density);
 
@@ -25,16 +27,16 @@ class SampledField final : public AppliedField {
     std::vector<FieldParameter> parameters() const override;
     std::shared_ptr<AppliedField> clone() const override { return std::make_shared<SampledField>(*this); }
     void set_values(std::span<const double> values) override;
-    /// The points lie in the grid.
+    /// The points must lie in the grid.
     void add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
                  std::span<double> out) const override;
 
-    /// Whether the point lies in the grid; rounding may carry it out by a billionth of a cell.
+    /// Returns true if the point lies in the grid, with a tolerance of a billionth of a cell for round-off.
     bool contains(const Vec3& point) const;
 
   private:
-    // One axis of the grid. A constant one has stride 0 and knots_per_metre 0, so that all four weights,
-    // which add up to one, meet the same coefficient.
+    // One axis of the grid. A constant axis has stride 0 and knots_per_metre 0, so that all four weights, which
+    // add up to one, refer to the same coefficient.
     struct Axis {
         double origin;
         double knots_per_metre;
@@ -45,7 +47,7 @@ class SampledField final : public AppliedField {
         bool contains(double x) const;
     };
 
-    // Of 64 coefficients around a point the first, and the weights along each axis.
+    // The 64 coefficients around a point: the index of the first, and the weights along each axis.
     struct Cell {
         std::ptrdiff_t first = 0;
         std::array<SplineWeights, 3> weights;
@@ -56,7 +58,7 @@ class SampledField final : public AppliedField {
     void add_sample(std::size_t k, const Vec3& point, const Vec3& moment, double scale,
                     FieldSamples& out) const;
 
-    /// The number of samples.
+    /// Returns the number of samples.
     std::size_t count() const;
 
     std::array<Axis, 3> axes_;
