@@ -1,14 +1,15 @@
-// A box around the origin, its edges and corners rounded or sharp.
+// Box: a box around the origin with rounded or sharp edges.
 #pragma once
 
 #include "magshell/obstacle/swept_ball.h"
 
 namespace magshell {
 
-/// A box that is smaller by the rounding on all sides, with a ball of that radius swept through it.
+/// The obstacle is a ball of the rounding radius swept through a box that is smaller by that radius on all
+/// sides.
 class Box final : public Obstacle {
   public:
-    /// half_extents: of the whole, each at least the rounding.
+    /// Creates the box. half_extents: of the whole box [m], each at least the rounding radius [m].
     Box(const Vec3& half_extents, double rounding)
         : core_(half_extents.array() - rounding), rounding_(rounding) {}
 

@@ -1,4 +1,4 @@
-// A segment with a ball swept along it.
+// Capsule: a ball swept along a segment.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@ namespace magshell {
 
 class Capsule final : public Obstacle {
   public:
-    /// The ends of the segment differ.
+    /// Creates the capsule; the ends of the segment must differ.
     Capsule(const Vec3& start, const Vec3& end, double radius)
         : start_(start), length_((end - start).norm()), along_((end - start) / length_), radius_(radius) {}
 

@@ -1,4 +1,4 @@
-// The space around a body, as a body: what keeps a sheet inside.
+// Complement: the space around a body, as an obstacle, which keeps other bodies inside that body.
 #pragma once
 
 #include <memory>

@@ -12,9 +12,9 @@
 namespace magshell {
 namespace {
 
-constexpr Index settled = 2;  // knots beyond the border, where the ground is level
+constexpr Index settled = 2;  // [knots] beyond the border until the surface is level
 
-// Where along an axis a coordinate lies: the four coefficients around it, and their weights.
+// The position of a coordinate on an axis: the four coefficients around it, and their weights.
 struct Place {
     std::array<std::ptrdiff_t, 4> index;
     SplineWeights weights;
@@ -46,7 +46,7 @@ HeightField::HeightField(const Pair& origin, const Pair& spacing, const std::arr
     build_blocks();
 }
 
-// Derivatives of a B-spline are averages of differences of its coefficients.
+// Bounds slope and curvature: derivatives of a B-spline are averages of differences of its coefficients.
 void HeightField::bound_derivatives() {
     const Index nx = samples_[0] + 2, ny = samples_[1] + 2;
     const auto c = [&](Index i, Index j) { return coefficients_[static_cast<std::size_t>(i) * ny + j]; };
@@ -91,7 +91,7 @@ void HeightField::build_blocks() {
 HeightField::Ground HeightField::ground(const Pair& at) const {
     const Place x = place_of((at.x() - origin_.x()) / spacing_.x(), samples_[0]);
     const Place y = place_of((at.y() - origin_.y()) / spacing_.y(), samples_[1]);
-    double sums[3][3] = {};  // differentiated so often along x and y
+    double sums[3][3] = {};  // [times differentiated by x][by y]
     for (int i = 0; i < 4; ++i) {
         const double* row = coefficients_.data() + x.index[i] * (samples_[1] + 2);
         for (int b = 0; b < 3; ++b) {
@@ -141,12 +141,12 @@ void HeightField::scan_block(const Block& block, const Vec3& point, double& leas
     }
 }
 
-// Where the ground comes nearest to the point, if each cell is looked at in one place only, the one below it
-// or the nearest to that. `start` if that is nearer still.
+// Finds the nearest point of the surface, evaluating each cell at one position only: below the point, or the
+// nearest to that. Returns `start` if that is nearer still.
 HeightField::Pair HeightField::scan(const Vec3& point, const Pair& start, double gap) const {
     double least = (start - point.head<2>()).squaredNorm() + gap * gap;
     Pair best = start;
-    const Block* first = nullptr;  // the most promising one: it leaves little for the others
+    const Block* first = nullptr;  // the most promising block: it leaves little for the others
     double lowest = least;
     for (const Block& block : blocks_) {
         const double bound = squared_bound(block, point);
@@ -159,9 +159,10 @@ HeightField::Pair HeightField::scan(const Vec3& point, const Pair& start, double
     return best;
 }
 
-// Newton's iteration for the minimum of D; where its second derivatives are not positive, those of Gauss and Newton.
+// Minimizes D by Newton's method; where its second derivatives are not positive definite, those of Gauss-Newton
+// are used.
 HeightField::Pair HeightField::nearest(const Vec3& point, Pair at) const {
-    const double close = 1e-8 * spacing_.minCoeff();  // the next step is far below rounding
+    const double close = 1e-8 * spacing_.minCoeff();  // the next step is far below round-off
     Ground g = ground(at);
     const auto half_square = [&](const Pair& where, const Ground& there) {
         const double rise = there.height - point.z();
@@ -175,7 +176,7 @@ HeightField::Pair HeightField::nearest(const Vec3& point, Pair at) const {
         Eigen::Matrix2d second = certain + rise * g.bend;
         if (!(second.determinant() > 1e-6 * certain.determinant() && second.trace() > 0.0)) second = certain;
         Pair step = -second.inverse() * gradient;
-        // Rounding alone decides between values when the step is small.
+        // Once the step is small, round-off alone decides between values.
         const bool last = !(step.lpNorm<Eigen::Infinity>() > close);
         for (int halving = 0;; ++halving) {
             const Pair next = at + step;
@@ -200,7 +201,7 @@ Distance HeightField::distance(const Vec3& point) const {
     Pair start = point.head<2>();
     const Ground below = ground(start);
     const double gap = point.z() - below.height;
-    // The nearest point is at most |gap| away. Where D is convex as far as that, there is no other minimum.
+    // The nearest point is at most |gap| away. If D is convex within that distance, there is no other minimum.
     const bool convex = std::abs(gap) * (1.0 + steepest_) * sharpest_ < 1.0;
     if (!convex) start = scan(point, start, gap);
 

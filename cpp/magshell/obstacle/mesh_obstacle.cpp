@@ -15,7 +15,7 @@
 namespace magshell {
 namespace {
 
-constexpr Index margin = 4;  // cells around the mesh
+constexpr Index margin = 4;  // [cells] margin of the grid around the mesh
 
 Vec3 lowest(const TriangleMesh& mesh) {
     return mesh.rest_positions().colwise().minCoeff().transpose();
@@ -36,14 +36,16 @@ std::vector<double> sample(const TriangleMesh& mesh, const Vec3& origin, double 
             for (Index k = 0; k < n[2]; ++k) {
                 line[k] = tree.signed_distance(origin + cell * Vec3(i, j, k), bound);
                 bound = 1.0001 *
-                        (std::abs(line[k]) + cell);  // of the next: distances grow no faster than the way
+                        // bound for the next sample: a distance changes at most by the displacement
+                        (std::abs(line[k]) + cell);
             }
         }
     });
     return values;
 }
 
-// The border of the grid lies outside the mesh, whose normals must agree.
+// Throws InvalidInput unless the border of the grid has positive distances, which it has if the normals of the
+// mesh point outwards.
 void check_outside(const std::vector<double>& values, const std::array<Index, 3>& n) {
     for (Index i = 0; i < n[0]; ++i)
         for (Index j = 0; j < n[1]; ++j)
@@ -120,11 +122,11 @@ MeshObstacle::Level MeshObstacle::level(const Vec3& point) const {
     return result;
 }
 
-// Newton's iteration for the saddle of |p - x|^2 / 2 + m phi(p): p - x + m dphi = 0 and phi = 0.
+// Newton's method for the saddle point of |p - x|^2 / 2 + m phi(p): p - x + m dphi = 0 and phi = 0.
 bool MeshObstacle::nearest(const Vec3& point, const Level& start, Distance& out) const {
     constexpr int most = 12;
-    constexpr double close = 1e-8;    // cells; the next step is far below rounding
-    constexpr double flattest = 0.2;  // |dphi|, which is near one by a surface
+    constexpr double close = 1e-8;    // [cells]; the next step is far below round-off
+    constexpr double flattest = 0.2;  // smallest |dphi| accepted [-]; it is about one near the surface
     Level at = start;
     Vec3 p = point;
     double m = start.value / start.gradient.squaredNorm();
@@ -141,7 +143,8 @@ bool MeshObstacle::nearest(const Vec3& point, const Level& start, Distance& out)
         at = level(p);
         if (!(at.gradient.squaredNorm() > flattest * flattest)) return false;
         if (step.squaredNorm() > close * close * cell_ * cell_) continue;
-        // Another point than the nearest would be farther than phi(x), a distance already, by more than its error.
+        // A stationary point other than the nearest one would be farther than phi(x), which is nearly the
+        // distance, by more than the error of phi.
         const double value = m * at.gradient.norm();
         if (std::abs(value - start.value) > 0.5 * cell_) return false;
         out = parallel_surface(value, at.gradient, at.second);

@@ -1,12 +1,12 @@
-// A body bounded by a closed triangle mesh.
+// MeshObstacle: a body bounded by a closed triangle mesh, as a smoothed signed-distance field.
 //
-// Its exact signed distance is sampled once on a regular grid and interpolated by tricubic B-splines phi,
-// whose zero surface is a smooth copy of the mesh: edges are rounded within about a cell, details finer than
-// two cells are lost. The distance is that to this surface, exactly: to the point p with phi(p) = 0 and x - p
-// parallel to dphi(p).
+// The exact signed distance is sampled once on a regular grid and interpolated by tricubic B-splines phi, whose
+// zero level set is a smooth copy of the mesh: edges are rounded within about a cell, and details finer than
+// two cells are lost. The distance is the exact distance to this level set: to the point p with phi(p) = 0 and
+// x - p parallel to dphi(p).
 //
-// In the middle of the body, or far outside a hollow, there is no such point near by; there it is phi, and
-// the normal that of phi's level surface.
+// In the middle of the body, or far outside a concave part, there is no such point nearby; there the distance
+// is phi, and the normal that of phi's level set.
 #pragma once
 
 #include <vector>
@@ -19,8 +19,9 @@ namespace magshell {
 
 class MeshObstacle final : public Obstacle {
   public:
-    /// A mesh without boundary, its normals outwards; `resolution` cells along its longest side. Throws
-    /// InvalidInput on other meshes: with a boundary, or with space outside that counts as inside.
+    /// Creates the obstacle from a mesh without boundary whose normals point outwards; `resolution` is the
+    /// number of cells along its longest side. Throws InvalidInput for meshes with a boundary, or where space
+    /// outside counts as inside.
     MeshObstacle(const TriangleMesh& mesh, Index resolution);
 
     Distance distance(const Vec3& point) const override;
@@ -40,7 +41,7 @@ class MeshObstacle final : public Obstacle {
     std::array<Index, 3> samples_;
     std::vector<double> coefficients_;
     Vec3 middle_;
-    Box bounds_;  // around the mesh: a bound of the distance outside the grid
+    Box bounds_;  // box around the mesh: a bound of the distance outside the grid
 };
 
 }  // namespace magshell

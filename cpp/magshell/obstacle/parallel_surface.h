@@ -1,4 +1,4 @@
-// How the normals of a smooth surface turn at a distance from it.
+// Curvature of the parallel surfaces of a smooth surface.
 #pragma once
 
 #include <algorithm>
@@ -7,13 +7,14 @@
 
 namespace magshell {
 
-/// The distance to a surface { f = 0 }, at the signed distance `value` along the normal of its nearest point,
-/// from the gradient and the second derivatives of f there.
+/// Returns the distance to a surface { f = 0 } with its derivatives, at the signed distance `value` along the
+/// normal of the nearest point, given the gradient and the second derivatives of f there.
 ///
 ///   S = P (d2f) P / |df|,      P = I - n n^T,      H = S (I + d S)^-1 = (S + d K P) / (1 + d T + d^2 K)
 ///
-/// with T and K the trace and the determinant of S in the tangent plane. The denominator is positive where
-/// the point is the nearest one and zero in a center of curvature, where H has no limit: it is kept away from zero.
+/// with T and K the trace and the determinant of S in the tangent plane. The denominator is positive where the
+/// point is the nearest one, and zero at a center of curvature, where H has no limit: it is bounded away from
+/// zero.
 inline Distance parallel_surface(double value, const Vec3& gradient, const Mat3& second) {
     constexpr double least_denominator = 1e-6;
     const double slope = gradient.norm();

@@ -1,14 +1,14 @@
-// A half-space.
+// Plane: a half-space as an obstacle.
 #pragma once
 
 #include "magshell/obstacle/obstacle.h"
 
 namespace magshell {
 
-/// All points x with normal . x <= 0.
+/// The body consists of all points x with normal . x <= 0.
 class Plane final : public Obstacle {
   public:
-    /// Any normal but zero.
+    /// Creates the half-space; the normal must not be zero and need not be a unit vector.
     explicit Plane(const Vec3& normal) : normal_(normal.normalized()) {}
 
     Distance distance(const Vec3& point) const override {

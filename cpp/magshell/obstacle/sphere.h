@@ -1,4 +1,4 @@
-// A ball around the origin.
+// Sphere: a ball around the origin.
 #pragma once
 
 #include "magshell/obstacle/swept_ball.h"

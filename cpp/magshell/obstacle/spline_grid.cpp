@@ -7,14 +7,14 @@ namespace magshell {
 
 std::vector<double> grid_coefficients(std::span<const double> values, std::span<const Index> samples) {
     std::vector<double> from(values.begin(), values.end());
-    std::ptrdiff_t stride = 1;  // of the axis in `from`; axes behind it are longer already
+    std::ptrdiff_t stride = 1;  // stride of the axis in `from`; later axes are longer already
     for (std::size_t axis = samples.size(); axis-- > 0;) {
         const Index n = samples[axis];
         const std::ptrdiff_t lines = static_cast<std::ptrdiff_t>(from.size()) / n;
         std::vector<double> to(lines * (n + 2));
         std::vector<Vec4> line(n, Vec4(Vec4::Zero()));
         for (std::ptrdiff_t first = 0; first < lines;
-             first += 4) {  // four lines go through the splines at once
+             first += 4) {  // four lines at once go through the splines
             const int together = static_cast<int>(std::min<std::ptrdiff_t>(4, lines - first));
             const auto place = [&](int l, Index length, Index i) {
                 const std::ptrdiff_t slab = (first + l) / stride, offset = (first + l) % stride;

@@ -1,4 +1,4 @@
-// Numbers on a regular grid, as coefficients of tensor-product cubic B-splines.
+// Interpolation of numbers on a regular grid by tensor-product cubic B-splines.
 #pragma once
 
 #include <span>
@@ -9,8 +9,8 @@
 
 namespace magshell {
 
-/// Coefficients c_{-1} ... c_n along each axis, in C order, that interpolate samples in C order. `samples`:
-/// how many there are along each axis, at least 2.
+/// Returns the coefficients c_{-1} ... c_n along each axis, in C order, that interpolate values in C order.
+/// samples: number of values along each axis, at least 2.
 std::vector<double> grid_coefficients(std::span<const double> values, std::span<const Index> samples);
 
 }  // namespace magshell

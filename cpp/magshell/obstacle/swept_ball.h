@@ -1,17 +1,18 @@
-// Balls around points, segments and curves: what sphere, capsule, box and tube have in common.
+// Distance to a ball swept along points, segments or curves, as sphere, capsule, box and tube share it.
 #pragma once
 
 #include "magshell/obstacle/obstacle.h"
 
 namespace magshell {
 
-/// Below this fraction of the radius, or this length [m], a point counts as lying on the ball's center.
+/// Fraction of the radius, or length [m] for radius zero, below which a point counts as lying on the ball's
+/// center.
 inline constexpr double on_the_center = 1e-12;
 
-/// The distance |offset| - radius of a point at `offset` from the nearest center of a ball.
+/// Returns the distance |offset| - radius of a point at `offset` from the nearest center of a ball.
 ///
-/// `held` is the projection on the directions in which that center does not follow the point, and `otherwise`
-/// the normal on the center itself, where there is no curvature to speak of: it is infinite.
+/// held: projection on the directions in which that center does not follow the point. otherwise: the normal at
+/// the center itself, where the curvature is infinite and returned as zero.
 inline Distance ball_distance(const Vec3& offset, double radius, const Mat3& held, const Vec3& otherwise) {
     const double length = offset.norm();
     if (length <= on_the_center * (radius > 0.0 ? radius : 1.0))

@@ -31,8 +31,8 @@ TriangleTree::TriangleTree(const TriangleMesh& mesh)
     }
 }
 
-// By the Voronoi regions of the triangle's corners and sides; C. Ericson, Real-Time Collision
-// Detection, 5.1.5.
+// Finds the nearest point of a triangle by the Voronoi regions of its corners and sides; C. Ericson, Real-Time
+// Collision Detection, 5.1.5.
 TriangleTree::Nearest TriangleTree::nearest_on(Index face, const Vec3& point) const {
     const Vec3 a = corner(face, 0), b = corner(face, 1), c = corner(face, 2);
     const Vec3 ab = b - a, ac = c - a;

@@ -1,4 +1,4 @@
-// The exact signed distance to a closed triangle mesh, with a tree of boxes around its faces.
+// TriangleTree: the exact signed distance to a closed triangle mesh, by a tree of boxes around its faces.
 #pragma once
 
 #include <array>
@@ -9,19 +9,22 @@
 
 namespace magshell {
 
-/// Negative inside. The sign is that of (x - p) . n at the nearest point p, with n the normal of the face,
-/// the sum of those of an edge's two faces, or the sum of those around a vertex weighted by their angles
-/// (Baerentzen and Aanaes 2005): the only weights for which it is always right.
+/// Distances are negative inside. The sign is that of (x - p) . n at the nearest point p, where n is the normal
+/// of the face, the sum of the normals of an edge's two faces, or the sum of those around a vertex weighted by
+/// their angles (Baerentzen and Aanaes 2005): the only weights for which the sign is always right.
 class TriangleTree {
   public:
-    /// A mesh without boundary, its normals outwards. It must live as long as the tree.
+    /// Creates the tree of a mesh without boundary whose normals point outwards. The mesh must outlive the
+    /// tree.
     explicit TriangleTree(const TriangleMesh& mesh);
 
-    /// `bound`: the magnitude is known to be at most so large; the smaller, the faster.
+    /// Returns the signed distance [m] at a point. bound: known upper bound of its magnitude; the smaller, the
+    /// faster.
     double signed_distance(const Vec3& point, double bound) const;
 
   private:
-    // Of a point, the nearest one of a face: on its inside (0), an edge (1 + i) or a vertex (4 + i).
+    // The nearest point of a face, and the feature it lies on: the interior (0), an edge (1 + i) or a vertex (4
+    // + i).
     struct Nearest {
         Vec3 point;
         int feature;

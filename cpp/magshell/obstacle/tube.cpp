@@ -13,9 +13,10 @@ namespace {
 
 constexpr int samples_a_segment = 4;
 constexpr int transition =
-    3;  // knots after which an open end is straight and round: coefficients reach so far
+    3;  // [knots] after which an open end is straight and round: a spline coefficient acts over this range
 
-// Of an open tube the radius settles: its spline goes on through values like the last one.
+// Extends the radius of an open tube beyond its ends by constant values, so that its spline becomes constant
+// there.
 void settle_radius(std::vector<Vec4>& coefficients, std::span<const double> radii) {
     std::vector<Vec4> longer(radii.size() + 2 * transition);
     for (std::size_t k = 0; k < longer.size(); ++k) {
@@ -27,7 +28,8 @@ void settle_radius(std::vector<Vec4>& coefficients, std::span<const double> radi
     for (std::size_t k = 0; k < coefficients.size(); ++k) coefficients[k][3] = longer[k + transition][3];
 }
 
-// Coefficients beyond the last ones: on the straight line through the last two, with the radius of the end.
+// Appends coefficients beyond the last ones, on the straight line through the last two, with the radius of the
+// end.
 void continue_straight(std::vector<Vec4>& c, double radius) {
     for (int k = 0; k < transition; ++k) {
         Vec4 next = 2.0 * c[c.size() - 1] - c[c.size() - 2];
@@ -103,10 +105,10 @@ Tube::Slope Tube::slope_at(const Section& at, const Vec3& point) {
     return {d - at.value[3], -along - at.first[3], second};
 }
 
-// The minimum of psi between the neighbours of a sample that is lower than they are: psi_s = 0 by Newton's
-// iteration, guarded by bisection. At an end of the curve psi may still fall outwards.
+// Finds the minimum of psi between the neighbours of a sample that is lower than they are: psi_s = 0 by
+// Newton's method, safeguarded by bisection. At an end of the curve psi may still fall outwards.
 double Tube::nearest(const Vec3& point, Eigen::Index sample) const {
-    constexpr double close = 1e-8;  // knots; the next Newton step is far below rounding
+    constexpr double close = 1e-8;  // [knots]; the next Newton step is far below round-off
     const double spacing = 1.0 / samples_a_segment;
     double s = static_cast<double>(sample) * spacing;
     double low = std::max(s - spacing, 0.0), high = std::min(s + spacing, last_);
@@ -124,12 +126,13 @@ double Tube::nearest(const Vec3& point, Eigen::Index sample) const {
 }
 
 Distance Tube::distance_at(double s, const Vec3& point) const {
-    constexpr double least_curvature = 1e-6;  // of d psi_ss, which is zero in a center of curvature
+    // lower bound of d psi_ss, which is zero at a center of curvature
+    constexpr double least_curvature = 1e-6;
     const Section at = section(s);
     const Vec3 offset = point - at.value.head<3>(), along = at.first.head<3>();
     const Vec3 straight = along.normalized();
     Distance result = ball_distance(offset, at.value[3], Mat3::Identity(), straight.unitOrthogonal());
-    const bool at_an_end = s == 0.0 || s == last_;  // its ball: the center does not follow the point
+    const bool at_an_end = s == 0.0 || s == last_;  // at its ball the center does not follow the point
     if (at_an_end || result.curvature.isZero(0.0)) return result;
     const double d = offset.norm();
     const double squared = along.squaredNorm();
@@ -159,7 +162,7 @@ Distance Tube::distance(const Vec3& point) const {
           samples_.col(3);
     const double least = psi.minCoeff();
 
-    // Refine every sampled minimum that may be the lowest: it lies at most as far below its sample as a
+    // Refines every sampled minimum that may be the lowest: it lies at most as far below its sample as a
     // neighbour lies above it.
     double best = std::numeric_limits<double>::infinity(), place = 0.0;
     for (Eigen::Index k = 0; k < count; ++k) {
