@@ -1,4 +1,5 @@
-// A tree of boxes around things in space: what is far away is passed over in whole branches.
+// BoxTree: a tree of bounding boxes around items in space, which lets searches skip whole branches that are far
+// away.
 #pragma once
 
 #include <vector>
@@ -10,7 +11,7 @@ namespace magshell {
 struct Bounds {
     Vec3 low, high;
 
-    /// Whether they are within `margin` of each other along every axis.
+    /// Returns true if both boxes are within `margin` of each other along every axis.
     bool meets(const Bounds& other, double margin) const {
         return ((low - other.high).array() <= margin).all() && ((other.low - high).array() <= margin).all();
     }
@@ -25,17 +26,18 @@ class BoxTree {
   public:
     struct Node {
         Bounds bounds;
-        Index first, count;  // of items() in a leaf; of an inner node, the left child follows it and
-        Index right;         // the right one is here; -1 in a leaf
+        // range of items() of a leaf; the left child of an inner node follows it, the right one
+        Index first, count;
+        Index right;  // is at this index; -1 in a leaf
     };
 
-    /// Halves the things at the median of their centers along the longest side, until few are left. A tree of
-    /// nothing is one empty leaf.
+    /// Builds the tree by splitting the items at the median of their centers along the longest side, until few
+    /// are left. Without items the tree is one empty leaf.
     BoxTree(const std::vector<Bounds>& boxes, const std::vector<Vec3>& centers);
 
-    /// The root first.
+    /// Returns the nodes, the root first.
     const std::vector<Node>& nodes() const { return nodes_; }
-    /// The numbers of the things, leaf by leaf.
+    /// Returns the numbers of the items, leaf by leaf.
     const std::vector<Index>& items() const { return items_; }
 
   private:
@@ -45,7 +47,7 @@ class BoxTree {
     std::vector<Node> nodes_;
 };
 
-/// Around faces (n_f, 3) with their vertices at `positions` (n_v, 3).
+/// Builds a tree around the faces (n_f, 3) of a mesh with vertices at `positions` (n_v, 3) [m].
 BoxTree tree_of_faces(const Rows3& positions, const Rows3i& faces);
 
 }  // namespace magshell

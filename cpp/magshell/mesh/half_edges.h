@@ -1,4 +1,4 @@
-// The sides of all faces, brought together by the edge they lie on.
+// HalfEdge: the sides of all faces, sorted by the edge they lie on.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +14,11 @@ struct HalfEdge {
     Index low, high;  // the edge's vertices
     Index face;
     std::int8_t corner;
-    bool forward;  // the face runs it from low to high
+    bool forward;  // true: the face runs the edge from low to high
 };
 
-/// All 3 n_f half-edges, sorted by low, high, face. A counting sort by low leaves a handful to compare at
-/// each vertex, so the time is linear in the number of faces.
+/// Returns all 3 n_f half-edges, sorted by low, high and face. A counting sort by low leaves a handful to
+/// compare at each vertex, so the time is linear in the number of faces.
 inline std::vector<HalfEdge> sorted_half_edges(const Rows3i& faces, Index n_vertices) {
     const auto ends = [&](Eigen::Index face, int corner) {
         return std::pair(faces(face, (corner + 1) % 3), faces(face, (corner + 2) % 3));

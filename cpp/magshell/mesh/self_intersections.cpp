@@ -1,15 +1,16 @@
-// Pairs of faces come from a tree of boxes that is held against itself. Of most the signs of a few volumes
-// tell at once whether they cross. Where a vertex or an edge lies in a face or on another edge, they do not:
-// the sheet may end there, touch, or go through with the pairs of faces at that place sharing no more than a line.
+// Finds the pairs of faces of a surface that pass through each other. Candidates come from a tree of boxes
+// tested against itself. For most pairs the signs of a few volumes decide whether they cross. If a vertex or an
+// edge lies in a face or on another edge, they do not: the surface may end there, touch itself, or pass through
+// itself with pairs of faces that share no more than a line.
 //
-// Then everything is decided twice more, after the sheet was moved by
+// Such pairs are decided twice more, after the surface was displaced by
 //
-//   u = +- s a (b . X + c k)     X: rest positions, k: the number of the connected part, s small,
-//                                a and b in no direction that a mesh would have
+//   u = +- s a (b . X + c k)     X: reference positions, k: number of the connected part, s small,
+//                                a and b in directions that a mesh would not have
 //
-// which tears nothing and moves what meets against each other, to one side or to the other. What crosses does
-// so both times; what touches comes free in one of the two. (A connected part whose *rest* shape goes through
-// itself right at its vertices is not moved against itself, and such a place not seen.)
+// which tears nothing and moves meeting parts against each other, to one side or to the other. Faces that cross
+// do so both times; faces that only touch separate in one of the two. (A connected part whose *reference* shape
+// passes through itself exactly at its vertices is not displaced against itself, so such a place is not found.)
 #include "magshell/mesh/self_intersections.h"
 
 #include <algorithm>
@@ -24,10 +25,10 @@ namespace {
 
 using Pair = std::pair<Index, Index>;
 
-constexpr double close_to = 1e-12;  // of the size of the sheet: nearer than that is touching
-constexpr double moved_by = 1e-6;   // of the size
+constexpr double close_to = 1e-12;  // [-] relative to the size of the surface: closer than this is touching
+constexpr double moved_by = 1e-6;   // [-] displacement relative to the size of the surface
 
-/// The faces of a mesh where they are now.
+/// The faces of a mesh at their current positions.
 class PlacedFaces {
   public:
     PlacedFaces(const TriangleMesh& mesh, const Rows3& positions) : mesh_(mesh) {
@@ -59,7 +60,7 @@ class PlacedFaces {
     std::vector<Triangle> triangles_;
 };
 
-/// visit(f, g) for the pairs of faces whose bounds meet, each once.
+/// Calls visit(f, g) for the pairs of faces whose boxes meet, each once.
 template <class Visit>
 void near_pairs(const BoxTree& tree, const PlacedFaces& faces, double margin, const Visit& visit) {
     std::vector<Pair> stack{{0, 0}};
@@ -85,7 +86,7 @@ void near_pairs(const BoxTree& tree, const PlacedFaces& faces, double margin, co
     }
 }
 
-/// Places where two parts of a sheet cross, to be found from pairs next to those that told of them.
+/// Locations at which two parts of a surface cross, identified by the vertices of the faces there.
 class Places {
   public:
     Places(const TriangleMesh& mesh, const std::vector<Pair>& pairs) : mesh_(mesh) {
@@ -101,7 +102,8 @@ class Places {
     }
 
   private:
-    // A vertex of one face and one of the other: faces around the same two vertices are at the same place.
+    // Keys of a pair: a vertex of one face and one of the other. Faces around the same two vertices are at the
+    // same location.
     template <class Stop>
     bool each_key(const Pair& pair, const Stop& stop) const {
         for (int i = 0; i < 3; ++i)
@@ -118,7 +120,7 @@ class Places {
     std::unordered_set<std::uint64_t> keys_;
 };
 
-/// The number of the connected part of each vertex, from 0.
+/// Returns the number of the connected part of each vertex, from 0.
 std::vector<Index> parts_of(const TriangleMesh& mesh) {
     std::vector<Index> lowest(mesh.n_vertices());
     std::iota(lowest.begin(), lowest.end(), 0);
@@ -136,7 +138,7 @@ std::vector<Index> parts_of(const TriangleMesh& mesh) {
     return part;
 }
 
-/// b . X + c k at each vertex, at most 1.
+/// Returns b . X + c k at each vertex, scaled to at most 1.
 VectorXd shares(const TriangleMesh& mesh) {
     const Vec3 b = Vec3(0.71, -0.43, 0.56).normalized();
     const std::vector<Index> part = parts_of(mesh);
@@ -146,7 +148,7 @@ VectorXd shares(const TriangleMesh& mesh) {
     return share / std::max(share.cwiseAbs().maxCoeff(), 1e-300);
 }
 
-/// Those of the touching pairs that cross once the sheet is moved so far, with those that cross anyway.
+/// Returns `crossing` and those of the touching pairs that cross after the displacement.
 std::vector<Pair> crossing_when_moved(const TriangleMesh& mesh, const Rows3& positions, const VectorXd& by,
                                       double close, const std::vector<Pair>& touching,
                                       std::vector<Pair> crossing) {
@@ -162,7 +164,7 @@ std::vector<Pair> crossing_when_moved(const TriangleMesh& mesh, const Rows3& pos
 std::vector<Pair> self_intersections(const TriangleMesh& mesh, const Rows3& positions) {
     const PlacedFaces faces(mesh, positions);
     const double size = (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).norm();
-    // Coordinates are known to a unit of their round-off.
+    // Coordinates are exact to a unit of round-off.
     const double close = close_to * size + 1e-15 * positions.cwiseAbs().maxCoeff();
     std::vector<Pair> crossing, touching;
     near_pairs(tree_of_faces(positions, mesh.faces()), faces, close, [&](Index f, Index g) {

@@ -1,4 +1,4 @@
-// Where a sheet passes through itself.
+// Self-intersections of a triangulated surface.
 #pragma once
 
 #include <utility>
@@ -8,9 +8,9 @@
 
 namespace magshell {
 
-/// The pairs of faces, lower number first, sorted, that pass through each other with the vertices at
-/// `positions` (n_v, 3) [m]. Faces that share an edge never do, those that share a vertex may, beyond it.
-/// What only touches is not among them: see the .cpp for how it is told apart.
+/// Returns the pairs of faces, lower number first, sorted, that pass through each other with the vertices at
+/// `positions` (n_v, 3) [m]. Faces that share an edge never do; those that share a vertex may, beyond it. Faces
+/// that only touch are not included; the .cpp explains how they are distinguished.
 std::vector<std::pair<Index, Index>> self_intersections(const TriangleMesh& mesh, const Rows3& positions);
 
 }  // namespace magshell

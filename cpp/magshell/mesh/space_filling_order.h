@@ -1,4 +1,5 @@
-// Numbering that keeps neighbours together in memory, whatever order the caller's mesh came in.
+// A numbering along a space-filling curve, which keeps neighbours close in memory, whatever the order of the
+// caller's mesh.
 #pragma once
 
 #include <vector>
@@ -7,7 +8,7 @@
 
 namespace magshell {
 
-/// Along a space-filling (Morton) curve through the points; equal keys keep their order.
+/// Numbers points along a Morton curve through them; points with equal keys keep their order.
 Renumbering order_along_curve(const std::vector<Vec3>& points);
 
 }  // namespace magshell

@@ -5,7 +5,7 @@
 namespace magshell {
 namespace {
 
-/// Distances of points along a direction.
+/// The range of distances of points along a direction.
 struct Range {
     double low, high;
 
@@ -18,7 +18,8 @@ Range range_of(const Triangle& t, const Vec3& origin, const Vec3& direction) {
     return {std::min({d[0], d[1], d[2]}), std::max({d[0], d[1], d[2]})};
 }
 
-/// Whether the plane of a, or a plane through one of its edges and its normal, has all of b on the other side.
+/// Returns true if the plane of a, or a plane through one of its edges and its normal, has all of b on the
+/// other side.
 bool separated_by(const Triangle& a, const Triangle& b, double close) {
     if (range_of(b, a.corner[0], a.normal).beyond(close)) return true;
     for (int i = 0; i < 3; ++i) {
@@ -28,8 +29,8 @@ bool separated_by(const Triangle& a, const Triangle& b, double close) {
     return false;
 }
 
-/// An edge from p to q against the inside of a triangle: its ends lie on both sides of the plane, and it goes
-/// round all three sides in one sense.
+/// Tests an edge from p to q against the interior of a triangle: it crosses if its ends lie on both sides of
+/// the plane and it passes all three sides in the same sense.
 Meeting meeting(const Vec3& p, const Vec3& q, const Triangle& t, double close) {
     const double at_p = t.normal.dot(p - t.corner[0]), at_q = t.normal.dot(q - t.corner[0]);
     if (std::min(at_p, at_q) > close || std::max(at_p, at_q) < -close) return Meeting::apart;
@@ -52,7 +53,7 @@ Meeting meeting(const Vec3& p, const Vec3& q, const Triangle& t, double close) {
 
 }  // namespace
 
-// Where two triangles cross, the ends of the line in which they do are on edges.
+// If two triangles cross, the ends of their common line lie on edges of one or the other.
 Meeting meeting(const Triangle& a, const Triangle& b, double close) {
     if (separated_by(a, b, close) || separated_by(b, a, close)) return Meeting::apart;
     Meeting most = Meeting::apart;
@@ -63,12 +64,13 @@ Meeting meeting(const Triangle& a, const Triangle& b, double close) {
     return most;
 }
 
-// The line in which they cross begins at the common vertex and ends on the edge opposite it, of one or the other.
+// The common line of two triangles with one common vertex begins at the vertex and ends on the edge opposite to
+// it, of one or the other.
 Meeting meeting_beyond_vertex(const Triangle& a, int i, const Triangle& b, int j, double close) {
     const Vec3& vertex = a.corner[i];
     const Vec3 &a1 = a.corner[(i + 1) % 3], &a2 = a.corner[(i + 2) % 3];
     const Vec3 &b1 = b.corner[(j + 1) % 3], &b2 = b.corner[(j + 2) % 3];
-    // Of smooth sheets nearly all such pairs look in different directions.
+    // In smooth surfaces nearly all such pairs extend in different directions, which this test detects.
     const Vec3 to_a = (a1 - vertex).normalized() + (a2 - vertex).normalized(),
                to_b = (b1 - vertex).normalized() + (b2 - vertex).normalized();
     const Vec3 between = (to_a - to_b).normalized();

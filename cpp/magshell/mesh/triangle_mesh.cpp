@@ -15,8 +15,9 @@ namespace magshell {
 
 namespace {
 
-// Twice the area of a face over its longest edge squared is sqrt(3)/2 when it is equilateral. Below this it
-// is lost in the round-off of the coordinates. The ratio has no unit: a mesh of microns is judged like one of metres.
+// Smallest ratio of twice the area of a face to its squared longest edge. [-] It is sqrt(3)/2 for an
+// equilateral face; below this value it is lost in the round-off of the coordinates. It has no unit, so a mesh
+// of microns is judged like one of metres.
 constexpr double degenerate_ratio = 1e-10;
 
 template <class... Parts>
@@ -45,8 +46,8 @@ void check_positions(const Rows3& positions) {
     }
 }
 
-// Half-edges of one edge, in the order of their faces. One alone is a boundary edge, two with opposite
-// directions an interior one; everything else is refused here.
+// Checks the half-edges of one edge, in the order of their faces. One half-edge is a boundary edge, two of
+// opposite directions an interior one; anything else throws.
 void check_edge(std::span<const HalfEdge> group, const Rows3i& faces) {
     const auto opposite = [&](const HalfEdge& h) { return faces(h.face, h.corner); };
     for (std::size_t i = 0; i < group.size(); ++i) {

@@ -1,6 +1,6 @@
-// A triangulated surface: rest positions, faces, and how faces meet at edges.
+// TriangleMesh: a triangulated surface: reference positions, faces, and their adjacency at edges.
 //
-// Faces run counter-clockwise seen from the side their normal points to. Edge i of a face is opposite its
+// Faces are counter-clockwise seen from the side that their normal points to. Edge i of a face is opposite its
 // vertex i:
 //
 //   a_i = x_{i+2} - x_{i+1}  (indices mod 3),   a_0 + a_1 + a_2 = 0,   normal ~ a_0 x a_1
@@ -17,16 +17,16 @@ using Rows2i = Eigen::Matrix<Index, Eigen::Dynamic, 2, Eigen::RowMajor>;
 using Rows3i = Eigen::Matrix<Index, Eigen::Dynamic, 3, Eigen::RowMajor>;
 using Rows3l = Eigen::Matrix<std::int64_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
-/// An oriented manifold surface, with or without boundary, of one part or several. Immutable.
+/// An oriented manifold surface, with or without boundary, of one or several connected parts. Immutable.
 class TriangleMesh {
   public:
-    /// No face: what an edge_faces entry says on the boundary.
+    /// The entry of edge_faces() for a missing face at the boundary.
     static constexpr Index none = -1;
 
-    /// rest_positions (n_v, 3) [m], faces (n_f, 3). Throws InvalidInput, naming the first offender, on
-    /// coordinates that are not finite, indices out of range, faces that are degenerate or doubled, edges of
-    /// three faces or of neighbours with opposite orientation, and vertices that no face uses. Faces come in
-    /// with 64 bits so that an index too large is reported rather than wrapped.
+    /// Creates the mesh from rest_positions (n_v, 3) [m] and faces (n_f, 3). Throws InvalidInput, naming the
+    /// first offender, for coordinates that are not finite, indices out of range, degenerate or duplicate
+    /// faces, edges with three faces or with two of opposite orientation, and vertices that no face uses. Faces
+    /// are given with 64-bit indices so that an index too large is reported instead of wrapped.
     TriangleMesh(Rows3 rest_positions, const Rows3l& faces);
 
     Index n_vertices() const { return static_cast<Index>(rest_positions_.rows()); }
@@ -36,7 +36,8 @@ class TriangleMesh {
     const Rows3& rest_positions() const { return rest_positions_; }  // (n_v, 3), m
     const Rows3i& faces() const { return faces_; }                   // (n_f, 3)
     const Rows2i& edges() const { return edges_; }                   // (n_e, 2), lower vertex first, sorted
-    /// (n_e, 2): the face that runs the edge forward (lower to higher vertex), then the one that runs it backward.
+    /// Returns (n_e, 2): the face that runs the edge forward (lower to higher vertex), then the one that runs
+    /// it backward.
     const Rows2i& edge_faces() const { return edge_faces_; }
     const Rows3i& face_edges() const { return face_edges_; }  // (n_f, 3): the edge opposite each vertex
 
