@@ -17,7 +17,7 @@ AttackCurve::AttackCurve(std::vector<double> knots, std::vector<Cubic> cubics)
                            std::to_string(knots_.size()) + " knots");
     }
     if (std::adjacent_find(knots_.begin(), knots_.end(), std::greater_equal<>()) != knots_.end()) {
-        throw InvalidInput("the knots of an attack curve must ascend");
+        throw InvalidInput("the angles of attack of a drag or thrust table must ascend");
     }
 }
 

@@ -1,10 +1,10 @@
-// How a coefficient of drag or thrust depends on the attack angle phi, the angle between a face and the flow:
-// 0 where the water runs along the face, pi/2 where it meets it head on.
+// AttackCurve: a drag or thrust coefficient as a function of the angle of attack phi between a face and the
+// flow: 0 where the flow is parallel to the face, pi/2 where it is perpendicular.
 //
 //   C(phi) = 2 sin^2 phi                                                                      [Chen22] (44)
 //
-// or a piecewise cubic, from a table. A face knows sine and cosine of its attack angle; the angle itself is
-// their atan2, which is as exact near pi/2 as anywhere else.
+// or a piecewise cubic through a table. Callers give sine and cosine of the angle; the angle is their atan2,
+// which is as accurate near pi/2 as elsewhere.
 #pragma once
 
 #include <array>
@@ -18,16 +18,17 @@ class AttackCurve {
         double value;
         double slope;  // dC/dphi [1/rad]
     };
-    using Cubic = std::array<double, 4>;  // of (phi - knot), the highest power first
+    using Cubic = std::array<double, 4>;  // coefficients of powers of (phi - knot), the highest first
 
-    /// 2 sin^2 phi
+    /// Creates the curve 2 sin^2 phi.
     AttackCurve() = default;
 
-    /// One cubic from each knot [rad] to the next; the first and the last are continued beyond. Throws
-    /// InvalidInput unless the knots ascend and there is one cubic less than knots.
+    /// Creates a piecewise cubic, one polynomial from each knot [rad] to the next; the first and the last are
+    /// continued beyond the table. Throws InvalidInput unless the knots ascend and there is one polynomial less
+    /// than knots.
     AttackCurve(std::vector<double> knots, std::vector<Cubic> cubics);
 
-    /// At an attack angle in [0, pi/2]: both are at least zero.
+    /// Returns the coefficient at an angle of attack in [0, pi/2]; both arguments are nonnegative.
     Sample at(double sine, double cosine) const {
         if (cubics_.empty()) return {2.0 * sine * sine, 4.0 * sine * cosine};
         return interpolated(sine, cosine);
@@ -37,7 +38,7 @@ class AttackCurve {
     Sample interpolated(double sine, double cosine) const;
 
     std::vector<double> knots_;
-    std::vector<Cubic> cubics_;  // none: 2 sin^2 phi
+    std::vector<Cubic> cubics_;  // empty: 2 sin^2 phi
 };
 
 }  // namespace magshell

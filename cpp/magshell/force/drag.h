@@ -1,25 +1,25 @@
-// Drag and thrust of water on a face that moves through it, and the water that the face carries along.
+// Drag: the force of surrounding water on a moving face: drag, thrust and added mass.
 //
 //   f = 1/2 rho A (C_d(phi) |u|^2 d - C_t(phi) |u|^2 n) - m A (n . w) n        [N]   [Chen22] (42), (43)
 //
-// with the flow u seen from the face (the water's velocity less the mean of the corners'), its direction d,
-// the current area A and unit normal n, the mean acceleration w of the corners, and the added mass m [kg/m2].
-// A third of f acts on each corner.
+// with the flow u relative to the face (the water's velocity minus the mean velocity of the corners), its
+// direction d, the current area A and unit normal n, the mean acceleration w of the corners, and the added mass
+// m [kg/m2]. A third of f acts on each corner.
 //
-// n is turned against the flow, n . u <= 0, so that the two sides of a face are alike: the printed equations
-// leave the sign open, and drag and thrust would cancel on one of the sides. With n as the corners have it,
-// s = n . d in [-1, 1] and k the sign of s, this is
+// n is oriented against the flow, n . u <= 0, so that both sides of a face behave alike: the printed equations
+// leave the sign open, and drag and thrust would cancel on one of the sides. With the face's own normal n, s =
+// n . d in [-1, 1] and k the sign of s, this is
 //
 //   f = 1/2 rho A |u|^2 (D d + T n) - m A (n . w) n,    sin phi = |s|,   D = C_d(phi),   T = k C_t(phi)
 //
-// Derivatives go by the signed angle psi = k phi, of which D is an even function and T an odd one. With c =
-// cos phi and unit vectors e_u, e_n along the components of n across d and of d across n,
+// Derivatives use the signed angle psi = k phi, of which D is an even function and T an odd one. With c = cos
+// phi and unit vectors e_u, e_n along the part of n perpendicular to d and of d perpendicular to n,
 //
 //   dpsi = e_u . du / |u| + e_n . dn,     e_u = (n - s d) / c,     e_n = (d - s n) / c = c d - s e_u
 //
-// and no angle is taken by acos, whose slope is infinite head on. There (c = 0) e_u and e_n are set to zero,
-// as are d where the water is at rest and n where the face has no area: what they stand in is zero, or has no
-// derivative and this is the mean over all directions.
+// No angle is computed by acos, whose slope is infinite at phi = pi/2. There (c = 0) e_u and e_n are set to
+// zero; so are d where the water is at rest and n where the face has no area. The terms that contain them are
+// then zero, or not differentiable, and zero is the mean over all directions.
 #pragma once
 
 #include <array>
@@ -31,29 +31,30 @@
 
 namespace magshell {
 
-/// The water around a sheet.
+/// The properties of the surrounding water.
 struct Water {
     double fluid_density = 1000.0;  // rho [kg/m3]
     Vec3 velocity = Vec3::Zero();   // [m/s]
     double drag_coefficient = 1.0;  // C_d = drag_coefficient * drag_curve(phi), C_t likewise
     double thrust_coefficient = 1.0;
-    double added_mass = 0.0;  // m, of a face that moves along its normal [kg/m2]
+    double added_mass = 0.0;  // m, for motion along the normal [kg/m2]
     AttackCurve drag_curve, thrust_curve;
 };
 
-/// What water does to one face. Refers to its water, which must outlive it.
+/// The force of water on one face. Stores a reference to the water, which must outlive it.
 class Drag {
   public:
     using Corners = std::array<Vec3, 3>;
 
-    /// Of the force on each corner. A corner's own velocity or acceleration enters by a third of what is here.
+    /// The Jacobian of the force on each corner. The velocity or acceleration of a single corner counts a
+    /// third.
     struct Jacobian {
-        std::array<Mat3, 3> by_position;  // each corner's               [N/m]
-        Mat3 by_velocity;                 // the mean of the corners'    [N s/m]
-        Mat3 by_acceleration;             // the mean of the corners'    [N s2/m]
+        std::array<Mat3, 3> by_position;  // by the position of each corner               [N/m]
+        Mat3 by_velocity;                 // by the corners' mean velocity     [N s/m]
+        Mat3 by_acceleration;             // by the corners' mean acceleration [N s2/m]
     };
 
-    /// Of the product of a vector with the force, by what describes the water.
+    /// The gradient of a vector's product with the force, by the properties of the water.
     struct Gradient {
         double fluid_density = 0.0, drag_coefficient = 0.0, thrust_coefficient = 0.0, added_mass = 0.0;
         Vec3 velocity = Vec3::Zero();
@@ -92,7 +93,7 @@ class Drag {
         thrust_ = {side * thrust.value, thrust.slope};
     }
 
-    /// f / 3
+    /// Returns f / 3.
     Vec3 corner_force() const {
         const Vec3 carried = normal_.dot(acceleration_) * normal_;
         const Vec3 pushed = drag().value * direction_ + thrust().value * normal_;
@@ -100,7 +101,7 @@ class Drag {
     }
 
     Jacobian corner_jacobian() const {
-        // By N = 2 A n: dA = n . dN / 2, A dn = (dN - n n . dN) / 2.
+        // With N = 2 A n: dA = n . dN / 2, A dn = (dN - n n . dN) / 2.
         const double along = normal_.dot(acceleration_);
         const Vec3 sideways = acceleration_ - along * normal_;
         Mat3 by_across = pressure() * (drag().value * direction_ * normal_.transpose() +
@@ -122,7 +123,7 @@ class Drag {
         return jacobian;
     }
 
-    /// Of lambda . f. Three vectors on the corners' forces make the same product with their mean.
+    /// Returns the gradient of lambda . f. For three vectors on the corners, lambda is their mean.
     Gradient gradient(const Vec3& lambda) const {
         const double along = normal_.dot(lambda);
         const double by_drag = area_ * direction_.dot(lambda), by_thrust = area_ * along;
@@ -135,16 +136,17 @@ class Drag {
     }
 
   private:
-    /// Exact where the three are equal: nothing acts on a face that moves with the water.
+    /// Returns the mean; it is exact where all three are equal, so that no force acts on a face that moves with
+    /// the water.
     static Vec3 mean(const Corners& c) { return c[0] + ((c[1] - c[0]) + (c[2] - c[0])) / 3.0; }
 
-    /// 1 / x, and 0 where there is none.
+    /// Returns 1 / x, or 0 where x is zero.
     static double reciprocal(double x) { return x > std::numeric_limits<double>::min() ? 1.0 / x : 0.0; }
 
-    /// rho |u|^2 / 2 [Pa]
+    /// Returns rho |u|^2 / 2 [Pa].
     double pressure() const { return 0.5 * water_.fluid_density * speed_ * speed_; }
 
-    /// D and T with their slopes by psi
+    /// Return D and T with their slopes by psi.
     AttackCurve::Sample drag() const {
         return {water_.drag_coefficient * drag_.value, water_.drag_coefficient * drag_.slope};
     }
@@ -152,10 +154,10 @@ class Drag {
         return {water_.thrust_coefficient * thrust_.value, water_.thrust_coefficient * thrust_.slope};
     }
 
-    /// d(D d + T n) / dpsi, with d and n held
+    /// Returns d(D d + T n) / dpsi at constant d and n.
     Vec3 turning() const { return drag().slope * direction_ + thrust().slope * normal_; }
 
-    /// df/du [N s/m]
+    /// Returns df/du [N s/m].
     Mat3 by_flow() const {
         Mat3 m = (drag().value * direction_ + 2.0 * thrust().value * normal_) * direction_.transpose() +
                  turning() * by_flow_.transpose();
@@ -167,7 +169,7 @@ class Drag {
     Vec3 acceleration_;                  // w
     Corners opposite_;                   // a_k, the edge opposite corner k
     double area_, speed_;                // A, |u|
-    Vec3 normal_, direction_;            // n as the corners have it, d
+    Vec3 normal_, direction_;            // the face's own n, d
     Vec3 by_flow_, by_normal_;           // e_u, e_n
     AttackCurve::Sample drag_, thrust_;  // of the curves alone, as functions of psi
 };

@@ -1,14 +1,14 @@
-// Coulomb friction of a point, made smooth where it sticks.
+// Friction: Coulomb friction at a contact point, regularized at small sliding speeds.
 //
 //   f = - N c(u/e) t,   v_t = (I - n n^T) v,   u = |v_t|,   t = v_t/u
-//   c(y) = mu_s (2 y - y^2) up to y = 1, from there on from mu_s to mu_k, on a cubic that ends at y = 10
+//   c(y) = mu_s (2 y - y^2) up to y = 1, beyond from mu_s to mu_k on a cubic that ends at y = 10
 //
-// v is the velocity relative to the other side, N the normal force, e the sticking speed, mu_s and mu_k the coefficients
-// of what sticks and of what slides: what would stick creeps slower than e, under a load that is a share r of mu_s N at
-// e (1 - sqrt(1 - r)). The parabola as in Li et al. 2020 (IPC).
+// v is the relative velocity, N the normal force, e the sticking speed (eps_v of IPC), mu_s and mu_k the static
+// and kinetic coefficients. A sticking contact creeps slower than e: under a load of a fraction r of mu_s N at
+// e (1 - sqrt(1 - r)). The parabola is that of Li et al. 2020 (IPC).
 //
-// A Newton step from sliding knows nothing of sticking, as f does not change with u there, and overshoots.
-// With the secant c/u in place of the slope it never does: f is then bounded from above by a quadratic potential.
+// A Newton step from sliding overshoots into sticking, because f does not change with u while sliding. With the
+// secant c/u in place of the slope it does not: f is then bounded from above by a quadratic potential.
 #pragma once
 
 #include <algorithm>
@@ -17,18 +17,18 @@
 
 namespace magshell {
 
-/// The numbers of friction.
+/// The parameters of friction.
 struct FrictionLaw {
     double kinetic = 0.0;         // mu_k
     double fixed = 0.0;           // mu_s
     double sticking_speed = 0.0;  // e [m/s]
 };
 
-/// The force and its derivatives.
+/// The friction force and its derivatives.
 struct Friction {
     Vec3 force;
     Vec3 by_normal_force;       // df/dN
-    Mat3 by_velocity;           // df/dv, symmetric; never positive, but where c falls
+    Mat3 by_velocity;           // df/dv, symmetric; negative semidefinite unless c falls
     Mat3 secant;                // - N (c/u) (I - n n^T), with f = secant v
     Mat3 by_normal;             // df/dn
     Vec3 by_sticking_speed;     // df/de
@@ -46,7 +46,7 @@ struct Friction {
             if (speed > 0.0) slope = -law.fixed / (e * e * speed);
             by_e = -2.0 * law.fixed * (1.0 - y) / (e * e);
         } else {
-            constexpr double length = 9.0;  // of the cubic
+            constexpr double length = 9.0;  // length of the cubic in y [-]
             const double z = std::min((y - 1.0) / length, 1.0), gone = z * z * (3.0 - 2.0 * z);
             const double fall = law.fixed - law.kinetic, c = law.kinetic + (1.0 - gone) * fall;
             const double by_speed = -fall * 6.0 * z * (1.0 - z) / (length * e);
@@ -69,7 +69,7 @@ struct Friction {
         by_normal = normal_force * turning * (along * Mat3::Identity() + normal * velocity.transpose());
     }
 
-    /// With both coefficients 1.
+    /// Evaluates friction with both coefficients equal to 1.
     Friction(double normal_force, const Vec3& normal, const Vec3& velocity, double sticking_speed)
         : Friction(normal_force, normal, velocity, FrictionLaw{1.0, 1.0, sticking_speed}) {}
 };
