@@ -1,12 +1,14 @@
-// What keeps two surfaces apart, as a function of their gap g = d - d_min: an energy a unit of area and of stiffness.
+// Barrier: the energy per unit area and unit stiffness of two surfaces as a function of their gap g = d -
+// d_min.
 //
 //   barrier   b(g) = - (r - g)^2 ln(g/r) / r          up to g = r, 0 beyond                      [m]
 //   penalty   b(g) = S(r - g) / r                     energy/contact.h                           [m]
 //
-// r is the reach (d_hat, of the gap). The barrier is that of Li et al. 2020 (IPC) on the distance itself rather than
-// its square, over r: its slope is a number, so that the stiffness that it is multiplied with is a pressure, that at
-// about half the reach (- b'(r/2) = 1.19), whatever the mesh and the time step. It is C2, and grows without bound.
-// The penalty's slope is C1, 1 at g = 0 at most: a larger pressure pushes through.
+// r is the activation distance (d-hat) of the gap. The barrier is that of Li et al. 2020 (IPC), but in the
+// distance itself instead of its square, and divided by r. Its slope then has no unit, so the stiffness it is
+// multiplied with is a pressure, the one at about half the activation distance (- b'(r/2) = 1.19), independent
+// of mesh and time step. It is C2 and grows without bound. The slope of the penalty is C1 and at most 1, at g =
+// 0: a larger pressure pushes surfaces through each other.
 #pragma once
 
 #include <cmath>
@@ -16,19 +18,19 @@
 
 namespace magshell {
 
-/// What all pairs of a contact share.
+/// The parameters that all pairs of a contact share.
 struct BarrierLaw {
     double stiffness = 0.0;  // [Pa]
-    double reach = 0.0;      // r [m], > 0
-    double thickness = 0.0;  // d_min [m], the distance that is left where the gap is none
-    double smoothing = 0.0;  // [m], of the penalty, > 0
-    bool penalty = false;    // else the barrier
+    double reach = 0.0;      // activation distance r [m], > 0
+    double thickness = 0.0;  // minimum separation d_min [m]: the distance where the gap is zero
+    double smoothing = 0.0;  // [m] of the penalty, > 0
+    bool penalty = false;    // false: barrier
 };
 
-/// b and its derivatives at a gap [m], for a stiffness of one. Without end where a barrier's gap is none.
+/// b and its derivatives at a gap [m], for unit stiffness. Infinite for a barrier without a gap.
 struct Barrier {
     double energy = 0.0, slope = 0.0, curvature = 0.0;   // b [m], db/dg, d2b/dg2 [1/m]
-    double energy_by_reach = 0.0, slope_by_reach = 0.0;  // at the same gap
+    double energy_by_reach = 0.0, slope_by_reach = 0.0;  // at constant gap
     double energy_by_smoothing = 0.0, slope_by_smoothing = 0.0;
 
     Barrier(double gap, const BarrierLaw& law) {

@@ -11,8 +11,10 @@
 namespace magshell {
 namespace {
 
-constexpr double parallel_share = 1e-3;  // of the squares of both rest lengths: contact/parallel_edges.h
-constexpr std::size_t block_of_pairs = 1024;
+// [-] of the product of squared reference lengths, below which edges count as parallel
+// (contact/parallel_edges.h); fixed by test_energies_are_those_of_ipctk
+constexpr double parallel_share = 1e-3;
+constexpr std::size_t block_of_pairs = 1024;  // [pairs] per task; plain-words: ok
 
 std::uint64_t key_of(Index first, Index second) {
     return static_cast<std::uint64_t>(first) << 32 | static_cast<std::uint32_t>(second);

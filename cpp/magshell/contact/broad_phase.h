@@ -1,17 +1,20 @@
-// Which points and triangles, and which edges, of surfaces are near each other, where they are or on their way.
+// BroadPhase: finds the pairs of points and triangles, and of edges, of surfaces that are near each other, at
+// one state or along straight paths.
 //
-// Everything is found through pairs of faces whose boxes are near: each vertex and each edge goes with one of its faces.
-// The order depends on nothing but the numbers of what is found.
+// Pairs are found through pairs of faces whose bounding boxes are near: each vertex and each edge is assigned
+// to one of its faces. The order of the result depends on nothing but the numbers of the vertices, edges and
+// faces.
 //
-// A point above a flat mesh has as many triangles near it as there are around the vertex or edge below it, at the same
-// distance. What they count too often is taken back by pairs of the point and an edge (- 1 for two triangles) and of the
-// point and a vertex (+ 1 for a closed fan), with negative areas, so that a flat mesh is as good as a plane [Li et al.
-// 2023, convergent incremental potential contact]. The sum is what the nearest gives or more where all that is near hangs
-// together without a hole, as it does around any place that a point touches, so that it grows without bound there; a ring
-// of faces around a point counts less.
+// A point above a flat mesh is near all triangles around the closest vertex or edge, at the same distance, and
+// would be counted once for each. Pairs of the point with an edge (- 1 for two triangles) and with a vertex (+
+// 1 for a closed fan), with negative areas, correct this overcount, so that a flat mesh acts like a plane [Li
+// et al. 2023, convergent incremental potential contact]. If the nearby triangles form a connected region
+// without a hole, the sum is at least what the nearest triangle alone gives, and grows without bound towards
+// contact; a ring of faces around a point counts less.
 //
-// Areas: of a point and a triangle half of the vertex's, as the other side has its vertices too; of two edges a quarter
-// of the smaller one's, so that a coarse edge across many fine ones counts no more than it covers.
+// Areas: half of the vertex's area for a point and a triangle, since the vertices of the other side count too;
+// for two edges a quarter of the smaller edge area, so that a coarse edge across many fine ones counts no more
+// than the area it covers.
 #pragma once
 
 #include <optional>
@@ -21,7 +24,7 @@
 
 namespace magshell {
 
-/// Surfaces that may touch each other; one and the same: itself.
+/// Two surfaces in contact; one surface with itself if both are the same.
 struct SurfacePair {
     Index a, b;
 };
@@ -30,44 +33,46 @@ class BroadPhase {
   public:
     BroadPhase(std::vector<ContactSurface> surfaces, std::vector<SurfacePair> contacts);
     BroadPhase(BroadPhase&&) = default;
-    BroadPhase(const BroadPhase&) = delete;  // the boxes know their surfaces
+    BroadPhase(const BroadPhase&) = delete;  // the boxes refer to the surfaces
 
-    /// Gives half their rest distance as their room to the pairs that are nearer at rest than `near_at_rest` (one a
-    /// contact, [m]: twice reach and thickness), because they are neighbours on a surface. rest: where nodes are at rest.
+    /// Limits the activation distance plus minimum separation of neighbouring parts of a surface to half of
+    /// their reference distance (ContactPair::room), if they are closer in the reference shape than
+    /// `near_at_rest` (one per contact, [m]: twice activation distance plus minimum separation). Otherwise they
+    /// would push each other in the reference shape. rest: reference positions of all nodes.
     void make_room(const std::vector<Vec3>& rest, const std::vector<double>& near_at_rest);
 
-    /// Two neighbours, and how far they are from each other at rest [m].
+    /// Two neighbouring parts, and their reference distance [m].
     struct NeighbourPair {
         double distance;
         NearPair near;
     };
-    /// Of a contact, those that are nearest each other of all to which it gave room; empty: to none.
+    /// Returns the closest neighbouring parts of a contact; empty if none are limited.
     const std::optional<NeighbourPair>& nearest_neighbours(Index contact) const { return nearest_[contact]; }
 
     const std::vector<ContactSurface>& surfaces() const { return surfaces_; }
 
-    /// Pairs that share a node are left out, here and below.
-    /// The pairs nearer than a contact's `margins` [m] with nodes at q, and what takes back double counts.
+    /// Returns the pairs nearer than the `margins` of each contact [m] with nodes at q, and the overcount
+    /// corrections. Pairs that share a node are left out, here and below.
     std::vector<NearPair> near(const double* q, const std::vector<double>& margins);
-    /// The points and triangles, and the edges, that may come nearer than that on straight ways of their nodes from q to
-    /// `end`: all that do, and some whose boxes do.
+    /// Returns the pairs that may come closer than the margins while nodes move straight from q to `end`: all
+    /// that do, and some whose boxes do.
     std::vector<NearPair> near_along_path(const double* q, const double* end,
                                           const std::vector<double>& margins);
-    /// Pairs of an edge (first) and a triangle (second) that pass through each other with nodes at q, as faces:
-    /// contact, first_face, second_face, swapped.
+    /// Returns the pairs of an edge (first) and a triangle (second) that intersect with nodes at q, by their
+    /// faces: contact, first_face, second_face and swapped are set.
     std::vector<NearPair> crossings(const double* q);
 
     std::size_t bytes() const;
 
   private:
-    /// In the order in which they come out.
+    /// Kinds of pairs, in the order of the results.
     enum class Sort { of_a_on_b, of_b_on_a, edges };
-    /// The numbers of a vertex and a face, or of two edges, in one that sorts them.
+    /// The numbers of a vertex and a face, or of two edges, packed into one number by which they are sorted.
     using Key = std::uint64_t;
     struct Keys {
         std::vector<Key> of[3];
     };
-    /// Rooms of neighbours, by key: sorted.
+    /// Distance limits of neighbouring parts, sorted by key.
     struct Rooms {
         std::vector<std::pair<Key, double>> of[3];
     };

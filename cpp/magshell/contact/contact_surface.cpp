@@ -5,7 +5,7 @@
 namespace magshell {
 namespace {
 
-/// What is equal among (nodes, face) once, with the first of its faces and the sum of the areas.
+/// Lists each distinct part among (nodes, face) once, with the first of its faces and the sum of its areas.
 template <class Part>
 void gather(std::vector<std::pair<Part, Index>> all, const std::vector<double>& thirds,
             std::vector<Part>& parts, std::vector<Index>& faces, std::vector<double>& areas) {

@@ -7,13 +7,18 @@
 namespace magshell {
 namespace {
 
-constexpr int most_turns = 1024;     // of the direction: the share found up to there is free all the same
-constexpr double small_rest = 0.01;  // of the gap to be used up: nearer than that is near enough
-// Of the largest coordinate. A place x + t p has an error of two units of round-off, a difference of two such places
-// five, and its product with a direction of length 1 (itself good to four) less than 32.
+// [-] largest number of directions tried; the fraction found so far is safe anyway. Fixed by
+// test_all_of_the_way_keeps_its_gap
+constexpr int most_turns = 1024;
+// [-] fraction of the usable gap that may be left unused; fixed by
+// test_hard_pairs_that_close_stop_before_they_touch
+constexpr double small_rest = 0.01;
+// Relative round-off of a projected difference of positions. [-] A position x + t p has an error of two units
+// of round-off, a difference of two such positions five, and its product with a unit direction (itself accurate
+// to four) less than 32. Fixed by test_far_from_the_origin_it_stops_a_little_earlier_but_never_late.
 constexpr double round_off = 32.0 * std::numeric_limits<double>::epsilon();
 
-/// How many of a pair's nodes are of the first part.
+/// Returns the number of nodes of a pair's first part.
 int first_part(PairKind kind) {
     return kind == PairKind::edge_edge ? 2 : 1;
 }
@@ -43,7 +48,7 @@ double collision_free_step(PairKind kind, const PairPositions& from, const PairP
             enough = least + small_rest * (gap - least);
         }
         if (gap <= enough) return share;
-        // How much farther, until some corner of the one part is too near to some of the other.
+        // Additional fraction until a corner of one part comes too close to a corner of the other.
         double more = 1.0 - share;
         for (int i = 0; i < first; ++i)
             for (int j = first; j < count; ++j) {

@@ -8,9 +8,10 @@
 namespace magshell {
 namespace {
 
+// [-] Relative round-off of a signed volume; fixed by test_crossings_are_those_of_ipctk
 constexpr double round_off = 16.0 * std::numeric_limits<double>::epsilon();
 
-/// On which side of the plane of a, b, c a point is: 1, -1, or 0 where round-off does not tell.
+/// Returns the side of the plane through a, b, c on which a point is: 1, -1, or 0 if round-off leaves it open.
 int side(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) {
     const Vec3 one = a - point, two = b - point, three = c - point;
     const double volume = one.dot(two.cross(three));
@@ -37,7 +38,8 @@ bool passes_through(const std::array<Vec3, 2>& edge, const std::array<Vec3, 3>& 
     }
     if (least < 0 && most > 0) return false;
     if (certain) return true;
-    // Then an end is near the plane, or the edge near a side, or all is near one plane: how near?
+    // Here an end is near the plane, or the edge near a side of the triangle, or all of it near one plane: the
+    // distance decides.
     double distance = std::numeric_limits<double>::infinity(), size = 0.0;
     for (int k = 0; k < 3; ++k) {
         distance = std::min(distance, pair_distance(PairKind::edge_edge,

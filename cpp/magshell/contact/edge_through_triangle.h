@@ -1,4 +1,4 @@
-// Whether an edge and a triangle have a point in common.
+// Intersection test of an edge with a triangle.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 
 namespace magshell {
 
-/// Also where they are so near that round-off does not tell.
+/// Returns true if an edge and a triangle intersect, also if they are so close that round-off leaves it open.
 bool passes_through(const std::array<Vec3, 2>& edge, const std::array<Vec3, 3>& triangle);
 
 }  // namespace magshell

@@ -7,14 +7,17 @@
 namespace magshell {
 namespace {
 
-constexpr double grown = 1.5;             // times what it was: then a new tree pays
-constexpr std::size_t enough_tasks = 32;  // for a few threads, in parts that differ
-constexpr Index too_few_faces = 512;      // for more than one thread
-constexpr Index block_of_faces = 1024;
+// [-] growth of the tree's boxes that makes a new tree worth its time; changes time only, fixed by
+// test_what_is_found_does_not_depend_on_threads_nor_on_what_was_asked_before
+constexpr double grown = 1.5;
+// [tasks] for a few threads, as tasks differ in size; plain-words: ok
+constexpr std::size_t enough_tasks = 32;
+constexpr Index too_few_faces = 512;    // [faces] below which one thread does the work; plain-words: ok
+constexpr Index block_of_faces = 1024;  // [faces] per task; plain-words: ok
 
 using Pair = std::pair<Index, Index>;
 
-/// Adds the pairs of children of a pair of boxes that is near; false where both are leaves.
+/// Replaces a pair of boxes that are near by the pairs of their children; returns false if both are leaves.
 bool split(const Pair& pair, const std::vector<BoxTree::Node>& of_a, const std::vector<BoxTree::Node>& of_b,
            bool same, std::vector<Pair>& out) {
     const auto [one, other] = pair;
@@ -69,7 +72,8 @@ void FaceBoxes::make() {
     measure_ = refit();
 }
 
-// The sum of the lengths of all boxes, as the measure of how much they overlap; children come after their parents.
+// Updates all boxes. Returns the sum of the lengths of their sides, a measure of how much they overlap.
+// Children come after their parents in the list.
 double FaceBoxes::refit() {
     double measure = 0.0;
     for (std::size_t k = nodes_.size(); k-- > 0;) {
@@ -102,7 +106,8 @@ void near_faces(const FaceBoxes& a, const FaceBoxes& b, double margin,
         return (same && pair.first == pair.second) ||
                a.nodes()[pair.first].bounds.meets(b.nodes()[pair.second].bounds, margin);
     };
-    // Level by level until there is something for every thread. The same for any number of them.
+    // Descends level by level until there are enough pairs for all threads. The result is the same for any
+    // number of threads.
     std::vector<Pair> tasks, next;
     if (near({0, 0})) tasks.push_back({0, 0});
     const bool several = a.nodes()[0].count + b.nodes()[0].count > too_few_faces;

@@ -1,4 +1,4 @@
-// A tree of boxes around the faces of a surface, that is put around them again wherever they move.
+// FaceBoxes: a tree of bounding boxes around the faces of a surface, which is updated when the nodes move.
 #pragma once
 
 #include <functional>
@@ -10,7 +10,7 @@
 
 namespace magshell {
 
-/// Where all nodes are: at `from`, or anywhere on straight ways from there to `to`; three numbers each.
+/// The positions of all nodes at `from`, or along straight paths from there to `to`; three numbers per node.
 struct NodePaths {
     const double* from;
     const double* to;
@@ -19,17 +19,17 @@ struct NodePaths {
     NodePaths(const double* begin, const double* end) : from(begin), to(end) {}
 
     bool still() const { return from == to; }
-    /// Around some nodes.
+    /// Returns the bounding box of some nodes.
     Bounds around(std::span<const Index> nodes) const;
 };
 
 class FaceBoxes {
   public:
-    /// The surface has to outlive it.
+    /// Stores a reference to the surface, which must outlive the object.
     explicit FaceBoxes(const ContactSurface& surface) : surface_(&surface) {}
 
-    /// Puts the boxes around the faces. What is near does not depend on how the tree was made, only the time does: it
-    /// is made anew when its boxes have grown to overlap.
+    /// Updates the boxes. The tree is rebuilt when its boxes have come to overlap too much, which affects the
+    /// time of a search but not its result.
     void fit(const NodePaths& ways);
     const std::vector<BoxTree::Node>& nodes() const { return nodes_; }
     const std::vector<Index>& items() const { return items_; }
@@ -44,12 +44,12 @@ class FaceBoxes {
     std::vector<Bounds> boxes_;
     std::vector<BoxTree::Node> nodes_;
     std::vector<Index> items_;
-    double measure_ = 0.0;  // of the boxes when the tree was made
+    double measure_ = 0.0;  // overlap measure of the boxes when the tree was built
 };
 
-/// visit(task, f, g) for the pairs of a face of a and one of b whose boxes are within `margin` of each other along every
-/// axis; where a and b are the same, each pair of different faces once. Tasks may run at the same time: prepare(n) says
-/// how many there are.
+/// Calls visit(task, f, g) for each pair of a face of a and one of b whose boxes are within `margin` of each
+/// other along every axis; if a and b are the same, for each pair of different faces once. Tasks may run at the
+/// same time: prepare(n) is called before with their number.
 void near_faces(const FaceBoxes& a, const FaceBoxes& b, double margin,
                 const std::function<void(int)>& prepare, const std::function<void(int, Index, Index)>& visit);
 

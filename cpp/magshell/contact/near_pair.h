@@ -1,4 +1,4 @@
-// A pair of parts of surfaces that are near each other, and where it is from.
+// NearPair: a pair of parts of surfaces that are near each other, and its origin.
 #pragma once
 
 #include "magshell/contact/pair_energy.h"
@@ -6,10 +6,10 @@
 namespace magshell {
 
 struct NearPair {
-    Index contact = 0;  // which SurfacePair
+    Index contact = 0;  // index of the SurfacePair
     ContactPair pair;
-    Index first_face = 0, second_face = 0;  // a face of each part, of the surfaces
-    bool swapped = false;                   // whether the first part is of surface b
+    Index first_face = 0, second_face = 0;  // a face of each part, numbered in its surface
+    bool swapped = false;                   // true: the first part belongs to surface b
 
     bool operator==(const NearPair&) const = default;
 };

@@ -9,7 +9,9 @@ namespace magshell {
 namespace {
 
 constexpr double endless = std::numeric_limits<double>::infinity();
-constexpr double way_round = 3.0;  // times the distance: half a turn around it is 1.6
+// [-] longest path between neighbours over their distance; along a half circle the ratio is 1.6. Fixed by
+// test_neighbours_on_a_sheet_leave_each_other_room_and_layers_do_not
+constexpr double way_round = 3.0;
 
 }  // namespace
 
@@ -26,7 +28,7 @@ Neighbours::Neighbours(const std::vector<ContactSurface>& surfaces, const std::v
             next_[filled[edge[0]]++] = edge[1];
             next_[filled[edge[1]]++] = edge[0];
         }
-    // Surfaces with a common node are one part.
+    // Surfaces with a common node are connected.
     std::iota(parts_.begin(), parts_.end(), 0);
     std::vector<Index> owner(rest.size(), -1);
     for (Index s = 0; s < static_cast<Index>(surfaces.size()); ++s)
@@ -37,7 +39,7 @@ Neighbours::Neighbours(const std::vector<ContactSurface>& surfaces, const std::v
         }
 }
 
-// Dijkstra's shortest ways, up to a limit.
+// Computes the shortest paths along edges from a node, up to a limit (Dijkstra).
 void Neighbours::walk(Index from, double limit) {
     if (from == from_ && limit <= limit_) return;
     for (Index node : reached_) lengths_[node] = endless;
@@ -64,7 +66,7 @@ void Neighbours::walk(Index from, double limit) {
 }
 
 bool Neighbours::are(const ContactPair& pair, double distance) {
-    double edge = 0.0;  // the longest of theirs
+    double edge = 0.0;  // longest edge of both parts
     const auto reach = [&](int i, int j) {
         edge = std::max(edge, (rest_[pair.nodes[i]] - rest_[pair.nodes[j]]).norm());
     };

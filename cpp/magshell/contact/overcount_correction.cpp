@@ -6,15 +6,15 @@
 namespace magshell {
 namespace {
 
-/// A vertex, or an edge, of one of a point's triangles.
+/// A vertex or an edge of one of the triangles near a point.
 struct Shared {
-    std::array<Index, 2> nodes;  // lower first; of a vertex twice the same
-    std::size_t from;            // which pair
+    std::array<Index, 2> nodes;  // lower first; twice the same for a vertex
+    std::size_t from;            // index of the pair
 
     bool operator<(const Shared& other) const { return nodes < other.nodes; }
 };
 
-/// visit(the first, how many) for those that are equal and stand together.
+/// Calls visit(first, count) for each group of equal entries.
 template <class Visit>
 void each_group(const std::vector<Shared>& all, const Visit& visit) {
     for (std::size_t k = 0, after; k < all.size(); k = after) {
@@ -25,12 +25,13 @@ void each_group(const std::vector<Shared>& all, const Visit& visit) {
 
 }  // namespace
 
-// Triangles less edges between two of them, plus vertices: 1 for any part of a surface without holes. Pairs that have
-// less room than the law would take do not count, as each has a law of its own.
+// Counts triangles minus shared edges plus vertices, which is 1 for any region of a surface without holes
+// (Euler characteristic). Neighbouring parts with a reduced activation distance do not count, because each has
+// a law of its own.
 void add_overcount_corrections(std::size_t first, const double* q, double margin,
                                std::vector<NearPair>& all) {
     std::vector<Shared> edges, vertices;
-    std::vector<int> shared;  // how many edges of two triangles a vertex has, at the first of its entries
+    std::vector<int> shared;  // number of shared edges at each vertex, at its first entry
     const auto add = [&](const Shared& shared, PairKind kind, int times) {
         NearPair near = all[shared.from];
         near.pair.kind = kind;

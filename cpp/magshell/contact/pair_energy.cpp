@@ -6,12 +6,12 @@
 namespace magshell {
 namespace {
 
-/// A part of the Hessian that is  u_u u u^T + u_v (u v^T + v u^T) + v_v v v^T  for orthogonal u and v.
+/// A part of the Hessian,  u_u u u^T + u_v (u v^T + v u^T) + v_v v v^T  for orthogonal u and v.
 struct RankTwo {
     double u_u = 0.0, u_v = 0.0, v_v = 0.0;
 };
 
-/// p (d u u^T + u v^T + v u^T); cautious: without its negative direction.
+/// Returns p (d u u^T + u v^T + v u^T), or its positive semidefinite projection.
 RankTwo of_free(double push, double distance, const PairWeights& slide, const PairWeights& weights,
                 bool project_psd) {
     if (!project_psd) return {push * distance, push, 0.0};
@@ -20,7 +20,7 @@ RankTwo of_free(double push, double distance, const PairWeights& slide, const Pa
         squared_u += slide[i] * slide[i];
         squared_v += weights[i] * weights[i];
     }
-    // With u and v of length 1: (2 m, k; k, 0), of which m + sqrt(m^2 + k^2) is the root that is not negative.
+    // For unit u and v the matrix is (2 m, k; k, 0), whose nonnegative eigenvalue is m + sqrt(m^2 + k^2).
     const double m = 0.5 * push * distance * squared_u, squared_k = push * push * squared_u * squared_v;
     if (!(squared_k > 0.0)) return {};
     const double far = std::sqrt(m * m + squared_k), root = m > 0.0 ? m + far : squared_k / (far - m);
@@ -104,7 +104,7 @@ void PairEnergy::hessian(bool project_psd, PairBlocks& blocks) const {
     if (edges_.acts) add_parallel(project_psd, blocks);
 }
 
-// With g = dc/dx:  E_b' m' (v_n g^T + g v_n^T) + E_b (m'' g g^T + m' d2c/dx2)
+// Adds, with g = dc/dx,  E_b' m' (v_n g^T + g v_n^T) + E_b (m'' g g^T + m' d2c/dx2).
 void PairEnergy::add_parallel(bool project_psd, PairBlocks& blocks) const {
     const Vec3 zero = Vec3::Zero();
     PairVectors moved{zero, zero, zero, zero},
@@ -121,7 +121,8 @@ void PairEnergy::add_parallel(bool project_psd, PairBlocks& blocks) const {
         add_outer(turned, moved, mixed, blocks);
         add_outer(turned, turned, energy_ * edges_.bend, blocks);
     } else if (squared_turned > 0.0 && squared_moved > 0.0) {
-        // v g^T + g v^T is |v| |g|/2 times the squares of v/|v| + g/|g| and, taken away, v/|v| - g/|g|.
+        // v g^T + g v^T equals |v| |g|/2 times the square of v/|v| + g/|g| minus that of v/|v| - g/|g|; the
+        // latter is dropped.
         const double scale_moved = 1.0 / std::sqrt(squared_moved),
                      scale_turned = 1.0 / std::sqrt(squared_turned);
         for (int i = 0; i < 4; ++i)
@@ -132,7 +133,7 @@ void PairEnergy::add_parallel(bool project_psd, PairBlocks& blocks) const {
     }
     const double scale = energy_ * edges_.slope;
     const ParallelEdges::Second second = edges_.second(project_psd);
-    const Mat3 below = second.mixed.transpose();  // two, one
+    const Mat3 below = second.mixed.transpose();  // block (two, one)
     for (int i = 0, at = 0; i < 4; ++i)
         for (int j = 0; j <= i; ++j, ++at) {
             const double sign = (i - j) % 2 == 0 ? scale : -scale;
@@ -154,7 +155,8 @@ PairEnergy::ByLaw PairEnergy::vjp(const PairVectors& lambda, double by_normal_fo
              -scale * (along * barrier_.curvature + turning * barrier_.slope),
              scale * (along * barrier_.slope_by_smoothing + turning * barrier_.energy_by_smoothing)};
     if (distance_scale_ < 1.0) {
-        // Its own numbers are a share of the law's, which is room / (reach + thickness).
+        // The pair's own distances are those of the law times room / (activation distance + minimum
+        // separation).
         const double both = law_.reach + law_.thickness;
         const double by_share =
             by.reach * law_.reach + by.thickness * law_.thickness + by.smoothing * law_.smoothing;

@@ -25,7 +25,8 @@ PairVectors PairFriction::force() const {
     return distributed(at_.near().weights, friction_.force);
 }
 
-// With dw, dn of contact/proximity.h and dN of the energy.
+// Calls take(product) for each rank-one part of dF/dx, using dw and dn of contact/proximity.h and dN of the
+// energy.
 template <class Take>
 void PairFriction::each_product(const Take& take) const {
     const Proximity& near = at_.near();
@@ -39,7 +40,7 @@ void PairFriction::each_product(const Take& take) const {
             take(turned);
             continue;
         }
-        // The places slide along, by which weights change: of the force, and of the velocity.
+        // The closest points move along the parts, which changes the weights of the force and of the velocity.
         const PairVectors tilted = distributed(near.slide[a], near.normal);
         const Vec3 change = friction_.by_velocity * weighted(near.slide[a], velocities_, at_.count());
         Product slid, turned{by_normal, tilted};

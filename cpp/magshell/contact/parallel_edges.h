@@ -1,26 +1,27 @@
-// A factor that lets the energy of two edges vanish, smoothly, where they become parallel, as their closest points
-// jump from one end to the other there.                                                 [Li et al. 2020] (IPC), 24
+// ParallelEdges: a mollifier that lets the energy of two edges vanish smoothly as they become parallel, because
+// their closest points jump from one end to the other there.                                     [Li et al.
+// 2020] (IPC), 24
 //
 //   c = |a x b|^2,   m = (2 - c/e) c/e up to c = e, 1 beyond,   a = x_1 - x_0, b = x_3 - x_2
 //
-// e is a thousandth of the product of the squares of the rest lengths: below 1.8 degrees. Close to parallel edges, the
-// pairs of a point and a triangle take over what is missing.
+// e is 1e-3 times the product of the squared reference lengths: angles below 1.8 degrees. Next to parallel
+// edges, pairs of a point and a triangle provide the missing energy.
 #pragma once
 
 #include "magshell/contact/proximity.h"
 
 namespace magshell {
 
-/// m and its derivatives by the edges a and b; those by nodes are these with a sign: - + - +.
+/// m and its derivatives by the edges a and b; those by nodes are the same with the signs - + - +.
 struct ParallelEdges {
     double factor = 1.0;             // m
-    bool acts = false;               // whether there are derivatives
+    bool acts = false;               // true if the derivatives are not zero
     double slope = 0.0, bend = 0.0;  // dm/dc, d2m/dc2
     Vec3 by_one, by_two;             // dc/da, dc/db
-    Vec3 one, two, normal;           // a, b, and a direction across both
+    Vec3 one, two, normal;           // a, b, and a unit direction perpendicular to both
     double area = 0.0;               // |a x b|
 
-    /// below: e, of rest lengths; 0 for none.
+    /// Computes the mollifier. below: e [m4]; 0 for none.
     ParallelEdges(const PairPositions& x, double below) {
         if (!(below > 0.0)) return;
         one = x[1] - x[0];
@@ -41,13 +42,14 @@ struct ParallelEdges {
             normal = one.unitOrthogonal();
     }
 
-    /// The second derivatives of c: by a twice, by a (rows) and b, by b twice. cautious: without what is negative.
+    /// The second derivatives of c: by a twice, by a (rows) and b, by b twice. project_psd: projected to be
+    /// positive semidefinite.
     struct Second {
         Mat3 one, mixed, two;
     };
     Second second(bool project_psd) const {
-        // Within the plane of a and b c is the square of the area A, whose own second derivatives have the
-        // eigenvalues 1 and -1; across it they are 2 (|b|^2, - a . b; |a|^2), which is never negative.
+        // In the plane of a and b, c is the square of the area A, whose second derivatives have the eigenvalues
+        // 1 and -1; perpendicular to it they are 2 (|b|^2, - a . b; |a|^2), which is positive semidefinite.
         const Mat3 across = 2.0 * normal * normal.transpose();
         const Vec3 area_by_one = two.cross(normal), area_by_two = normal.cross(one);
         Mat3 turned;  // - [n]

@@ -7,11 +7,12 @@
 namespace magshell {
 namespace {
 
-/// A square of a sine, below which two directions count as one: what is nearest is at an end as well, to a share of
-/// 1e-16 of any distance above 1e-5 of their lengths.
+/// Squared sine of the angle below which two directions count as parallel. [-] The closest point is then also
+/// at an end, up to a relative error of 1e-16 of any distance above 1e-5 of their lengths. Fixed by
+/// test_distances_are_those_of_ipctk.
 constexpr double parallel = 1e-22;
 
-/// The closest points found so far: weights, and what moves them (a node to weigh less, one to weigh more).
+/// The closest points found so far: weights, and the nodes that lose and gain weight as the free points move.
 struct Closest {
     double squared = std::numeric_limits<double>::infinity();
     PairWeights weights{};
@@ -19,7 +20,8 @@ struct Closest {
     int less[2] = {0, 0}, more[2] = {0, 0};
 };
 
-/// A point `p` of one part against the edge from node a to node b of the other; sign of the edge's weights.
+/// Compares a point `p` of one part with the edge from node a to node b of the other; sign: that of the edge's
+/// weights.
 void try_point_edge(const PairPositions& x, int p, int a, int b, double sign, Closest& best) {
     const Vec3 along = x[b] - x[a], to = x[p] - x[a];
     const double squared_length = along.squaredNorm(), projected = along.dot(to);
@@ -38,14 +40,14 @@ void try_point_edge(const PairPositions& x, int p, int a, int b, double sign, Cl
     best.weights[a] = sign * (1.0 - s);
     best.weights[b] = sign * s;
     best.free = free ? 1 : 0;
-    // Along the edge the weights of a second part, which are negative, move the other way.
+    // The weights of a second part are negative, so they change the other way along the edge.
     best.less[0] = sign > 0.0 ? a : b;
     best.more[0] = sign > 0.0 ? b : a;
 }
 
-/// Coordinates in the plane of two vectors: to = first one + second two + something across both.
+/// Coordinates in the plane of two vectors: to = first one + second two + a part perpendicular to both.
 struct InPlane {
-    bool told = false;  // false where the two are parallel
+    bool told = false;  // false if the two are parallel
     double first, second;
     double squared_height;
 
@@ -99,7 +101,7 @@ Closest closest(PairKind kind, const PairPositions& x) {
     return best;
 }
 
-/// A direction across n, of length 1.
+/// Returns a unit vector perpendicular to n.
 Vec3 across(const Vec3& n) {
     int smallest;
     n.cwiseAbs().minCoeff(&smallest);
@@ -113,7 +115,7 @@ Proximity completed(PairKind kind, const PairPositions& x, const Closest& at) {
     near.slide[0] = near.slide[1] = {};
     Vec3 difference = Vec3::Zero();
     for (int i = 0; i < nodes_of(kind); ++i) difference += at.weights[i] * x[i];
-    // Gram and Schmidt, on dP/ds_a = x[more] - x[less] and with it on dw/ds_a.
+    // Gram-Schmidt orthogonalization of dP/ds_a = x[more] - x[less], and with it of dw/ds_a.
     for (int a = 0; a < at.free; ++a) {
         Vec3 way = x[at.more[a]] - x[at.less[a]];
         PairWeights& slide = near.slide[a];
@@ -130,7 +132,7 @@ Proximity completed(PairKind kind, const PairPositions& x, const Closest& at) {
         difference -= near.along[a].dot(difference) * near.along[a];
     }
     if (at.free == 2) {
-        // More accurate than the difference of two points that are close to each other.
+        // This is more accurate than the difference of two points that are close to each other.
         near.normal = near.along[0].cross(near.along[1]).normalized();
         near.distance = near.normal.dot(difference);
         if (near.distance < 0.0) {
