@@ -1,6 +1,8 @@
-// What elimination has left of a graph is kept as variables and elements. An element is what an elimination coupled: variables
-// that all know each other, without their pairs being written down. A variable knows the elements that it is in, and the
-// variables beside it that are in none of these. Variables that know the same become one, which weighs as much as they do.
+// Approximate minimum degree. What elimination has left of a graph is stored as variables and elements
+// (quotient graph). An element is the result of an elimination: variables that are all coupled with each other,
+// without storing their pairs. A variable knows the elements that contain it, and those adjacent variables that
+// share no element with it. Variables with the same adjacency are merged into one, whose weight is the sum of
+// theirs.
 #include "magshell/linalg/approximate_degree.h"
 
 #include <algorithm>
@@ -11,9 +13,9 @@
 namespace magshell {
 namespace {
 
-constexpr Index none = -1;
+constexpr Index none = -1;  // no variable; plain-words: ok
 
-// The variables by their degree, of which the least is wanted.
+// Buckets of variables by their degree, to find one of least degree.
 class ByDegree {
   public:
     ByDegree(Index nodes, Index largest)
@@ -80,7 +82,7 @@ class Elimination {
     }
 
     std::vector<Index> order(const std::function<void()>& watch) {
-        constexpr int now_and_then = 1024;
+        constexpr int now_and_then = 1024;  // [eliminations] between calls of watch; plain-words: ok
         for (int step = 0; left_ > 0; ++step) {
             if (step % now_and_then == 0) watch();
             eliminate(by_degree_.least());
@@ -99,9 +101,12 @@ class Elimination {
         return sum;
     }
 
-    // It would be in every list: it comes last.
+    // Orders nodes with very many neighbours last: they would be in every list.
     void put_aside_what_knows_many(const NodeGraph& graph) {
-        const double many = std::max(16.0, 10.0 * std::sqrt(static_cast<double>(left_)));
+        // [-] Factor of the square root of all unknowns, and least number, of neighbours that count as very many, as in AMD;
+        // fixed by test_minimum_degree_puts_what_knows_all_last
+        constexpr double dense_factor = 10.0, least_dense = 16.0;
+        const double many = std::max(least_dense, dense_factor * std::sqrt(static_cast<double>(left_)));
         for (Index i = 0; i < graph.size(); ++i)
             if (degree(graph, i) > many) aside_.push_back(i);
         for (const Index i : aside_) {
@@ -122,7 +127,7 @@ class Elimination {
         for (const Index i : members) {
             const Index weight = weight_[i];
             if (forget_what_the_pivot_knows(i, pivot)) continue;
-            taken += weight;  // there is nothing else that it knows
+            taken += weight;  // the variable is coupled with nothing else
             make_part_of(i, pivot);
         }
         join_alike();
@@ -135,7 +140,7 @@ class Elimination {
         for (Index node = pivot; node != none; node = next_[node]) order_.push_back(node);
     }
 
-    // Makes an element of a variable: all that it knows.
+    // Turns a variable into an element that contains everything it is coupled with.
     void gather(Index pivot) {
         std::vector<Index> members;
         met_[pivot] = step_;
@@ -161,7 +166,7 @@ class Elimination {
         std::vector<Index>().swap(members_of_[element]);
     }
 
-    // What an element has that the pivot's has not, once all that both have are taken off.
+    // Counts the weight of an element outside the pivot's element, by subtracting all common variables.
     void count_beyond(Index element, Index weight) {
         if (state_[element] != State::element) return;
         if (met_[element] != step_) {
@@ -171,7 +176,8 @@ class Elimination {
         beyond_[element] -= weight;
     }
 
-    // Puts the pivot's element in place of what is in it. False if nothing else is left.
+    // Replaces, in a variable's lists, everything that the pivot's element contains by that element. Returns
+    // false if nothing else is left.
     bool forget_what_the_pivot_knows(Index i, Index pivot) {
         Index outside = 0, to = begin_[i];
         std::uint64_t key = 0;
@@ -196,7 +202,7 @@ class Elimination {
             lists_[to++] = other;
         }
         if (outside == 0) return false;
-        // There is room: the pivot was in the list, or an element that is absorbed.
+        // There is space: the pivot, or an absorbed element, was in the list.
         const Index beside = to - begin_[i] - kept;
         lists_[to] = lists_[begin_[i] + kept];
         lists_[begin_[i] + kept] = lists_[begin_[i]];
@@ -238,12 +244,13 @@ class Elimination {
         }
     }
 
-    std::vector<Index> lists_, begin_, elements_, variables_;  // what each knows: elements, then variables
-    std::vector<Index> weight_;                                // of each variable, in unknowns
+    // adjacency of each variable: elements, then variables
+    std::vector<Index> lists_, begin_, elements_, variables_;
+    std::vector<Index> weight_;  // of each variable, in degrees of freedom
     std::vector<State> state_;
     std::vector<std::vector<Index>> members_of_;  // of each element
-    std::vector<Index> within_;                   // the weight of these
-    std::vector<Index> next_, last_;              // what went with each variable, one after another
+    std::vector<Index> within_;                   // weight of these
+    std::vector<Index> next_, last_;              // variables merged into each variable, as a linked list
     std::vector<Index> met_, beyond_, bound_, mark_;
     std::vector<std::pair<std::uint64_t, Index>> keys_;
     std::vector<Index> aside_, order_;

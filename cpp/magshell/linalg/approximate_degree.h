@@ -1,4 +1,5 @@
-// Minimum degree with degrees that are bounded instead of counted (Amestoy, Davis, Duff 1996), for graphs of any size.
+// Approximate minimum degree ordering, with upper bounds of degrees instead of exact counts (Amestoy, Davis,
+// Duff 1996), for graphs of any size.
 #pragma once
 
 #include <functional>
@@ -8,8 +9,8 @@
 
 namespace magshell {
 
-/// order[k] = the node to eliminate k-th. Nodes count as many unknowns as they weigh. `watch` is called now and then, and may
-/// throw.
+/// Returns order, where order[k] is the node to eliminate k-th. A node counts as many degrees of freedom as its
+/// weight. `watch` is called now and then, and may throw.
 std::vector<Index> approximate_minimum_degree(const NodeGraph& graph, const std::function<void()>& watch);
 
 }  // namespace magshell

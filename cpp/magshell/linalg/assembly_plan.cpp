@@ -18,7 +18,8 @@ using slabs::Rectangle;
 using slabs::Triangle;
 using slabs::width;
 
-// Offset of (row, column) of a panel; rows count from the first pivot, then from the first row below.
+// Returns the offset of (row, column) in a panel [doubles]; rows count from the first pivot, or from the first
+// row below.
 std::ptrdiff_t panel_place(const FrontShape& front, Index row, bool is_pivot, Index column) {
     const Index slab = row / width, lane = row % width;
     const std::ptrdiff_t start =
@@ -37,8 +38,9 @@ void place_entries(const SparsePattern& pattern, AssemblyPlan& plan) {
         for (Index k = front.first; k < front.first + front.pivots; ++k) eliminated[plan.order[k]] = {k, s};
     }
 
-    // Sorted by front: for now, with the position of an entry's column for its place, and that of its row beside it. What
-    // is looked up by an unknown is all over the memory, so it is done here, in the pattern's order.
+    // Sorts entries by front, with the position of an entry's column as its place for now, and that of its row
+    // next to it. What is looked up by an unknown is scattered in memory, so it is done here, in the pattern's
+    // order.
     plan.entries.resize(pattern.rows.size());
     std::vector<Index> row_of(pattern.rows.size()), next(plan.fronts.size() + 1, 0), local_row(pattern.size);
     const auto each_entry = [&](auto&& visit) {
@@ -74,7 +76,7 @@ void place_entries(const SparsePattern& pattern, AssemblyPlan& plan) {
     }
 }
 
-// The rows of one slab, grouped by the slab of the parent they land in.
+// Adds the transfers of a front: the rows of each slab, grouped by the slab of the parent that receives them.
 void add_transfers(const FrontPlan& front, AssemblyPlan& plan) {
     for (Index first = 0; first < front.shape.below; first += width) {
         const Index end = std::min(first + width, front.shape.below);
@@ -116,7 +118,7 @@ void place_updates(AssemblyPlan& plan) {
     }
 }
 
-// First fit in one line of memory.
+// First-fit allocation in one contiguous piece of memory.
 class Line {
   public:
     std::ptrdiff_t take(std::ptrdiff_t size) {
@@ -134,13 +136,13 @@ class Line {
     std::ptrdiff_t extent() const { return extent_; }
 
   private:
-    std::map<std::ptrdiff_t, std::ptrdiff_t> used_;  // start, size
+    std::map<std::ptrdiff_t, std::ptrdiff_t> used_;  // start -> size
     std::ptrdiff_t extent_ = 0;
 };
 
-// Where the updates of fronts that are handled one after another lie: an update lives until its parent has
-// taken it. Those of `waiting` are there from the beginning, for parents in the sequence. Returns where all
-// of them end.
+// Allocates work space for the updates of fronts that are processed one after another: an update lives until
+// its parent has taken it. The updates of `waiting` exist from the beginning, for parents in the sequence.
+// Returns the space needed [doubles].
 std::ptrdiff_t place_work(AssemblyPlan& plan, const std::vector<Index>& waiting,
                           const std::vector<Index>& sequence) {
     Line line;
@@ -158,13 +160,16 @@ std::ptrdiff_t place_work(AssemblyPlan& plan, const std::vector<Index>& waiting,
     return line.extent();
 }
 
-// Splits the tree into subtrees of at most 1/16 of the work and the fronts above them.
+// Splits the tree into subtrees of limited work and the fronts above them.
 void split(AssemblyPlan& plan, const std::vector<double>& subtree_flops, double total) {
+    // [-] Number of parts of equal work that no subtree may exceed: enough to keep a few threads busy; fixed by
+    // test_many_bodies_in_one_matrix_are_solved_on_any_number_of_threads
+    constexpr double parts = 16.0;
     std::vector<bool> in_top(plan.front_count(), false);
     for (Index s = plan.front_count() - 1; s >= 0; --s) {
         const Index parent = plan.fronts[s].shape.parent;
         if (parent != -1 && !in_top[parent]) continue;
-        if (subtree_flops[s] > total / 16.0) in_top[s] = true;
+        if (subtree_flops[s] > total / parts) in_top[s] = true;
     }
     Index begin = 0;
     for (Index s = 0; s < plan.front_count(); ++s) {
@@ -179,7 +184,7 @@ void split(AssemblyPlan& plan, const std::vector<double>& subtree_flops, double 
             begin = s + 1;
         }
     }
-    // The largest first, so that threads end together.
+    // The largest first, so that threads end at about the same time.
     const auto flops = [&](const Subtree& subtree) { return subtree_flops[subtree.end - 1]; };
     std::stable_sort(plan.subtrees.begin(), plan.subtrees.end(),
                      [&](const Subtree& a, const Subtree& b) { return flops(a) > flops(b); });

@@ -1,5 +1,6 @@
-// Where everything goes during a factorization, worked out once for a pattern: matrix entries into fronts,
-// updates into parents, and which part of a work space each update occupies while it lives.
+// AssemblyPlan: the memory layout of a factorization, computed once per pattern: the positions of matrix
+// entries in fronts and of updates in parents, and the part of the work space that each update occupies while
+// it lives.
 #pragma once
 
 #include <array>
@@ -10,8 +11,8 @@
 
 namespace magshell {
 
-/// Rows of one slab of an update that land in one slab of the parent. Lane l of the parent receives lane
-/// from[l] of the update, or nothing where from[l] is 8.
+/// Rows of one slab of an update that are added to one slab of the parent. Lane l of the parent receives lane
+/// from[l] of the update, or nothing if from[l] is 8.
 struct Transfer {
     Index slab;         // of the update
     Index parent_slab;  // of the parent's pivots if to_pivots, else of its rows below
@@ -20,7 +21,7 @@ struct Transfer {
     std::array<std::uint8_t, 8> from;
 };
 
-/// A matrix entry and its place in its front's panel [doubles].
+/// A matrix entry and its position in its front's panel [doubles].
 struct RoutedEntry {
     Index entry;
     Index place;
@@ -28,35 +29,38 @@ struct RoutedEntry {
 
 struct FrontPlan {
     FrontShape shape;
-    std::ptrdiff_t panel = 0;   // its columns of L in the factor's storage [doubles]
-    std::ptrdiff_t update = 0;  // its update in the shared work space, or in that of its subtree [doubles]
+    std::ptrdiff_t panel = 0;  // position of its columns of L in the factor's storage [doubles]
+    // position of its update in the shared work space, or in that of its subtree [doubles]
+    std::ptrdiff_t update = 0;
     Index first_entry = 0, first_transfer = 0;
-    Index rows_in_parent_pivots = 0;  // how many of its rows below are pivots of the parent
+    Index rows_in_parent_pivots = 0;  // number of its rows below that are pivots of the parent
     std::vector<Index> children;
 };
 
-/// Fronts that depend on no others, for one thread.
+/// Fronts that depend on no others, processed by one thread.
 struct Subtree {
-    Index begin, end;          // its fronts, the root last
-    Index first, unknowns;     // what they eliminate
-    std::ptrdiff_t local = 0;  // where its vector stands among those of all subtrees [doubles]
+    Index begin, end;          // range of its fronts, the root last
+    Index first, unknowns;     // range of unknowns that they eliminate
+    std::ptrdiff_t local = 0;  // position of its vector among those of all subtrees [doubles]
 };
 
 struct AssemblyPlan {
     std::vector<Index> order;
-    std::vector<FrontPlan> fronts;  // and one more, for the ends of entries and transfers
-    std::vector<Index> rows;        // below the pivots of each front, from shape.rows on
-    std::vector<Index> places;      // of those rows in the parent: among its pivots, or among its rows below
-    std::vector<Index> targets;     // of those rows in the vector of the subtree, or for top fronts of all
+    std::vector<FrontPlan> fronts;  // plus one more, for the ends of entries and transfers
+    std::vector<Index> rows;        // rows below the pivots of each front, from shape.rows on
+    // position of those rows in the parent: among its pivots, or among its rows below
+    std::vector<Index> places;
+    // position of those rows in the vector of the subtree; for top fronts in the whole vector
+    std::vector<Index> targets;
     std::vector<RoutedEntry> entries;
     std::vector<Transfer> transfers;
     std::vector<Subtree> subtrees;          // independent of the number of threads
-    std::vector<Index> top;                 // the fronts above them, in order
-    Index most_pivots = 0, most_below = 0;  // of a front
-    // Of the vectors of all subtrees: their unknowns, then one number for each row below their roots.
+    std::vector<Index> top;                 // the fronts above the subtrees, in order
+    Index most_pivots = 0, most_below = 0;  // of any front
+    // Size of the vectors of all subtrees: their unknowns, then one number per row below their roots.
     std::ptrdiff_t local_doubles = 0;
-    // Updates of top fronts and of the roots of subtrees lie in one work space that all threads share, those
-    // within a subtree in one that its thread has to itself.
+    // Updates of top fronts and of the roots of subtrees are in a work space that all threads share; those
+    // within a subtree are in one that belongs to its thread.
     std::ptrdiff_t factor_doubles = 0, shared_doubles = 0, subtree_doubles = 0;
 
     Index front_count() const { return static_cast<Index>(fronts.size()) - 1; }

@@ -8,10 +8,15 @@
 namespace magshell {
 namespace {
 
-// The time a front takes [ns], fitted to measurements: a constant, arithmetic, panel entries and update entries.
+// Returns the estimated time of a front [ns]: a constant, arithmetic, panel entries and update entries. It
+// decides which fronts are merged.
 double front_time(double pivots, double below) {
     const double panel_entries = pivots * (0.5 * pivots + below);
-    return 600.0 + 0.020 * elimination_flops(pivots, below) + 0.6 * panel_entries + 0.25 * below * below;
+    // [ns] per front, per operation, per entry of the panel and of the update; changes time only, results are fixed by
+    // test_definite_matrices_are_solved_to_rounding
+    constexpr double per_front = 600.0, per_flop = 0.020, per_panel_entry = 0.6, per_update_entry = 0.25;
+    return per_front + per_flop * elimination_flops(pivots, below) + per_panel_entry * panel_entries +
+           per_update_entry * below * below;
 }
 
 void reorder(std::vector<Index>& order, const std::vector<Index>& by) {
@@ -20,7 +25,7 @@ void reorder(std::vector<Index>& order, const std::vector<Index>& by) {
     order = std::move(result);
 }
 
-// Nodes relabelled so that node k of the result is node by[k] of the argument.
+// Relabels nodes: node k of the result is node by[k] of the argument.
 std::vector<Index> relabel(const std::vector<Index>& parent, const std::vector<Index>& by) {
     std::vector<Index> label(by.size()), result(by.size());
     for (std::size_t k = 0; k < by.size(); ++k) label[by[k]] = static_cast<Index>(k);
@@ -28,12 +33,12 @@ std::vector<Index> relabel(const std::vector<Index>& parent, const std::vector<I
     return result;
 }
 
-// A front, and the nodes of the elimination tree that are its pivots: up to the first of the next front.
+// A front, and the range of elimination tree nodes that are its pivots.
 struct NodeFront : FrontShape {
     Index first_node = 0, end_node = 0;
 };
 
-// Nodes whose structure differs only by the node itself, joined.
+// Joins consecutive nodes whose structure differs only by the node itself (fundamental supernodes).
 std::vector<NodeFront> fundamental_fronts(const std::vector<Index>& parent, const std::vector<Index>& counts,
                                           const std::vector<Index>& weights) {
     const Index size = static_cast<Index>(parent.size());
@@ -55,9 +60,10 @@ std::vector<NodeFront> fundamental_fronts(const std::vector<Index>& parent, cons
     return fronts;
 }
 
-// Which front absorbs each front: itself, or an ancestor.
+// Returns the front that absorbs each front: itself, or an ancestor.
 //
-// A child merged into its parent takes all rows of the parent: pivots add up, the rows below stay the parent's.
+// A child merged into its parent takes all rows of the parent: the pivots add up, and the rows below remain
+// those of the parent.
 std::vector<Index> merge_fronts(const std::vector<NodeFront>& fronts) {
     const Index count = static_cast<Index>(fronts.size());
     std::vector<std::vector<Index>> children(count);
@@ -90,8 +96,8 @@ std::vector<Index> merge_fronts(const std::vector<NodeFront>& fronts) {
     return absorbed_by;
 }
 
-// The rows below each front, by following every node's entries up the tree of fronts. `ends`: where the
-// nodes' unknowns end, in the order of elimination.
+// Returns the rows below each front, by following the entries of every node up the tree of fronts. `ends`: end
+// of each node's unknowns in the order of elimination.
 std::vector<Index> rows_below(const UpperPattern& upper, const std::vector<Index>& ends,
                               const std::vector<FrontShape>& fronts) {
     const Index size = static_cast<Index>(ends.size());
@@ -158,7 +164,8 @@ AssemblyTree assembly_tree(const Quotient& quotient, std::vector<Index> order) {
     const std::vector<NodeFront> simple = fundamental_fronts(parent, counts, weights);
     const std::vector<Index> absorbed_by = merge_fronts(simple);
 
-    // The merged fronts form a tree; its postorder, and within a front the old order, is the new order of elimination.
+    // The merged fronts form a tree. Its postorder, and within a front the old order, is the new order of
+    // elimination.
     std::vector<Index> merged_parent, merged_label(simple.size(), -1), survivors;
     for (std::size_t s = 0; s < simple.size(); ++s) {
         if (absorbed_by[s] != static_cast<Index>(s)) continue;

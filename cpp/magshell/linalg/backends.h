@@ -1,4 +1,5 @@
-// The other factorizations, each in its own file so that no library's header reaches further.
+// Creates the factorizations by other libraries. Each is in a file of its own, so that no library's header is
+// included elsewhere.
 #pragma once
 
 #include <memory>
@@ -7,10 +8,10 @@
 
 namespace magshell {
 
-/// CHOLMOD's supernodal L L^T. Throws InvalidInput where magshell was built without CHOLMOD.
+/// Creates CHOLMOD's supernodal L L^T. Throws InvalidInput if magshell was built without CHOLMOD.
 std::unique_ptr<Factor> make_cholmod_factor(std::shared_ptr<const SparsePattern> pattern, Ordering ordering);
 
-/// Eigen's simplicial L D L^T with Eigen's own AMD.
+/// Creates Eigen's simplicial L D L^T with Eigen's own AMD ordering.
 std::unique_ptr<Factor> make_eigen_factor(std::shared_ptr<const SparsePattern> pattern);
 
 }  // namespace magshell

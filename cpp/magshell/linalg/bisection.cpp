@@ -11,8 +11,8 @@
 namespace magshell {
 namespace {
 
-// The cut at the median. `reach` bounds by how much the coordinates of neighbours differ, so that only nodes
-// near the cut are looked at more closely.
+// Returns the cut at the median coordinate. `reach` bounds how much the coordinates of neighbours differ, so
+// that only nodes near the cut need a closer look.
 template <class Coordinate, class Reach>
 Cut median_cut(const NodeGraph& graph, const std::vector<Index>& nodes, const CutState& state,
                const Coordinate& coordinate, const Reach& reach) {
@@ -25,7 +25,7 @@ Cut median_cut(const NodeGraph& graph, const std::vector<Index>& nodes, const Cu
     Cut cut;
     cut.at = *middle;
     if (std::none_of(sorted.begin(), middle, [&](double value) { return value < cut.at; })) {
-        // More than half of them have the least of all.
+        // More than half of the nodes have the smallest coordinate.
         const auto above =
             std::remove_if(sorted.begin(), sorted.end(), [&](double v) { return v <= cut.at; });
         if (above == sorted.begin()) return {};
@@ -46,7 +46,7 @@ Cut median_cut(const NodeGraph& graph, const std::vector<Index>& nodes, const Cu
     return cut;
 }
 
-// Unit vectors along which the points extend far enough for a cut across them to be short.
+// Returns unit vectors along which the points extend far enough for a cut perpendicular to them to be short.
 std::vector<Vec3> directions(const std::vector<Vec3>& points, const std::vector<Index>& nodes) {
     Vec3 center = Vec3::Zero();
     for (const Index node : nodes) center += points[node];
@@ -59,8 +59,11 @@ std::vector<Vec3> directions(const std::vector<Vec3>& points, const std::vector<
     Eigen::SelfAdjointEigenSolver<Mat3> solver;
     solver.computeDirect(moments);
     const Mat3 axes = solver.eigenvectors();
-    constexpr double far_enough = 0.1;  // of the mean second moment
-    constexpr double alike = 0.99;      // cosine
+    // [-] smallest second moment along a direction, relative to the mean; fixed by
+    // test_dissection_of_a_solid_needs_less_than_metis
+    constexpr double far_enough = 0.1;
+    // [-] cosine of equal directions; test_dissection_of_a_solid_needs_less_than_metis
+    constexpr double alike = 0.99;
     const double enough = far_enough * moments.trace() / 3.0;
     std::vector<Vec3> chosen;
     const auto consider = [&](const Vec3& direction) {
@@ -75,10 +78,10 @@ std::vector<Vec3> directions(const std::vector<Vec3>& points, const std::vector<
     return chosen;
 }
 
-// How many steps each node is away from one at an end of the nodes that hang together. Sets of those follow
-// one another.
+// Computes the level of each node: its distance in edges from a node at an end of its connected set. The levels
+// of different connected sets follow one another.
 void find_levels(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state) {
-    std::vector<Index> reached;  // of this set
+    std::vector<Index> reached;  // nodes of this connected set
     const auto search = [&](Index from, Index first_level) {
         reached.assign(1, from);
         state.level[from] = first_level;
@@ -103,15 +106,18 @@ void find_levels(const NodeGraph& graph, const std::vector<Index>& nodes, CutSta
     }
 }
 
-// Across a direction, or zero: along the ways from a node at an end.
+// A candidate cut: perpendicular to a direction, or by levels if the direction is zero.
 struct Way {
     Cut cut;
     Vec3 direction;
 };
 
-// Whether more cuts are worth trying than those that look best: where eliminating what separates takes long beside it.
+// Returns true if more cuts than the best looking one are worth trying: if eliminating the separator takes long
+// compared with making a cut.
 bool worth_trying(Index separator, std::size_t nodes) {
-    constexpr double as_long = 2e4;  // cubes of unknowns, as a cut takes a node
+    // [unknowns cubed per node] elimination time that a cut is worth; fixed by
+    // test_as_few_operations_as_others_need
+    constexpr double as_long = 2e4;
     return std::pow(static_cast<double>(separator), 3) > as_long * static_cast<double>(nodes);
 }
 
@@ -123,7 +129,8 @@ bool cheaper(const Way& a, const Way& b) {
     return a.cut.cost < b.cut.cost;
 }
 
-// Puts the nodes, all of them on the left, on the sides of a cut along state.coordinate, and returns its lighter border.
+// Assigns the nodes, all of them on the left, to the sides of a cut along state.coordinate, and returns the
+// lighter border as the separator.
 std::vector<Index> separate(const NodeGraph& graph, const std::vector<Index>& nodes, const Cut& cut,
                             CutState& state) {
     for (const Index node : nodes)
@@ -141,7 +148,7 @@ std::vector<Index> separate(const NodeGraph& graph, const std::vector<Index>& no
     return separator;
 }
 
-// Of what separates the sides, as of a cut.
+// Returns the cost of the current separator, in the units of Cut::cost.
 double cost_of(const NodeGraph& graph, const std::vector<Index>& nodes, const CutState& state) {
     double weight[4] = {0.0, 0.0, 0.0, 0.0};
     for (const Index node : nodes) weight[static_cast<int>(state.side[node])] += graph.weights[node];
@@ -159,11 +166,13 @@ CutState::CutState(const NodeGraph& graph)
       beside(graph.size()),
       has_moved(graph.size(), false) {
     if (graph.points.empty()) return;
+    // [-] Enlargement for round-off; fixed by test_useless_points_do_no_harm
+    constexpr double for_rounding = 1.0 + 1e-9;
     reach.assign(graph.size(), 0.0);
     for (Index node = 0; node < graph.size(); ++node) {
         for (const Index beside_it : graph.around(node))
             reach[node] = std::max(reach[node], (graph.points[beside_it] - graph.points[node]).squaredNorm());
-        reach[node] = std::sqrt(reach[node]) * (1.0 + 1e-9);  // rounding
+        reach[node] = std::sqrt(reach[node]) * for_rounding;  // enlarged for round-off
     }
 }
 
@@ -198,7 +207,9 @@ std::vector<Index> bisect(const NodeGraph& graph, const std::vector<Index>& node
     } else {
         ways = {*first};
     }
-    // Those that look best before they are refined are smoother, and so are the parts that they leave.
+    // Cuts that look best before refinement are smoother, and so are the parts that they leave: a later
+    // candidate must be clearly cheaper.
+    // [-] Largest cost of such a candidate relative to the best so far; fixed by test_as_few_operations_as_others_need
     constexpr double so_much_less = 0.9;
     std::vector<Side> best_sides;
     std::vector<Index> best_separator;

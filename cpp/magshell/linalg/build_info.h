@@ -1,4 +1,4 @@
-// What this build was made of, for show_config().
+// Compiler and libraries of this build, for show_config().
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace magshell {
 
-/// Names and values, in the order in which they should be read.
+/// Returns names and values, in the order in which they should be read.
 std::vector<std::pair<std::string, std::string>> linalg_build_info();
 
 }  // namespace magshell

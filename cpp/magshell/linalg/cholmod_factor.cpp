@@ -1,7 +1,7 @@
-// CHOLMOD's supernodal L L^T.
+// CholmodFactor: CHOLMOD's supernodal L L^T.
 //
-// This is the one file that calls CHOLMOD's Supernodal module, which is under the GPL (version 2 or later);
-// magshell's own sources are under the MIT licence, and the default backend does without that module.
+// This is the only file that calls CHOLMOD's Supernodal module, which is under the GPL (version 2 or later);
+// magshell's own sources are under the MIT licence, and the default backend does not need that module.
 #include <string>
 
 #include "magshell/core/errors.h"
@@ -71,7 +71,7 @@ class CholmodFactor : public Factor {
         check_solvable(report_, pattern_->size, rhs);
         if (rhs.size() == 0) return;
         const SingleThreaded guard;
-        CholmodCommon common;  // a workspace of this call's own, so that threads may solve at the same time
+        CholmodCommon common;  // a workspace of this call, so that threads may solve at the same time
         cholmod_dense view{};
         view.nrow = rhs.rows();
         view.ncol = rhs.cols();

@@ -1,5 +1,5 @@
-// What the files that call CHOLMOD share: its settings object and a view of a pattern. Included by
-// linalg/*.cpp only.
+// CHOLMOD's settings object and a view of a pattern, for the files that call CHOLMOD. Included by linalg/*.cpp
+// only.
 #pragma once
 
 #include <cholmod.h>
@@ -25,7 +25,7 @@ class CholmodCommon {
     cholmod_common common_;
 };
 
-/// The lower triangle as CHOLMOD sees it, without a copy; without values where `values` is null.
+/// Returns the lower triangle as CHOLMOD's type without copying; without values if `values` is null.
 inline cholmod_sparse cholmod_view(const SparsePattern& pattern, const double* values) {
     cholmod_sparse view{};
     view.nrow = view.ncol = static_cast<std::size_t>(pattern.size);

@@ -8,17 +8,19 @@
 
 namespace magshell {
 
-// With nodes sorted by their coordinate, a node is on the left side's border of every cut between it and its farthest
-// neighbour to the right, and on the right side's the other way round: all borders' weights are sums of differences.
+// Sorted by coordinate, a node belongs to the left border of every cut between it and its farthest neighbour to
+// the right, and to the right border the other way round. The weights of all borders are therefore cumulative
+// sums.
 Cut lightest_cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state) {
-    constexpr double farthest = 0.2;  // of the whole weight, from the middle
+    // [-] of the whole weight, from the middle; fixed by test_as_few_operations_as_others_need
+    constexpr double farthest = 0.2;
     const Index count = static_cast<Index>(nodes.size());
     std::vector<std::pair<double, Index>>
-        sorted;  // coordinates beside their nodes, which are all over the memory
+        sorted;  // coordinates next to their nodes, whose data are scattered in memory
     sorted.reserve(nodes.size());
     for (const Index node : nodes) sorted.emplace_back(state.coordinate[node], node);
     std::sort(sorted.begin(), sorted.end());
-    // A node's place is that of the first that has its coordinate.
+    // The rank of a node is that of the first node with the same coordinate.
     std::vector<Index>& place = state.place;
     double whole = 0.0;
     for (Index k = 0; k < count; ++k) {
@@ -27,7 +29,8 @@ Cut lightest_cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutSta
         place[node] = alike ? place[sorted[k - 1].second] : k;
         whole += graph.weights[node];
     }
-    std::vector<Index> left(count + 1, 0), right(count + 1, 0);  // how the borders change from cut to cut
+    // changes of the borders' weights from cut to cut
+    std::vector<Index> left(count + 1, 0), right(count + 1, 0);
     for (const auto& [coordinate, node] : sorted) {
         Index first = place[node], last = first;
         for (const Index beside : graph.around(node)) {
@@ -51,7 +54,7 @@ Cut lightest_cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutSta
         below += graph.weights[sorted[k].second];
         if (k == 0 || place[sorted[k].second] != k) continue;
         const Index weight = std::min(borders[0], borders[1]);
-        // Beyond the limit the more even cut counts alone.
+        // Beyond the limit only the balance of the cut counts.
         const double cost = off > farthest ? (1.0 + off) * 2.0 * whole : cost_of_cut(weight, off);
         if (cost >= cut.cost) continue;
         cut = {

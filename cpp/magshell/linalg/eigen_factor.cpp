@@ -1,5 +1,5 @@
-// Eigen's SimplicialLDLT: no supernodes, no pivoting; needs nothing but Eigen, and is the yardstick the
-// others are tested by.
+// EigenFactor: Eigen's SimplicialLDLT, without supernodes and pivoting. It needs nothing but Eigen, and is the
+// reference that the others are tested against.
 #include <Eigen/SparseCholesky>
 #include <string>
 
@@ -43,7 +43,7 @@ class EigenFactor : public Factor {
     std::unique_ptr<Factor> sibling() const override { return std::make_unique<EigenFactor>(pattern_); }
     std::string name() const override { return "eigen"; }
 
-    // Eigen tells neither before the first factorization.
+    // Eigen knows neither of these before the first factorization.
     std::int64_t nonzeros() const override {
         return report_.succeeded && pattern_->size > 0
                    ? solver_.matrixL().nestedExpression().nonZeros() + pattern_->size

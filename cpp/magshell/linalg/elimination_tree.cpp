@@ -30,7 +30,7 @@ UpperPattern permuted_upper(const SparsePattern& pattern, const std::vector<Inde
 std::vector<Index> elimination_tree(const UpperPattern& upper) {
     const Index size = static_cast<Index>(upper.starts.size()) - 1;
     std::vector<Index> parent(size, -1);
-    std::vector<Index> ancestor(size, -1);  // the highest node reached so far: path compression
+    std::vector<Index> ancestor(size, -1);  // highest node reached so far (path compression)
     for (Index j = 0; j < size; ++j) {
         for (Index k = upper.starts[j]; k < upper.starts[j + 1]; ++k) {
             for (Index i = upper.rows[k]; i != -1 && i < j;) {
@@ -72,8 +72,8 @@ std::vector<Index> postorder(const std::vector<Index>& parent) {
     return order;
 }
 
-// Row i of L has an entry in column j exactly when j lies on a path of the tree from an entry of row i of A
-// up to i.
+// Row i of L has an entry in column j exactly if j lies on a path of the tree from an entry of row i of A up to
+// i.
 std::vector<Index> column_counts(const UpperPattern& upper, const std::vector<Index>& parent,
                                  const std::vector<Index>& weights) {
     const Index size = static_cast<Index>(parent.size());

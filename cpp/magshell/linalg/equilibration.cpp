@@ -7,8 +7,8 @@
 
 namespace magshell {
 
-// Ruiz (2001): divide rows and columns by the square root of their largest entry, repeatedly; twice is enough
-// for pivoting.
+// Ruiz (2001): divides rows and columns by the square root of their largest entry, repeatedly; two sweeps are
+// enough for pivoting.
 double equilibrate(const SparsePattern& pattern, LargeVector<double>& values, std::vector<double>& scale) {
     check_finite(values);
     std::fill(scale.begin(), scale.end(), 1.0);

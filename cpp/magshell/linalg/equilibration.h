@@ -1,4 +1,4 @@
-// Scaling a symmetric matrix so that its rows are of one size, whatever units its unknowns are in.
+// Scaling of a symmetric matrix so that its rows are of similar size, whatever the units of its unknowns.
 #pragma once
 
 #include <vector>
@@ -8,9 +8,9 @@
 
 namespace magshell {
 
-/// A <- S A S with S diagonal, its entries powers of two: scaling rounds nothing. The largest entry of each
-/// row of the result is between 1/4 and 4 in most rows. Returns the largest of all. Throws InvalidInput when
-/// a value is not finite.
+/// Replaces A by S A S with a diagonal S of powers of two, so that scaling causes no round-off. The largest
+/// entry of most rows of the result is between 1/4 and 4. Returns the largest entry of all. Throws InvalidInput
+/// if a value is not finite.
 double equilibrate(const SparsePattern& pattern, LargeVector<double>& values, std::vector<double>& scale);
 
 }  // namespace magshell

@@ -14,7 +14,7 @@ std::shared_ptr<Factor> FactorStore::get(const std::shared_ptr<const SparsePatte
                                          const Analyze& analyze) {
     const Shelf* found = shelf_of(pattern);
     if (!found) {
-        shelves_[1] = {};  // its memory first
+        shelves_[1] = {};  // frees memory first
         shelves_[1].analysed = analyze();
         ++analyses_;
     }
@@ -24,6 +24,7 @@ std::shared_ptr<Factor> FactorStore::get(const std::shared_ptr<const SparsePatte
 }
 
 void FactorStore::store(std::shared_ptr<Factor> factor) {
+    // [bytes] that are freed, not stored; plain-words: ok
     constexpr std::size_t large = std::size_t{1} << 28;
     if (!factor || factor.use_count() > 1 || factor->bytes() > large) return;
     Shelf* shelf = shelf_of(factor->pattern());

@@ -1,4 +1,4 @@
-// Factorizations to be had again: what two patterns need that are used by turns is analysed once.
+// FactorStore: keeps the analyses of the last two patterns, so that patterns used in turn are analysed once.
 #pragma once
 
 #include <array>
@@ -13,13 +13,13 @@ class FactorStore {
   public:
     using Analyze = std::function<std::unique_ptr<Factor>()>;
 
-    /// One for a pattern, which is the same if it is the same object; analysed by the function where it is none of the two
-    /// asked for last.
+    /// Returns a factor for a pattern; patterns are the same only if they are the same object. Calls `analyze`
+    /// unless the pattern is one of the last two asked for.
     std::shared_ptr<Factor> get(const std::shared_ptr<const SparsePattern>& pattern, const Analyze& analyze);
-    /// One that nobody else holds, for the next who asks: fresh memory costs page faults. What is large goes back to the
-    /// system.
+    /// Takes back a factor that nobody else uses, for the next caller of get(): fresh memory costs page faults.
+    /// Large factors are freed instead.
     void store(std::shared_ptr<Factor> factor);
-    /// How often a pattern was analysed.
+    /// Returns the number of analyses so far.
     int analyses() const { return analyses_; }
 
   private:
@@ -30,7 +30,7 @@ class FactorStore {
 
     Shelf* shelf_of(const std::shared_ptr<const SparsePattern>& pattern);
 
-    std::array<Shelf, 2> shelves_;  // the one asked for last first
+    std::array<Shelf, 2> shelves_;  // the one asked for last comes first
     int analyses_ = 0;
 };
 

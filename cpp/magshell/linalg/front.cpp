@@ -18,9 +18,9 @@ using slabs::width;
 constexpr Index block_columns = PivotBlock::max_size;
 constexpr Index block_slabs = block_columns / width;
 constexpr Index depth_block =
-    192;  // columns of L multiplied at a time: three slabs of it stay in the first-level cache
+    192;  // [columns] of L multiplied at a time: three slabs of this size stay in the first-level cache
 
-// W = L D, for the rows of one slab and some columns of L.
+// Computes W = L D for the rows of one slab and some columns of L.
 void scale_by_pivots(const double* slab, Index first, Index depth, const Pivots& d, double* scaled) {
     for (Index p = 0; p < depth; ++p) {
         const Index k = first + p;
@@ -31,18 +31,18 @@ void scale_by_pivots(const double* slab, Index first, Index depth, const Pivots&
     }
 }
 
-// Scratch for W of one block: four slabs, depth_block columns.
+// Scratch memory for W of one block: four slabs, depth_block columns.
 struct ScaledBlock {
     alignas(64) double data[block_slabs][width * depth_block];
 };
 
-// A range of slabs, or of columns.
+// A range of slabs or columns.
 struct Range {
     Index begin, end;
 };
 
-// target(I, J) -= L(I, :) D L(J, :)^T over some columns of L, for the slabs J of one block of columns of the
-// target and slabs I = rows, none of them above J. Source and Target hand out slab pointers.
+// Computes target(I, J) -= L(I, :) D L(J, :)^T over some columns of L, for the slabs J of one block of columns
+// of the target and the slabs I = rows, none of them above J. Source and Target return pointers to slabs.
 template <bool Overwrite, class Source, class Target>
 void update_block(const Source& source, const Target& target, Range columns, Range rows, Range depth,
                   const Pivots& d) {
@@ -64,7 +64,7 @@ void update_block(const Source& source, const Target& target, Range columns, Ran
     };
     Index i = rows.begin;
     for (; i < std::min(rows.end, slabs_across.end); ++i)
-        tiles.template operator()<1>(i, i + 1);  // the diagonal's triangle
+        tiles.template operator()<1>(i, i + 1);  // the triangle at the diagonal
     for_groups(i, rows.end,
                [&]<int S>(Index group) { tiles.template operator()<S>(group, slabs_across.end); });
 }
@@ -80,7 +80,7 @@ void load_block(const Panel& panel, Index first, PivotBlock& block) {
     }
 }
 
-// L, with the zeros above its diagonal that share a slab with it.
+// Stores L, with the zeros above its diagonal in the same slabs.
 void store_block(const Panel& panel, Index first, const PivotBlock& block) {
     for (Index i = 0; i < block.size; ++i) {
         const Index row = first + i;
@@ -90,7 +90,7 @@ void store_block(const Panel& panel, Index first, const PivotBlock& block) {
     }
 }
 
-// The pivots' rows of the columns of L already computed follow their new order.
+// Permutes the pivots' rows in the columns of L computed so far to their new order.
 void permute_rows(const Panel& panel, Index first, const PivotBlock& block) {
     double old[block_columns];
     for (Index p = 0; p < first; ++p) {
@@ -102,7 +102,7 @@ void permute_rows(const Panel& panel, Index first, const PivotBlock& block) {
     }
 }
 
-// D^-1 of one block, so that L = W D^-1 costs multiplications only.
+// D^-1 of one block, so that L = W D^-1 needs multiplications only.
 struct InversePivots {
     double diagonal[block_columns + 1], coupling[block_columns + 1];
     InversePivots(const Pivots& d, Index first, Index size) {
@@ -123,8 +123,8 @@ struct InversePivots {
     }
 };
 
-// Rows below a factorized block: W = A P^T L^-T by substitution, then L = W D^-1. `slab[s]` begins at the
-// block's first column.
+// Solves for rows below a factorized block: W = A P^T L^-T by substitution, then L = W D^-1. `slab[s]` begins
+// at the block's first column.
 template <int S>
 void solve_rows(double* const (&slab)[S], const PivotBlock& block, const InversePivots& inverse,
                 Lanes& growth) {
@@ -178,11 +178,11 @@ void solve_rows(double* const (&slab)[S], const PivotBlock& block, const Inverse
     }
 }
 
-// Calls body(range) for parts of a range of slabs, on several threads where there are many slabs. The parts
-// depend on the range alone.
+// Calls body(range) for parts of a range of slabs, on several threads if there are many slabs. The parts depend
+// on the range only.
 template <class Body>
 void for_parts(Range range, Body&& body) {
-    constexpr Index part = 12;
+    constexpr Index part = 12;  // [slabs] per task; time only, the sums do not depend on it; plain-words: ok
     const Index parts = (range.end - range.begin + part - 1) / part;
     if (parts <= 1) return body(range);
     parallel_for(parts, [&](int k) {
@@ -243,7 +243,7 @@ void eliminate_pivots(const Panel& panel, Index pivots, Index below_slabs, const
             for (int lane = 0; lane < width; ++lane) tally.growth = std::max(tally.growth, growth[lane]);
         });
         if (block.permuted)
-            permute_rows(panel, first, block);  // last: the rows below still used the old order
+            permute_rows(panel, first, block);  // last, because the rows below still used the old order
     }
 }
 

@@ -6,12 +6,12 @@
 namespace magshell {
 namespace {
 
-// The least-squares problem of the Hessenberg matrix, by Givens rotations, a column at a time.
+// The least-squares problem of the Hessenberg matrix, solved by Givens rotations column by column.
 class HessenbergLeastSquares {
   public:
     explicit HessenbergLeastSquares(double rhs_norm) : rhs_{rhs_norm} {}
 
-    /// Column k, of k + 2 entries.
+    /// Adds column k, which has k + 2 entries.
     void add(std::vector<double> column) {
         const std::size_t k = columns_.size();
         for (std::size_t i = 0; i < k; ++i) {
@@ -62,7 +62,7 @@ GmresReport gmres(const std::function<VectorXd(const VectorXd&)>& product,
         precondition(preconditioned.emplace_back(basis.back()));
         VectorXd next = product(preconditioned.back());
         std::vector<double> column(basis.size() + 1, 0.0);
-        // Twice: once leaves the basis orthogonal only to the square root of round-off.
+        // Orthogonalizes twice: once leaves the basis orthogonal only to the square root of round-off.
         for (int sweep = 0; sweep < 2; ++sweep)
             for (std::size_t i = 0; i < basis.size(); ++i) {
                 const double share = basis[i].dot(next);

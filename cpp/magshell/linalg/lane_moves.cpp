@@ -9,7 +9,7 @@ namespace {
 
 using slabs::width;
 
-// Moves lanes of one slab to the lanes of another, column after column.
+// Moves lanes of one slab to lanes of another, column after column.
 class LaneMove {
   public:
 #ifdef __AVX512F__

@@ -12,7 +12,7 @@
 namespace magshell {
 namespace {
 
-// Sets of coupled unknowns, each known by its first.
+// Disjoint sets of coupled unknowns, each represented by its first (union-find).
 class Coupled {
   public:
     explicit Coupled(Index size) : above_(size) { std::iota(above_.begin(), above_.end(), 0); }
@@ -27,7 +27,7 @@ class Coupled {
 
     bool is_known(Index first_of_one, Index other) const { return above_[other] == first_of_one; }
 
-    /// Returns the first of both.
+    /// Merges two sets and returns the first unknown of both.
     Index join(Index first_of_one, Index other) {
         const Index first_of_other = first(other);
         const auto [before, after] = std::minmax(first_of_one, first_of_other);
@@ -43,10 +43,10 @@ template <Index count>
 bool all_zero(const double* values) {
     std::uint64_t bits = 0;
     for (Index k = 0; k < count; ++k) bits |= std::bit_cast<std::uint64_t>(values[k]);
-    return bits << 1 == 0;  // but for signs
+    return bits << 1 == 0;  // ignoring the signs of zeros
 }
 
-// Of each column the rows below the diagonal whose entries are not zero.
+// For each column, the rows below the diagonal whose entries are not zero.
 struct Coupling {
     std::vector<Index> starts, rows;
 
@@ -56,18 +56,19 @@ struct Coupling {
 };
 
 Coupling coupling_of(const SparsePattern& pattern, std::span<const double> values) {
-    Index count = 0;  // most are zero: little fresh memory is needed
+    Index count = 0;  // most entries are zero, so little fresh memory is needed
     bool all_finite = true;
     for (const double value : values) {
         count += value != 0.0;
         all_finite &= std::abs(value) <= std::numeric_limits<double>::max();
     }
     if (!all_finite) check_finite(values);
-    Coupling coupling{{0}, std::vector<Index>(count + 1)};  // what is passed over is written behind the last
+    // entries that are skipped are written behind the last one
+    Coupling coupling{{0}, std::vector<Index>(count + 1)};
     coupling.starts.reserve(pattern.size + 1);
     Index to = 0;
     for (Index j = 0; j < pattern.size; ++j) {
-        constexpr Index several = 8;  // zeros often stand together
+        constexpr Index several = 8;  // [entries] tested at once: zeros often stand together; plain-words: ok
         Index k = pattern.column_starts[j] + 1;
         const Index end = pattern.column_starts[j + 1];
         while (k < end) {
@@ -76,7 +77,7 @@ Coupling coupling_of(const SparsePattern& pattern, std::span<const double> value
                 continue;
             }
             for (const Index last = std::min(k + several, end); k < last; ++k) {
-                coupling.rows[to] = pattern.rows[k];  // without a branch, which would be as good as random
+                coupling.rows[to] = pattern.rows[k];  // without a branch, which would be unpredictable
                 to += values[k] != 0.0;
             }
         }
@@ -85,7 +86,7 @@ Coupling coupling_of(const SparsePattern& pattern, std::span<const double> value
     return coupling;
 }
 
-// Whether each unknown is coupled with a force; all are where there is none.
+// Returns for each unknown whether it is coupled with a force; true for all if there is no force.
 std::vector<char> loaded(const Coupling& coupling, const VectorXd& forces) {
     const Index size = static_cast<Index>(forces.size());
     Coupled coupled(size);
@@ -105,7 +106,8 @@ std::vector<char> loaded(const Coupling& coupling, const VectorXd& forces) {
     return is_loaded;
 }
 
-// Chosen unknowns that follow each other and have the same rows below, as those of a node; each knows the first of its own.
+// Returns the first unknown of each node: chosen unknowns that follow each other and have the same rows below
+// belong to one node.
 std::vector<Index> nodes_of(const SparsePattern& pattern, const std::vector<char>& is_chosen) {
     std::vector<Index> node(pattern.size);
     for (Index j = 0; j < pattern.size; ++j) {
@@ -118,7 +120,7 @@ std::vector<Index> nodes_of(const SparsePattern& pattern, const std::vector<char
     return node;
 }
 
-// The columns and rows of some unknowns.
+// Extracts the columns and rows of some unknowns.
 class Selection {
   public:
     Selection(const SparsePattern& pattern, const double* values, const Coupling& coupling,
@@ -149,7 +151,7 @@ class Selection {
     LoadedPart&& take() { return std::move(part_); }
 
   private:
-    // Its columns: within the node all rows, of those below the same for each column.
+    // Adds the columns of a node: all rows within the node, and the same rows below for each column.
     void add_node(Index first, Index end) {
         if (number_[first] < 0) return;
         const Index count = choose_below(first, end);
@@ -164,7 +166,7 @@ class Selection {
         }
     }
 
-    // The rows below a node that belong to nodes coupled with it, and how many they are.
+    // Collects the rows below a node that belong to nodes coupled with it; returns their number.
     Index choose_below(Index node, Index end) {
         for (Index column = node; column < end; ++column)
             for (const Index row : coupling_.of(column)) coupled_[node_[row]] = node;
@@ -188,9 +190,9 @@ class Selection {
     const double* const values_;
     const Coupling& coupling_;
     const std::vector<Index> node_;
-    std::vector<Index> coupled_;         // of each node: the last that it is coupled with
-    std::vector<Index> number_;          // or -1
-    std::vector<Index> places_, below_;  // rows below: where in each column, and their new numbers
+    std::vector<Index> coupled_;         // of each node: the last node that it is coupled with
+    std::vector<Index> number_;          // new number of each unknown, or -1
+    std::vector<Index> places_, below_;  // rows below: their position in each column, and their new numbers
     LoadedPart part_;
 };
 

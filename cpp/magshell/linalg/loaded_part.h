@@ -1,5 +1,6 @@
-// A matrix may fall into parts that no entry other than zero couples, as bending and stretching of a flat sheet: the one that
-// forces act on can be solved by itself, and nothing answers elsewhere.
+// LoadedPart: the part of a linear system that forces act on. A matrix may consist of parts that no nonzero
+// entry couples, such as bending and stretching of a flat shell; the loaded part can then be solved alone, and
+// the solution is zero elsewhere.
 #pragma once
 
 #include <span>
@@ -8,16 +9,16 @@
 
 namespace magshell {
 
-/// A symmetric matrix of some of the unknowns of another one, without pairs of nodes between which all is zero. Single zeros
-/// stay: unknowns that have the same pattern, as those of a node, are ordered as one.
+/// The submatrix of some unknowns of a symmetric matrix, without pairs of nodes whose entries are all zero.
+/// Single zeros stay, so that unknowns with the same pattern, such as those of a node, are ordered as one.
 struct LoadedPart {
     std::vector<Index> unknowns;  // ascending
     SparsePattern pattern;
     std::vector<double> values;
 };
 
-/// What chains of entries other than zero couple with a force other than zero; all of the matrix where there is no force.
-/// Throws InvalidInput on NaN or infinity among the values.
+/// Returns the part that chains of nonzero entries couple with a nonzero force; the whole matrix if there is no
+/// force. Throws InvalidInput if a value is NaN or infinite.
 LoadedPart loaded_part(const SparsePattern& pattern, std::span<const double> values, const VectorXd& forces);
 
 }  // namespace magshell

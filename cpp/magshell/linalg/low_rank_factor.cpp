@@ -10,10 +10,13 @@
 namespace magshell {
 namespace {
 
-// An eigenvalue of the scaled border below this is zero: K is singular.
+// [-] Magnitude below which an eigenvalue of the scaled border counts as zero, so that K is singular; fixed by
+// test_solutions_and_inertia.
 constexpr double singular = 16.0 * std::numeric_limits<double>::epsilon();
-// Where A alone is next to singular, as where a pressure reaches its limit, what it answers is much longer than what K does.
+// [-] Ratio of the solution of A alone to that of K above which the latter is refined: A is nearly singular
+// where a pressure reaches its limit. Fixed by test_a_sparse_part_that_is_next_to_singular_alone.
 constexpr double cancelling = 30.0;
+// [-] Largest number of refinements; fixed by test_a_sparse_part_that_is_next_to_singular_alone
 constexpr int most_refinements = 4;
 
 }  // namespace
@@ -36,7 +39,7 @@ FactorReport LowRankFactor::factorize() {
     Eigen::MatrixXd m = columns_.transpose() * solved_;
     m = 0.5 * (m + m.transpose()).eval();
     m.diagonal() += signs_;
-    // Stiffnesses of all sizes side by side: as large as its diagonal, each row.
+    // Scales each row by its diagonal, because the columns have very different stiffnesses.
     const VectorXd scale =
         m.diagonal().unaryExpr([](double each) { return 1.0 / std::sqrt(1.0 + std::abs(each)); });
     m = scale.asDiagonal() * m * scale.asDiagonal();

@@ -1,14 +1,14 @@
-// A factorization of a sparse matrix A and a few dense columns beside it, K = A + U S U^T with S = +-1 (the stiffness of a
-// column is put into it): by bordering,
+// LowRankFactor: a factorization of a sparse matrix A plus a few dense columns, K = A + U S U^T with S = +-1
+// (each column contains the square root of its stiffness), by a bordered system,
 //
 //   [ A    U   ] [ x ]   [ b ]
 //   [ U^T  -S  ] [ y ] = [ 0 ],        M = S + U^T A^-1 U,      x = A^-1 b - A^-1 U M^-1 U^T A^-1 b
 //
-// and with the inertia of the bordered matrix, counted both ways round, K has
+// Counting the inertia of the bordered matrix in both ways gives
 //
 //   negative(K) = negative(A) + positive(M) - positive(S).
 //
-// However stiff a column is, M stays as large as it has to be: nothing is lost in the limit of a constraint.
+// For a very stiff column M stays as large as necessary, so no digits are lost in the limit of a constraint.
 #pragma once
 
 #include <memory>
@@ -21,7 +21,8 @@ class LowRankFactor final : public Factor {
   public:
     explicit LowRankFactor(std::unique_ptr<Factor> sparse);
 
-    /// What is added to the sparse matrix: sum_k stiffness_k column_k column_k^T, (size, k) and (k,), until it is set again.
+    /// Sets the low-rank part sum_k stiffness_k column_k column_k^T, columns (size, k) and stiffness (k,),
+    /// until it is set again.
     void set_low_rank(Eigen::MatrixXd columns, const VectorXd& stiffness);
     FactorReport factorize() override;
     VectorXd image(const VectorXd& x) const override;

@@ -10,10 +10,10 @@ namespace magshell {
 namespace {
 
 using Word = std::uint64_t;
-constexpr int bits = 64;
+constexpr int bits = 64;  // of a word; plain-words: ok
 
-// Sets of places, of a known number of words so that they are handled in registers: one set for each of the
-// first places, its row, and one for each binary digit of the weights.
+// The elimination graph as bit sets with a fixed number of words, which are processed in registers: one set for
+// each of the first nodes, its row, and one for each binary digit of the weights.
 template <int Words>
 class EliminationGraph {
   public:
@@ -30,7 +30,7 @@ class EliminationGraph {
         }
     }
 
-    /// The weight of what a row is coupled with.
+    /// Returns the total weight of the nodes that a row is coupled with.
     Index degree(Index row) const {
         Index sum = 0;
         for (std::size_t digit = 0; digit < digits_.size(); ++digit) {
@@ -41,7 +41,8 @@ class EliminationGraph {
         return sum;
     }
 
-    /// Couples what a row is coupled with, takes it out, and visits the rows that this has changed.
+    /// Eliminates a node: couples all nodes that its row is coupled with, removes it, and visits the rows that
+    /// have changed.
     template <class Visit>
     void eliminate(Index pivot, Visit&& visit) {
         const Set taken = rows_[pivot];
@@ -62,10 +63,10 @@ class EliminationGraph {
     std::vector<Set> rows_, digits_;
 };
 
-// The nodes of a piece, then those beyond that they border on.
+// The nodes of a piece, followed by the adjacent nodes outside it.
 struct Places {
-    std::vector<Index> nodes, starts, coupled;  // of each of the piece's: the places that it is coupled with
-    std::vector<Index> weights;                 // of all places
+    std::vector<Index> nodes, starts, coupled;  // for each node of the piece: the nodes it is coupled with
+    std::vector<Index> weights;                 // of all nodes
 };
 
 template <int Words>

@@ -1,4 +1,4 @@
-// Minimum degree on small graphs that border on larger ones.
+// Exact minimum degree ordering of small graphs that border on larger ones.
 #pragma once
 
 #include <vector>
@@ -7,12 +7,12 @@
 
 namespace magshell {
 
-/// The nodes of a piece of a graph, in an order of little fill if all others that they border on are
-/// eliminated later: of those that are left, always the one whose elimination couples the fewest unknowns,
-/// exactly counted. For some hundreds of nodes: rows of the graph are sets of bits.
+/// Returns the nodes of a piece of a graph in an order of little fill, given that all adjacent nodes outside it
+/// are eliminated later: it always takes the node whose elimination couples the fewest unknowns, counted
+/// exactly. For up to some hundreds of nodes, because rows of the graph are bit sets.
 ///
-/// `piece_of` tells whose each node is. `number` is room for the places of this piece's nodes; other nodes'
-/// are neither read nor written.
+/// piece_of: the piece of each node. number: work space for this piece's nodes; entries of other nodes are
+/// neither read nor written.
 std::vector<Index> minimum_degree_order(const NodeGraph& graph, const std::vector<Index>& nodes,
                                         const std::vector<Index>& piece_of, std::vector<Index>& number);
 

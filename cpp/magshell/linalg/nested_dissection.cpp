@@ -9,9 +9,9 @@
 namespace magshell {
 namespace {
 
-// A separator or a part that is cut no more, and the separator it was cut off by.
+// A separator, or a part that is not cut further, and the separator above it.
 struct Piece {
-    Index parent;  // of a lower number; -1 for the first
+    Index parent;  // index of the separator above, which is lower; -1 for the first
     std::vector<Index> nodes;
 };
 
@@ -31,7 +31,7 @@ Halves cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& st
     return halves;
 }
 
-// The tree of separators of a graph; parents come before their children.
+// Returns the tree of separators of a graph; parents come before their children.
 std::vector<Piece> dissect(const NodeGraph& graph, std::size_t few, const std::function<void()>& watch) {
     CutState state(graph);
     std::vector<Piece> pieces(1, Piece{-1, std::vector<Index>(graph.size())});
@@ -61,8 +61,8 @@ Index common_ancestor(const std::vector<Piece>& pieces, Index a, Index b) {
     return a;
 }
 
-// As far from the root as the leaders beside a node let it go: to the piece that all others hold on their
-// way to the root, or where their ways part.
+// Returns the piece that a node can go to, as far from the root as the adjacent leaders allow: the piece that
+// all of them have on their path to the root, or where their paths part.
 Index place_beside(const std::vector<Piece>& pieces, const NodeGraph& graph, Index node,
                    const std::vector<char>& leads, const std::vector<Index>& piece_of) {
     Index place = -1;
@@ -81,7 +81,7 @@ Index place_beside(const std::vector<Piece>& pieces, const NodeGraph& graph, Ind
     return place;
 }
 
-// Puts the nodes that are no leaders beside these: piece_of and the pieces' nodes become complete.
+// Assigns the nodes that are not leaders to pieces next to those: completes piece_of and the pieces' nodes.
 void place_followers(const NodeGraph& graph, const std::vector<char>& leads, std::vector<Piece>& pieces,
                      std::vector<Index>& piece_of) {
     std::vector<Index> followers;
@@ -90,7 +90,7 @@ void place_followers(const NodeGraph& graph, const std::vector<char>& leads, std
         followers.push_back(node);
         piece_of[node] = place_beside(pieces, graph, node, leads, piece_of);
     }
-    // Few are neighbours across a separator: one of them joins it.
+    // Few of them are adjacent across a separator: one of the two joins it.
     for (bool moved = true; moved;) {
         moved = false;
         for (const Index node : followers) {
@@ -109,7 +109,8 @@ void place_followers(const NodeGraph& graph, const std::vector<char>& leads, std
 
 std::vector<Index> nested_dissection(const NodeGraph& graph, const std::function<void()>& watch) {
     if (graph.size() == 0) return {};
-    constexpr std::size_t few_nodes = 200;  // in a part that is cut no more
+    // [nodes] size of a part that is not cut further; fixed by test_as_few_operations_as_others_need
+    constexpr std::size_t few_nodes = 200;
     const std::vector<char> leads = leaders(graph);
     std::vector<Index> leading, number(graph.size(), -1);
     for (Index node = 0; node < graph.size(); ++node) {

@@ -13,7 +13,7 @@ namespace magshell {
 namespace {
 
 #ifdef MAGSHELL_HAS_CHOLMOD
-// Nodes in the order of the first of their unknowns.
+// Returns nodes in the order of the first of their unknowns.
 std::vector<Index> nodes_in_order(const Quotient& quotient, const std::vector<Index>& unknowns) {
     std::vector<Index> node_of(unknowns.size()), order;
     for (Index node = 0; node < quotient.pattern.size; ++node)
@@ -40,11 +40,12 @@ std::vector<Index> metis(const SparsePattern& pattern) {
 }
 #endif
 
-// Whether the factor's columns are of about the same length, as in a band: the mean square of their lengths over the square
-// of the mean is 1.5 in a rod, 2 to 3 in squares and cubes.
+// Returns true if the factor's columns have about the same length, as in a band: the mean square of their
+// lengths divided by the square of their mean is 1.5 in a rod and 2 to 3 in squares and cubes.
 bool is_long(const AssemblyTree& tree, Index size) {
     const double nonzeros = static_cast<double>(tree.nonzeros());
-    return tree.flops() * size < 1.75 * nonzeros * nonzeros;
+    constexpr double limit = 1.75;  // [-] fixed by test_a_rod_of_tetrahedra_is_ordered_by_minimum_degree
+    return tree.flops() * size < limit * nonzeros * nonzeros;
 }
 
 }  // namespace
@@ -63,10 +64,14 @@ AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, const FactorOpt
 #endif
     AssemblyTree dissection = assembly_tree(quotient, nested_dissection(graph, options.watch));
     if (options.ordering == Ordering::dissection) return dissection;
-    // AMD takes a good part of the time of a factorization. It does better than nested dissection where cuts are short
-    // beside the whole, on narrow strips and rods above all, and may where nothing is known but the pattern.
-    constexpr double few_operations = 5.5e4;  // an unknown
-    constexpr Index few_unknowns = 6000;      // that AMD takes no time to speak of
+    // Skips AMD, which takes a good part of the time of a factorization, where it cannot win. It beats nested
+    // dissection where cuts are short compared with the whole, above all on narrow strips and rods, and may
+    // where only the pattern is known.
+    // [operations per unknown] below which AMD is tried; fixed by test_as_few_operations_as_others_need
+    constexpr double few_operations = 5.5e4;
+    // [unknowns] up to which the time of AMD is negligible; fixed by
+    // test_minimum_degree_needs_as_few_operations_as_another
+    constexpr Index few_unknowns = 6000;
     if (!options.points.empty() && pattern.size > few_unknowns &&
         dissection.flops() > few_operations * pattern.size && !is_long(dissection, pattern.size))
         return dissection;

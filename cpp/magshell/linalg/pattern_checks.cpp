@@ -13,8 +13,8 @@ std::string text(Index number) {
     return std::to_string(number);
 }
 
-// Whether a column whose bounds are right is sorted, begins with its diagonal entry and ends within the matrix: without a
-// branch, so that the usual case is one vectorized pass.
+// Returns true if a column with valid bounds is sorted, begins with its diagonal entry and ends within the
+// matrix; without branches, so that the usual case is one vectorized pass.
 bool is_column(const SparsePattern& pattern, Index j) {
     const Index first = pattern.column_starts[j], last = pattern.column_starts[j + 1] - 1;
     const Index* rows = pattern.rows.data();
@@ -77,7 +77,7 @@ void check_points(const SparsePattern& pattern, const std::vector<Vec3>& points)
 }
 
 void check_finite(std::span<const double> values) {
-    bool all_finite = true;  // without a branch, so that the usual case is one vectorized pass
+    bool all_finite = true;  // without branches, so that the usual case is one vectorized pass
     for (std::size_t k = 0; k < values.size(); ++k)
         all_finite &= std::abs(values[k]) <= std::numeric_limits<double>::max();
     if (all_finite) return;

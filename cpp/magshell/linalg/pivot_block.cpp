@@ -11,7 +11,7 @@ using slabs::Lanes;
 
 constexpr Index stride = PivotBlock::stride;
 
-// Rows and columns i < k of the block exchanged, columns of L to the left of `done` included.
+// Exchanges rows and columns i < k of the block, including the columns of L computed so far.
 void exchange(PivotBlock& block, Index i, Index k) {
     if (i == k) return;
     const auto at = [&](Index row, Index column) -> double& { return block.entries[column * stride + row]; };
@@ -21,7 +21,7 @@ void exchange(PivotBlock& block, Index i, Index k) {
     block.permuted = true;
 }
 
-// The row of the largest |entry| of a column, from `first` on, `skip` left out.
+// Returns the row of the largest |entry| of a column from `first` on, excluding `skip`.
 Index largest(const double* column, Index first, Index size, Index skip) {
     Index best = first == skip ? first + 1 : first;
     for (Index i = best + 1; i < size; ++i) {
@@ -32,9 +32,11 @@ Index largest(const double* column, Index first, Index size, Index skip) {
 
 enum class PivotSize { one, two };
 
-// Moves the pivot to row k (and k + 1). alpha balances the growth of 1x1 and 2x2 steps.
+// Chooses a pivot by Bunch and Kaufman and moves it to row k (and k + 1). alpha balances the growth of 1x1 and
+// 2x2 steps.
 PivotSize choose_pivot(PivotBlock& block, Index k) {
-    constexpr double alpha = 0.6403882032022076;  // (1 + sqrt(17)) / 8
+    // [-] (1 + sqrt(17)) / 8, Bunch and Kaufman; plain-words: ok
+    constexpr double alpha = 0.6403882032022076;
     if (k + 1 == block.size) return PivotSize::one;
     const double* column = block.entries + k * stride;
     const double diagonal = std::abs(column[k]);
@@ -53,8 +55,8 @@ PivotSize choose_pivot(PivotBlock& block, Index k) {
     return PivotSize::two;
 }
 
-// column j -= w_j l for all columns right of the pivot; both triangles are kept, so that rows and columns
-// swap alike.
+// Computes column j -= w_j l for all columns right of the pivot. Both triangles are stored, so that rows and
+// columns are exchanged alike.
 void subtract_outer(PivotBlock& block, Index first, const double* l, const double* w) {
     const Index from = first / slabs::width * slabs::width;
     for (Index j = first; j < block.size; ++j) {
@@ -94,8 +96,8 @@ void PivotBlock::factorize(Pivots pivots, PivotTally& tally) {
             column[k] = 1.0;
             k += 1;
         } else {
-            // A 2x2 pivot has |coupling| beyond both its diagonals, so its determinant is negative: one of
-            // each sign.
+            // The off-diagonal entry of a 2x2 pivot exceeds both its diagonal entries, so its determinant is
+            // negative: one eigenvalue of each sign.
             double* next = column + stride;
             const double a = column[k], b = column[k + 1], c = next[k + 1];
             const double determinant = a * c - b * b;

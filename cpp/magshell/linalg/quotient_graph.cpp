@@ -7,14 +7,16 @@
 namespace magshell {
 namespace {
 
-// The finalizer of splitmix64: each bit depends on all bits of the argument.
+// Mixes the bits of a number (the finalizer of splitmix64): each bit of the result depends on all bits of the
+// argument.
 std::uint64_t mixed(std::uint64_t value) {
     value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9u;
     value = (value ^ (value >> 27)) * 0x94d049bb133111ebu;
     return value ^ (value >> 31);
 }
 
-// Equal sums over the neighbours, and the unknown itself, stand for equal neighbours.
+// Returns a fingerprint of each unknown's neighbourhood, itself included: equal sums of hashes stand for equal
+// neighbours.
 std::vector<std::uint64_t> fingerprints(const SparsePattern& pattern) {
     std::vector<std::uint64_t> own(pattern.size), sum(pattern.size, 0);
     for (Index j = 0; j < pattern.size; ++j) own[j] = mixed(static_cast<std::uint64_t>(j) + 1);
@@ -29,10 +31,11 @@ std::vector<std::uint64_t> fingerprints(const SparsePattern& pattern) {
     return sum;
 }
 
-// Whether the pattern is that of the quotient: no entry is without one there, and there are as many.
+// Returns true if the pattern is exactly that of the quotient: every entry has one there, and their numbers
+// agree.
 bool stands_for(const Quotient& quotient, const std::vector<Index>& node, const SparsePattern& pattern) {
     const SparsePattern& nodes = quotient.pattern;
-    std::vector<Index> last(nodes.size, -1);  // the last node that this one is in the column of
+    std::vector<Index> last(nodes.size, -1);  // the last node in whose column this one is
     std::size_t pairs = 0;
     for (Index b = 0; b < nodes.size; ++b) {
         const std::size_t own = quotient.members(b).size();
@@ -46,7 +49,8 @@ bool stands_for(const Quotient& quotient, const std::vector<Index>& node, const 
             for (Index k = pattern.column_starts[j]; k < pattern.column_starts[j + 1]; ++k) {
                 const Index a = node[pattern.rows[k]];
                 if (last[a] == b) continue;
-                const auto column = nodes.rows.begin();  // where members of two nodes are numbered in turn
+                // needed if members of two nodes are numbered alternately
+                const auto column = nodes.rows.begin();
                 if (a > b || !std::binary_search(column + nodes.column_starts[a],
                                                  column + nodes.column_starts[a + 1], b))
                     return false;
@@ -92,7 +96,7 @@ Quotient quotient_graph(const SparsePattern& pattern) {
         }
         result.pattern.column_starts.push_back(static_cast<Index>(result.pattern.rows.size()));
     }
-    // Two sums may agree by chance.
+    // Two different neighbourhoods may have equal sums by chance.
     return stands_for(result, node, pattern) ? result : each_by_itself(pattern);
 }
 

@@ -7,10 +7,15 @@
 namespace magshell {
 namespace {
 
-constexpr double largest_share = 0.6;  // of a side
-constexpr double alike_enough = 0.52;  // the larger side's share of both
-constexpr int most_passes = 3;
-constexpr int most_moves_in_vain = 200;  // nor more than the separator has nodes
+// [-] largest fraction of the whole weight on one side; fixed by test_as_few_operations_as_others_need
+constexpr double largest_share = 0.6;
+// [-] fraction of the larger side of both up to which the sides count as balanced; same
+// test_as_few_operations_as_others_need
+constexpr double alike_enough = 0.52;
+constexpr int most_passes = 3;  // [-] fixed by test_as_few_operations_as_others_need
+// [moves] without improvement before a pass ends, at most the separator's nodes; fixed by
+// test_as_few_operations_as_others_need
+constexpr int most_moves_in_vain = 200;
 
 int number(Side side) {
     return static_cast<int>(side);
@@ -32,8 +37,9 @@ class Refinement {
     }
 
   private:
-    // Less is better: the separator's weight, then how unlike the sides are. Sides that are alike enough become no more
-    // so: a separator gets steps from it, along which later cuts take longer.
+    // Returns the cost, to be minimized: the separator's weight, then the imbalance of the sides. Sides that
+    // are balanced enough are not balanced further: it would make the separator jagged, and later cuts along it
+    // longer.
     std::pair<Index, Index> cost() const {
         const Index larger = std::max(weight_[0], weight_[1]);
         return {weight_[2], larger > alike_enough * (weight_[0] + weight_[1]) ? larger : 0};
@@ -46,7 +52,7 @@ class Refinement {
         }
     };
 
-    // How much lighter the separator becomes if a node of it goes to a side.
+    // Returns how much lighter the separator becomes if one of its nodes goes to a side.
     Index gain(Index node, Side to) const {
         return graph_.weights[node] - state_.beside[node][number(other(to))];
     }
@@ -60,7 +66,7 @@ class Refinement {
         for (const Side to : {Side::left, Side::right}) offer(node, to);
     }
 
-    // The best move to a side that is still what it was offered as.
+    // Returns the best move to a side that is still valid.
     const Move* best(Side to) {
         std::priority_queue<Move>& moves = moves_[number(to)];
         for (; !moves.empty(); moves.pop()) {
@@ -82,15 +88,15 @@ class Refinement {
     void apply(Index node, Side to);
 
     const NodeGraph& graph_;
-    std::vector<Index>& separator_;  // while nodes move, also those that have left it
+    std::vector<Index>& separator_;  // while nodes move it also contains those that have left it
     CutState& state_;
     Index weight_[3] = {0, 0, 0};
     Index largest_;
     std::priority_queue<Move> moves_[2];
-    std::vector<std::pair<Index, Side>> log_;  // nodes and where they were
+    std::vector<std::pair<Index, Side>> log_;  // nodes and their previous sides
 };
 
-// To a side from the separator, or back.
+// Moves a node from the separator to a side, and its neighbours on the other side into the separator.
 void Refinement::apply(Index node, Side to) {
     log_.emplace_back(node, Side::between);
     change_side(node, to);
@@ -120,7 +126,7 @@ bool Refinement::improved_in_a_pass() {
     log_.clear();
     const auto before = cost();
     auto least = before;
-    std::size_t kept = 0;  // of the log
+    std::size_t kept = 0;  // entries of the log to keep
     const int patience = std::min(most_moves_in_vain, static_cast<int>(separator_.size()));
     for (int in_vain = 0; in_vain < patience; ++in_vain) {
         const Move *left = best(Side::left), *right = best(Side::right);
@@ -140,7 +146,7 @@ bool Refinement::improved_in_a_pass() {
         log_.pop_back();
     }
     std::erase_if(separator_, [&](Index node) { return state_.side[node] != Side::between; });
-    std::sort(separator_.begin(), separator_.end());  // one that left and came back is there twice
+    std::sort(separator_.begin(), separator_.end());  // a node that left and came back is listed twice
     separator_.erase(std::unique(separator_.begin(), separator_.end()), separator_.end());
     return least < before;
 }

@@ -13,8 +13,8 @@ namespace magshell {
 
 namespace {
 
-// What CHOLMOD's own dependencies offer, looked up at run time: which BLAS and which OpenMP are loaded is for
-// the system to say, not for the build, and another package may have brought a second one of either.
+// Functions of CHOLMOD's own dependencies, looked up at run time: the system decides which BLAS and which
+// OpenMP are loaded, not the build, and another package may have loaded a second one of either.
 struct Dependencies {
     void* cholmod = handle();
     int (*openmp_levels)() = symbol<int()>("omp_get_max_active_levels");

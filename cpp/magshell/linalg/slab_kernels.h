@@ -6,11 +6,14 @@
 namespace magshell::slabs {
 inline namespace MAGSHELL_FAMILY {
 
-// How many slabs and columns a product handles at once: as many as leave its sums in registers.
+// Number of slabs and columns that a product handles at once: as many as fit in registers. Changes time only;
+// fixed by test_definite_matrices_are_solved_to_rounding. plain-words: ok
 inline constexpr int group = native_bytes == 64 ? 3 : 1;
+// [columns] at once; plain-words: ok
 inline constexpr int columns_at_once = native_bytes == 64 ? 8 : native_bytes == 32 ? 4 : 2;
 
-/// sum(8 S, 8) -= rows(8 S, depth) columns(depth, 8); `columns` holds eight numbers every `Stride` for each step.
+/// Computes sum(8 S, 8) -= rows(8 S, depth) columns(depth, 8); `columns` holds eight numbers every `Stride` for
+/// each step.
 template <int S, int Stride>
 [[gnu::always_inline]] inline void subtract_multiple(Lanes (&sum)[S][width], const double* const (&rows)[S],
                                                      const double* columns, Index depth) {
@@ -41,7 +44,7 @@ template <int S, int Stride>
     }
 }
 
-/// target(8 S, columns <= 8) -= rows(8 S, depth) weights(depth, 8), or = - rows weights.
+/// Computes target(8 S, columns <= 8) -= rows(8 S, depth) weights(depth, 8), or = - rows weights.
 template <int S, bool Overwrite>
 [[gnu::noinline]] void subtract_product(double* const (&target)[S], const double* const (&rows)[S],
                                         const double* weights, Index depth, Index columns) {

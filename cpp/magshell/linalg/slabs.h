@@ -1,8 +1,8 @@
 // Dense matrices in slabs: eight rows side by side, column after column.
 //
-// Eight doubles are one vector register (or two, or four, on older processors), so a slab is already the
-// "packed" operand of a matrix product and the factor is stored, multiplied and solved with in this one
-// layout, never repacked.
+// Eight doubles are one vector register (two or four on older processors), so a slab is already the "packed"
+// operand of a matrix product. The factor is stored, multiplied and solved with in this one layout and never
+// repacked.
 #pragma once
 
 #include <cstddef>
@@ -14,10 +14,10 @@
 
 namespace magshell::slabs {
 
-inline constexpr Index width = 8;  // rows of a slab
+inline constexpr Index width = 8;  // [rows] of a slab; one vector register of doubles, plain-words: ok
 
-// The widest vector of the processor. What depends on it has the family's name among its own (an inline namespace), as a
-// wheel holds some of it for two families (dense_kernels.h).
+// The widest vector of the processor. Everything that depends on it is in an inline namespace with the family's
+// name, because a wheel contains some of it for two families (dense_kernels.h).
 #if defined(__AVX512F__)
 #define MAGSHELL_FAMILY avx512
 #elif defined(__AVX__)
@@ -29,24 +29,24 @@ inline constexpr Index width = 8;  // rows of a slab
 inline namespace MAGSHELL_FAMILY {
 
 #if defined(__AVX512F__)
-inline constexpr int native_bytes = 64;
+inline constexpr int native_bytes = 64;  // [bytes] of a vector register; plain-words: ok
 #elif defined(__AVX__)
-inline constexpr int native_bytes = 32;
+inline constexpr int native_bytes = 32;  // [bytes] of a vector register; plain-words: ok
 #else
-inline constexpr int native_bytes = 16;
+inline constexpr int native_bytes = 16;  // [bytes] of a vector register; plain-words: ok
 #endif
 using Native [[gnu::vector_size(native_bytes), gnu::may_alias]] = double;
 
 /// Eight doubles, 64-byte aligned: one, two or four registers. (GCC keeps vectors wider than a register in
-/// memory, so these are spelled out.)
+/// memory, so they are written out.)
 struct [[gnu::may_alias]] alignas(64) Lanes {
-    static constexpr int natives = 64 / native_bytes;
+    static constexpr int natives = 64 / native_bytes;  // registers; plain-words: ok
     Native part[natives];
 
     double& operator[](Index lane) { return reinterpret_cast<double*>(part)[lane]; }
     double operator[](Index lane) const { return reinterpret_cast<const double*>(part)[lane]; }
 
-    /// this = f(this, other), register by register.
+    /// Sets this = f(this, other), register by register.
     template <class F>
     [[gnu::always_inline]] Lanes& apply(const Lanes& other, F&& f) {
 #pragma GCC unroll 4
@@ -68,7 +68,7 @@ struct [[gnu::may_alias]] alignas(64) Lanes {
     [[gnu::always_inline]] Lanes& operator/=(double b) {
         return apply(*this, [b](const Native& x, const Native&) -> Native { return x / b; });
     }
-    /// this = max(this, |other|)
+    /// Sets this = max(this, |other|).
     [[gnu::always_inline]] void raise_to_magnitude(const Lanes& b) {
         apply(b, [](const Native& x, const Native& y) -> Native {
             const Native magnitude = y < 0.0 ? -y : y;
@@ -95,18 +95,18 @@ inline constexpr Index count(Index rows) {
     return (rows + width - 1) / width;
 }
 
-/// A lower triangle: slab i holds the columns 0 ... 8 i + 7, of which the last eight contain the diagonal.
+/// A lower triangle: slab i holds the columns 0 ... 8 i + 7, the last eight of which contain the diagonal.
 struct Triangle {
     double* data;
     double* slab(Index i) const { return data + offset(i); }
     static constexpr std::ptrdiff_t offset(Index i) { return 32 * std::ptrdiff_t{i} * (i + 1); }
-    /// Doubles taken by a triangle of this many rows, when the columns stop at its last row.
+    /// Returns the doubles taken by a triangle of this many rows whose columns end at its last row.
     static constexpr std::ptrdiff_t doubles(Index rows) {
         return rows == 0 ? 0 : offset(count(rows) - 1) + std::ptrdiff_t{width} * rows;
     }
 };
 
-/// Full rows with a given number of columns.
+/// A rectangle: full rows with a given number of columns.
 struct Rectangle {
     double* data;
     Index columns;
@@ -116,7 +116,8 @@ struct Rectangle {
     }
 };
 
-/// The eliminated columns of a front: the pivots' own rows on top (a triangle), the other rows below (a rectangle).
+/// The eliminated columns of a front: the pivots' own rows on top (a triangle), the other rows below (a
+/// rectangle).
 struct Panel {
     Triangle top;
     Rectangle below;
@@ -130,7 +131,7 @@ struct Panel {
     }
 };
 
-/// Aligned memory, not initialised: pages are touched first by whoever fills them.
+/// Aligned, uninitialized memory: pages are touched first by the thread that fills them.
 class Buffer {
   public:
     Buffer() = default;

@@ -11,13 +11,13 @@ using slabs::Lanes;
 using slabs::Panel;
 using slabs::width;
 
-// rows(8, eight right-hand sides) -= slab(8, count) pivots(count, eight right-hand sides)
+// Computes rows(8, eight right-hand sides) -= slab(8, count) pivots(count, eight right-hand sides).
 void subtract_slab(const double* slab, Index count, const double* pivots, Lanes (&rows)[1][width]) {
     const double* const sources[1] = {pivots};
     slabs::subtract_multiple<1, width>(rows, sources, slab, count);
 }
 
-// pivots(count, eight) -= slab(8, count)^T rows(8, eight)
+// Computes pivots(count, eight) -= slab(8, count)^T rows(8, eight).
 void subtract_transposed(const double* slab, Index count, const Lanes (&rows)[width], double* pivots) {
     for (Index p = 0; p < count; ++p) {
         Lanes even = lanes(pivots + width * p), odd{};

@@ -14,14 +14,15 @@ using slabs::Panel;
 using slabs::width;
 
 constexpr int row_group =
-    4;  // slabs multiplied at once by one vector: enough chains of additions to hide their latency
+    // [slabs] multiplied at once by one vector: enough independent sums to hide their latency; plain-words: ok
+    4;
 
 double sum(const Lanes& v) {
     return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
 }
 
-// One right-hand side. `pivots` is the part of x on a front's pivots, in the order they were taken, padded to
-// whole slabs.
+// Substitution for one right-hand side. `pivots` is the part of x on a front's pivots, in the order in which
+// they were taken, padded to whole slabs.
 
 void forward_top(const Panel& panel, Index count, double* pivots) {
     for (Index i = 0; i < panel.top_slabs; ++i) {
@@ -37,7 +38,8 @@ void forward_top(const Panel& panel, Index count, double* pivots) {
         for (Index lane = 0; lane < end; ++lane) {
             const double solved = result[lane];
             result -=
-                lanes(slab + width * (width * i + lane)) * solved;  // L is unit: clears the lane itself, too
+                // L has a unit diagonal: this clears the lane itself, too
+                lanes(slab + width * (width * i + lane)) * solved;
             result[lane] = solved;
         }
     }
@@ -76,7 +78,7 @@ void gather_transposed(const Panel& panel, Index first_slab, Index count, const 
     }
 }
 
-// sums[p], added over its lanes, is what is to be subtracted from pivot p.
+// Backward substitution within the pivots: sums[p], added over its lanes, is subtracted from pivot p.
 void backward_top(const Panel& panel, Index count, Lanes* sums, double* pivots) {
     for (Index i = panel.top_slabs - 1; i >= 0; --i) {
         const double* slab = panel.top.slab(i);
@@ -89,7 +91,7 @@ void backward_top(const Panel& panel, Index count, Lanes* sums, double* pivots) 
     }
 }
 
-// The fronts' parts in both substitutions, in the memory of one thread.
+// The contributions of fronts to both substitutions, in the memory of one thread.
 class Fronts {
   public:
     Fronts(const FactorView& factor, double* memory) : factor_(factor), memory_(memory) {}
@@ -99,7 +101,8 @@ class Fronts {
                (plan.most_pivots + slabs::count(plan.most_pivots) + slabs::count(plan.most_below));
     }
 
-    /// x begins at unknown `first` of the elimination order; rows below are where the front's targets say.
+    /// Forward substitution of front s. x begins at unknown `first` of the elimination order; rows below are at
+    /// the front's targets.
     void forward(Index s, double* x, Index first) {
         const FrontShape& shape = factor_.plan.fronts[s].shape;
         const Panel panel(factor_.panels + factor_.plan.fronts[s].panel, shape.pivots);
@@ -153,7 +156,7 @@ class Fronts {
 
 }  // namespace
 
-// Each subtree works in a vector of its own; what it leaves to the rows below its root is added up in the
+// Each subtree works in a vector of its own; its contributions to the rows below its root are added in the
 // order of the plan.
 void substitute_one(const FactorView& factor, double* x) {
     const AssemblyPlan& plan = factor.plan;
@@ -178,7 +181,8 @@ void substitute_one(const FactorView& factor, double* x) {
         for (Index s = subtree.end - 1; s >= subtree.begin; --s) fronts.backward(s, own, subtree.first);
         std::copy_n(own, subtree.unknowns, x + subtree.first);
     };
-    // A body of its own among many: both ways at once, while its part of L is in the cache.
+    // A subtree that is a whole connected component is substituted in both directions at once, while its part
+    // of L is in the cache.
     const auto is_whole = [&](const Subtree& subtree) {
         return plan.fronts[subtree.end - 1].shape.below == 0;
     };

@@ -22,7 +22,9 @@ using slabs::width;
 
 namespace {
 
-constexpr double doubtful_growth = 1e8;  // half of the digits are gone: check before claiming success
+// [-] pivot growth that costs half of the digits: checked before success is reported; fixed by
+// test_pivot_growth_tells_definite_from_hard
+constexpr double doubtful_growth = 1e8;
 
 }  // namespace
 
@@ -38,7 +40,8 @@ std::shared_ptr<SupernodalLdlt::Analysis> SupernodalLdlt::analysed(const SparseP
     analysis->flops = tree.flops();
     analysis->plan = assembly_plan(pattern, std::move(tree));
 #ifdef __GLIBC__
-    constexpr std::size_t large = 1000000;  // entries: what orderings leave behind then counts
+    // [entries] above which the memory that orderings leave behind is returned; plain-words: ok
+    constexpr std::size_t large = 1000000;
     if (pattern.rows.size() > large) malloc_trim(0);
 #endif
     return analysis;

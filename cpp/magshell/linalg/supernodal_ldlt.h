@@ -1,13 +1,16 @@
-// magshell's own factorization: multifrontal L D L^T (Duff and Reid 1983) of a symmetric matrix, definite or not.
+// SupernodalLdlt: magshell's own factorization: multifrontal L D L^T (Duff and Reid 1983) of a symmetric
+// matrix, definite or not.
 //
 //     P S A S P^T = L D L^T
 //
 // S scales rows and columns by powers of two, so that the result does not depend on units. Pivots are 1x1 or
 // 2x2 and are chosen among the 32 columns of a block, never across fronts: the pattern of L is fixed by the
-// analysis and definite and indefinite matrices cost the same. A pivot that vanishes to rounding is replaced;
-// solutions are then refined, and if even that does not recover a known solution the matrix is reported as singular.
+// analysis, and definite and indefinite matrices cost the same. A pivot that vanishes to round-off is replaced;
+// solutions are then refined, and if even that does not recover a known solution the matrix is reported as
+// singular.
 //
-// Every sum is formed in an order that depends on the pattern alone: the same bits for any number of threads.
+// Every sum is formed in an order that depends on the pattern only: the bits are the same for any number of
+// threads.
 #pragma once
 
 #include <memory>
@@ -39,7 +42,7 @@ class SupernodalLdlt : public Factor {
         std::int64_t nonzeros;
         double flops;
         std::mutex mutex;
-        std::weak_ptr<SharedWork> work;  // of the factors that there are
+        std::weak_ptr<SharedWork> work;  // work memory of the existing factors
 
         std::shared_ptr<SharedWork> shared_work();
     };
@@ -47,7 +50,8 @@ class SupernodalLdlt : public Factor {
     SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, std::shared_ptr<Analysis> analysis);
     static std::shared_ptr<Analysis> analysed(const SparsePattern& pattern, const FactorOptions& options);
 
-    /// Of a front: the work spaces that the updates of its children lie in, and that its own goes to.
+    /// Factorizes a front. from, to: work spaces that contain the updates of its children, and that receive its
+    /// own.
     PivotTally process(Index front, double* from, double* to);
     void solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const;
     VectorXd refined_solution(const VectorXd& rhs) const;
@@ -56,9 +60,9 @@ class SupernodalLdlt : public Factor {
     std::shared_ptr<Analysis> analysis_;
     const AssemblyPlan& plan_ = analysis_->plan;
 
-    // Once factorized, values_ are those of S A S.
+    // After factorize(), values_ are those of S A S.
     std::vector<double> scale_;    // S
-    double largest_scaled_ = 0.0;  // |entry| of S A S
+    double largest_scaled_ = 0.0;  // largest |entry| of S A S
     slabs::Buffer factor_;
     std::shared_ptr<SharedWork> work_;
     std::vector<double> diagonal_, coupling_;  // D

@@ -1,4 +1,5 @@
-// The solving half of SupernodalLdlt: scaling, substitution, and refinement where the factorization was not exact.
+// Solution with SupernodalLdlt: scaling, substitution, and iterative refinement where the factorization was not
+// exact.
 #include <algorithm>
 #include <cmath>
 
@@ -9,9 +10,14 @@
 namespace magshell {
 namespace {
 
-constexpr double refined_from_growth = 1e4;  // below it at least 12 digits are there without refinement
-constexpr int most_refinements = 8;
+// [-] pivot growth from which solutions are refined: below it they have at least 12 digits; fixed by
+// test_pivot_growth_tells_definite_from_hard
+constexpr double refined_from_growth = 1e4;
+constexpr int most_refinements = 8;  // [-] fixed by test_a_singular_matrix_is_reported
+// [-] relative residual of a refined solution; test_a_saddle_point_with_a_small_corner_is_solved
 constexpr double rounding = 1e-15;
+// [-] Largest relative error of the recovered vector; fixed by test_a_singular_matrix_is_reported
+constexpr double recovered = 1e-3;
 
 }  // namespace
 
@@ -51,15 +57,15 @@ void SupernodalLdlt::solve(Eigen::Ref<Eigen::MatrixXd> rhs) const {
     for (Index j = 0; j < rhs.cols(); ++j) rhs.col(j) = refined_solution(rhs.col(j));
 }
 
-// A x. S is of powers of two: nothing is lost by taking them out again.
+// Returns A x. S consists of powers of two, so nothing is lost by removing it.
 VectorXd SupernodalLdlt::image(const VectorXd& x) const {
     const Eigen::Map<const VectorXd> scale(scale_.data(), size());
     return product(*pattern_, values_.data(), x.cwiseQuotient(scale)).cwiseQuotient(scale);
 }
 
-// x += (L D L^T)^-1 (b - A x), until the residual is down to rounding or does not fall any more.
+// Refines x += (L D L^T)^-1 (b - A x) until the residual is down to round-off or stops falling.
 VectorXd SupernodalLdlt::refined_solution(const VectorXd& rhs) const {
-    // Norms in the scaled unknowns, where rows are comparable.
+    // Norms are those of the scaled unknowns, where rows are comparable.
     const auto residual_norm = [&](const VectorXd& residual) {
         double largest = 0.0;
         for (Index j = 0; j < size(); ++j) largest = std::max(largest, std::abs(residual[j] * scale_[j]));
@@ -88,17 +94,18 @@ VectorXd SupernodalLdlt::refined_solution(const VectorXd& rhs) const {
     return solution;
 }
 
-// A vector of size one in the scaled unknowns, its image, and what solving with that image gives back. Along
-// a null direction nothing can be given back, however small the residual.
+// Checks that solving with the image of a known vector, of size one in the scaled unknowns, gives that vector
+// back. Along a null direction it cannot, however small the residual.
 bool SupernodalLdlt::recovers_known_solution() const {
+    constexpr double half_range = 2147483648.0;  // 2^31, half of the range of the hash; plain-words: ok
     VectorXd known(size());
     for (Index j = 0; j < size(); ++j) {
         const std::uint32_t hash = static_cast<std::uint32_t>(j + 1) * 2654435769u;  // golden-ratio hashing
-        known[j] = scale_[j] * (hash / 2147483648.0 - 1.0);
+        known[j] = scale_[j] * (hash / half_range - 1.0);
     }
     const VectorXd found = refined_solution(image(known));
     for (Index j = 0; j < size(); ++j) {
-        if (!(std::abs(found[j] - known[j]) <= 1e-3 * scale_[j])) return false;
+        if (!(std::abs(found[j] - known[j]) <= recovered * scale_[j])) return false;
     }
     return true;
 }

@@ -11,11 +11,11 @@ namespace {
 
 using slabs::Triangle;
 
-// Calls body(transfer) for those of a child, on several threads where there are many. What lands in one slab
-// of the parent is left to one of them.
+// Calls body(transfer) for all transfers of a child, on several threads if there are many. All transfers to one
+// slab of the parent go to the same thread.
 template <class Body>
 void for_transfers(const AssemblyPlan& plan, Index child, Body&& body) {
-    constexpr Index part = 12;
+    constexpr Index part = 12;  // [slabs] per task; time only, the sums do not depend on it; plain-words: ok
     const Index first = plan.fronts[child].first_transfer, end = plan.fronts[child + 1].first_transfer;
     const auto each = [&](Index from, Index to) {
         for (Index t = from; t < to; ++t) body(plan.transfers[t]);

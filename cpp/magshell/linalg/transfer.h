@@ -1,4 +1,4 @@
-// Adds the update a front leaves behind to its parent's front ("extend-add").
+// Adds the update of a front to its parent's front ("extend-add").
 #pragma once
 
 #include "magshell/linalg/assembly_plan.h"
@@ -6,11 +6,11 @@
 
 namespace magshell {
 
-/// The part of a child's update that falls on the parent's pivot columns. `work` is the space that the update
-/// lies in.
+/// Adds the part of a child's update that belongs to the parent's pivot columns. `work` is the space that
+/// contains the update.
 void add_to_panel(const AssemblyPlan& plan, Index child, double* work, const slabs::Panel& parent);
 
-/// The rest, which falls on the update the parent itself leaves behind.
+/// Adds the rest, which belongs to the update of the parent itself.
 void add_to_update(const AssemblyPlan& plan, Index child, double* work, const slabs::Triangle& parent);
 
 }  // namespace magshell

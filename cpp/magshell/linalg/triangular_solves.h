@@ -17,10 +17,10 @@ struct FactorView {
     const Index* pivot_order;  // within each front
 };
 
-/// x <- (L D L^T)^-1 x for one vector in elimination order.
+/// Replaces x by (L D L^T)^-1 x for one vector in elimination order.
 void substitute_one(const FactorView& factor, double* x);
 
-/// The same for eight vectors side by side: x holds eight doubles an unknown, 64-byte aligned.
+/// Does the same for eight vectors side by side: x holds eight doubles per unknown, 64-byte aligned.
 void substitute_eight(const FactorView& factor, double* x);
 
 }  // namespace magshell

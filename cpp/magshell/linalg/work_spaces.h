@@ -1,4 +1,4 @@
-// Work space for the threads of one loop.
+// WorkSpaces: work memory for the threads of a parallel loop.
 #pragma once
 
 #include <map>
@@ -11,7 +11,7 @@
 
 namespace magshell {
 
-/// Equal parts of a buffer, one for each thread, which finds in its caches what it wrote there before.
+/// Divides a buffer into equal parts, one per thread, so that a thread finds its own data in its caches again.
 class WorkSpaces {
   public:
     WorkSpaces(slabs::Buffer& buffer, std::ptrdiff_t each) : each_(each) {
@@ -23,7 +23,7 @@ class WorkSpaces {
         const std::lock_guard lock(mutex_);
         double*& mine = taken_[std::this_thread::get_id()];
         if (mine) return mine;
-        if (free_.empty()) {  // threads were added since the buffer was made
+        if (free_.empty()) {  // threads were added since the buffer was allocated
             extra_.emplace_back(each_);
             free_.push_back(extra_.back().data());
         }
@@ -40,18 +40,18 @@ class WorkSpaces {
     std::map<std::thread::id, double*> taken_;
 };
 
-/// What one factorization writes besides the factor.
+/// The memory that one factorization writes besides the factor.
 struct WorkMemory {
     slabs::Buffer shared, subtrees;
 
     std::size_t bytes() const { return sizeof(double) * (shared.size() + subtrees.size()); }
 };
 
-/// Work memory that factors of one analysis share: it is needed only while one of them is computed, and many
-/// of them may be kept. Lives as long as one that was factorized does.
+/// Work memory shared by the factors of one analysis: only one of them needs it at a time, and many of them may
+/// be stored. It lives as long as any factor that was factorized.
 class SharedWork {
   public:
-    /// Empty where another thread has it.
+    /// Takes the memory; empty if another thread has it.
     WorkMemory take() {
         const std::lock_guard lock(mutex_);
         return std::exchange(memory_, {});
