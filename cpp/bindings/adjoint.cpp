@@ -1,4 +1,5 @@
-// Adjoints to Python: a gradient by positions and edge rotations in, gradients by everything a solve takes out.
+// Binds the adjoints: they take the gradient by positions and edge rotations and return the gradients by all
+// parameters of a solve.
 #include "bindings/gradients.h"
 #include "magshell/adjoint/static.h"
 
@@ -19,7 +20,7 @@ py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, co
     return py::make_tuple(values_to_user(model, gradient.values), gradient.controls);
 }
 
-// lambda . dg/dk at a state, by all values in the caller's order.
+// Returns lambda . dg/dk at a state for all parameters, in the caller's order.
 VectorXd by_values(Model& model, const VectorXd& q, const Controls& controls, const VectorXd& lambda) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());

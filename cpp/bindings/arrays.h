@@ -1,4 +1,5 @@
-// numpy arrays to the core's own: shapes are checked by the package, which knows the caller's names for them.
+// Converts numpy arrays to types of the core. The Python package has checked their shapes, because it knows the
+// caller's names for them.
 #pragma once
 
 #include <pybind11/eigen.h>
@@ -19,7 +20,7 @@ inline VectorXd to_vector(const Array& array) {
     return Eigen::Map<const VectorXd>(array.data(), array.size());
 }
 
-/// One for each of `rows`, `each` of a row: (n, k, 3, 3), without the second where k = 0.
+/// Returns one block for each of `rows`, `each` per row: (n, k, 3, 3), without the second axis if k = 0.
 inline py::array_t<double> to_matrices(const std::vector<Mat3>& given, Index rows, int each) {
     std::vector<py::ssize_t> shape = {static_cast<py::ssize_t>(rows)};
     if (each > 0) shape.push_back(each);

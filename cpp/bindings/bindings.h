@@ -1,4 +1,5 @@
-// What the binding files share: one register function a family, and C-order float64 arrays checked in one place.
+// The declarations that the binding files share: one register function per family, and arrays in C order and
+// float64.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -11,10 +12,10 @@ namespace magshell::bindings {
 
 namespace py = pybind11;
 
-// C order and float64 (int32 for indices); anything else is converted by numpy on the way in.
+// Arrays in C order and float64 (int32 for indices); numpy converts anything else.
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// How numpy has a matrix.
+/// A matrix in the memory layout of numpy.
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using IndexArray = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
 

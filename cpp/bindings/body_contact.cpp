@@ -1,4 +1,4 @@
-// What touches in a state, for results.
+// Binds the contact state of bodies, for results.
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "magshell/contact/pair_friction.h"
@@ -9,8 +9,8 @@
 namespace magshell::bindings {
 namespace {
 
-// The pairs of all contacts at q, with these velocities of all unknowns. What there is not, of pairs of fewer vertices, is
-// -1 and zero.
+// Returns the active pairs of all contacts at q, with the velocities v of all degrees of freedom. Entries that
+// pairs of fewer vertices do not have are -1 and zero.
 py::dict touching_pairs(Model& model, const VectorXd& q, const VectorXd& v) {
     std::vector<BodyContactTerm::ActiveContact> all;
     std::vector<FrictionLaw> laws;
@@ -19,7 +19,9 @@ py::dict touching_pairs(Model& model, const VectorXd& q, const VectorXd& v) {
         const std::lock_guard lock(model.in_use());
         if (!model.has_body_contact()) throw InvalidInput("the scene has no contact of bodies");
         if (q.size() != model.size() || v.size() != model.size())
-            throw InvalidInput("q and v must have a number for each of all unknowns");
+            throw InvalidInput("q and v must have one number per degree of freedom, " +
+                               std::to_string(model.size()) + ", got " + std::to_string(q.size()) + " and " +
+                               std::to_string(v.size()));
         all = model.body_contact()->active_contacts(q.data());
         for (const BodyContactTerm::ActiveContact& touch : all)
             laws.push_back(model.body_contact()->friction(touch));

@@ -1,4 +1,4 @@
-// Calls of the caller's own functions from inside a solve.
+// Calls the caller's Python functions from inside a solve.
 #pragma once
 
 #include <utility>
@@ -8,7 +8,7 @@
 
 namespace magshell::bindings {
 
-/// With the GIL. Ctrl-C while the function runs ends the solve as it does anywhere else; what else it raises passes.
+/// Calls a function with the GIL. Ctrl-C while it runs ends the solve; its other exceptions are passed on.
 template <class... Arguments>
 py::object call_python(const py::object& function, Arguments&&... arguments) {
     try {

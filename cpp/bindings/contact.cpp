@@ -1,4 +1,4 @@
-// Contact of surfaces, looked at pair by pair: scenes take it whole.
+// Binds the contact of surfaces pair by pair, for tests. Scenes use the whole terms.
 #include <limits>
 #include <string>
 
@@ -20,7 +20,7 @@ PairKind kind_of(const std::string& name) {
                        name + "'");
 }
 
-/// Vectors of the nodes of n pairs: (n, 4, 3).
+/// The vectors of the nodes of n pairs: (n, 4, 3).
 class PairRows {
   public:
     PairRows(const Array& array, const char* name) : array_(array) {
@@ -41,7 +41,7 @@ void copy_rows(const PairVectors& from, double* to) {
     for (const Vec3& each : from) to = std::copy_n(each.data(), 3, to);
 }
 
-// (distances (n,), weights (n, 4), normals (n, 3), how many places are free (n,))
+// Returns (distances (n,), weights (n, 4), normals (n, 3), numbers of free parameters (n,)).
 py::tuple proximities(const std::string& kind, const Array& places) {
     const PairKind which = kind_of(kind);
     const PairRows x(places, "places [m]");
@@ -75,7 +75,8 @@ Pairs pairs_of(const std::string& kind, double area, double parallel, const py::
     return pairs;
 }
 
-// energy (n,), gradient (n, 4, 3), Hessian (n, 12, 12), normal force (n,) and its derivative by places (n, 4, 3).
+// Returns energy (n,), gradient (n, 4, 3), Hessian (n, 12, 12), normal force (n,) and its derivative by
+// positions (n, 4, 3).
 py::dict pair_energies_of(const std::string& kind, const Array& places, double area, double parallel,
                           const py::dict& law, bool cautious, double room) {
     const Pairs with = pairs_of(kind, area, parallel, law, room);
@@ -106,7 +107,8 @@ py::dict pair_energies_of(const std::string& kind, const Array& places, double a
                     py::arg("normal_force") = force, py::arg("normal_force_by_place") = by_place);
 }
 
-// The sums over pairs of their gradients (4, 3) and of the lower blocks of their Hessians (10, 3, 3): what they cost.
+// Returns the sums over pairs of their gradients (4, 3) and of the lower blocks of their Hessians (10, 3, 3),
+// to measure their time.
 py::tuple sums(const std::string& kind, const Array& places, double area, double parallel,
                const py::dict& law, bool cautious) {
     const Pairs with = pairs_of(kind, area, parallel, law);
@@ -134,7 +136,8 @@ py::tuple sums(const std::string& kind, const Array& places, double area, double
     return py::make_tuple(gradient, hessian);
 }
 
-// The derivatives of lambda . gradient + by_normal_force . normal force by stiffness, reach, thickness, smoothing: (n, 4).
+// Returns the derivatives of lambda . gradient + by_normal_force . normal force by stiffness, activation
+// distance, minimum separation and smoothing: (n, 4).
 Array by_law(const std::string& kind, const Array& places, double area, double parallel, const py::dict& law,
              const Array& lambda, const Array& by_normal_force, double room) {
     const Pairs with = pairs_of(kind, area, parallel, law, room);
@@ -152,7 +155,7 @@ Array by_law(const std::string& kind, const Array& places, double area, double p
     return out;
 }
 
-// Shares of straight ways that are free: (n,).
+// Returns the collision-free fractions of straight paths: (n,).
 Array free_shares(const std::string& kind, const Array& from, const Array& to, double thickness,
                   double keep) {
     const PairKind which = kind_of(kind);
@@ -164,8 +167,8 @@ Array free_shares(const std::string& kind, const Array& from, const Array& to, d
     return shares;
 }
 
-// force (n, 4, 3); by_velocity, secant, by_place (n, 12, 12); of lambda . force: its derivatives by velocities and places
-// (n, 4, 3), normal forces (n,) and (kinetic, fixed, sticking speed) (n, 3).
+// Returns force (n, 4, 3); by_velocity, secant, by_place (n, 12, 12); and the derivatives of lambda . force by
+// velocities and positions (n, 4, 3), normal forces (n,) and (kinetic, fixed, sticking speed) (n, 3).
 py::dict frictions(const std::string& kind, const Array& places, double area, double parallel,
                    const py::dict& law, const Array& velocities, const std::array<double, 3>& friction,
                    const Array& lambda) {
@@ -208,8 +211,8 @@ py::dict frictions(const std::string& kind, const Array& places, double area, do
                     py::arg("along_normal_force") = along_normal_force, py::arg("along_law") = along_law);
 }
 
-// What the broad phase finds, as columns: contact (n,), kind (n,), nodes (n, 4), area, parallel, room (n,), faces (n, 2),
-// swapped (n,).
+// Returns the pairs of the broad phase as columns: contact (n,), kind (n,), nodes (n, 4), area, parallel, room
+// (n,), faces (n, 2), swapped (n,).
 py::dict columns_of(const std::vector<NearPair>& pairs) {
     const auto n = static_cast<py::ssize_t>(pairs.size());
     IndexArray contact(n), kind(n), nodes({n, py::ssize_t{4}}), faces({n, py::ssize_t{2}}), swapped(n);

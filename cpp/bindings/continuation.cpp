@@ -1,4 +1,4 @@
-// Path following to Python.
+// Binds path following.
 #include "magshell/solve/continuation.h"
 
 #include "bindings/arrays.h"

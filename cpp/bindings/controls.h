@@ -1,4 +1,4 @@
-// Controls from Python, with the numbers of what varies behind them.
+// Converts load parameters from Python, followed by the values of time-varying parameters.
 #pragma once
 
 #include <string>
@@ -8,7 +8,8 @@
 
 namespace magshell::bindings {
 
-/// Throws InvalidInput where the ends of a way have not as many numbers as the model and what varies.
+/// Throws InvalidInput unless both ends of a load path have as many numbers as the model's load parameters and
+/// varying parameters.
 inline void check_controls(const Model& model, const Varying& varying, const Controls& from,
                            const Controls& to) {
     const Index width = model.registry().controls.size() + varying.size();

@@ -1,4 +1,4 @@
-// Motions and their adjoint to Python: whole runs with the GIL released.
+// Binds motions and their adjoints. Whole runs release the GIL.
 #include <limits>
 #include <string>
 #include <tuple>
@@ -21,13 +21,14 @@ Tableau tableau_of(const std::string& name) {
     throw InvalidInput("no integrator is called \"" + name + "\"");
 }
 
-// A row a knot.
+// Converts load parameters with one row per time point.
 using Knots = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 std::vector<Controls> controls_of(const Model& model, const Varying& varying, const Array& rows) {
     const Index width = model.registry().controls.size() + varying.size();
     if (rows.ndim() != 2 || rows.shape(1) != width)
-        throw InvalidInput("controls must have shape (knots, " + std::to_string(width) + ")");
+        throw InvalidInput("controls must have one row per time point, of " + std::to_string(width) +
+                           " numbers");
     std::vector<Controls> controls;
     for (py::ssize_t k = 0; k < rows.shape(0); ++k)
         controls.push_back(Eigen::Map<const VectorXd>(rows.data(k, 0), width));
@@ -40,7 +41,7 @@ Knots rows_of(const std::vector<Controls>& controls) {
     return rows;
 }
 
-// The numbers of each element and elastic term, in our order; empty without a Maxwell branch.
+// Returns the history of each element and elastic term, in the core's order; empty without a Maxwell branch.
 StrainSet strains_of(Model& model, const Array& numbers) {
     StrainSet strains;
     if (numbers.size() == 0) return strains;
@@ -98,7 +99,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     return input;
 }
 
-// (n, n_v, 3), of the recorded states, the own points of rigid parts among them.
+// Returns the positions of the recorded states, (n, n_v, 3), those of points of rigid bodies included.
 template <class Field>
 Array positions_of(const Model& model, const MotionResult& motion, const Field& field) {
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size()),
@@ -119,7 +120,8 @@ Array rotations_of(const Model& model, const MotionResult& motion) {
     return rows;
 }
 
-// (n, 3 n_d), as they stand between positions and rotations in a state.
+// Returns the fixed directors of the recorded states, (n, 3 n_d), as they are stored between positions and
+// rotations.
 Array directions_of(const MotionResult& motion, const Model& model) {
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size());
     const Index n_v = model.nodes().n_vertices(), size = 3 * (model.nodes().n_nodes() - n_v);
@@ -130,7 +132,7 @@ Array directions_of(const MotionResult& motion, const Model& model) {
     return rows;
 }
 
-// (n, m): what motors do in every recorded state; NaN in one that no step led to.
+// Returns the motor forces of the recorded states, (n, m); NaN in states that no step led to.
 Knots driving_of(const MotionResult& motion) {
     const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()), m = motion.last.driving.size();
     Knots rows = Knots::Constant(n, m, std::numeric_limits<double>::quiet_NaN());
@@ -139,7 +141,8 @@ Knots driving_of(const MotionResult& motion) {
     return rows;
 }
 
-// (n, m, 3) [N], of the held nodes in the order in which they were given; NaN in states that no step led to.
+// Returns the support forces of the recorded states, (n, m, 3) [N], of the prescribed nodes in the order in
+// which they were given; NaN in states that no step led to.
 Array held_forces_of(const MotionResult& motion, const Model& model) {
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size());
     const VectorXd none = model.reduction().held(VectorXd::Zero(model.size()));
@@ -156,7 +159,7 @@ Array held_forces_of(const MotionResult& motion, const Model& model) {
     return rows;
 }
 
-// Of every recorded state.
+// Returns the principal strains of every recorded state.
 py::list largest_strains(const MotionResult& motion, const Model& model, const VectorXd& thickness) {
     std::vector<LargestStrains> largest;
     {

@@ -1,4 +1,4 @@
-// C++ exceptions to Python's own.
+// Binds the C++ exceptions to those of the Python package.
 #include "magshell/core/errors.h"
 
 #include "bindings/bindings.h"

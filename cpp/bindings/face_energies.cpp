@@ -1,4 +1,4 @@
-// Energies of faces: a line each.
+// Binds the energies of single faces: one line per energy.
 #include "bindings/bindings.h"
 #include "magshell/energy/surface_tension.h"
 #include "magshell/term/face_energy.h"

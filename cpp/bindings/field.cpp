@@ -1,4 +1,4 @@
-// Applied magnetic fields, and the one that calls back into Python.
+// Binds the applied magnetic fields, and one that calls Python.
 #include <algorithm>
 #include <array>
 #include <memory>

@@ -1,4 +1,4 @@
-// Forces that no energy gives. Scenes take them whole; the functions here look at their elements one by one.
+// Binds the forces without an energy, element by element, for tests. Scenes use the whole terms.
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -30,7 +30,7 @@ Array curve_samples(const AttackCurve& curve, const Array& angles) {
     return samples;
 }
 
-/// Corners of n faces: (n, 3, 3).
+/// The corners of n faces: (n, 3, 3).
 class FaceCorners {
   public:
     FaceCorners(const Array& array, const char* name) : array_(array) {

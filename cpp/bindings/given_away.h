@@ -1,4 +1,4 @@
-// Numbers that the core has no more use for, as a numpy array that owns them: large ones are not copied.
+// Moves numbers of the core to a numpy array that owns them, so that large arrays are not copied.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// Gradients by the values and controls of a scene to Python: flat, in the caller's order of rows.
+// Converts gradients by parameters and load parameters to Python: flat, in the caller's order of rows.
 #pragma once
 
 #include "bindings/arrays.h"

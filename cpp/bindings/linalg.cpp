@@ -1,4 +1,4 @@
-// Factorizations of sparse symmetric matrices, thread counts, and what this build is made of.
+// Binds factorizations of sparse symmetric matrices, thread counts, and the description of this build.
 #include <algorithm>
 #include <mutex>
 #include <optional>
@@ -43,7 +43,7 @@ std::vector<Index> to_indices(const IndexArray& array, const char* name) {
     return {array.data(), array.data() + array.size()};
 }
 
-// A factor that several Python threads may hold: solves run side by side, a factorization waits for them.
+// A factor that several Python threads may use: solves run at the same time, a factorization waits for them.
 class SharedFactor {
   public:
     SharedFactor(Index size, const IndexArray& column_starts, const IndexArray& rows,
@@ -120,7 +120,7 @@ class SharedFactor {
 
     py::ssize_t entries_;
     std::unique_ptr<Factor> factor_;
-    LowRankFactor* bordered_ = nullptr;  // factor_, once there were columns
+    LowRankFactor* bordered_ = nullptr;  // factor_, once it has a low-rank part
     mutable std::shared_mutex mutex_;
 };
 
@@ -129,7 +129,9 @@ py::tuple loaded(Index size, const IndexArray& column_starts, const IndexArray& 
     const SparsePattern pattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")};
     check_pattern(pattern);
     if (values.ndim() != 1 || values.size() != rows.size() || forces.size() != size)
-        throw InvalidInput("values must be as many as rows, and forces as many as unknowns");
+        throw InvalidInput("values must have " + std::to_string(rows.size()) +
+                           " entries, one per row index, and " + "forces " + std::to_string(size) +
+                           ", one per row of the matrix");
     LoadedPart part;
     {
         const py::gil_scoped_release release;

@@ -1,4 +1,4 @@
-// TriangleMesh to Python: arrays in, read-only views out.
+// Binds TriangleMesh: arrays in, read-only views out.
 #include <memory>
 #include <string>
 
@@ -27,7 +27,7 @@ std::shared_ptr<TriangleMesh> make_mesh(const Array& rest_positions, const LongI
     return std::make_shared<TriangleMesh>(std::move(positions), face_rows);
 }
 
-// A view into the mesh that keeps it alive and cannot be written to.
+// Returns a read-only view into the mesh that keeps the mesh alive.
 template <auto member>
 py::array view(const py::object& self) {
     const auto& rows = (self.cast<const TriangleMesh&>().*member)();
@@ -37,7 +37,7 @@ py::array view(const py::object& self) {
     return array;
 }
 
-// (k, 2) faces.
+// Returns pairs of faces, (k, 2).
 IndexArray crossings(const TriangleMesh& mesh, const Array& positions) {
     std::vector<std::pair<Index, Index>> pairs;
     {

@@ -1,4 +1,4 @@
-// The model of a scene to Python: checked arrays in, numbers out. Scene in the package builds it.
+// Binds the model of a scene: checked arrays in, numbers out. The Python class Scene creates it.
 #include "magshell/scene/model.h"
 
 #include <optional>
@@ -21,7 +21,7 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
     return std::make_unique<Model>(input);
 }
 
-// (owner, name, unit, first, rows, width) of each.
+// Returns (owner, name, unit, first, rows, width) of each parameter.
 py::list entries_of(const Parameters& parameters) {
     py::list entries;
     for (const Parameters::Entry& entry : parameters.entries())
@@ -37,14 +37,14 @@ py::dict energies(const Model& model, const VectorXd& q, const Controls& control
         of_terms = model.energies(q, controls);
     }
     py::dict energies;
-    for (const auto& [name, value] : of_terms) {  // terms of one name, of several bodies, as one
+    for (const auto& [name, value] : of_terms) {  // terms of the same name, of several bodies, are summed
         const py::str key(name.data(), name.size());
         energies[key] = value + (energies.contains(key) ? energies[key].cast<double>() : 0.0);
     }
     return energies;
 }
 
-// [(name, J)], of each term: those of one name, of several bodies, follow each other.
+// Returns [(name, J)] for each term; terms of the same name, of several bodies, are consecutive.
 py::list term_energies(Model& model, const VectorXd& q, const Model::Turns& turns, const Controls& controls) {
     std::vector<std::pair<std::string_view, double>> of_terms;
     {
@@ -59,7 +59,8 @@ py::list term_energies(Model& model, const VectorXd& q, const Model::Turns& turn
     return energies;
 }
 
-// The lower triangle as (size, column starts, rows, values): of all unknowns, or of the free ones.
+// Returns the lower triangle as (size, column starts, rows, values), of all degrees of freedom or of the free
+// ones.
 py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, bool reduced) {
     LargeVector<double> values;
     SparsePattern pattern;
@@ -84,7 +85,7 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
 
 std::vector<Index> recut_faces(const Model& model) {
     std::vector<Index> faces;
-    Index first = 0;  // of a body, in the numbers of all
+    Index first = 0;  // first face of a body in the numbering of all
     for (Index body = 0; body < static_cast<Index>(model.bodies().sheets().size()); ++body) {
         const Sheet& sheet = *model.bodies().sheets()[body];
         for (Index f = 0; f < sheet.n_faces(); ++f)
@@ -95,7 +96,8 @@ std::vector<Index> recut_faces(const Model& model) {
     return faces;
 }
 
-// (n_f, 4): of the membrane and of bending. Reads nothing that a solve of another thread changes.
+// Returns the principal strains of membrane and bending, (n_f, 4). Reads nothing that a solve in another thread
+// changes.
 PrincipalStrains strains_at(const Model& model, const VectorXd& q, const VectorXd& thickness) {
     const py::gil_scoped_release unlocked;
     return principal_strains(model, q, thickness);

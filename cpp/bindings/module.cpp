@@ -1,4 +1,4 @@
-// The extension module: errors first, then one register function a family.
+// Defines the extension module: errors first, then one register function per family.
 #include "bindings/bindings.h"
 
 namespace magshell::bindings {
@@ -13,17 +13,17 @@ PYBIND11_MODULE(_core, module) {
     b::register_linalg(module);
     b::register_mesh(module);
     b::register_field(module);
-    b::register_obstacle(module);  // meshes are obstacles too
+    b::register_obstacle(module);  // MeshObstacle takes a mesh
     b::register_force(module);
     b::register_contact(module);
     b::register_face_energies(module);
     b::register_model(module);
     b::register_sheet(module);
-    b::register_body_contact(module);  // of models
+    b::register_body_contact(module);  // takes models
     b::register_muscle(module);
     b::register_solid(module);
     b::register_statics(module);
-    b::register_adjoint(module);       // takes what a solve found
-    b::register_continuation(module);  // after the options that it shares with statics
+    b::register_adjoint(module);       // takes results of solves
+    b::register_continuation(module);  // shares options with statics
     b::register_dynamics(module);
 }

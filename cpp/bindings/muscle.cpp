@@ -12,7 +12,7 @@
 namespace magshell::bindings {
 namespace {
 
-// (origin, spacing, coefficients), or None.
+// Converts (origin, spacing, coefficients), or None, to a curve.
 FibreCurve curve_of(const py::handle& given) {
     if (given.is_none()) return {};
     const py::tuple parts = py::reinterpret_borrow<py::tuple>(given);
@@ -27,7 +27,7 @@ FibreLaw law_of(const py::handle& muscle) {
             curve_of(muscle["passive"]), curve_of(muscle["force_velocity"])};
 }
 
-// (n, p) of n elements, p points each.
+// Returns numbers as (n, p), for n elements with p points each.
 py::array_t<double> muscle_rows_of(const std::vector<double>& numbers, int points) {
     py::array_t<double> rows(
         {static_cast<py::ssize_t>(numbers.size()) / points, static_cast<py::ssize_t>(points)});

@@ -1,4 +1,4 @@
-// Muscles from Python, as the scene hands them over.
+// Converts the description of muscles from Python.
 #pragma once
 
 #include "bindings/bindings.h"

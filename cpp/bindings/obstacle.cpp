@@ -1,4 +1,4 @@
-// Obstacles: one factory a shape, and distances at many points.
+// Binds obstacles: one factory per shape, and distances at many points.
 #include <algorithm>
 #include <array>
 #include <memory>

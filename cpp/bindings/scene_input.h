@@ -1,4 +1,4 @@
-// A scene's description from Python, as Scene in the package hands it over.
+// Converts the description of a scene from Python.
 #pragma once
 
 #include "bindings/bindings.h"

@@ -10,7 +10,7 @@
 namespace magshell::bindings {
 namespace {
 
-// (F, Cauchy stress, volumes) at the points of integration: (n_t, p, 3, 3) twice and (n_t, p).
+// Returns (F, Cauchy stress, volumes) at the integration points: (n_t, p, 3, 3) twice and (n_t, p).
 py::tuple point_states(const Model& model, Index solid, const VectorXd& q) {
     PointStates states;
     {
@@ -57,7 +57,7 @@ std::vector<SkinInput> skins_of(const py::list& given) {
     return skins;
 }
 
-// In whole packs, the last one filled up.
+// Returns the logarithms of numbers as the SIMD function computes them; the last pack is filled up with ones.
 py::array_t<double> lane_logarithms(const Array& numbers) {
     py::array_t<double> out(numbers.size());
     const double* from = numbers.data();

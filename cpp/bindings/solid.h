@@ -1,4 +1,4 @@
-// Solids from Python, as the scene hands them over.
+// Converts the description of solids from Python.
 #pragma once
 
 #include "bindings/bindings.h"
@@ -6,11 +6,11 @@
 
 namespace magshell::bindings {
 
-/// The keys "surface" and "surface_vertices" of a body.
+/// Converts the keys "surface" and "surface_vertices" of a body.
 SolidSurface surface_of(const py::handle& given);
 std::vector<SolidInput> solids_of(const py::list& given);
 std::vector<SkinInput> skins_of(const py::list& given);
-/// Volumes of cavities and cells, and tendons.
+/// Convert the volumes of cavities and pneumatic cells, and tendons.
 std::vector<VolumeInput> volumes_of(const py::list& given);
 std::vector<TendonInput> tendons_of(const py::list& given);
 

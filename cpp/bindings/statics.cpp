@@ -1,4 +1,4 @@
-// Static solves to Python: the GIL is released, Ctrl-C is looked for, progress is called back.
+// Binds static solves. They release the GIL, check for Ctrl-C and report progress.
 #include "magshell/solve/statics.h"
 
 #include "bindings/arrays.h"
@@ -29,7 +29,8 @@ VectorXd change(Model& model, const StaticsResult& equilibrium, const Controls& 
     return first_order_change(model, equilibrium, to);
 }
 
-// Shapes of all unknowns and their eigenvalues [N/m3] about an equilibrium, and its number of unstable directions.
+// Returns the lowest eigenmodes of all degrees of freedom about an equilibrium, their eigenvalues [N/m3], and
+// the number of negative ones.
 py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::Turns& turns,
                        const Controls& controls, int count, const py::object& progress) {
     const Watch watch(progress);
@@ -54,7 +55,7 @@ py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::Turns& 
     return py::make_tuple(eigenvalues, shapes, negative);
 }
 
-// As far along as bodies in contact let it.
+// Moves a state along a step, as far as body contact allows.
 VectorXd moved(Model& model, const VectorXd& state, const VectorXd& step) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());

@@ -1,4 +1,4 @@
-// The largest strains of a state to Python.
+// Converts the largest strains of a state to Python.
 #pragma once
 
 #include "bindings/bindings.h"
@@ -6,7 +6,7 @@
 
 namespace magshell::bindings {
 
-/// (membrane, its face, bending, its face)
+/// Returns (membrane strain, its face, bending strain, its face).
 inline py::tuple to_tuple(const LargestStrains& largest) {
     return py::make_tuple(largest.membrane, largest.membrane_face, largest.bending, largest.bending_face);
 }

@@ -1,4 +1,4 @@
-// Called from inside a long solve: looks for Ctrl-C and tells Python how far things are, a few times a second.
+// Watch: checks for Ctrl-C and reports progress to Python from inside a long solve, a few times a second.
 #pragma once
 
 #include <chrono>
@@ -11,7 +11,7 @@ class Watch {
   public:
     explicit Watch(py::object progress) : progress_(std::move(progress)) {}
 
-    /// Without the GIL. Throws Interrupted on Ctrl-C; what the progress function raises passes through.
+    /// Call without the GIL. Throws Interrupted on Ctrl-C; exceptions of the progress function are passed on.
     void operator()(double progress, double residual) const {
         const Clock::time_point now = Clock::now();
         if (now - last_ < std::chrono::milliseconds(50)) return;
