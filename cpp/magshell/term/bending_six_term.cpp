@@ -60,7 +60,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
     }
     for (const FoldSixStencil& fold : sheet.folds) {
         PairSlots<9>& slots = dihedral_slots_.emplace_back(pair_slots<9>(matrix, fold.nodes));
-        for (int a = 6; a < 9; ++a)  // the two wings do not meet in d2theta
+        for (int a = 6; a < 9; ++a)  // the two half-planes do not meet in d2theta
             for (int b = 3; b < 6; ++b) slots[lower_index(a - 1, b)] = -1;
     }
 }

@@ -51,7 +51,7 @@ BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks
     }
     for (const FoldStencil& fold : sheet.folds) {
         fold_slots_.push_back(pair_slots<4>(matrix, fold.nodes));
-        fold_slots_.back()[lower_index(2, 2)] = -1;  // (3, 2): the two wings do not meet in d2theta
+        fold_slots_.back()[lower_index(2, 2)] = -1;  // (3, 2): the two half-planes do not meet in d2theta
     }
 }
 
