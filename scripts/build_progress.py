@@ -21,7 +21,7 @@ def followed(log: Path, command: list[str]) -> int:
     """The exit status of the command."""
     log.parent.mkdir(parents=True, exist_ok=True)
     began, told = time.monotonic(), 0
-    with log.open("w") as file:
+    with log.open("w", buffering=1) as file:
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
         )
