@@ -12,15 +12,15 @@ sources := CMakeLists.txt pyproject.toml README.md LICENSE \
     $(shell find cpp cmake python/magshell -type f ! -name '*.so' ! -name '*.pyc' 2>/dev/null)
 # A file's tests stay together, as they share what is dear to make; what takes longest comes first (tests/parallel.py).
 PYTEST = $(VENV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
-pythons := $(wildcard python tests examples docs)
+pythons := $(wildcard python tests examples docs scripts)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick seconds docs wheel sanitize lint format stubs clean
+.PHONY: help demo test quick seconds docs wheel sanitize processors lint format stubs clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pictures, in out/
 	$(VENV)/bin/python examples/bistable_beam.py
@@ -46,6 +46,9 @@ wheel: $(VENV)/.created  ## a wheel for other machines and the sdist, in dist/, 
 sanitize: $(VENV)/.with-test  ## tests against an extension that watches its memory, arithmetic and threads
 	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/sanitize.sh address,undefined
 	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/sanitize.sh thread
+
+processors: $(VENV)/.with-test  ## every test as other processors see it: an hour or two
+	PYTHON=$(CURDIR)/$(VENV)/bin/python PROCESSES=$(PROCESSES) scripts/other_processors.sh
 
 lint: $(VENV)/.with-dev  ## ruff and clang-format, changing nothing
 	$(VENV)/bin/ruff check $(pythons)
@@ -77,12 +80,15 @@ $(VENV)/.created: scripts/setup.sh
 # `pip install .` builds in a directory of its own, so that its options do not end up in this one's cache.
 $(VENV)/.wheel: $(sources) $(VENV)/.created
 	rm -rf build/wheels
-	$(PIP) wheel --quiet --no-deps --no-build-isolation --check-build-dependencies \
+	@echo "Building magshell (some minutes the first time; all that is said goes into build/make.log):"
+	@$(VENV)/bin/python scripts/build_progress.py build/make.log \
+	    $(PIP) wheel --verbose --no-deps --no-build-isolation --check-build-dependencies \
 	    --config-settings=build-dir=build/make --wheel-dir build/wheels .
 	$(PIP) install --quiet --no-deps --force-reinstall build/wheels/*.whl
 	touch $@
 
 # What one of pyproject.toml's extras brings beside it.
 $(VENV)/.with-%: $(VENV)/.wheel
+	@echo "Installing what the extra '$*' brings beside it:"
 	$(PIP) install --quiet "$$(echo build/wheels/*.whl)[$*]"
 	touch $@

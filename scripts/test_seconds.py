@@ -1,5 +1,5 @@
-"""Writes how long tests took, of a report of pytest: one line a test function, all its parameters together. `make seconds`
-runs it.
+"""Writes how much time of the processor tests took, from a report of pytest: one line a test function, all its parameters
+together. `make seconds` runs it.
 
     python scripts/test_seconds.py build/tests.xml tests/seconds.txt
 """
@@ -12,18 +12,22 @@ from pathlib import Path
 
 LEAST = 0.5  # s: shorter ones are not listed
 HEADER = """\
-# Tests that took more than half a second, all parameters together: seconds, file::test. `make quick` leaves them out, and
-# several processes begin with the files that take longest. Written by `make seconds`; a test that is not here is quick.
+# Tests that took more than half a second of the processor, all parameters together: seconds, file::test.
+# `make quick` leaves them out, and several processes begin with the files that take longest. Written by `make seconds`;
+# a test that is not here is quick.
 """
 
 
 def seconds_of(report: Path) -> dict[str, float]:
-    """test_file.py::test_name -> seconds, with fixtures, as tests/parallel.py names them."""
+    """Return test_file.py::test_name -> seconds, with fixtures, as tests/parallel.py names and measures them."""
     seconds: dict[str, float] = defaultdict(float)
     for case in ElementTree.parse(report).iter("testcase"):
         file = case.attrib["classname"].split(".")[-1]  # tests are functions, in no class
         name = re.sub(r"\[.*", "", case.attrib["name"], flags=re.DOTALL)
-        seconds[f"{file}.py::{name}"] += float(case.attrib["time"])
+        properties = case.iter("property")
+        seconds[f"{file}.py::{name}"] += sum(
+            float(each.attrib["value"]) for each in properties if each.attrib["name"] == "processor_seconds"
+        )
     return seconds
 
 

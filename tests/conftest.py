@@ -24,6 +24,8 @@ from parallel import (  # noqa: E402, F401 - pytest finds hooks by their names
     pytest_collection_modifyitems,
     pytest_configure_node,
     pytest_runtest_protocol,
+    pytest_runtest_setup,
+    pytest_runtest_teardown,
     pytest_xdist_auto_num_workers,
 )
 

@@ -3,7 +3,7 @@ tests run while all others wait.
 
 A test that measures time, or counts threads, is marked `alone`. While it runs, the other processes wait between two tests.
 Tests that took long when they were last measured (tests/seconds.txt, written by `make seconds`) are marked `slow`;
-`make quick` leaves them out.
+`make quick` leaves them out. They are measured in time of the processor, which depends little on what else it does.
 """
 
 import contextlib
@@ -22,6 +22,7 @@ except ImportError:  # Windows
 
 MEMORY_A_PROCESS = 2.5e9  # bytes: the largest test, with torch and a picture in memory
 SECONDS = Path(__file__).parent / "seconds.txt"
+BEGAN = pytest.StashKey[float]()
 PROCESSES = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 
 
@@ -37,12 +38,12 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def name_of(item: pytest.Item) -> str:
-    """test_file.py::test_name, without folder and parameters, so that a moved file keeps its seconds."""
+    """Return test_file.py::test_name, without folder and parameters, so that a moved file keeps its seconds."""
     return f"{item.path.name}::{getattr(item, 'originalname', item.name)}"
 
 
 def measured() -> dict[str, float]:
-    """name_of -> seconds that all of its parameters took together; tests that take less than 0.2 s are not listed."""
+    """Return name_of -> seconds that all of its parameters took together, of the tests that are listed."""
     if not SECONDS.exists():
         return {}
     lines = (line.split() for line in SECONDS.read_text().splitlines() if not line.startswith("#"))
@@ -90,6 +91,27 @@ def turn(folder: Path, alone: bool) -> Iterator[None]:
             fcntl.flock(
                 room, fcntl.LOCK_UN
             )  # as a process that the test forked and left behind would hold it too
+
+
+def processor_time() -> float:
+    """Seconds of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
+    """Notes when the test's first fixture is made."""
+    item.stash[BEGAN] = processor_time()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
+    """Adds the seconds to pytest's report, where scripts/test_seconds.py reads it."""
+    try:
+        return (yield)
+    finally:
+        item.user_properties.append(("processor_seconds", round(processor_time() - item.stash[BEGAN], 3)))
 
 
 @pytest.hookimpl(wrapper=True)

@@ -208,9 +208,17 @@ def torch_energy(model: SolidModel, material: str, mean: bool, values: dict | No
     return energy
 
 
+def determinant(f):
+    """Return the determinant of matrices (..., 3, 3), written out as a polynomial whose derivatives hold everywhere.
+
+    Derivatives of torch.linalg.det divide by pivots, which are mere round-off where a matrix is singular."""
+    a, b, c = f.unbind(-2)
+    return (a * torch.linalg.cross(b, c)).sum(-1)
+
+
 def density(material, f, values, averaged):
     """(n_t, p) J/m3, straight from the definitions."""
-    i1, j = (f * f).sum((-1, -2)), torch.linalg.det(f)
+    i1, j = (f * f).sum((-1, -2)), determinant(f)
     strain = 0.5 * (f.transpose(-1, -2) @ f - torch.eye(3, dtype=torch.float64))
     if material == "Guccione":
         c, bf, bt, bfs, bulk = (values[name][:, None] for name in list(GUCCIONE)[:5])

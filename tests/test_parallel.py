@@ -4,6 +4,7 @@ import importlib.util
 import shutil
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,32 @@ def test_other_processes_wait_while_a_test_runs_alone(folder):
     assert len(alone) == 8 and len(others) == 24
     assert all(end <= a or b <= began for began, end in alone for a, b in others)
     assert any(a < d < b for a, b in others for _, d in others)  # the others did run at the same time
+
+
+def test_seconds_of_the_processor_are_written_for_all_parameters_together(folder):
+    busy = """
+    import time, pytest
+    @pytest.fixture(scope="module")
+    def dear():
+        spin(0.3)
+    def spin(seconds):
+        end = time.process_time() + seconds
+        while time.process_time() < end:
+            pass
+    @pytest.mark.parametrize("k", range(3))
+    def test_spins(k, dear):
+        spin(0.2)
+    def test_sleeps():
+        time.sleep(0.8)
+    """
+    (folder / "test_busy.py").write_text(textwrap.dedent(busy))
+    run(folder, "--junitxml=report.xml")
+    script = HERE.parent / "scripts" / "test_seconds.py"
+    subprocess.run([sys.executable, script, folder / "report.xml", folder / "seconds.txt"], check=True)
+    lines = [each for each in (folder / "seconds.txt").read_text().splitlines() if not each.startswith("#")]
+    (line,) = lines  # the sleep takes no processor
+    seconds, name = line.split()
+    assert name == "test_busy.py::test_spins" and 0.85 < float(seconds) < 3.0
 
 
 def test_tests_listed_with_their_seconds_are_slow_with_all_their_parameters(folder):

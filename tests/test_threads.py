@@ -205,7 +205,7 @@ for _ in range(8):
     stop.wait(5e-3)
     child = os.fork()
     if child == 0:
-        signal.alarm(60)
+        signal.alarm(240)
         alone = len(threads()) == 1
         os._exit(0 if alone and bits(scene) == expected and len(threads()) == 2 else 1)
     children.append(child)
@@ -240,6 +240,7 @@ def test_a_loop_ends_without_helpers_that_were_stopped():
     printed_by(SHEET + STOPPED, timeout=100)
 
 
+@pytest.mark.alone
 @LINUX
 @pytest.mark.skipif(
     SANITIZED, reason="ThreadSanitizer allows no threads after a fork of a process with threads"

@@ -92,7 +92,9 @@ class Chamber:
         """m3, of positions (..., n_v, 3) m. Seen from the mouth's center the fan spans none of it."""
         positions = as_tensor(positions)
         seen = positions - positions[..., self._mouth, :].mean(dim=-2, keepdim=True)
-        return -torch.linalg.det(seen[..., self._faces, :]).sum(dim=-1) / 6
+        a, b, c = seen[..., self._faces, :].unbind(-2)
+        # a . (b x c): torch's derivative of a determinant divides by what vanishes where a face looks at the center.
+        return -(a * torch.linalg.cross(b, c)).sum(dim=(-1, -2)) / 6
 
 
 def as_tensor(positions) -> torch.Tensor:
