@@ -9,7 +9,7 @@
 namespace magshell::bindings {
 
 /// Throws InvalidInput where the ends of a way have not as many numbers as the model and what varies.
-inline void check_controls(const Model& model, const Varying& varying, const Controls& from,
+inline void check_controls(const Model& model, const TimeVaryingParameters& varying, const Controls& from,
                            const Controls& to) {
     const Index width = model.registry().controls.size() + varying.size();
     if (from.size() != width || to.size() != width)

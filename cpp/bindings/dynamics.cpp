@@ -24,7 +24,8 @@ Tableau tableau_of(const std::string& name) {
 // A row a knot.
 using Knots = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-std::vector<Controls> controls_of(const Model& model, const Varying& varying, const Array& rows) {
+std::vector<Controls> controls_of(const Model& model, const TimeVaryingParameters& varying,
+                                  const Array& rows) {
     const Index width = model.registry().controls.size() + varying.size();
     if (rows.ndim() != 2 || rows.shape(1) != width)
         throw InvalidInput("controls must have shape (knots, " + std::to_string(width) + ")");
@@ -69,7 +70,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     MotionInput input;
     input.start.q = to_vector(array("state"));
     input.start.v = to_vector(array("velocity"));
-    input.start.turns = given["turns"].cast<Model::Turns>();
+    input.start.turns = given["turns"].cast<Model::AngleBranches>();
     input.inertia = {model.bodies().vertex_weights(to_vector(array("mass"))),
                      model.bodies().vertex_weights(to_vector(array("damping")))};
     input.start.e = strains_of(model, given["maxwell_strains"].cast<Array>());
@@ -85,7 +86,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.tableau = tableau_of(given["integrator"].cast<std::string>());
     input.time_step = given["time_step"].cast<double>();
     input.steps = given["steps"].cast<Index>();
-    input.varying = Varying(model.registry(), given["varying"].cast<std::vector<Index>>());
+    input.varying = TimeVaryingParameters(model.registry(), given["varying"].cast<std::vector<Index>>());
     input.controls = controls_of(model, input.varying, array("controls"));
     input.newton = given["newton"].cast<NewtonOptions>();
     if (const py::object projective = given["projective"]; !projective.is_none()) {
@@ -142,7 +143,7 @@ Knots driving_of(const MotionResult& motion) {
 // (n, m, 3) [N], of the held nodes in the order in which they were given; NaN in states that no step led to.
 Array held_forces_of(const MotionResult& motion, const Model& model) {
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size());
-    const VectorXd none = model.reduction().held(VectorXd::Zero(model.size()));
+    const VectorXd none = model.dof_map().along_supports(VectorXd::Zero(model.size()));
     const py::ssize_t size = none.size();
     Array rows({n, size / 3, py::ssize_t{3}});
     for (py::ssize_t k = 0; k < n; ++k) {

@@ -26,7 +26,8 @@ class BallTorqueTerm final : public Term {
     bool driven() const override { return false; }
     double energy(const double*, const Controls&) const override { return 0.0; }
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void add_remainder(const double* q, const Controls& controls, Remainder& out) const override;
+    void add_nonsymmetric_tangent(const double* q, const Controls& controls,
+                                  NonsymmetricTangent& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
     std::size_t bytes() const override { return sides_.capacity() * sizeof(Side); }
 

@@ -7,7 +7,7 @@
 
 namespace magshell {
 
-BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
+BendingSixTerm::BendingSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks,
                                const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
                                Registry& registry)
     : StrainScaffold(sheet.n_faces()),
@@ -23,7 +23,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
       elements_(loop_.packs()),
       rest_measures_(loop_.packs()),
       stiffness_(loop_.packs()),
-      folds_(sheet.folds.size()) {
+      folds_(sheet.dihedrals.size()) {
     for (Index pack = 0; pack < loop_.packs(); ++pack) {
         Pack3 x[6];
         for (int lane = 0; lane < Pack::width; ++lane) {
@@ -38,7 +38,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
     if (growth_.any())
         for (Index f = 0; f < sheet.n_faces(); ++f)
             rest_inside_.push_back(lane_of<9>(rest_measures_[f / Pack::width].data(), f % Pack::width));
-    for (const SixNodeSheet::Stencil& s : sheet.stencils) {
+    for (const SixNodeShell::Stencil& s : sheet.stencils) {
         FaceSlots& slots = face_slots_.emplace_back();
         slots.nodes = pair_slots<15>(matrix, s.nodes);
         for (int a = 0; a < 6; ++a) {
@@ -51,18 +51,18 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
                     r < 0 || s.rotations[b] < 0 ? -1 : matrix.rotations_slot(r, s.rotations[b]);
         }
     }
-    for (const FoldSixStencil& fold : sheet.folds) {
+    for (const DihedralSixStencil& fold : sheet.dihedrals) {
         PairSlots<9>& slots = fold_slots_.emplace_back(pair_slots<9>(matrix, fold.nodes));
         for (int a = 6; a < 9; ++a)  // the two wings do not meet in d2theta
             for (int b = 3; b < 6; ++b) slots[lower_index(a - 1, b)] = -1;
     }
 }
 
-FoldSix BendingSixTerm::folds_at(Index first, Index last, int point, const double* q) const {
+FoldSix BendingSixTerm::dihedral_angles_at(Index first, Index last, int point, const double* q) const {
     Pack3 x[9] = {};
     Pack right_is_face(0.0);
     for (int lane = 0; lane < Pack::width; ++lane) {
-        const FoldSixStencil& fold = sheet_.folds[std::min(first + lane, last - 1)];
+        const DihedralSixStencil& fold = sheet_.dihedrals[std::min(first + lane, last - 1)];
         for (int a = 0; a < 9; ++a)
             if (fold.nodes[a] >= 0) set_lane(x[a], lane, q + 3 * fold.nodes[a]);
         right_is_face.set(lane, fold.right_is_face ? 1.0 : 0.0);
@@ -70,23 +70,23 @@ FoldSix BendingSixTerm::folds_at(Index first, Index last, int point, const doubl
     return FoldSix(x, right_is_face, point);
 }
 
-double BendingSixTerm::turn_from(Index fold, int point, double angle) const {
-    return std::remainder(angle - sheet_.folds[fold].rest_angle[point], 2.0 * std::numbers::pi);
+double BendingSixTerm::angle_change(Index fold, int point, double angle) const {
+    return std::remainder(angle - sheet_.dihedrals[fold].rest_angle[point], 2.0 * std::numbers::pi);
 }
 
 void BendingSixTerm::store_folds(const double* q) {
     state_.assign(q, q + 3 * nodes_.n_nodes());
     chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_fold);
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
             for (int g = 0; g < 2; ++g) {
-                const FoldSix fold = folds_at(first, last, g, q);
+                const FoldSix fold = dihedral_angles_at(first, last, g, q);
                 const Pack angle = fold.angle();
                 Pack3 by_node[9];
                 fold.gradient(by_node);
                 for (int lane = 0; lane < last - first; ++lane) {
                     FoldState& state = folds_[first + lane][g];
-                    state.turn = turn_from(first + lane, g, angle[lane]);
+                    state.turn = angle_change(first + lane, g, angle[lane]);
                     for (int a = 0; a < 9; ++a) {
                         state.gradient[3 * a] = by_node[a].x[lane];
                         state.gradient[3 * a + 1] = by_node[a].y[lane];
@@ -100,11 +100,11 @@ void BendingSixTerm::store_folds(const double* q) {
 
 void BendingSixTerm::store_rates(const double* p) {
     chunks_.each([&](const Chunk& chunk) {
-        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h)
+        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h)
             for (FoldState& state : folds_[h]) {
                 state.rate = 0.0;
                 for (int a = 0; a < 9; ++a) {
-                    const Index node = sheet_.folds[h].nodes[a];
+                    const Index node = sheet_.dihedrals[h].nodes[a];
                     if (node < 0) continue;
                     for (int c = 0; c < 3; ++c) state.rate += state.gradient[3 * a + c] * p[3 * node + c];
                 }
@@ -120,7 +120,7 @@ void BendingSixTerm::measure(Index pack, const double* q, const Turn& turn, Pack
         for (int i = 0; i < 3; ++i) {
             const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
             for (int g = 0; g < 2; ++g) {
-                double delta = side.fold < 0 ? 0.0 : side.weight * turn(side.fold, side.point(g));
+                double delta = side.dihedral < 0 ? 0.0 : side.weight * turn(side.dihedral, side.point(g));
                 if (side.rotation[g] >= 0) delta += side.sign * rotation[side.rotation[g]];
                 d[3 * i + g].set(lane, d[3 * i + g][lane] + delta);
             }
@@ -152,11 +152,11 @@ void BendingSixTerm::rate(Index pack, const double* p, Pack d[9]) const {
 std::vector<std::array<double, 2>> BendingSixTerm::turns_at(const double* q) const {
     std::vector<std::array<double, 2>> turns(folds_.size());
     chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_fold);
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
             for (int g = 0; g < 2; ++g) {
-                const Pack angle = folds_at(first, last, g, q).angle();
-                for (Index h = first; h < last; ++h) turns[h][g] = turn_from(h, g, angle[h - first]);
+                const Pack angle = dihedral_angles_at(first, last, g, q).angle();
+                for (Index h = first; h < last; ++h) turns[h][g] = angle_change(h, g, angle[h - first]);
             }
         }
     });
@@ -197,7 +197,7 @@ void BendingSixTerm::evaluate(const double* q, const Controls&, Residual& out) {
 }
 
 /// dE/dtheta at a point of a fold: what the strains that it enters are worth.
-double BendingSixTerm::moment(const FoldSixStencil& fold, int point, const Strains& stress) const {
+double BendingSixTerm::moment(const DihedralSixStencil& fold, int point, const Strains& stress) const {
     double sum = 0.0;
     if (fold.left.face >= 0) sum += stress.number(fold.left.face, 3 * fold.left.corner + point);
     if (fold.right.face >= 0) sum += stress.number(fold.right.face, 3 * fold.right.corner + 1 - point);
@@ -215,11 +215,11 @@ void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
     });
     // Faces that share a rotation share an edge and so a node: chunks of one colour meet at no rotation either.
     chunks_.scatter([&](const Chunk& chunk) {
-        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h)
+        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h)
             for (int g = 0; g < 2; ++g) {
-                const double m = moment(sheet_.folds[h], g, stresses);
+                const double m = moment(sheet_.dihedrals[h], g, stresses);
                 for (int a = 0; a < 9; ++a) {
-                    const Index node = sheet_.folds[h].nodes[a];
+                    const Index node = sheet_.dihedrals[h].nodes[a];
                     if (node < 0) continue;
                     for (int c = 0; c < 3; ++c) out.add(3 * node + c, m * folds_[h][g].gradient[3 * a + c]);
                 }
@@ -242,8 +242,8 @@ void BendingSixTerm::assemble(const Chunk& chunk, const double* q, const Control
         return;
     }
     ElementLoop<6>::over_packs(chunk, [&](Index pack) { assemble_faces(pack, q, stress, out); });
-    for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width)
-        assemble_folds(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
+    for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width)
+        assemble_folds(first, std::min(first + Pack::width, chunk.last_dihedral), q, stress, out);
 }
 
 void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& stress,
@@ -260,11 +260,11 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
         for (int i = 0; i < 3; ++i) {
             const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
             sign[i].set(lane, side.sign);
-            if (side.fold < 0) continue;
+            if (side.dihedral < 0) continue;
             const SideNodes& at = side.on_left ? left_side : right_side;
             const std::array<int, 6> own = face_order(i);
             for (int g = 0; g < 2; ++g) {
-                const std::array<double, 27>& by_node = folds_[side.fold][side.point(g)].gradient;
+                const std::array<double, 27>& by_node = folds_[side.dihedral][side.point(g)].gradient;
                 const auto part = [&](int a) -> Vec3 { return side.weight * Vec3(by_node.data() + 3 * a); };
                 for (int k = 0; k < 6; ++k) {
                     Pack3& row = rows.at[3 * i + g][own[k]];
@@ -308,7 +308,7 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
         }
     for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
         const Index f = loop_.element(pack, lane);
-        const SixNodeSheet::Stencil& stencil = sheet_.stencils[f];
+        const SixNodeShell::Stencil& stencil = sheet_.stencils[f];
         const FaceSlots& slots = face_slots_[f];
         scatter_blocks<15>(out, stencil.nodes, slots.nodes, h, lane);
         for (int a = 0; a < 6; ++a) {
@@ -339,11 +339,11 @@ void BendingSixTerm::assemble_folds(Index first, Index last, const double* q, co
     for (int g = 0; g < 2; ++g) {
         Pack moments(0.0);
         for (Index fold = first; fold < last; ++fold)
-            moments.set(fold - first, moment(sheet_.folds[fold], g, stress));
-        folds_at(first, last, g, q).add_curvature(moments, h);
+            moments.set(fold - first, moment(sheet_.dihedrals[fold], g, stress));
+        dihedral_angles_at(first, last, g, q).add_curvature(moments, h);
     }
     for (Index fold = first; fold < last; ++fold)
-        scatter_blocks<9>(out, sheet_.folds[fold].nodes, fold_slots_[fold], h, fold - first);
+        scatter_blocks<9>(out, sheet_.dihedrals[fold].nodes, fold_slots_[fold], h, fold - first);
 }
 
 // As for triangles of three nodes: angles are exact to a unit of round-off, or as the positions over the heights.

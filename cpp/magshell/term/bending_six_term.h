@@ -6,7 +6,7 @@
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
-#include "magshell/body/six_node_sheet.h"
+#include "magshell/body/six_node_shell.h"
 #include "magshell/energy/bending_six.h"
 #include "magshell/energy/grown_six.h"
 #include "magshell/energy/six_node_face.h"
@@ -19,7 +19,7 @@ namespace magshell {
 
 class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
   public:
-    BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
+    BendingSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
                    const GrowthForm& growth, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "bending"; }
@@ -33,7 +33,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
-    bool add_surrogate(NodeMatrix& out) const override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
@@ -78,8 +78,8 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     }
     /// theta - theta~ at both points of every fold.
     std::vector<std::array<double, 2>> turns_at(const double* q) const;
-    FoldSix folds_at(Index first, Index last, int point, const double* q) const;
-    double turn_from(Index fold, int point, double angle) const;
+    FoldSix dihedral_angles_at(Index first, Index last, int point, const double* q) const;
+    double angle_change(Index fold, int point, double angle) const;
     template <class Turn>
     void measure(Index pack, const double* q, const Turn& turn, Pack d[9]) const;
     void inside(Index pack, const double* q, Pack f[9]) const;
@@ -97,7 +97,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     std::vector<std::array<std::array<double, 9>, 2>> slopes_at_rest() const;
     void store_folds(const double* q);
     void store_rates(const double* p);
-    double moment(const FoldSixStencil& fold, int point, const Strains& stress) const;
+    double moment(const DihedralSixStencil& fold, int point, const Strains& stress) const;
     void assemble_faces(Index pack, const double* q, const Strains& stress, SystemMatrix& out) const;
     void assemble_from_rest(Index pack, const double* q, SystemMatrix& out) const;
     void add_held(Index pack, const Pack3 (&held)[3][2], const Pack sign[3], const Symmetric9& stiffness,
@@ -109,7 +109,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void assemble_folds(Index first, Index last, const double* q, const Strains& stress,
                         SystemMatrix& out) const;
 
-    const SixNodeSheet& sheet_;
+    const SixNodeShell& sheet_;
     const Index body_;
     const Nodes& nodes_;
     const Index first_scalar_;

@@ -19,8 +19,8 @@ Vec9 BendingSixTerm::rest_angles(Index face) const {
     Vec9 angles = Vec9::Zero();
     for (int i = 0; i < 3; ++i) {
         const FaceSideSix& side = sheet_.sides[face][i];
-        for (int g = 0; g < 2 && side.fold >= 0; ++g)
-            angles[3 * i + g] = side.weight * sheet_.folds[side.fold].rest_angle[side.point(g)];
+        for (int g = 0; g < 2 && side.dihedral >= 0; ++g)
+            angles[3 * i + g] = side.weight * sheet_.dihedrals[side.dihedral].rest_angle[side.point(g)];
     }
     return angles;
 }

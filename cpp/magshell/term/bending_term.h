@@ -4,8 +4,8 @@
 // faces' J^T C J, plus each fold's curvature times the moment of the faces beside it.
 #pragma once
 
-#include "magshell/assembly/face_loop.h"
-#include "magshell/body/sheet.h"
+#include "magshell/assembly/element_loop.h"
+#include "magshell/body/shell.h"
 #include "magshell/energy/bending.h"
 #include "magshell/energy/grown_face.h"
 #include "magshell/strain/fold_angle.h"
@@ -17,7 +17,7 @@ namespace magshell {
 
 class BendingTerm final : public StrainScaffold<BendingTerm> {
   public:
-    BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
+    BendingTerm(const Shell& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
                 const Nodes& nodes, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "bending"; }
@@ -30,7 +30,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
-    bool add_surrogate(NodeMatrix& out) const override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
@@ -75,7 +75,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     const Symmetric3& stiffness(Index pack) const { return stiffness_[pack]; }
     /// Of each fold at rest, how its angle goes with its nodes along a normal of both of its sides.
     std::vector<std::array<double, 4>> slopes_at_rest() const;
-    double moment(const FoldStencil& fold, const Strains& stress) const;
+    double moment(const DihedralStencil& fold, const Strains& stress) const;
     void store_folds(const double* q);
     void store_rates(const double* p);
     Vec3 scales_of(Index face) const;
@@ -89,7 +89,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void assemble_folds(Index first, Index last, const double* q, const Strains& stress,
                         SystemMatrix& out) const;
 
-    const Sheet& sheet_;
+    const Shell& sheet_;
     const Index body_;
     const ChunkLoop& chunks_;
     const Nodes& nodes_;

@@ -210,7 +210,7 @@ void BodyContactTerm::prepare_assembly(const double* q, const Controls&) {
         soon_ = candidates_.soon(ahead_);
         for (std::size_t k = 0; k < near.size(); ++k)
             if (candidates_.may_touch(k, soon_)) groups.push_back(near[k].pair.nodes);
-        layer_.couple(std::move(groups));
+        layer_.add_couplings(std::move(groups));
     }
 }
 
@@ -265,7 +265,7 @@ void BodyContactTerm::each_limit(const double* q, const double* p, const Found& 
     }
 }
 
-double BodyContactTerm::largest_share(const double* q, const double* p) const {
+double BodyContactTerm::max_step_length(const double* q, const double* p) const {
     double share = 1.0;
     each_limit(q, p, [&](const NearPair*, double limit) { share = limit; });
     return share;
@@ -279,7 +279,7 @@ std::string BodyContactTerm::blocking(const double* q, const double* p) const {
     return names;
 }
 
-std::string BodyContactTerm::refusal(const double* q) const {
+std::string BodyContactTerm::invalid_state_reason(const double* q) const {
     const std::vector<NearPair> crossing = candidates_.crossings(q);
     if (!crossing.empty()) {
         const std::string more =

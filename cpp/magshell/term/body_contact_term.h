@@ -70,7 +70,7 @@ class BodyContactTerm final : public Term {
     /// Which faces are in the way of a step p from q, in words.
     std::string blocking(const double* q, const double* p) const;
     /// Whether what is negative of the Hessians of pairs is left out from now on.
-    void be_cautious(bool cautious) override { cautious_ = cautious; }
+    void set_psd_projection(bool cautious) override { cautious_ = cautious; }
     /// Adds the magnitude of forces that cancel inside those between pairs at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
     /// Adds the gradient by the numbers of a pair's contact.
@@ -81,7 +81,7 @@ class BodyContactTerm final : public Term {
     void forget() const {
         candidates_.forget();
         found_.clear();
-        layer_.couple({});
+        layer_.add_couplings({});
         layer_.use(false);
         untouched_ = 0;
         assembled_ = often;
@@ -93,9 +93,9 @@ class BodyContactTerm final : public Term {
 
     std::string_view name() const override { return "body contact"; }
     bool set_values(const Values& values) override;
-    bool refuses_states() const override { return true; }
-    double largest_share(const double* q, const double* p) const override;
-    std::string refusal(const double* q) const override;
+    bool has_infeasible_states() const override { return true; }
+    double max_step_length(const double* q, const double* p) const override;
+    std::string invalid_state_reason(const double* q) const override;
     bool driven() const override { return false; }
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;

@@ -37,14 +37,14 @@ void BodyFrictionTerm::hold(bool held) {
 }
 
 void BodyFrictionTerm::assemble(const Kinematics& at, const Controls&, bool cautious, SystemMatrix&,
-                                Remainder& rest) const {
+                                NonsymmetricTangent& rest) const {
     for (const Rub& each : rubbing_) {
         const std::array<Index, 4>& nodes = each.touch->near.pair.nodes;
         contact_.layer().add(nodes, [&](int i, int j) -> Mat3 {
             return -at.rate * each.friction.by_velocity(i, j, cautious);
         });
         if (each.lagged || holds_) continue;
-        Remainder::Pair& pair = rest.add_pair();
+        NonsymmetricTangent::PairBlock& pair = rest.append_pair();
         pair.nodes = nodes;
         each.friction.by_place(pair.blocks);
         for (Mat3& block : pair.blocks) block *= -1.0;

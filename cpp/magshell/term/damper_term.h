@@ -35,8 +35,8 @@ class DamperTerm final : public ElasticTerm {
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
-    std::vector<double> turns() const override { return last_turn_; }
-    void set_turns(const std::vector<double>& turns) override { last_turn_ = turns; }
+    std::vector<double> angle_branches() const override { return last_turn_; }
+    void set_angle_branches(const std::vector<double>& turns) override { last_turn_ = turns; }
     std::size_t bytes() const override { return each_.capacity() * sizeof(Each); }
 
     Index elements() const override { return static_cast<Index>(each_.size()); }

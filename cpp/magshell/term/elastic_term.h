@@ -9,7 +9,7 @@ namespace magshell {
 class ElasticTerm : public Term {
   public:
     bool driven() const override { return false; }
-    bool add_surrogate(NodeMatrix&) const override { return false; }
+    bool add_projective_stiffness(NodeMatrix&) const override { return false; }
 
     /// From now on; an empty history makes the term elastic again.
     void set_history(const StrainHistory& history) { history_ = history; }

@@ -5,10 +5,10 @@
 //   v = (q - x^)/tau,   w = (v - v^)/tau,   K = - df/dq - df/dv/tau - df/dw/tau^2
 //
 // and K, the force's share of the stage's matrix, is in general not symmetric. What can well be kept of it in
-// the symmetric matrix goes there, the rest into a Remainder.
+// the symmetric matrix goes there, the rest into a NonsymmetricTangent.
 #pragma once
 
-#include "magshell/assembly/remainder.h"
+#include "magshell/assembly/nonsymmetric_tangent.h"
 #include "magshell/term/pair_stiffness.h"
 #include "magshell/term/term.h"
 
@@ -49,7 +49,7 @@ class ForceTerm {
     /// Adds K at the last evaluated state. Cautious: what keeps an iteration from overshooting instead of the
     /// exact derivatives, where there is such a thing.
     virtual void assemble(const Kinematics& at, const Controls& controls, bool cautious, SystemMatrix& out,
-                          Remainder& rest) const = 0;
+                          NonsymmetricTangent& rest) const = 0;
 
     /// Of pairs that touch, at the last evaluated state: what never overshoots.
     virtual void add_stiffness(const Kinematics& /*at*/, std::vector<PairStiffness>& /*out*/) const {}

@@ -50,7 +50,7 @@ void FrictionTerm::hold(bool held) {
 }
 
 void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool cautious, SystemMatrix& out,
-                            Remainder& rest) const {
+                            NonsymmetricTangent& rest) const {
     for (const Rub& each : rubbing_) {
         const double coefficient = contact_.law(each.touch).friction;
         const Mat3& by_velocity = cautious ? each.friction.secant : each.friction.by_velocity;
@@ -62,7 +62,7 @@ void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool cautious
             rest.add(point.nodes[0], block);
             continue;
         }
-        Remainder::Shared shared{point.nodes, point.weights, {}};
+        NonsymmetricTangent::FaceBlock shared{point.nodes, point.weights, {}};
         for (int k = 0; k < 3; ++k) shared.block.middleCols<3>(3 * k) = point.weights[k] * block;
         rest.add(shared);
     }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
-#include "magshell/body/six_node_sheet.h"
+#include "magshell/body/six_node_shell.h"
 #include "magshell/energy/magnetic_six.h"
 #include "magshell/term/felt_field.h"
 #include "magshell/term/field_packs.h"
@@ -13,7 +13,7 @@ namespace magshell {
 class MagneticSixTerm final : public Term {
   public:
     /// The sources have to outlive it.
-    MagneticSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
+    MagneticSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks,
                     const SystemMatrix& matrix, const FieldSources& sources, Registry& registry);
 
     std::string_view name() const override { return Magnetic::name; }
@@ -41,7 +41,7 @@ class MagneticSixTerm final : public Term {
     /// The applied field there, in packs; none where it is uniform. Order as in AppliedField::add_samples.
     std::vector<Fields> sample(const double* q, const Controls& controls, int order) const;
 
-    const SixNodeSheet& sheet_;
+    const SixNodeShell& sheet_;
     const Index body_;
     const ElementLoop<6> loop_;
     const FeltField field_;

@@ -4,7 +4,7 @@
 // force does not depend on the deformation and there is no Hessian to add.
 #pragma once
 
-#include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/element_loop.h"
 #include "magshell/body/surface.h"
 #include "magshell/energy/magnetic.h"
 #include "magshell/term/felt_field.h"

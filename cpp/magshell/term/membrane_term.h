@@ -1,7 +1,7 @@
 // The membrane energy of a whole sheet: energy/membrane.h on every face.
 #pragma once
 
-#include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/element_loop.h"
 #include "magshell/body/membrane_faces.h"
 #include "magshell/energy/grown_face.h"
 #include "magshell/energy/membrane.h"
@@ -27,7 +27,7 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
                   SystemMatrix& out) const override;
     void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
-    bool add_surrogate(NodeMatrix& out) const override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;

@@ -25,7 +25,7 @@ class MuscleEnergy final : public MuscleTerm {
     Index body() const override { return body_; }
     bool driven() const override { return false; }
     bool varies() const override { return true; }
-    void be_cautious(bool cautious) override { cautious_ = cautious; }
+    void set_psd_projection(bool cautious) override { cautious_ = cautious; }
 
     bool set_values(const Values& values) override {
         if (shortening_rate_.size() > 0) largest_rate_ = values.number(shortening_rate_);
@@ -46,7 +46,7 @@ class MuscleEnergy final : public MuscleTerm {
     }
 
     /// w m m^T, as stiff as it is at rest, fully activated: so that it stays the same whatever the activation.
-    bool add_surrogate(NodeMatrix& out) const override {
+    bool add_projective_stiffness(NodeMatrix& out) const override {
         const FibreLaw::Response law = fibres_->law.at(Pack(1.0), Pack(1.0));
         const Pack stiffness = max(max(law.slope, law.tension), Pack(0.0));
         for (Index pack = 0; pack < loop_.packs(); ++pack) {

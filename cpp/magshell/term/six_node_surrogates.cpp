@@ -16,7 +16,7 @@ Vec3 normal_of(const std::array<Vec3, 6>& x) {
 }  // namespace
 
 // As of three nodes: h w grad N_k . grad N_l over the points inside, w = E/(1 - nu^2).
-bool MembraneSixTerm::add_surrogate(NodeMatrix& out) const {
+bool MembraneSixTerm::add_projective_stiffness(NodeMatrix& out) const {
     constexpr auto first = six_nodes::inside_towards(2, 1.0), second = six_nodes::inside_towards(1, -1.0);
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
         const SheetMaterial& m = materials_[f];
@@ -45,16 +45,17 @@ bool MembraneSixTerm::add_surrogate(NodeMatrix& out) const {
 std::vector<std::array<std::array<double, 9>, 2>> BendingSixTerm::slopes_at_rest() const {
     VectorXd q(3 * nodes_.n_nodes());
     for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
-    const Index n = sheet_.n_folds();
+    const Index n = sheet_.n_dihedrals();
     std::vector<std::array<std::array<double, 9>, 2>> slopes(n);
     for (Index first = 0; first < n; first += Pack::width) {
         const Index last = std::min<Index>(first + Pack::width, n);
         for (int g = 0; g < 2; ++g) {
             Pack3 by_node[9];
-            folds_at(first, last, g, q.data()).gradient(by_node);
+            dihedral_angles_at(first, last, g, q.data()).gradient(by_node);
             for (Index h = first; h < last; ++h) {
                 Vec3 normal = Vec3::Zero();
-                for (const FoldStencil::Side& side : {sheet_.folds[h].left, sheet_.folds[h].right})
+                for (const DihedralStencil::Side& side :
+                     {sheet_.dihedrals[h].left, sheet_.dihedrals[h].right})
                     if (side.face >= 0) normal += normal_of(sheet_.rest[side.face]);
                 normal.normalize();
                 for (int a = 0; a < 9; ++a) slopes[h][g][a] = lane_of(by_node[a], h - first).dot(normal);
@@ -64,7 +65,7 @@ std::vector<std::array<std::array<double, 9>, 2>> BendingSixTerm::slopes_at_rest
     return slopes;
 }
 
-bool BendingSixTerm::add_surrogate(NodeMatrix& out) const {
+bool BendingSixTerm::add_projective_stiffness(NodeMatrix& out) const {
     const std::vector<std::array<std::array<double, 9>, 2>> slopes = slopes_at_rest();
     for (Index pack = 0; pack < loop_.packs(); ++pack) {
         Pack3 x[6];
@@ -82,13 +83,13 @@ bool BendingSixTerm::add_surrogate(NodeMatrix& out) const {
             for (int i = 0; i < 3; ++i) {
                 const FaceSideSix& side = sheet_.sides[f][i];
                 for (int g = 0; g < 2; ++g) {
-                    for (int a = 0; a < 9 && side.fold >= 0; ++a)
-                        if (const Index node = sheet_.folds[side.fold].nodes[a]; node >= 0)
-                            rows.add(3 * i + g, node, side.weight * slopes[side.fold][side.point(g)][a]);
+                    for (int a = 0; a < 9 && side.dihedral >= 0; ++a)
+                        if (const Index node = sheet_.dihedrals[side.dihedral].nodes[a]; node >= 0)
+                            rows.add(3 * i + g, node, side.weight * slopes[side.dihedral][side.point(g)][a]);
                     if (side.rotation[g] < 0) continue;
                     rows.add(3 * i + g, out.point(side.rotation[g]), side.sign);
                     const std::array<Index, 6>& own = sheet_.own_nodes[f];
-                    out.add_beside(side.rotation[g], {own[0], own[1], own[2]});
+                    out.add_adjacent_face(side.rotation[g], {own[0], own[1], own[2]});
                 }
             }
             rows.add_to(out, [&](int r, int s) { return stiffness_[pack](r, s)[lane]; });

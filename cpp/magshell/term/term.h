@@ -6,10 +6,10 @@
 #include <string_view>
 #include <vector>
 
+#include "magshell/assembly/element_coloring.h"
 #include "magshell/assembly/node_matrix.h"
-#include "magshell/assembly/remainder.h"
-#include "magshell/assembly/residual.h"
-#include "magshell/assembly/schedule.h"
+#include "magshell/assembly/nonsymmetric_tangent.h"
+#include "magshell/assembly/out_of_balance.h"
 #include "magshell/assembly/system_matrix.h"
 #include "magshell/core/parameters.h"
 
@@ -33,11 +33,11 @@ class Term {
     virtual double length_scale() const { return std::numeric_limits<double>::infinity(); }
 
     /// Whether it has no energy in some states, as of elements turned inside out.
-    virtual bool refuses_states() const { return false; }
+    virtual bool has_infeasible_states() const { return false; }
     /// The largest share of a step p from q, at most all of it, up to which it has an energy.
-    virtual double largest_share(const double* /*q*/, const double* /*p*/) const { return 1.0; }
+    virtual double max_step_length(const double* /*q*/, const double* /*p*/) const { return 1.0; }
     /// What is wrong with q, in words; empty where nothing is.
-    virtual std::string refusal(const double* /*q*/) const { return {}; }
+    virtual std::string invalid_state_reason(const double* /*q*/) const { return {}; }
 
     /// Whether the controls drive it, its gradient linear in them but for a constant; poses move in time steps only.
     virtual bool driven() const { return true; }
@@ -51,7 +51,7 @@ class Term {
     virtual void evaluate(const double* q, const Controls& controls, Residual& out) = 0;
 
     /// From now on, what keeps an iteration from overshooting instead of a Hessian that is not positive, or not.
-    virtual void be_cautious(bool /*cautious*/) {}
+    virtual void set_psd_projection(bool /*cautious*/) {}
 
     /// What the Hessian at the last evaluated state needs beforehand.
     virtual void prepare_assembly(const double* /*q*/, const Controls&) {}
@@ -64,7 +64,8 @@ class Term {
     virtual void finish_assembly(const double* /*q*/, const Controls&, SystemMatrix& /*out*/) const {}
 
     /// Adds what of the derivative of its gradient is not symmetric: of forces that have no potential.
-    virtual void add_remainder(const double* /*q*/, const Controls&, Remainder& /*out*/) const {}
+    virtual void add_nonsymmetric_tangent(const double* /*q*/, const Controls&,
+                                          NonsymmetricTangent& /*out*/) const {}
 
     /// Keeps the stresses that a linearized step p from the last evaluated state leads to: sigma = C (d + J p).
     virtual void extrapolate(const double* /*p*/) {}
@@ -80,12 +81,12 @@ class Term {
 
     /// Angles [rad] at the last evaluated state with their full turns, which positions do not tell; a solve that rejects it
     /// puts them back.
-    virtual std::vector<double> turns() const { return {}; }
-    virtual void set_turns(const std::vector<double>&) {}
+    virtual std::vector<double> angle_branches() const { return {}; }
+    virtual void set_angle_branches(const std::vector<double>&) {}
 
     /// What Projective Dynamics puts in the place of its Hessian: a matrix of the nodes, the same along x, y and z, about as
     /// stiff as the term in any state. Adds it; false where there is none, and Projective Dynamics cannot do the term.
-    virtual bool add_surrogate(NodeMatrix& /*out*/) const { return true; }
+    virtual bool add_projective_stiffness(NodeMatrix& /*out*/) const { return true; }
     /// Of what touches at the last evaluated state: stiffness [N/m] on the nodes.
     virtual void add_touching_stiffness(VectorXd& /*of_nodes*/) const {}
 

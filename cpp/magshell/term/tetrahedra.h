@@ -75,7 +75,7 @@ class Tetrahedra : public SolidTerm {
     }
 
     /// w sum_p V_p g_k . g_l,  w what a material says, or the modulus of its waves at rest, 2 mu + lam.
-    bool add_surrogate(NodeMatrix& out) const override {
+    bool add_projective_stiffness(NodeMatrix& out) const override {
         for (Index pack = 0; pack < loop_.packs(); ++pack) {
             const RestModuli moduli = Material::rest_moduli(constants_[pack].at);
             Pack weight = Pack(2.0) * moduli.mu + moduli.lambda;
@@ -102,9 +102,9 @@ class Tetrahedra : public SolidTerm {
         return true;
     }
 
-    bool refuses_states() const override { return Material::refuses_inversion; }
+    bool has_infeasible_states() const override { return Material::refuses_inversion; }
 
-    double largest_share(const double* q, const double* step) const override {
+    double max_step_length(const double* q, const double* step) const override {
         std::vector<double> of_packs(loop_.packs(), 1.0);
         loop_.each_pack([&](Index pack) {
             Pack3 x[N], d[N];
@@ -123,7 +123,7 @@ class Tetrahedra : public SolidTerm {
         return *std::min_element(of_packs.begin(), of_packs.end());
     }
 
-    std::string refusal(const double* q) const override {
+    std::string invalid_state_reason(const double* q) const override {
         Index first = std::numeric_limits<Index>::max();
         double least = 0.0;
         for (Index pack = 0; pack < loop_.packs(); ++pack) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "magshell/assembly/skew_blocks.h"
+#include "magshell/assembly/lanes.h"
 
 namespace magshell {
 namespace {
@@ -119,12 +119,12 @@ bool VolumeTerm::set_values(const Values& values) {
     return false;  // its round-off is that of the state
 }
 
-bool VolumeTerm::refuses_states() const {
+bool VolumeTerm::has_infeasible_states() const {
     return std::any_of(volumes_.begin(), volumes_.end(), [](const Volume& each) { return each.stays_open; });
 }
 
 // Along a straight way the volume is a cubic: V(q) + s V'(q) p + s^2 V'(p) q + s^3 V(p).
-double VolumeTerm::largest_share(const double* q, const double* p) const {
+double VolumeTerm::max_step_length(const double* q, const double* p) const {
     constexpr int samples = 64, halvings = 50;
     double share = 1.0;
     for (const Volume& each : volumes_) {
@@ -159,7 +159,7 @@ double VolumeTerm::largest_share(const double* q, const double* p) const {
     return share;
 }
 
-std::string VolumeTerm::refusal(const double* q) const {
+std::string VolumeTerm::invalid_state_reason(const double* q) const {
     for (const Volume& each : volumes_)
         if (const double volume = each.stays_open ? each.volume_at(each.at(q)) : 1.0; !(volume > 0.0))
             return "a cavity of " + std::to_string(each.rest) + " m3 at rest is left with a volume of " +

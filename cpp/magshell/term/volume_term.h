@@ -40,9 +40,9 @@ class VolumeTerm final : public BorderTerm {
 
     std::string_view name() const override { return "volume"; }
     bool set_values(const Values& values) override;
-    bool refuses_states() const override;
-    double largest_share(const double* q, const double* p) const override;
-    std::string refusal(const double* q) const override;
+    bool has_infeasible_states() const override;
+    double max_step_length(const double* q, const double* p) const override;
+    std::string invalid_state_reason(const double* q) const override;
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
