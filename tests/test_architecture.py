@@ -93,7 +93,7 @@ HIDDEN_MODULES = {
 OPTIONAL_MODULES = (
     "torch matplotlib pyvista PIL imageio_ffmpeg meshio gmsh magpylib ipctk distributed cloudpickle gymnasium pandas xarray"
 ).split()
-LONGEST_FILE = 400
+LONGEST_FILE = 600
 SPELLINGS = {"cent" + "re": "center"}  # in two halves, as this file is read as well
 
 
@@ -343,7 +343,7 @@ def test_the_rules_look_at_files() -> None:
         ),
         (hidden_violations, "python/magshell/__init__.py", "from .mesh import *\n", "imports *"),
         (hidden_violations, "python/magshell/mesh/__init__.py", "from .weld import weld\n", "hides a module"),
-        (length_violations, "tests/test_long.py", "\n" * (LONGEST_FILE + 1), "401 lines"),
+        (length_violations, "tests/test_long.py", "\n" * (LONGEST_FILE + 1), "601 lines"),
         (spelling_violations, "tests/test_a.py", f"x = bary{next(iter(SPELLINGS))}s\n", "spelled center"),
     ],
 )

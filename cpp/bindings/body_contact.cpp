@@ -86,7 +86,7 @@ void register_body_contact(py::module_& module) {
         "at rest, if "
         "that is nearer than twice its reach and minimal distance: how far [m], and their faces in words.");
     module.def(
-        "contact_pair_stiffness", &contact_pair_stiffness, py::arg("model"), py::arg("q"), py::arg("v"),
+        "touching_pairs", &contact_pair_stiffness, py::arg("model"), py::arg("q"), py::arg("v"),
         "Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) "
         "[N], "
         "forces (n, 4, 3) [N], weights (n, 4) of the difference of the closest points, normals (n, 3) on the "

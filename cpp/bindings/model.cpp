@@ -222,7 +222,7 @@ void register_model(py::module_& module) {
         .def("energies", &energies)
         .def("term_energies", &term_energies, "[(name, J)] of each term, at a state with these turns.",
              py::arg("q"), py::arg("turns"), py::arg("controls"))
-        .def("invalid_state_reason", &Model::invalid_state_reason,
+        .def("refusal", &Model::invalid_state_reason,
              "What is wrong with a state, in words; empty where nothing is.",
              py::call_guard<py::gil_scoped_release>())
         .def(

@@ -176,7 +176,7 @@ SceneInput scene_input(const py::kwargs& given) {
     input.n_vertices = given["n_vertices"].cast<Index>();
     input.original = given["original"].cast<std::vector<Index>>();
     input.shells = sheets_of(given["sheets"]);
-    input.six_node_shells = six_node_sheets_of(given["six_node_shells"]);
+    input.six_node_shells = six_node_sheets_of(given["six_node_sheets"]);
     input.solids = solids_of(given["solids"]);
     input.skins = skins_of(given["skins"]);
     input.muscles = muscles_of(given["muscles"]);
