@@ -133,10 +133,10 @@ Array directions_of(const MotionResult& motion, const Model& model) {
 
 // (n, m): what motors do in every recorded state; NaN in one that no step led to.
 Knots driving_of(const MotionResult& motion) {
-    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()), m = motion.last.driving.size();
+    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()), m = motion.last.motor_forces.size();
     Knots rows = Knots::Constant(n, m, std::numeric_limits<double>::quiet_NaN());
     for (Eigen::Index k = 0; k < n; ++k)
-        if (motion.recorded[k].driving.size() == m) rows.row(k) = motion.recorded[k].driving.transpose();
+        if (motion.recorded[k].motor_forces.size() == m) rows.row(k) = motion.recorded[k].motor_forces.transpose();
     return rows;
 }
 
@@ -170,7 +170,7 @@ py::list largest_strains(const MotionResult& motion, const Model& model, const V
     return rows;
 }
 
-MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget, Keep keep,
+MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget, AdjointStorage keep,
                  const py::object& progress) {
     const Watch watch(progress);
     const py::gil_scoped_release unlocked;
@@ -193,14 +193,14 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
         const VectorXd rotations = Eigen::Map<const VectorXd>(by_edge_rotations.data() + k * n_e, n_e);
         by.q.push_back(model.bodies().gradient_by_state(rows(by_positions), rotations));
         by.v.push_back(model.bodies().gradient_by_state(rows(by_velocities), no_rotations));
-        if (by_driving.size() > 0) by.driving.push_back(by_driving.row(k).transpose());
+        if (by_driving.size() > 0) by.motor_forces.push_back(by_driving.row(k).transpose());
     }
     MotionGradient gradient;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
         gradient =
-            pull_back(model, input, motion, by, [&](double at, double residual) { watch(at, residual); });
+            motion_vjp(model, input, motion, by, [&](double at, double residual) { watch(at, residual); });
     }
     py::dict result;
     result["values"] = values_to_user(model, gradient.values);
@@ -225,11 +225,11 @@ void register_dynamics(py::module_& module) {
     py::class_<MotionInput>(module, "MotionInput")
         .def(py::init(&input_of), py::arg("model"), py::arg("given"));
 
-    py::enum_<Keep>(module, "Keep")
-        .value("nothing", Keep::nothing)
-        .value("checkpoints", Keep::checkpoints)
-        .value("stages", Keep::stages)
-        .value("factors", Keep::factors);
+    py::enum_<AdjointStorage>(module, "Keep")
+        .value("nothing", AdjointStorage::nothing)
+        .value("checkpoints", AdjointStorage::checkpoints)
+        .value("stages", AdjointStorage::stages)
+        .value("factors", AdjointStorage::factors);
 
     py::class_<MotionResult>(module, "MotionResult")
         .def_readonly("outcome", &MotionResult::outcome)
@@ -251,7 +251,7 @@ void register_dynamics(py::module_& module) {
         .def_property_readonly("halved",
                                [](const MotionResult& r) {
                                    std::map<Index, std::vector<std::tuple<double, double, bool>>> all;
-                                   for (const auto& [step, substeps] : r.halved)
+                                   for (const auto& [step, substeps] : r.substeps)
                                        for (const Substep& each : substeps)
                                            all[step].emplace_back(each.begin, each.end, each.dissipative);
                                    return all;

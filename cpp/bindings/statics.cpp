@@ -96,8 +96,8 @@ void register_statics(py::module_& module) {
         .def_readonly("state", &FailedAttempt::state)
         .def_readonly("controls", &FailedAttempt::controls)
         .def_readonly("shortest_step", &FailedAttempt::shortest_step)
-        .def_readonly("last_move", &FailedAttempt::last_move)
-        .def_readonly("falling", &FailedAttempt::falling);
+        .def_readonly("last_move", &FailedAttempt::last_displacement)
+        .def_readonly("falling", &FailedAttempt::descent_direction);
 
     py::class_<StaticsResult>(module, "StaticsResult")
         .def_readonly("outcome", &StaticsResult::outcome)
