@@ -16,11 +16,11 @@ using Eigen::MatrixXd;
 
 // Iterations that fit the coordinates to a start, and the relative size of the last one [-]; see test_joints_hold_to_round_off_over_ten_thousand_steps.
 constexpr int max_fit_iterations = 30;  // see test_joints_hold_to_round_off_over_ten_thousand_steps
-constexpr double motor_round_off =
-    1e-14;  // [-] over the lengths involved; see test_a_motor_holds_an_arm_at_its_angle_and_says_its_torque
+// [-] over the lengths involved; see test_a_motor_holds_an_arm_at_its_angle_and_says_its_torque
+constexpr double motor_round_off = 1e-14;
 constexpr double fit_tolerance = 1e-14;  // [-] see test_joints_hold_to_round_off_over_ten_thousand_steps
-constexpr double rotation_round_off =
-    0.125;  // [-] part of epsilon |x|/l that four corners leave; see test_long_chains_of_links_move_at_the_usual_tolerance
+// [-] part of epsilon |x|/l that four corners leave; see test_long_chains_of_links_move_at_the_usual_tolerance
+constexpr double rotation_round_off = 0.125;
 
 Vec3 across(const Vec3& axis) {
     Index smallest;

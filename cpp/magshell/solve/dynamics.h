@@ -33,7 +33,7 @@ struct MotionInput {
     std::pair<Index, double> between(Index step, double fraction) const;
 };
 
-/// What is stored of a motion for its adjoint. The less is stored, the more steps are computed again.
+/// The data of a motion that are stored for its adjoint. The less is stored, the more steps are computed again.
 enum class AdjointStorage { nothing, checkpoints, stages, factors };
 
 struct AdjointStorageOptions {

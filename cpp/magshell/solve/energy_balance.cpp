@@ -33,7 +33,7 @@ EnergyBalance::StateEnergy EnergyBalance::state_energy(const MotionState& state,
             model_.body_contact()->energy(state.q.data(), controls)};
 }
 
-bool EnergyBalance::touches(const StepAlgebra& step, const SubstepRecord& record) const {
+bool EnergyBalance::has_contact(const StepAlgebra& step, const SubstepRecord& record) const {
     const BodyContactTerm& contact = *model_.body_contact();
     for (const StageState& stage : record.stages)
         if (contact.acts(stage.q.data())) return true;
@@ -42,7 +42,7 @@ bool EnergyBalance::touches(const StepAlgebra& step, const SubstepRecord& record
 
 bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
                                  std::span<const Controls> controls) {
-    if (!touches(step, record)) return false;
+    if (!has_contact(step, record)) return false;
     const MotionState& begin = record.begin;
     const Controls &first = controls.front(), &last = controls.back();
     const StateEnergy at_first = state_energy(begin, first);

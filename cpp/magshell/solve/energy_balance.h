@@ -38,7 +38,7 @@ class EnergyBalance {
         double energy, of_contact;  // [J] of all terms, and of the contact between bodies
     };
     StateEnergy state_energy(const MotionState& state, const Controls& controls);
-    bool touches(const StepAlgebra& step, const SubstepRecord& record) const;
+    bool has_contact(const StepAlgebra& step, const SubstepRecord& record) const;
     /// Returns the work of supports and of forces without potential over the step [J].
     double work(const StepAlgebra& step, const SubstepRecord& record, std::span<const Controls> controls);
 

@@ -68,10 +68,10 @@ double EnergyDescent::length(const VectorXd& p) const {
 }
 
 double EnergyDescent::leave_saddle(const Mode& mode) {
-    constexpr double deeper_share =
-        1e-6;  // [-] difference of depths that decides; see test_a_pressed_beam_buckles_to_where_the_field_pushes_it
-    constexpr double round_off =
-        1e-12;  // [-] of an energy; see test_a_pressed_beam_buckles_to_where_the_field_pushes_it
+    // [-] difference of depths that decides; see test_a_pressed_beam_buckles_to_where_the_field_pushes_it
+    constexpr double deeper_share = 1e-6;
+    // [-] of an energy; see test_a_pressed_beam_buckles_to_where_the_field_pushes_it
+    constexpr double round_off = 1e-12;
     const VectorXd saddle = q_;
     struct Side {
         VectorXd q;

@@ -19,8 +19,8 @@ constexpr double max_support_rotation = 0.5;
 // Moves links to where their joints lead them, for example after the origin of a motor has changed. No force would do that, since
 // motors hold in any position.
 void project_onto_joints(const Model& model, VectorXd& q) {
-    constexpr double round_off =
-        1e-13;  // [-] over the extent; see test_a_start_goes_along_with_the_place_of_a_motor
+    // [-] over the extent; see test_a_start_goes_along_with_the_place_of_a_motor
+    constexpr double round_off = 1e-13;
     VectorXd projected = q;
     model.dof_map().project_state(projected, nullptr);
     const double off = (projected - q).head(model.n_coordinates()).lpNorm<Eigen::Infinity>();
@@ -156,8 +156,8 @@ class Statics {
     }
 
     bool find_other_equilibrium() {
-        constexpr int iteration_factor =
-            3;  // of the usual limit of iterations; see test_its_saddles_if_asked_for
+        // of the usual limit of iterations; see test_its_saddles_if_asked_for
+        constexpr int iteration_factor = 3;
         controls_at(1.0);
         VectorXd trial = result_.state;
         const NewtonReport report =

@@ -10,6 +10,7 @@
 namespace magshell {
 
 struct Tableau {
+    // Stages of a method, at most, without an explicit first one; see test_order_in_time.
     static constexpr int max_stages = 3;
 
     int stages = 1;  // implicit ones
@@ -31,12 +32,14 @@ inline Tableau implicit_euler() {
 
 /// Returns SDIRK2 [Alexander 1977]: two stages, second order, L-stable.
 inline Tableau sdirk2() {
+    // [-] Coefficients of the method; see test_order_in_time.
     constexpr double g = 0.29289321881345247560;  // 1 - 1/sqrt(2)
     return {2, g, false, {{g}, {1.0 - g, g}}};
 }
 
 /// Returns SDIRK3 [Alexander 1977]: three stages, third order, L-stable.
 inline Tableau sdirk3() {
+    // [-] Coefficients of the method; see test_order_in_time.
     constexpr double g = 0.43586652150845899942;  // g^3 - 3 g^2 + 3/2 g - 1/6 = 0
     return {3,
             g,
@@ -49,6 +52,7 @@ inline Tableau sdirk3() {
 /// Returns TR-BDF2 [Bank et al. 1985; Hosea and Shampine 1996]: the trapezoidal rule to 2 - sqrt(2) of the step, then BDF2. It is of second
 /// order, L-stable, and every stage is of second order too.
 inline Tableau tr_bdf2() {
+    // [-] Coefficients of the method; see test_order_in_time.
     constexpr double g = 0.29289321881345247560, w = 0.35355339059327376220;  // 1 - 1/sqrt(2), sqrt(2)/4
     return {2, g, true, {{g, g}, {w, w, g}}};
 }
