@@ -91,7 +91,7 @@ class Newton {
     NewtonReport solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
                        int max_iterations);
     /// Solves a load step, and stops as soon as the matrix has negative pivots that it had not at the beginning while the steps
-    /// do not get much shorter, or as the steps get longer (early termination on loss of stability; Crisfield 9.5).
+    /// do not get much shorter, or if the second step grows too long (early termination on loss of stability; Crisfield 9.5).
     NewtonReport solve_until_unstable(VectorXd& q, const Controls& controls, const LoadStep& load);
     /// Solves a load step without stopping on loss of stability.
     NewtonReport solve_load(VectorXd& q, const Controls& controls, const LoadStep& load);
